@@ -1,0 +1,85 @@
+"""rosglass: a glass cockpit for robots.
+
+Talk to any topic of any ROS robot without ROS installed, and build the screen it is steered from
+in QML. Start with :func:`connect` and :func:`load`, or on the command line with ``rosglass --help``.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rosglass.comm import Duration, Node, QoS, Time
+    from rosglass.connection import connect
+    from rosglass.errors import (
+        ConnectionLostError,
+        ConversionError,
+        CyclicTypeError,
+        DecodeError,
+        DefinitionConflictError,
+        DefinitionError,
+        Error,
+        FieldPathError,
+        InvalidNameError,
+        NodeClosedError,
+        QmlError,
+        TimeoutError,  # noqa: A004 - also a builtin TimeoutError
+        TypeNotFoundError,
+        UnsupportedError,
+    )
+    from rosglass.interfaces import Library
+    from rosglass.messages import ActionType, Message, MessageType, ServiceType, load
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "ActionType",
+    "ConnectionLostError",
+    "ConversionError",
+    "CyclicTypeError",
+    "DecodeError",
+    "DefinitionConflictError",
+    "DefinitionError",
+    "Duration",
+    "Error",
+    "FieldPathError",
+    "InvalidNameError",
+    "Library",
+    "Message",
+    "MessageType",
+    "Node",
+    "NodeClosedError",
+    "QmlError",
+    "QoS",
+    "ServiceType",
+    "Time",
+    "TimeoutError",
+    "TypeNotFoundError",
+    "UnsupportedError",
+    "__version__",
+    "connect",
+    "load",
+]
+
+_HOMES = {
+    "rosglass.comm": ("Duration", "Node", "QoS", "Time"),
+    "rosglass.connection": ("connect",),
+    "rosglass.interfaces": ("Library",),
+    "rosglass.messages": ("ActionType", "Message", "MessageType", "ServiceType", "load"),
+}
+_HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
+
+
+def __getattr__(name: str) -> object:
+    # Imported on first use, so that `import rosglass` and `rosglass --help` stay quick.
+    module = _HOME_OF.get(name, "rosglass.errors" if name in __all__ else "")
+    if not module:
+        raise AttributeError(f"module 'rosglass' has no attribute {name!r}")
+    value: object = getattr(import_module(module), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

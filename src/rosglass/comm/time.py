@@ -1,0 +1,87 @@
+"""Points in time and spans of time with nanosecond accuracy."""
+
+from __future__ import annotations
+
+import time as _time
+from dataclasses import dataclass
+
+__all__ = ["Duration", "Time"]
+
+_NS = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Duration:
+    """A span of time.
+
+    Attributes:
+        nanoseconds: Length in nanoseconds; may be negative.
+    """
+
+    nanoseconds: int = 0
+
+    @classmethod
+    def from_seconds(cls, seconds: float) -> Duration:
+        """Return the duration nearest to `seconds`."""
+        return cls(round(seconds * _NS))
+
+    @property
+    def seconds(self) -> float:
+        """Length in seconds."""
+        return self.nanoseconds / _NS
+
+    def __add__(self, other: Duration) -> Duration:
+        return Duration(self.nanoseconds + other.nanoseconds)
+
+    def __sub__(self, other: Duration) -> Duration:
+        return Duration(self.nanoseconds - other.nanoseconds)
+
+    def __neg__(self) -> Duration:
+        return Duration(-self.nanoseconds)
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Time:
+    """A point in time.
+
+    Attributes:
+        nanoseconds: Nanoseconds since the epoch of the clock it was read from
+            (the Unix epoch unless a simulated clock is in use).
+    """
+
+    nanoseconds: int = 0
+
+    @classmethod
+    def now(cls) -> Time:
+        """Return the system clock's time."""
+        return cls(_time.time_ns())
+
+    @classmethod
+    def from_parts(cls, sec: int, nanosec: int) -> Time:
+        """Return the time given as ROS messages carry it (seconds, nanoseconds)."""
+        return cls(sec * _NS + nanosec)
+
+    @property
+    def sec(self) -> int:
+        """Whole seconds, rounded towards minus infinity."""
+        return self.nanoseconds // _NS
+
+    @property
+    def nanosec(self) -> int:
+        """Nanoseconds beyond :attr:`sec`, 0 to 999,999,999."""
+        return self.nanoseconds % _NS
+
+    @property
+    def seconds(self) -> float:
+        """Seconds since the epoch; a float loses accuracy below a microsecond."""
+        return self.nanoseconds / _NS
+
+    def to_dict(self) -> dict[str, int]:
+        """Return ``{"sec": ..., "nanosec": ...}``, the value of a ``builtin_interfaces/msg/Time``."""
+        return {"sec": self.sec, "nanosec": self.nanosec}
+
+    def __add__(self, other: Duration) -> Time:
+        return Time(self.nanoseconds + other.nanoseconds)
+
+    def __sub__(self, other: Time) -> Duration:
+        return Duration(self.nanoseconds - other.nanoseconds)

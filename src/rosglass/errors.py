@@ -1,0 +1,115 @@
+"""Every error rosglass raises, so that one ``except rosglass.Error`` catches them all.
+
+Messages follow one pattern: what happened, where (topic, field path, file and line), what to do.
+"""
+
+from __future__ import annotations
+
+__all__ = [
+    "ConnectionLostError",
+    "ConversionError",
+    "CyclicTypeError",
+    "DecodeError",
+    "DefinitionConflictError",
+    "DefinitionError",
+    "Error",
+    "FieldPathError",
+    "InvalidNameError",
+    "NodeClosedError",
+    "QmlError",
+    "TimeoutError",
+    "TypeNotFoundError",
+    "UnsupportedError",
+]
+
+
+class Error(Exception):
+    """Base of every error raised by rosglass."""
+
+
+class DefinitionError(Error):
+    """An interface definition cannot be parsed.
+
+    Attributes:
+        file: Where the text came from: a path, or a label such as ``<std_msgs/msg/String>``.
+        line: 1-based line number, 0 when the error concerns the whole text.
+        column: 1-based column, 0 when the error concerns the whole line.
+    """
+
+    def __init__(self, message: str, file: str = "<text>", line: int = 0, column: int = 0) -> None:
+        super().__init__(f"{file}:{line}:{column}: {message}")
+        self.file, self.line, self.column = file, line, column
+
+
+class CyclicTypeError(DefinitionError):
+    """A type contains itself, directly or through its fields."""
+
+
+class TypeNotFoundError(Error):
+    """No provider of the library has a definition of the type."""
+
+
+class DefinitionConflictError(Error):
+    """Two sources define the same type differently."""
+
+
+class FieldPathError(Error):
+    """A field path does not exist in the type it is applied to."""
+
+
+class ConversionError(Error):
+    """A value does not fit the field it was given for.
+
+    Attributes:
+        path: Field path from the message's root, e.g. ``poses[3].position.x``; empty for the root.
+        value: The offending value.
+        expected: What would have been accepted, in words.
+    """
+
+    def __init__(self, path: str, value: object, expected: str, type_name: str = "") -> None:
+        shown = repr(value)
+        if len(shown) > 80:
+            shown = shown[:77] + "..."
+        where = f"{type_name}: " if type_name else ""
+        super().__init__(f"{where}{path or '(message)'}: expected {expected}, got {shown}")
+        self.path, self.value, self.expected, self.type_name = path, value, expected, type_name
+
+
+class DecodeError(Error):
+    """Received bytes are not a valid message of the type.
+
+    Attributes:
+        type_name: Full name of the type, e.g. ``geometry_msgs/msg/Pose``.
+        path: Field path at which decoding stopped, if known.
+        offset: Byte offset into the buffer at which decoding stopped, -1 if unknown.
+    """
+
+    def __init__(self, type_name: str, message: str, path: str = "", offset: int = -1) -> None:
+        place = f".{path}" if path else ""
+        at = f" at byte {offset}" if offset >= 0 else ""
+        super().__init__(f"{type_name}{place}{at}: {message}")
+        self.type_name, self.path, self.offset = type_name, path, offset
+
+
+class InvalidNameError(Error, ValueError):
+    """A node, topic, namespace or type name breaks ROS's naming rules."""
+
+
+class UnsupportedError(Error):
+    """This world or middleware cannot do what was asked; the message says why."""
+
+
+class NodeClosedError(Error):
+    """The node, or the object created from it, was closed before this call."""
+
+
+class ConnectionLostError(Error):
+    """The middleware could not be reached, or the connection to it was lost."""
+
+
+class TimeoutError(Error, TimeoutError):  # noqa: A001 - the field's own word; also a builtin TimeoutError
+    """What was waited for did not come within the given time."""
+
+
+class QmlError(Error):
+    """A QML file is missing or has errors; the message lists them as ``file:line:column``."""

@@ -1,0 +1,183 @@
+"""What a type is: the parsed form of a ``.msg``, ``.srv``, ``.action`` or ``.idl`` definition.
+
+All classes are frozen. Names are always full and in ROS 2's spelling (``pkg/msg/Type``), for
+ROS 1 too; the world a definition belongs to is :attr:`Definition.ros`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import TYPE_CHECKING, Union
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+__all__ = [
+    "ActionDefinition",
+    "ArrayKind",
+    "Constant",
+    "Definition",
+    "Field",
+    "FieldType",
+    "InterfaceDefinition",
+    "ServiceDefinition",
+    "Source",
+    "Value",
+]
+
+#: A constant's or default's value; lists only as defaults of array fields.
+Value = Union[bool, int, float, str, tuple[Union[bool, int, float, str], ...]]
+
+
+class ArrayKind(Enum):
+    """How many elements a field holds."""
+
+    NONE = "single value"
+    FIXED = "fixed array"
+    BOUNDED = "bounded sequence"
+    UNBOUNDED = "unbounded sequence"
+
+
+@dataclass(frozen=True, slots=True)
+class FieldType:
+    """The type of a field.
+
+    Attributes:
+        name: A primitive (``bool``, ``byte``, ``char``, ``int8`` ... ``uint64``, ``float32``,
+            ``float64``, ``string``, ``wstring``; in ROS 1 also ``time``, ``duration``) or the full
+            name of a message type.
+        array: Whether and how the field repeats.
+        size: Element count of a fixed array, maximum of a bounded sequence, otherwise None.
+        string_bound: Maximum length of a bounded string in characters, otherwise None.
+    """
+
+    name: str
+    array: ArrayKind = ArrayKind.NONE
+    size: int | None = None
+    string_bound: int | None = None
+
+    @property
+    def is_compound(self) -> bool:
+        """Whether the element type is a message type."""
+        return "/" in self.name
+
+    def __str__(self) -> str:
+        text = self.name if self.string_bound is None else f"{self.name}<={self.string_bound}"
+        if self.array is ArrayKind.FIXED:
+            return f"{text}[{self.size}]"
+        if self.array is ArrayKind.BOUNDED:
+            return f"{text}[<={self.size}]"
+        return f"{text}[]" if self.array is ArrayKind.UNBOUNDED else text
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One field of a message.
+
+    Attributes:
+        name: The name on the wire.
+        type: Its type.
+        default: Default value given in the definition (ROS 2), None when there is none.
+        comment: The comment lines above and beside the field, joined by newlines.
+        unit: Unit named in the comment, e.g. ``m`` or ``rad/s``; empty when there is none.
+    """
+
+    name: str
+    type: FieldType
+    default: Value | None = None
+    comment: str = ""
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """A named constant of a message.
+
+    Attributes:
+        name: Its name, e.g. ``STATUS_EXECUTING``.
+        type: Primitive type name.
+        value: The value, converted to Python.
+        text: The value as written in the definition (md5 sums are computed over it).
+        comment: The comment lines above and beside the constant, joined by newlines.
+    """
+
+    name: str
+    type: str
+    value: bool | int | float | str
+    text: str
+    comment: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """Where a definition came from.
+
+    Attributes:
+        provider: Name of the provider, e.g. ``rosbags jazzy``, ``workspace /opt/ros/jazzy``,
+            ``wire /camera/image``.
+        file: Path or label used in error messages.
+    """
+
+    provider: str
+    file: str
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A message definition.
+
+    Attributes:
+        name: Full name, ``pkg/msg/Type``.
+        ros: 1 or 2: whose syntax, primitive types and wire format it follows.
+        fields: In order of declaration. An empty ROS 2 message has no fields here; codecs add the
+            placeholder byte that its wire format demands.
+        constants: In order of declaration.
+        text: The definition as received, comments included.
+        source: Where it came from.
+        nested: Every message type it needs, directly or indirectly, by full name.
+    """
+
+    name: str
+    ros: int
+    fields: tuple[Field, ...]
+    constants: tuple[Constant, ...] = ()
+    text: str = ""
+    source: Source = Source("text", "<text>")
+    nested: Mapping[str, Definition] = field(default_factory=dict, compare=False, repr=False)
+
+    def constant(self, name: str) -> Constant:
+        """Return the constant called `name`; raises KeyError with the known names."""
+        for candidate in self.constants:
+            if candidate.name == name:
+                return candidate
+        known = ", ".join(c.name for c in self.constants) or "none"
+        raise KeyError(f"{self.name} has no constant {name!r}; it has: {known}")
+
+
+@dataclass(frozen=True)
+class ServiceDefinition:
+    """A service definition: ``pkg/srv/Type`` with its request and response messages."""
+
+    name: str
+    ros: int
+    request: Definition
+    response: Definition
+    text: str = ""
+    source: Source = Source("text", "<text>")
+
+
+@dataclass(frozen=True)
+class ActionDefinition:
+    """An action definition: ``pkg/action/Type`` with its goal, result and feedback messages."""
+
+    name: str
+    ros: int
+    goal: Definition
+    result: Definition
+    feedback: Definition
+    text: str = ""
+    source: Source = Source("text", "<text>")
+
+
+InterfaceDefinition = Union[Definition, ServiceDefinition, ActionDefinition]
