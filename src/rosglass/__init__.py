@@ -1,7 +1,7 @@
 """rosglass: a glass cockpit for robots.
 
 Talk to any topic of any ROS robot without ROS installed, and build the screen it is steered from
-in QML. Start with :func:`connect` and :func:`load`, or on the command line with ``rosglass --help``.
+in QML. Start with :func:`connect` and :func:`load`, or with ``rosglass --help``.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["main"]
 
-#: Subcommand -> (module, one-line help). A module has ``configure(parser)`` and ``run(args) -> int``.
+#: Subcommand -> (module, one-line help). Modules have ``configure(parser)``, ``run(args) -> int``.
 COMMANDS = {
     "run": ("rosglass.cli.run", "open an interface written in QML"),
     "demo": ("rosglass.cli.demo", "open the demo cockpit on a simulated robot"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 from rosglass.comm.qos import QoS
@@ -58,7 +58,7 @@ class EndpointInfo:
     name: str
     type: str
     node: NodeName
-    qos: QoS = QoS()
+    qos: QoS = field(default_factory=QoS)
     type_hash: str = ""
     gid: bytes = b""
 

@@ -8,9 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import TYPE_CHECKING
 
-from rosglass.comm.time import Duration
 from rosglass.errors import UnsupportedError
+
+if TYPE_CHECKING:
+    from rosglass.comm.time import Duration
 
 __all__ = ["Durability", "History", "Liveliness", "QoS", "Reliability"]
 

@@ -77,7 +77,7 @@ class Time:
         return self.nanoseconds / _NS
 
     def to_dict(self) -> dict[str, int]:
-        """Return ``{"sec": ..., "nanosec": ...}``, the value of a ``builtin_interfaces/msg/Time``."""
+        """Return the value of a ``builtin_interfaces/msg/Time`` field."""
         return {"sec": self.sec, "nanosec": self.nanosec}
 
     def __add__(self, other: Duration) -> Time:

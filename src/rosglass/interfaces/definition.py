@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING, Union
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -27,7 +27,7 @@ __all__ = [
 ]
 
 #: A constant's or default's value; lists only as defaults of array fields.
-Value = Union[bool, int, float, str, tuple[Union[bool, int, float, str], ...]]
+Value = bool | int | float | str | tuple[bool | int | float | str, ...]
 
 
 class ArrayKind(Enum):
@@ -180,4 +180,4 @@ class ActionDefinition:
     source: Source = Source("text", "<text>")
 
 
-InterfaceDefinition = Union[Definition, ServiceDefinition, ActionDefinition]
+InterfaceDefinition = Definition | ServiceDefinition | ActionDefinition

@@ -1,0 +1,1 @@
+"""What a type is: interface definitions, where they come from, and their hashes."""
