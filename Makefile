@@ -1,0 +1,40 @@
+# `make demo` opens the cockpit on a simulated robot; `make test` runs every check.
+# Both do all their own set-up in a clean checkout (scripts/setup.sh says what, and what is missing).
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+BIN := .venv/bin
+export PYTHON
+
+.PHONY: help demo test setup lint types docs wheel bench clean
+
+help: ## show this list
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
+
+demo: ## open the demo cockpit on a simulated robot (20 s on a virtual screen where there is no display)
+	@scripts/setup.sh demo
+	@$(BIN)/rosglass demo $(DEMO_ARGS)
+
+test: ## run lint, types, docs and all tests in both environments
+	@scripts/setup.sh test
+	@scripts/test.sh
+
+setup: ## prepare both environments without running anything
+	@scripts/setup.sh test
+
+lint: ## check style and format
+	@$(BIN)/ruff check . && $(BIN)/ruff format --check .
+
+types: ## check types strictly
+	@$(BIN)/mypy
+
+docs: ## build the documentation into site/
+	@$(BIN)/mkdocs build --strict --quiet && echo "open site/index.html"
+
+wheel: ## build the wheel into dist/
+	@$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist . && ls dist/*.whl
+
+bench: ## run every benchmark (some minutes)
+	@scripts/bench.sh
+
+clean: ## remove everything that set-up and builds made
+	@rm -rf .venv .venv-system .stamps site dist build demo.png htmlcov .coverage* coverage.xml

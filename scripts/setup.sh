@@ -1,0 +1,91 @@
+#!/usr/bin/env bash
+# Prepares a clean checkout: scripts/setup.sh demo | test
+#   demo  what `make demo` needs: .venv with rosglass and its cockpit
+#   test  what `make test` needs: .venv with everything, .venv-system on Debian's own Python
+# Repeatable: what is already there is left alone, so a second run needs no network and no root.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+purpose=${1:-demo}
+mkdir -p .stamps
+
+say()  { printf '==> %s\n' "$*"; }
+fail() { printf '\nrosglass set-up stopped: %s\n' "$1" >&2; shift; printf '  %s\n' "$@" >&2; exit 1; }
+
+case $purpose in demo|test) ;; *) fail "unknown purpose '$purpose'" "use: scripts/setup.sh demo|test" ;; esac
+
+# What Qt's wheels expect from the system, a virtual screen, and a font.
+apt_demo=(xvfb libegl1 libgl1 libopengl0 libxkbcommon-x11-0 libdbus-1-3 libfontconfig1 libglib2.0-0
+          libxcb-cursor0 libxcb-icccm4 libxcb-image0 libxcb-keysyms1 libxcb-randr0
+          libxcb-render-util0 libxcb-shape0 libxcb-xinerama0 libxcb-xkb1 libpulse0
+          libgl1-mesa-dri fonts-dejavu-core)
+# Debian's own Python for the RViz environment, and ROS 1's message generator to compare with.
+apt_test=(python3 python3-venv python3-genpy python3-genmsg xdotool x11-apps)
+
+install_apt() {
+  command -v dpkg-query >/dev/null && command -v apt-get >/dev/null || {
+    say "no apt here: assuming that these Debian packages' equivalents are installed: $*"; return; }
+  local missing=()
+  for package in "$@"; do
+    dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'ok installed' || missing+=("$package")
+  done
+  [ ${#missing[@]} -eq 0 ] && return
+  local root=()
+  if [ "$(id -u)" -ne 0 ]; then
+    if command -v sudo >/dev/null && { [ -t 0 ] || sudo -n true 2>/dev/null; }; then root=(sudo)
+    else fail "system packages are missing and this user cannot install them" \
+      "ask an administrator to run:" "  apt-get install --no-install-recommends ${missing[*]}" "then run this again."; fi
+  fi
+  say "installing Debian packages: ${missing[*]}"
+  "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get update -qq >.stamps/apt.log 2>&1 &&
+  "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
+    "${missing[@]}" >>.stamps/apt.log 2>&1 || {
+      tail -5 .stamps/apt.log >&2
+      fail "apt-get could not install: ${missing[*]}" "the whole output is in .stamps/apt.log;" \
+        "without a network, connect this machine (or set http_proxy) and run this again."; }
+}
+
+# make_venv DIR PYTHON EXTRAS [venv options]
+make_venv() {
+  local dir=$1 python=$2 extras=$3; shift 3
+  local wanted; wanted="$(cat pyproject.toml; echo "$python $extras $*"; "$python" -V)"
+  [ "$(cat "$dir/.rosglass" 2>/dev/null)" = "$wanted" ] && return
+  "$python" -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null ||
+    fail "$python is not Python 3.10 or newer ($("$python" -V 2>&1))" \
+      "install a newer one, or name it: make PYTHON=/usr/bin/python3.11 $purpose"
+  say "making $dir with $("$python" -V)"
+  [ -x "$dir/bin/python" ] && "$dir/bin/python" -m pip --version >/dev/null 2>&1 ||
+    "$python" -m venv --clear "$@" "$dir" >.stamps/venv.log 2>&1 || {
+      tail -3 .stamps/venv.log >&2; fail "$python cannot make virtual environments" \
+        "on Debian and Ubuntu: sudo apt-get install python3-venv, then run this again."; }
+  say "installing Python packages into $dir (rosglass[$extras]; a few minutes the first time)"
+  "$dir/bin/python" -m pip install --disable-pip-version-check --progress-bar off -e ".[$extras]" \
+    2>&1 | tee .stamps/pip.log | sed -un 's/^Downloading \(.*\)/    \1/p'
+  [ "${PIPESTATUS[0]}" -eq 0 ] || {
+    grep -E '^ *(ERROR|error)' .stamps/pip.log | tail -5 >&2
+    if grep -q 'Python\.h' .stamps/pip.log; then
+      fail "a package had to be compiled and Python's headers are missing" \
+        "sudo apt-get install build-essential python3-dev, then run this again."
+    elif grep -qiE 'connection|resolve|timed out|network' .stamps/pip.log; then
+      fail "PyPI could not be reached" "check the network (or set https_proxy / PIP_INDEX_URL) and run this again;" \
+        "pip's whole output is in .stamps/pip.log"
+    else fail "pip could not install the Python packages" "pip's whole output is in .stamps/pip.log"; fi; }
+  printf '%s\n' "$wanted" >"$dir/.rosglass"
+}
+
+python=${PYTHON:-python3}
+case $purpose in
+  demo) install_apt "${apt_demo[@]}" ;;
+  test) install_apt "${apt_demo[@]}" "${apt_test[@]}" ;;
+esac
+command -v "$python" >/dev/null || install_apt python3 python3-venv
+command -v "$python" >/dev/null || fail "there is no $python" "install Python 3.10 or newer, or name it: make PYTHON=... $purpose"
+if ! "$python" -c 'import venv, ensurepip' 2>/dev/null; then install_apt python3-venv; fi
+case $purpose in
+  demo) [ -f .venv/.rosglass-dev ] || make_venv .venv "$python" cockpit ;;
+  test)
+    make_venv .venv "$python" dev
+    touch .venv/.rosglass-dev
+    [ -x /usr/bin/python3 ] || fail "/usr/bin/python3 is missing" "the RViz environment needs Debian's own Python 3"
+    make_venv .venv-system /usr/bin/python3 zenoh,test,peers --system-site-packages ;;
+esac
+say "set-up complete"

@@ -1,0 +1,20 @@
+#!/usr/bin/env bash
+# Every check, quickest first; ends with pytest's own closing line.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+say() { printf '==> %s\n' "$*"; }
+export QT_LOGGING_RULES=${QT_LOGGING_RULES:-qt.multimedia.*=false}
+
+say "lint and format (ruff)"
+.venv/bin/ruff check .
+.venv/bin/ruff format --check .
+say "types (mypy --strict)"
+.venv/bin/mypy
+say "documentation (mkdocs --strict)"
+.venv/bin/mkdocs build --strict --quiet
+say "wheel"
+scripts/check_wheel.sh
+say "tests on Debian's own Python ($(.venv-system/bin/python -V))"
+.venv-system/bin/python -m pytest -q tests/unit "$@"
+say "tests, standalone ($(.venv/bin/python -V))"
+.venv/bin/python -m pytest --cov --cov-report=term --cov-report=html "$@"

@@ -1,0 +1,80 @@
+"""The house's one rule: imports point downwards only (docs/architecture.md, section 1)."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import rosglass
+
+ROOT = Path(rosglass.__file__).parent
+RANK = {
+    "errors": 0,
+    "interfaces": 1,
+    "messages": 2,
+    "comm": 3,
+    "ros1": 4,
+    "ros2": 4,
+    "connection": 5,
+    "tf": 5,
+    "images": 5,
+    "qt": 5,
+    "qml": 6,
+    "rviz": 7,
+    "cli": 8,
+    "demo": 8,
+}
+QT = {"PySide6", "PySide2", "PyQt5", "PyQt6", "shiboken6", "shiboken2"}
+MODULES = sorted(ROOT.rglob("*.py"))
+
+
+def imports(path: Path) -> set[str]:
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}:{node.lineno}: relative import"
+            names.add(node.module or "")
+            if node.module == "rosglass":
+                names |= {f"rosglass.{alias.name}" for alias in node.names}
+    return names
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda p: p.relative_to(ROOT).as_posix())
+def test_imports_point_downwards(path: Path) -> None:
+    room = path.relative_to(ROOT).parts[0].removesuffix(".py")
+    if room in {"__init__", "__main__"}:
+        return
+    assert room in RANK, f"{room} has no place in docs/architecture.md"
+    for name in imports(path):
+        parts = name.split(".")
+        if parts[0] in QT:
+            assert room in {"qt", "rviz"} or RANK[room] >= RANK["qml"], f"{path} imports {name}"
+        if parts[0] != "rosglass" or len(parts) == 1 or parts[1] not in RANK:
+            continue
+        other = parts[1]
+        assert other == room or RANK[other] < RANK[room], f"{path} imports {name}"
+
+
+def run(code: str) -> str:
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+    )
+    return done.stdout.strip()
+
+
+def test_import_is_light() -> None:
+    heavy = "{'numpy', 'PySide6', 'PySide2', 'zenoh', 'cv2', 'rosbags', 'yaml'}"
+    assert run(f"import rosglass, sys; print(sorted({heavy} & set(sys.modules)))") == "[]"
+
+
+def test_public_names_are_all_there() -> None:
+    assert [name for name in rosglass.__all__ if getattr(rosglass, name, None) is None] == []
+    assert dir(rosglass) == sorted(rosglass.__all__)
+    with pytest.raises(AttributeError, match="no attribute 'conect'"):
+        rosglass.conect  # noqa: B018
