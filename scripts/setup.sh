@@ -81,7 +81,10 @@ command -v "$python" >/dev/null || install_apt python3 python3-venv
 command -v "$python" >/dev/null || fail "there is no $python" "install Python 3.10 or newer, or name it: make PYTHON=... $purpose"
 if ! "$python" -c 'import venv, ensurepip' 2>/dev/null; then install_apt python3-venv; fi
 case $purpose in
-  demo) [ -f .venv/.rosglass-dev ] || make_venv .venv "$python" cockpit ;;
+  demo)
+    # Once it was made for the tests, keep it complete.
+    if [ -f .venv/.rosglass-dev ]; then make_venv .venv "$python" dev
+    else make_venv .venv "$python" cockpit; fi ;;
   test)
     make_venv .venv "$python" dev
     touch .venv/.rosglass-dev
