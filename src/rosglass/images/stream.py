@@ -1,0 +1,245 @@
+"""A camera stream: subscribes, converts in a thread of its own, keeps only the newest picture."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rosglass.comm.executor import IMMEDIATE
+from rosglass.comm.node import Handle
+from rosglass.comm.qos import QoS, Reliability
+from rosglass.errors import Error, NodeClosedError
+from rosglass.images.encodings import ANY_FORMAT, convert
+from rosglass.images.transports import TRANSPORTS, Choice, choose
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rosglass.comm.node import Node
+    from rosglass.comm.subscription import Sample, Subscription
+    from rosglass.images.frame import Frame, PixelFormat, RawImage
+    from rosglass.messages import MessageType
+
+__all__ = ["ImageStream", "StreamStatistics"]
+
+_log = logging.getLogger("rosglass.images")
+#: Seconds after which the graph is looked at again while there is nothing to receive.
+_RETRY = 1.0
+#: Seconds between two log lines about the same stream.
+_LOG_EVERY = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class StreamStatistics:
+    """How a stream is doing.
+
+    Attributes:
+        received: Pictures received.
+        shown: Pictures converted and handed on.
+        dropped: Pictures overtaken by a newer one before they were converted.
+        lost: Pictures that never arrived, by the publisher's running numbers.
+        invalid: Pictures that could not be shown; :attr:`ImageStream.problem` says why.
+    """
+
+    received: int = 0
+    shown: int = 0
+    dropped: int = 0
+    lost: int = 0
+    invalid: int = 0
+
+
+class ImageStream(Handle):
+    """Receives the pictures of one camera.
+
+    Subscribes best effort to the preferred transport, or to another one while that is not
+    published. Conversion runs in the stream's own thread, so that neither the middleware nor the
+    user interface waits for it; a picture that is overtaken by a newer one is dropped.
+
+    Args:
+        node: Where to subscribe.
+        topic: The camera's base topic, or a transport's own topic.
+        deliver: Called in the stream's thread with each picture, ready to be shown.
+        preferred: Name of the transport to prefer.
+        changed: Called from any thread when :attr:`problem` or :attr:`transport` changed.
+
+    Raises:
+        InvalidNameError: The topic name breaks ROS's rules.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        topic: str,
+        deliver: Callable[[Frame], None],
+        preferred: str = "compressed",
+        changed: Callable[[], None] | None = None,
+    ) -> None:
+        self.topic = node.resolve(topic)
+        #: Layouts that all displays of this stream take.
+        self.accept: frozenset[PixelFormat] = ANY_FORMAT
+        self._node, self._preferred = node, preferred
+        self._deliver, self._changed = deliver, changed
+        self._wake = threading.Condition()
+        self._sample: Sample | None = None
+        self._look, self._closing = True, False
+        self._choice: Choice | None = None
+        self._subscription: Subscription | None = None
+        self._reader: tuple[MessageType, str, Callable[[Sample], RawImage]] | None = None
+        self._problem, self._logged = "", ("", 0.0)
+        self._received = self._shown = self._dropped = self._lost = self._invalid = 0
+        self._sequence: tuple[bytes, int] = (b"", -1)
+        self._graph = node.on_graph_change(self._on_graph, IMMEDIATE)
+        self._thread = threading.Thread(target=self._work, name=f"images {topic}", daemon=True)
+        self._thread.start()
+
+    @property
+    def problem(self) -> str:
+        """Why no picture can be shown, in words; empty when all is well."""
+        subscription = self._subscription
+        return self._problem or (subscription.problem if subscription is not None else "")
+
+    @property
+    def transport(self) -> str:
+        """Name of the transport received; empty while nothing is published."""
+        return self._choice.transport.name if self._choice is not None else ""
+
+    @property
+    def subscribed(self) -> bool:
+        """Whether there is a subscription."""
+        return self._subscription is not None
+
+    def publisher_count(self) -> int:
+        """Return how many publishers the transport in use has."""
+        choice = self._choice
+        return len(self._node.publishers(choice.topic)) if choice is not None else 0
+
+    def statistics(self) -> StreamStatistics:
+        """Return the counts as of now."""
+        with self._wake:
+            return StreamStatistics(
+                self._received, self._shown, self._dropped, self._lost, self._invalid
+            )
+
+    def close(self) -> None:
+        """Stop receiving. Returns at once; the thread ends after the picture it works on."""
+        with self._wake:
+            if self._closing:
+                return
+            self._closing = True
+            self._wake.notify_all()
+        self._graph.close()
+
+    def join(self, timeout: float) -> bool:
+        """Wait up to `timeout` seconds for the thread after :meth:`close`; True when it ended."""
+        self._thread.join(timeout)
+        return not self._thread.is_alive()
+
+    def _on_graph(self) -> None:
+        with self._wake:
+            self._look = True
+            self._wake.notify_all()
+
+    def _on_sample(self, sample: Sample) -> None:
+        with self._wake:
+            self._received += 1
+            self._dropped += self._sample is not None
+            publisher, last = self._sequence
+            if sample.sequence >= 0:
+                if sample.publisher == publisher and sample.sequence > last >= 0:
+                    self._lost += sample.sequence - last - 1
+                self._sequence = (sample.publisher, sample.sequence)
+            self._sample = sample
+            self._wake.notify_all()
+
+    def _work(self) -> None:
+        while True:
+            with self._wake:
+                self._wake.wait_for(
+                    lambda: self._sample is not None or self._look or self._closing,
+                    _RETRY if self._subscription is None else None,
+                )
+                if self._closing:
+                    break
+                look, self._look = self._look or self._subscription is None, False
+                sample, self._sample = self._sample, None
+            if look:
+                self._subscribe()
+            if sample is not None:
+                self._show(sample)
+        if self._subscription is not None:
+            self._subscription.close()
+
+    def _subscribe(self) -> None:
+        try:
+            published = {
+                name: types
+                for name, types in self._node.topics().items()
+                if name.startswith(self.topic) and self._node.publishers(name)
+            }
+            choice = choose(self.topic, self._preferred, published)
+            # A camera that went away may come back as it was: keep listening.
+            if choice is None or choice == self._choice:
+                self._say("" if choice is not None else self._problem)
+                return
+            subscription = self._node.create_subscription(
+                choice.topic,
+                choice.transport.type,
+                qos=QoS(depth=1, reliability=Reliability.BEST_EFFORT),
+                raw_callback=self._on_sample,
+                executor=IMMEDIATE,
+            )
+        except NodeClosedError:
+            self._say("")
+            return
+        except Error as error:
+            self._say(str(error))
+            return
+        previous, self._subscription = self._subscription, subscription
+        self._choice, self._reader = choice, None
+        if previous is not None:
+            previous.close()
+        self._problem = ""
+        self._tell()
+
+    def _show(self, sample: Sample) -> None:
+        try:
+            if self._reader is None or self._reader[:2] != (sample.type, sample.wire):
+                transport = next(
+                    t for t in TRANSPORTS.values() if t.type == sample.type.definition.name
+                )
+                reader = transport.reader(sample.type, sample.wire)
+                self._reader = (sample.type, sample.wire, reader)
+            frame = convert(self._reader[2](sample), self.accept, sample.received)
+        except Error as error:
+            with self._wake:
+                self._invalid += 1
+            self._say(str(error))
+            return
+        except Exception as error:
+            # Whatever a camera sends must not end the stream.
+            _log.exception("%s: a picture could not be converted", self.topic)
+            self._say(f"internal error: {error}")
+            return
+        self._say("")
+        with self._wake:
+            self._shown += 1
+        self._deliver(frame)
+
+    def _say(self, problem: str) -> None:
+        """Remember why nothing is shown; log it, but not for every picture of a bad stream."""
+        if problem:
+            now = time.monotonic()
+            last, at = self._logged
+            if problem != last or now - at > _LOG_EVERY:
+                self._logged = (problem, now)
+                _log.warning("%s: %s", self.topic, problem)
+        if problem != self._problem:
+            self._problem = problem
+            self._tell()
+
+    def _tell(self) -> None:
+        if self._changed is not None:
+            self._changed()

@@ -1,0 +1,120 @@
+"""The one place that chooses a Qt binding; everything above imports Qt from here.
+
+PySide6 (Qt 6) is the default. PySide2 (Qt 5) is taken when a Qt 5 binding is already in the
+process, as inside RViz, or when the environment variable ``ROSGLASS_QT`` says ``pyside2``. Two Qt
+builds in one process overwrite each other's symbols, so a second one is refused.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from rosglass.errors import UnsupportedError
+
+__all__ = [
+    "BINDING",
+    "QT6",
+    "Property",
+    "QJSValue",
+    "QtCore",
+    "QtGui",
+    "QtQml",
+    "QtQuick",
+    "Signal",
+    "Slot",
+    "choose_binding",
+    "engine_of",
+    "is_alive",
+    "optional",
+]
+
+#: Binding -> major version of its Qt. PyQt is never chosen, but tells which Qt is loaded.
+_QT_OF = {"PySide6": 6, "PyQt6": 6, "PySide2": 5, "PyQt5": 5}
+
+
+def choose_binding(loaded: frozenset[str], wanted: str = "") -> str:
+    """Return the binding to use.
+
+    Args:
+        loaded: Bindings whose QtCore is already imported in this process.
+        wanted: The value of ``ROSGLASS_QT``: ``pyside6``, ``pyside2`` or empty.
+
+    Raises:
+        UnsupportedError: `wanted` is unknown, or needs another Qt than the one already loaded.
+    """
+    known = {"pyside6": "PySide6", "pyside2": "PySide2"}
+    if wanted and wanted.lower() not in known:
+        raise UnsupportedError(f"ROSGLASS_QT is {wanted!r}; it must be pyside6 or pyside2")
+    choice = known.get(wanted.lower(), "")
+    if not choice:
+        qt5 = any(_QT_OF[name] == 5 for name in loaded)
+        choice = "PySide2" if qt5 else "PySide6"
+    clash = sorted(name for name in loaded if _QT_OF[name] != _QT_OF[choice])
+    if clash:
+        raise UnsupportedError(
+            f"{choice} cannot be loaded: this process already uses {', '.join(clash)}, and two Qt "
+            "versions in one process crash; unset ROSGLASS_QT or import rosglass.qt first"
+        )
+    return choice
+
+
+def _refuse_broken_binding(binding: str, version: tuple[int, ...]) -> None:
+    """Refuse a binding that is known to bring the interpreter down.
+
+    PySide6 6.12 gives back a reference to None on each call that returns nothing when run on
+    Python 3.11 or older; after some thousand calls the interpreter aborts.
+    """
+    if binding == "PySide6" and version[:2] == (6, 12) and sys.version_info < (3, 12):
+        raise UnsupportedError(
+            f"PySide6 {'.'.join(map(str, version))} corrupts reference counts on Python "
+            f"{sys.version_info[0]}.{sys.version_info[1]} and would abort this program after a "
+            'while; install another one with: pip install "PySide6-Essentials<6.12" '
+            '"PySide6-Addons<6.12"'
+        )
+
+
+_loaded = frozenset(name for name in _QT_OF if f"{name}.QtCore" in sys.modules)
+#: Name of the binding in use, ``PySide6`` or ``PySide2``.
+BINDING = choose_binding(_loaded, os.environ.get("ROSGLASS_QT", ""))
+#: Whether this is Qt 6.
+QT6 = _QT_OF[BINDING] == 6
+
+_refuse_broken_binding(BINDING, tuple(import_module(BINDING).__version_info__[:3]))
+
+if TYPE_CHECKING:
+    import shiboken6 as _shiboken
+    from PySide6 import QtCore, QtGui, QtQml, QtQuick
+else:
+    QtCore = import_module(f"{BINDING}.QtCore")
+    QtGui = import_module(f"{BINDING}.QtGui")
+    QtQml = import_module(f"{BINDING}.QtQml")
+    QtQuick = import_module(f"{BINDING}.QtQuick")
+    _shiboken = import_module("shiboken6" if QT6 else "shiboken2")
+
+Signal, Slot, Property = QtCore.Signal, QtCore.Slot, QtCore.Property
+QJSValue = QtQml.QJSValue
+
+
+def optional(module: str) -> Any:
+    """Return a Qt module that not every installation has, e.g. ``QtMultimedia``; None without it."""
+    try:
+        return import_module(f"{BINDING}.{module}")
+    except ImportError:
+        return None
+
+
+def is_alive(item: QtCore.QObject | None) -> bool:
+    """Return whether a QObject still exists on the C++ side."""
+    return item is not None and bool(_shiboken.isValid(item))
+
+
+def engine_of(item: QtCore.QObject) -> QtQml.QQmlEngine | None:
+    """Return the QML engine an object lives in; None when it was never seen by QML."""
+    if QT6:
+        engine = QtQml.qjsEngine(item)
+        return engine if isinstance(engine, QtQml.QQmlEngine) else None
+    context = QtQml.QQmlEngine.contextForObject(item)
+    return context.engine() if context is not None else None

@@ -1,0 +1,47 @@
+"""Which topic a camera's pictures are received from."""
+
+from __future__ import annotations
+
+import pytest
+
+from rosglass.errors import UnsupportedError
+from rosglass.images import choose
+
+RAW, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
+BOTH = {"/cam": [RAW], "/cam/compressed": [COMPRESSED]}
+
+
+@pytest.mark.parametrize(
+    ("topic", "preferred", "published", "expected"),
+    [
+        ("/cam", "compressed", BOTH, "/cam/compressed"),
+        ("/cam", "raw", BOTH, "/cam"),
+        ("/cam", "compressed", {"/cam": [RAW]}, "/cam"),
+        ("/cam", "raw", {"/cam/compressed": [COMPRESSED]}, "/cam/compressed"),
+        ("/cam/compressed", "compressed", BOTH, "/cam/compressed"),
+        ("/cam/compressed", "raw", BOTH, "/cam/compressed"),
+        ("/cam", "raw", {"/cam": ["std_msgs/msg/String", RAW]}, "/cam"),
+    ],
+)
+def test_choice(topic: str, preferred: str, published: dict, expected: str) -> None:
+    choice = choose(topic, preferred, published)
+    assert choice is not None
+    assert choice.topic == expected
+    assert choice.base == "/cam"
+
+
+def test_nothing_published_yet_is_no_error() -> None:
+    assert choose("/cam", "raw", {"/other": [RAW]}) is None
+
+
+@pytest.mark.parametrize(
+    ("preferred", "published", "reason"),
+    [
+        ("teleport", BOTH, "'teleport' is unknown; known are: raw, compressed"),
+        ("raw", {"/cam/theora": ["theora_image_transport/msg/Packet"]}, "only sent as theora"),
+        ("raw", {"/cam": ["std_msgs/msg/String"]}, "carries std_msgs/msg/String, not pictures"),
+    ],
+)
+def test_what_cannot_be_shown_is_named(preferred: str, published: dict, reason: str) -> None:
+    with pytest.raises(UnsupportedError, match=reason):
+        choose("/cam", preferred, published)
