@@ -1,1 +1,67 @@
 """What a type is: interface definitions, where they come from, and their hashes."""
+
+from __future__ import annotations
+
+from rosglass.interfaces.definition import (
+    ActionDefinition,
+    ArrayKind,
+    Constant,
+    Definition,
+    Field,
+    FieldType,
+    InterfaceDefinition,
+    ServiceDefinition,
+    Source,
+    Value,
+)
+from rosglass.interfaces.derived import service_event
+from rosglass.interfaces.distributions import DISTRIBUTIONS, Distributions
+from rosglass.interfaces.folders import Folders, workspace
+from rosglass.interfaces.hashes import full_text, md5, rihs01, type_description
+from rosglass.interfaces.idl import parse_idl
+from rosglass.interfaces.library import Library
+from rosglass.interfaces.literals import INTEGER_RANGES
+from rosglass.interfaces.names import join_name, ros1_name, split_name
+from rosglass.interfaces.parser import (
+    PRIMITIVES,
+    parse,
+    parse_action,
+    parse_message,
+    parse_service,
+)
+from rosglass.interfaces.provider import MemoryProvider, Provider
+
+__all__ = [
+    "DISTRIBUTIONS",
+    "INTEGER_RANGES",
+    "PRIMITIVES",
+    "ActionDefinition",
+    "ArrayKind",
+    "Constant",
+    "Definition",
+    "Distributions",
+    "Field",
+    "FieldType",
+    "Folders",
+    "InterfaceDefinition",
+    "Library",
+    "MemoryProvider",
+    "Provider",
+    "ServiceDefinition",
+    "Source",
+    "Value",
+    "full_text",
+    "join_name",
+    "md5",
+    "parse",
+    "parse_action",
+    "parse_idl",
+    "parse_message",
+    "parse_service",
+    "rihs01",
+    "ros1_name",
+    "service_event",
+    "split_name",
+    "type_description",
+    "workspace",
+]

@@ -81,6 +81,7 @@ class Field:
         default: Default value given in the definition (ROS 2), None when there is none.
         comment: The comment lines above and beside the field, joined by newlines.
         unit: Unit named in the comment, e.g. ``m`` or ``rad/s``; empty when there is none.
+        place: Line and column in the source's file, 1-based; zeros when unknown.
     """
 
     name: str
@@ -88,6 +89,7 @@ class Field:
     default: Value | None = None
     comment: str = ""
     unit: str = ""
+    place: tuple[int, int] = field(default=(0, 0), compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +138,7 @@ class Definition:
         text: The definition as received, comments included.
         source: Where it came from.
         nested: Every message type it needs, directly or indirectly, by full name.
+        comment: The comment at the start of the definition, about the message as a whole.
     """
 
     name: str
@@ -145,6 +148,7 @@ class Definition:
     text: str = ""
     source: Source = Source("text", "<text>")
     nested: Mapping[str, Definition] = field(default_factory=dict, compare=False, repr=False)
+    comment: str = ""
 
     def constant(self, name: str) -> Constant:
         """Return the constant called `name`; raises KeyError with the known names."""

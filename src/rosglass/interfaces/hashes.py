@@ -1,0 +1,294 @@
+"""md5 sums (ROS 1) and RIHS01 hashes (ROS 2) that peers compare before they talk to each other.
+
+md5: ``genmsg/gentools.py``. RIHS01: REP 2016 and ``rosidl_generator_type_description``: the SHA-256
+of the type description as JSON, without default values.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import TYPE_CHECKING, Any
+
+from rosglass.errors import DefinitionError, UnsupportedError
+from rosglass.interfaces.definition import (
+    ActionDefinition,
+    ArrayKind,
+    Definition,
+    ServiceDefinition,
+)
+from rosglass.interfaces.derived import derive, service_event
+from rosglass.interfaces.parser import parse_message
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from rosglass.interfaces.definition import Field, InterfaceDefinition
+
+__all__ = ["full_text", "md5", "rihs01", "type_description"]
+
+# type_description_interfaces/msg/FieldType's constants. rosidl turns a .msg file's char into IDL's
+# uint8, so its id is 3 and not FIELD_TYPE_CHAR (AddTwoInts' official hash depends on it).
+_TYPE_IDS = {
+    "int8": 2, "uint8": 3, "int16": 4, "uint16": 5, "int32": 6, "uint32": 7, "int64": 8,
+    "uint64": 9, "float32": 10, "float64": 11, "char": 3, "bool": 15, "byte": 16, "string": 17,
+    "wstring": 18,
+}  # fmt: skip
+_NESTED_ID = 1
+_BOUNDED_STRING_OFFSET = 4
+_ARRAY_OFFSETS = {
+    ArrayKind.NONE: 0,
+    ArrayKind.FIXED: 48,
+    ArrayKind.BOUNDED: 96,
+    ArrayKind.UNBOUNDED: 144,
+}
+_PLACEHOLDER = "structure_needs_at_least_one_member"
+
+# What rosidl and actionlib add to services and actions; fixed parts of the hashes.
+_BUILT_IN = {
+    (2, "builtin_interfaces/msg/Time"): "int32 sec\nuint32 nanosec",
+    (2, "unique_identifier_msgs/msg/UUID"): "uint8[16] uuid",
+    (2, "service_msgs/msg/ServiceEventInfo"): (
+        "uint8 event_type\nbuiltin_interfaces/Time stamp\nchar[16] client_gid\nint64 sequence_number"
+    ),
+    (1, "std_msgs/msg/Header"): "uint32 seq\ntime stamp\nstring frame_id",
+    (1, "actionlib_msgs/msg/GoalID"): "time stamp\nstring id",
+    (1, "actionlib_msgs/msg/GoalStatus"): (
+        "uint8 PENDING=0\nuint8 ACTIVE=1\nuint8 PREEMPTED=2\nuint8 SUCCEEDED=3\nuint8 ABORTED=4\n"
+        "uint8 REJECTED=5\nuint8 PREEMPTING=6\nuint8 RECALLING=7\nuint8 RECALLED=8\nuint8 LOST=9\n"
+        "GoalID goal_id\nuint8 status\nstring text"
+    ),
+}
+
+
+def md5(definition: InterfaceDefinition) -> str:
+    """Return the md5 sum that ROS 1 peers compare.
+
+    An action's is that of its ``pkg/TypeAction`` message.
+
+    Raises:
+        UnsupportedError: `definition` is a ROS 2 one.
+        DefinitionError: `definition` is not resolved.
+    """
+    if definition.ros != 1:
+        raise UnsupportedError(
+            f"{definition.name} is a ROS 2 definition, which has no md5 sum; use rihs01()"
+        )
+    sums: dict[str, str] = {}
+    if isinstance(definition, ServiceDefinition):
+        texts = [
+            _md5_text(part, part.nested, sums) for part in (definition.request, definition.response)
+        ]
+    else:
+        message = _action_message(definition)
+        texts = [_md5_text(message, message.nested, sums)]
+    return _md5("".join(texts))
+
+
+def _action_message(definition: Definition | ActionDefinition) -> Definition:
+    if isinstance(definition, Definition):
+        return definition
+    message = derive(definition, "Action")
+    assert isinstance(message, Definition)
+    return message
+
+
+def _md5_text(
+    definition: Definition, nested: Mapping[str, Definition], sums: dict[str, str]
+) -> str:
+    lines = [f"{c.type} {c.name}={c.text}" for c in definition.constants]
+    for field in definition.fields:
+        name = field.type.name
+        if not field.type.is_compound:
+            lines.append(f"{field.type} {field.name}")
+            continue
+        if name not in sums:
+            sums[name] = _md5(_md5_text(_nested(definition, field, nested), nested, sums))
+        lines.append(f"{sums[name]} {field.name}")
+    return "\n".join(lines).strip()
+
+
+def _md5(text: str) -> str:
+    return hashlib.md5(text.encode(), usedforsecurity=False).hexdigest()
+
+
+def rihs01(definition: InterfaceDefinition) -> str:
+    """Return the type hash of REP 2016, ``RIHS01_`` and 64 hexadecimal digits.
+
+    Raises:
+        UnsupportedError: `definition` is a ROS 1 one.
+        DefinitionError: `definition` is not resolved.
+    """
+    description = type_description(definition)
+    for part in (description["type_description"], *description["referenced_type_descriptions"]):
+        for field in part["fields"]:
+            del field["default_value"]
+    text = json.dumps(description, separators=(", ", ": "))
+    return f"RIHS01_{hashlib.sha256(text.encode()).hexdigest()}"
+
+
+def type_description(definition: InterfaceDefinition) -> dict[str, Any]:
+    """Return the type description of REP 2016 (``type_description_interfaces/TypeDescription``).
+
+    Returns:
+        ``type_description`` and ``referenced_type_descriptions`` (sorted by name), each with
+        ``type_name`` and ``fields``.
+
+    Raises:
+        UnsupportedError: `definition` is a ROS 1 one.
+        DefinitionError: `definition` is not resolved.
+    """
+    if definition.ros != 2:
+        raise UnsupportedError(
+            f"{definition.name} is a ROS 1 definition, which has no RIHS01 hash; use md5()"
+        )
+    described: dict[str, dict[str, Any]] = {}
+    _describe(definition, described)
+    main = described.pop(definition.name)
+    return {
+        "type_description": main,
+        "referenced_type_descriptions": [described[name] for name in sorted(described)],
+    }
+
+
+def _describe(definition: InterfaceDefinition, described: dict[str, dict[str, Any]]) -> None:
+    if isinstance(definition, ServiceDefinition):
+        members: dict[str, InterfaceDefinition] = {
+            "request_message": definition.request,
+            "response_message": definition.response,
+            "event_message": service_event(definition),
+        }
+    elif isinstance(definition, ActionDefinition):
+        labels = ("SendGoal", "GetResult", "FeedbackMessage")
+        send_goal, get_result, feedback_message = (
+            _derived(definition, f"_{label}") for label in labels
+        )
+        members = {
+            "goal": definition.goal,
+            "result": definition.result,
+            "feedback": definition.feedback,
+            "send_goal_service": send_goal,
+            "get_result_service": get_result,
+            "feedback_message": feedback_message,
+        }
+    else:
+        _describe_message(definition, definition.nested, described)
+        return
+    fields = [_field(name, _NESTED_ID, nested=part.name) for name, part in members.items()]
+    described[definition.name] = {"type_name": definition.name, "fields": fields}
+    for part in members.values():
+        _describe(part, described)
+
+
+def _derived(action: ActionDefinition, suffix: str) -> InterfaceDefinition:
+    derived = derive(action, suffix)
+    assert derived is not None
+    return derived
+
+
+def _describe_message(
+    definition: Definition,
+    nested: Mapping[str, Definition],
+    described: dict[str, dict[str, Any]],
+) -> None:
+    if definition.name in described:
+        return
+    fields: list[dict[str, Any]] = []
+    described[definition.name] = {"type_name": definition.name, "fields": fields}
+    for field in definition.fields:
+        kind = field.type
+        capacity = kind.size or 0
+        offset = _ARRAY_OFFSETS[kind.array]
+        default = _default_text(field)
+        if kind.is_compound:
+            fields.append(_field(field.name, _NESTED_ID + offset, capacity, nested=kind.name))
+            _describe_message(_nested(definition, field, nested), nested, described)
+            continue
+        bound = kind.string_bound or 0
+        type_id = _TYPE_IDS[kind.name] + offset + (_BOUNDED_STRING_OFFSET if bound else 0)
+        fields.append(_field(field.name, type_id, capacity, bound, default=default))
+    if not fields:
+        fields.append(_field(_PLACEHOLDER, _TYPE_IDS["uint8"]))
+
+
+def _field(
+    name: str,
+    type_id: int,
+    capacity: int = 0,
+    bound: int = 0,
+    nested: str = "",
+    default: str = "",
+) -> dict[str, Any]:
+    return {
+        "name": name,
+        "type": {
+            "type_id": type_id,
+            "capacity": capacity,
+            "string_capacity": bound,
+            "nested_type_name": nested,
+        },
+        "default_value": default,
+    }
+
+
+def _default_text(field: Field) -> str:
+    if field.default is None:
+        return ""
+    if isinstance(field.default, tuple):
+        return str(field.default)
+    return str(field.default)
+
+
+def _nested(owner: Definition, field: Field, nested: Mapping[str, Definition]) -> Definition:
+    name = field.type.name
+    found = nested.get(name)
+    if found is None:
+        text = _BUILT_IN.get((owner.ros, name))
+        if text is None:
+            raise DefinitionError(
+                f"field {field.name}: {owner.name} is not resolved, {name} is missing; load it "
+                "with Library.definition()",
+                owner.source.file,
+                *field.place,
+            )
+        found = parse_message(text, name, ros=owner.ros)
+    return found
+
+
+def full_text(definition: InterfaceDefinition) -> str:
+    """Return the definition with those it needs appended, as ROS 1 connection headers carry it.
+
+    Raises:
+        DefinitionError: `definition` is not resolved.
+    """
+    if isinstance(definition, ServiceDefinition):
+        parts: Iterable[Definition] = (definition.request, definition.response)
+    elif isinstance(definition, ActionDefinition):
+        parts = (definition.goal, definition.result, definition.feedback)
+    else:
+        parts = (definition,)
+    needed: dict[str, Definition] = {}
+    for part in parts:
+        for field in part.fields:
+            if field.type.is_compound:
+                _collect(part, field, part.nested, needed)
+    texts = [definition.text]
+    for name, nested in needed.items():
+        package, _, base = name.split("/")
+        texts.append(f"{'=' * 80}\nMSG: {package}/{base}\n{nested.text}")
+    return "\n".join(texts)
+
+
+def _collect(
+    owner: Definition,
+    field: Field,
+    nested: Mapping[str, Definition],
+    needed: dict[str, Definition],
+) -> None:
+    if field.type.name in needed:
+        return
+    definition = _nested(owner, field, nested)
+    needed[definition.name] = definition
+    for inner in definition.fields:
+        if inner.type.is_compound:
+            _collect(definition, inner, nested, needed)

@@ -1,0 +1,347 @@
+"""The library: looks definitions up in a chain of providers and remembers them."""
+
+from __future__ import annotations
+
+import os
+import threading
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rosglass.errors import (
+    DefinitionConflictError,
+    DefinitionError,
+    TypeNotFoundError,
+    UnsupportedError,
+)
+from rosglass.interfaces.definition import ActionDefinition, Definition, ServiceDefinition
+from rosglass.interfaces.derived import derive, derived_from
+from rosglass.interfaces.distributions import Distributions
+from rosglass.interfaces.folders import Folders, workspace
+from rosglass.interfaces.hashes import md5, rihs01
+from rosglass.interfaces.idl import parse_idl
+from rosglass.interfaces.names import KINDS, join_name, split_name
+from rosglass.interfaces.parser import parse
+from rosglass.interfaces.provider import MemoryProvider, Provider, difference
+from rosglass.interfaces.resolver import Resolver
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from rosglass.interfaces.definition import Field, InterfaceDefinition, Source
+
+__all__ = ["Library"]
+
+PREFER_VARIABLE = "ROSGLASS_PREFER_DEFINITIONS"
+
+
+class Library:
+    """Definitions of types, wherever they come from; safe to use from several threads.
+
+    A type is looked for in definitions received from peers, the sourced workspace, folders added by
+    the user, and the distributions' standard sets, in this order. When two of them define a type
+    differently neither is used, unless one is preferred.
+
+    Args:
+        providers: Replaces the workspace, the folders and the standard sets.
+        distribution: Whose standard set comes first, e.g. ``humble``; by default the
+            environment's ``ROS_DISTRO``, else Jazzy.
+        prefer: Names of providers that win when definitions differ, see :meth:`prefer`; by
+            default the environment's ``ROSGLASS_PREFER_DEFINITIONS`` (separated by commas).
+
+    Raises:
+        UnsupportedError: `distribution` or `prefer` is unknown.
+    """
+
+    def __init__(
+        self, *providers: Provider, distribution: str = "", prefer: str | tuple[str, ...] = ()
+    ) -> None:
+        self._wire = MemoryProvider()
+        self._folders = Folders()
+        standard = [workspace(os.environ), self._folders, Distributions(distribution)]
+        self._chain: list[Provider] = [self._wire, *(providers or standard)]
+        self._lock = threading.RLock()
+        self._loaded: dict[tuple[int, str, str], InterfaceDefinition] = {}
+        self._resolvers: dict[int, Resolver] = {}
+        self._preferred: list[str] = []
+        chosen = (prefer,) if isinstance(prefer, str) else prefer
+        if not chosen:
+            chosen = tuple(os.environ.get(PREFER_VARIABLE, "").replace(",", " ").split())
+        self.prefer(*chosen)
+
+    def definition(self, name: str, ros: int = 2, *, hash: str = "") -> InterfaceDefinition:
+        """Return the definition of a type, with everything that it needs.
+
+        Args:
+            name: ``pkg/msg/Type``, ``pkg/srv/Type``, ``pkg/action/Type``; ``pkg/Type`` is the
+                message, service or action of that name, whichever there is first. Types implied
+                by services and actions have names too, e.g. ``pkg/srv/Type_Request``,
+                ``pkg/action/Type_FeedbackMessage``; in ROS 1 ``pkg/TypeActionGoal``.
+            ros: 1 or 2.
+            hash: md5 sum or RIHS01 hash that a peer announced for it. Picks the definition that
+                has it, of any provider and any distribution.
+
+        Raises:
+            InvalidNameError: `name` is not a type name.
+            TypeNotFoundError: Nobody knows the type; says where it was looked for.
+            DefinitionConflictError: Two providers define the type, or one that it needs,
+                differently, or nobody's definition has `hash`.
+            DefinitionError: A definition has an error or needs an unknown type.
+        """
+        loaded = self._loaded.get((ros, name, hash))
+        if loaded is None:
+            if ros not in (1, 2):
+                raise UnsupportedError(f"ros must be 1 or 2, got {ros!r}")
+            with self._lock:
+                if hash:
+                    loaded = self._matching(name, ros, hash)
+                else:
+                    loaded = self._load(name, ros, self._resolver(ros), self._chain)
+                self._loaded[ros, name, hash] = loaded
+        return loaded
+
+    def source(self, name: str, ros: int = 2) -> Source:
+        """Return where the definition of a type came from; errors as in :meth:`definition`."""
+        return self.definition(name, ros).source
+
+    def names(self, ros: int = 2, kind: str | None = None) -> list[str]:
+        """Return the full names of all known types, sorted.
+
+        Args:
+            ros: 1 or 2.
+            kind: ``msg``, ``srv`` or ``action``; None for all.
+        """
+        with self._lock:
+            names = {name for provider in self._chain for name in provider.names(ros)}
+        return sorted(name for name in names if kind is None or name.split("/")[1] == kind)
+
+    def add_path(self, folder: str | os.PathLike[str]) -> None:
+        """Add a folder: a package, a tree of packages, or an install or devel space.
+
+        Types that are loaded already stay as they are.
+
+        Raises:
+            TypeNotFoundError: There is no such folder.
+        """
+        path = Path(folder).expanduser()
+        if not path.is_dir():
+            raise TypeNotFoundError(f"{path} is not a folder; no definitions can be read from it")
+        with self._lock:
+            if self._folders not in self._chain:
+                self._chain.append(self._folders)
+            self._folders.add(path.resolve())
+
+    def add_text(
+        self, name: str, text: str, ros: int = 2, source: str = "wire", *, encoding: str = ""
+    ) -> InterfaceDefinition:
+        """Add a definition that was received, e.g. from a ROS 1 connection header.
+
+        Args:
+            name: Its type name; ``pkg/Type`` means a message.
+            text: The definition, optionally with those it needs after ``===`` lines.
+            ros: 1 or 2.
+            source: Who sent it, for error messages, e.g. ``wire /camera/image``.
+            encoding: ``idl`` for IDL; otherwise the kind in `name` decides.
+
+        Returns:
+            The definition, not resolved.
+
+        Raises:
+            DefinitionError: The text breaks a rule.
+            DefinitionConflictError: It differs from what another peer sent, or from the
+                definition that is in use already.
+        """
+        file = f"<{name} from {source}>"
+        if encoding == "idl":
+            definition = parse_idl(text, name, file=file, provider=source)
+        elif encoding in ("", *KINDS):
+            full = join_name(name, encoding or "msg")
+            definition = parse(text, full, ros=ros, file=file, provider=source)
+        else:
+            raise UnsupportedError(
+                f"{name}: definitions in the encoding {encoding!r} can't be read; known: "
+                f"{', '.join(KINDS)}, idl"
+            )
+        self.add(definition)
+        return definition
+
+    def add(self, definition: InterfaceDefinition) -> None:
+        """Add a parsed definition, and those that came along in its ``nested``.
+
+        Raises:
+            DefinitionConflictError: As for :meth:`add_text`.
+        """
+        with self._lock:
+            for nested in _nested(definition).values():
+                self._add_one(nested)
+            self._add_one(definition)
+
+    def prefer(self, *providers: str) -> None:
+        """Let these providers' definitions win over differing ones, instead of an error.
+
+        Args:
+            providers: ``wire`` (received), ``workspace``, ``folders`` or ``distribution``; the
+                first one wins over the others.
+
+        Raises:
+            UnsupportedError: There is no such provider.
+        """
+        known = [provider.name for provider in self._chain]
+        for provider in providers:
+            if provider not in known:
+                raise UnsupportedError(
+                    f"there is no provider {provider!r} to prefer; there are: {', '.join(known)}"
+                )
+        with self._lock:
+            self._preferred = [*providers, *(p for p in self._preferred if p not in providers)]
+
+    def _resolver(self, ros: int) -> Resolver:
+        if ros not in self._resolvers:
+            self._resolvers[ros] = self._new_resolver(ros, self._chain)
+        return self._resolvers[ros]
+
+    def _new_resolver(self, ros: int, chain: list[Provider], *, check: bool = True) -> Resolver:
+        def find(name: str, owner: Definition, field: Field) -> Definition:
+            found = self._find(name, ros, chain, check=check)
+            if isinstance(found, Definition):
+                return found
+            raise DefinitionError(
+                f"field {field.name} has the type {name}, which is unknown: "
+                f"{self._not_found(name, ros)}",
+                owner.source.file,
+                *field.place,
+            )
+
+        return Resolver(find)
+
+    def _load(
+        self, name: str, ros: int, resolver: Resolver, chain: list[Provider], *, check: bool = True
+    ) -> InterfaceDefinition:
+        package, kind, base = split_name(name)
+        for candidate in (kind,) if kind else KINDS:
+            found = self._find(f"{package}/{candidate}/{base}", ros, chain, check=check)
+            if found is not None:
+                return resolver.resolve(found)
+        raise TypeNotFoundError(
+            f"no definition of {name} (ROS {ros}) was found: {self._not_found(name, ros)}"
+        )
+
+    def _find(
+        self, name: str, ros: int, chain: list[Provider], *, check: bool
+    ) -> InterfaceDefinition | None:
+        """Return the unresolved definition of a full name, given or derived."""
+        found = self._choose(name, ros, chain, check=check)
+        if found is not None:
+            return found
+        for owner_name, suffix in derived_from(name, ros):
+            owner = self._choose(owner_name, ros, chain, check=check)
+            derived = derive(owner, suffix) if owner is not None else None
+            if derived is not None:
+                return derived
+        return None
+
+    def _choose(
+        self, name: str, ros: int, chain: list[Provider], *, check: bool
+    ) -> InterfaceDefinition | None:
+        """Return the first provider's definition; raises when a later one's differs."""
+        offers = [(provider, provider.find(name, ros)) for provider in chain]
+        offers = [(provider, found) for provider, found in offers if found]
+        if not offers:
+            return None
+        provider, (chosen, *_) = offers[0]
+        if not check:
+            return chosen
+        for other, found in offers[1:]:
+            differences = [difference(chosen, candidate) for candidate in found]
+            if all(differences):
+                winner = self._winner(offers)
+                if winner is not None:
+                    return winner
+                one, two = _place(provider, chosen), _place(other, found[0])
+                raise DefinitionConflictError(
+                    f"two sources define {name} differently: {one} and {two}: {differences[0]}. "
+                    f"Remove one, or choose: Library.prefer({provider.name!r}) or "
+                    f"Library.prefer({other.name!r}), or set {PREFER_VARIABLE}={provider.name}"
+                )
+        return chosen
+
+    def _winner(
+        self, offers: list[tuple[Provider, Sequence[InterfaceDefinition]]]
+    ) -> InterfaceDefinition | None:
+        for name in self._preferred:
+            for provider, found in offers:
+                if provider.name == name:
+                    return found[0]
+        return None
+
+    def _matching(self, name: str, ros: int, wanted: str) -> InterfaceDefinition:
+        """Return the definition with a given hash, of whichever provider or distribution."""
+        tried: dict[str, str] = {}
+        for chain in self._views(ros):
+            resolver = self._new_resolver(ros, chain, check=False)
+            found = self._load(name, ros, resolver, chain, check=False)
+            actual = md5(found) if ros == 1 else rihs01(found)
+            if actual == wanted:
+                return found
+            tried.setdefault(actual, _place(None, found))
+        known = "; ".join(f"{place} has {actual}" for actual, place in tried.items())
+        raise DefinitionConflictError(
+            f"no definition of {name} has the hash {wanted} that the peer announces: {known}. Add "
+            "the peer's definition with Library.add_path() or source its workspace"
+        )
+
+    def _views(self, ros: int) -> Iterator[list[Provider]]:
+        """Yield the chain with each provider, and each distribution, moved to the front."""
+        for provider in self._chain:
+            for view in provider.views(ros):
+                yield [view, *(other for other in self._chain if other is not provider)]
+
+    def _add_one(self, definition: InterfaceDefinition) -> None:
+        key = (definition.ros, definition.name, "")
+        used = self._loaded.get(key) or self._resolver(definition.ros).known(definition.name)
+        found = difference(used, definition) if used is not None else ""
+        if found and self._preferred[:1] != [self._wire.name]:
+            assert used is not None
+            raise DefinitionConflictError(
+                f"{definition.name} as received from {definition.source.provider} differs from "
+                f"the definition in use, from {_place(None, used)}: {found}. Use "
+                "Library.prefer('wire') to trust what peers send"
+            )
+        if found:
+            self._wire.replace(definition)
+            self._loaded.clear()
+            self._resolvers.clear()
+        else:
+            self._wire.add(definition)
+
+    def _not_found(self, name: str, ros: int) -> str:
+        import difflib  # noqa: PLC0415 - only needed to explain an error
+
+        looked = [text for text in (p.describe(ros) for p in self._chain) if text]
+        names = self.names(ros)
+        other = self.names(3 - ros)
+        short = {f"{n.split('/')[0]}/{n.split('/')[2]}": n for n in reversed(names)}
+        wanted = "/".join(part for part in name.split("/") if part not in KINDS)
+        close = [short[match] for match in difflib.get_close_matches(wanted, short, 3, 0.75)]
+        text = f"looked in {'; '.join(looked) or 'nothing: there are no providers'}."
+        if close:
+            text += f" Did you mean {' or '.join(close)}?"
+        if any(n.split("/")[0] + "/" + n.split("/")[2] == wanted for n in other):
+            text += f" ROS {3 - ros} has it."
+        return f"{text} Source its workspace, or add its folder with Library.add_path()"
+
+
+def _place(provider: Provider | None, definition: InterfaceDefinition) -> str:
+    label = definition.source.provider
+    file = definition.source.file
+    if provider is not None and not label.startswith(provider.name):
+        label = f"{provider.name} {label}"
+    return label if file.startswith("<") else f"{label} ({file})"
+
+
+def _nested(definition: InterfaceDefinition) -> dict[str, Definition]:
+    if isinstance(definition, ServiceDefinition):
+        return {**definition.request.nested, **definition.response.nested}
+    if isinstance(definition, ActionDefinition):
+        parts = (definition.goal, definition.result, definition.feedback)
+        return {name: nested for part in parts for name, nested in part.nested.items()}
+    return dict(definition.nested)
