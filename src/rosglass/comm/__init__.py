@@ -1,13 +1,18 @@
 """What a robot offers: the abstract node and everything the worlds have in common."""
 
+from rosglass.comm.executor import IMMEDIATE, Dispatcher
 from rosglass.comm.graph import ConnectionState, EndpointInfo, EndpointKind, NodeName, Status
+from rosglass.comm.listeners import Listeners
 from rosglass.comm.node import Executor, Handle, Node, Publisher
 from rosglass.comm.qos import Durability, History, Liveliness, QoS, Reliability
 from rosglass.comm.subscription import Sample, Statistics, Subscription
 from rosglass.comm.time import Duration, Time
+from rosglass.comm.worker import Worker
 
 __all__ = [
+    "IMMEDIATE",
     "ConnectionState",
+    "Dispatcher",
     "Durability",
     "Duration",
     "EndpointInfo",
@@ -15,6 +20,7 @@ __all__ = [
     "Executor",
     "Handle",
     "History",
+    "Listeners",
     "Liveliness",
     "Node",
     "NodeName",
@@ -26,4 +32,5 @@ __all__ = [
     "Status",
     "Subscription",
     "Time",
+    "Worker",
 ]

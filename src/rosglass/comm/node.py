@@ -7,7 +7,7 @@ package knows which one it talks to.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from rosglass.messages import Message, MessageType
 
 __all__ = ["Executor", "Handle", "Node", "Publisher"]
+
+_H = TypeVar("_H", bound="Handle")
 
 
 class Executor(ABC):
@@ -37,7 +39,7 @@ class Handle(ABC):
     def close(self) -> None:
         """Undo the registration; safe to call twice."""
 
-    def __enter__(self) -> Handle:
+    def __enter__(self: _H) -> _H:  # noqa: PYI019 - typing.Self needs 3.11
         return self
 
     def __exit__(

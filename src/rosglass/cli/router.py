@@ -1,0 +1,53 @@
+"""``rosglass router``: run a Zenoh router until Ctrl-C or SIGTERM."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import argparse
+
+__all__ = ["configure", "run"]
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
+        "--listen",
+        default="tcp/127.0.0.1:7447",
+        metavar="tcp/HOST:PORT",
+        help="where to listen (default: %(default)s, this machine only; port 0 takes a free one)",
+    )
+    where.add_argument(
+        "--open",
+        action="store_const",
+        const="tcp/[::]:7447",
+        dest="listen",
+        help="listen for the whole network, as ROS 2's own router does: tcp/[::]:7447",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the router; returns 0 after Ctrl-C or SIGTERM."""
+    from rosglass.ros2.router import Router
+
+    ended = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ended.set())
+    with Router(args.listen) as router:
+        if not router.is_local:
+            print(
+                f"rosglass: warning: {router.listen} is open to the network; anyone who reaches it "
+                "can steer the robot",
+                file=sys.stderr,
+            )
+        print(f"Zenoh router at {router.listen}; connect with {router.url}", flush=True)
+        # In slices: Windows delivers no signal to a thread that waits for ever.
+        while not ended.wait(0.5):
+            pass
+    print("Zenoh router ended", flush=True)
+    return 0

@@ -1,0 +1,83 @@
+"""Callbacks that are told about a value, each on its own executor."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+from rosglass.comm.node import Executor, Handle
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+__all__ = ["Listeners"]
+
+_T = TypeVar("_T")
+
+
+class Listeners(Generic[_T]):
+    """A list of callbacks.
+
+    Args:
+        merge: Whether a callback that has not run yet is only told the newest value, so that a
+            burst of changes costs one call.
+    """
+
+    def __init__(self, merge: bool = False) -> None:
+        self._merge = merge
+        self._lock = threading.Lock()
+        self._listeners: list[_Listener[_T]] = []
+
+    def add(self, callback: Callable[[_T], None], executor: Executor) -> Handle:
+        """Tell `callback` each new value on `executor`, until the handle is closed."""
+        listener = _Listener(self, callback, executor)
+        with self._lock:
+            self._listeners.append(listener)
+        return listener
+
+    def notify(self, value: _T) -> None:
+        """Tell everyone `value`; from any thread, without waiting."""
+        with self._lock:
+            told = list(self._listeners)
+        for listener in told:
+            listener.tell(value, self._merge)
+
+    def clear(self) -> None:
+        """Forget everyone."""
+        with self._lock:
+            told, self._listeners = self._listeners, []
+        for listener in told:
+            listener.closed = True
+
+    def _remove(self, listener: _Listener[_T]) -> None:
+        with self._lock:
+            if listener in self._listeners:
+                self._listeners.remove(listener)
+
+
+class _Listener(Handle, Generic[_T]):
+    def __init__(
+        self, owner: Listeners[_T], callback: Callable[[_T], None], executor: Executor
+    ) -> None:
+        self._owner, self._callback, self._executor = owner, callback, executor
+        self._lock = threading.Lock()
+        self._waiting: list[_T] = []
+        self.closed = False
+
+    def tell(self, value: _T, merge: bool) -> None:
+        with self._lock:
+            if merge and self._waiting:
+                self._waiting[-1] = value
+                return
+            self._waiting.append(value)
+        self._executor.post(self._run)
+
+    def _run(self) -> None:
+        with self._lock:
+            value = self._waiting.pop(0)
+        if not self.closed:
+            self._callback(value)
+
+    def close(self) -> None:
+        self.closed = True
+        self._owner._remove(self)

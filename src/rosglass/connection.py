@@ -1,0 +1,107 @@
+"""Connecting to a robot: which world a URL or the environment names."""
+
+from __future__ import annotations
+
+import itertools
+import os
+from typing import TYPE_CHECKING
+
+from rosglass.errors import ConversionError, UnsupportedError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from rosglass.comm import Node
+    from rosglass.interfaces import Library
+
+__all__ = ["connect", "default_url"]
+
+_EXAMPLE = "zenoh://127.0.0.1:7447"
+#: Schemes that are refused in this version, and why.
+_REFUSED = {
+    "ros1": "ROS 1 is not in this version",
+    "dds": "DDS is not in this version; run the robot with RMW_IMPLEMENTATION=rmw_zenoh_cpp",
+}
+_anonymous = itertools.count(1)
+
+
+def connect(
+    url: str | None = None,
+    name: str | None = None,
+    namespace: str = "/",
+    *,
+    library: Library | None = None,
+) -> Node:
+    """Join a robot's graph and return the node that stands for this program in it.
+
+    Returns at once: when nobody answers, the node keeps trying, says so in
+    :meth:`~rosglass.comm.Node.status`, and catches up when someone does.
+
+    Args:
+        url: ``zenoh://host:port`` of a Zenoh router (rmw_zenoh), port 7447 when left out. Options
+            follow as in ``zenoh://robot:7447?domain=5&mode=client``: ``domain`` (default:
+            ROS_DOMAIN_ID, or 0), ``mode`` (``peer`` links directly with other nodes, ``client``
+            only with the router), ``distro=humble`` (announce types as Humble does),
+            ``shm=true`` (shared memory between programs of one machine that both allow it).
+            ``zenoh://`` alone means the router that ZENOH_SESSION_CONFIG_URI names, or one on this
+            machine. None asks the environment: ROSGLASS_URL, then RMW_IMPLEMENTATION and
+            ZENOH_SESSION_CONFIG_URI.
+        name: Base name of the node; None for ``rosglass_<process id>``.
+        namespace: Absolute namespace of the node.
+        library: Where message definitions come from; None for the shared library.
+
+    Raises:
+        ConversionError: A part of the URL or an environment variable is not valid.
+        UnsupportedError: The URL's scheme is unknown, or there is neither URL nor environment.
+        InvalidNameError: The name or namespace breaks ROS's rules.
+        ConnectionLostError: This machine cannot open a session at all.
+    """
+    if url is None:
+        url = default_url(os.environ)
+    if not isinstance(url, str):
+        raise ConversionError("url", url, f"a text such as {_EXAMPLE}")
+    scheme, separator, _ = url.partition("://")
+    if scheme != "zenoh" or not separator:
+        reason = _REFUSED.get(scheme, f"unknown scheme {scheme!r}" if separator else "no scheme")
+        raise UnsupportedError(
+            f"cannot connect to {url!r}: {reason}; known: zenoh:// (ROS 2 with rmw_zenoh), "
+            f"e.g. {_EXAMPLE}"
+        )
+    if name is None:
+        number = next(_anonymous)
+        name = f"rosglass_{os.getpid()}" + (f"_{number}" if number > 1 else "")
+    return _connect_zenoh(url, name, namespace, library)
+
+
+def default_url(env: Mapping[str, str]) -> str:
+    """Return the URL that the environment `env` asks for; raises UnsupportedError when it doesn't.
+
+    ROSGLASS_URL wins; otherwise RMW_IMPLEMENTATION names the middleware, as for ROS 2's own
+    programs, and a Zenoh session configuration implies Zenoh.
+    """
+    choice = f"pass a URL to connect(), or set ROSGLASS_URL, e.g. ROSGLASS_URL={_EXAMPLE}"
+    if env.get("ROSGLASS_URL"):
+        return env["ROSGLASS_URL"]
+    implementation = env.get("RMW_IMPLEMENTATION", "")
+    if implementation and implementation != "rmw_zenoh_cpp":
+        raise UnsupportedError(
+            f"RMW_IMPLEMENTATION={implementation} asks for DDS, which is not in this version; "
+            f"run the robot with rmw_zenoh_cpp and {choice}"
+        )
+    if implementation or env.get("ZENOH_SESSION_CONFIG_URI"):
+        return "zenoh://"
+    hint = ""
+    if env.get("ROS_MASTER_URI"):
+        hint = " (ROS_MASTER_URI is set, but ROS 1 is not in this version)"
+    raise UnsupportedError(f"no robot was named{hint}: {choice}")
+
+
+def _connect_zenoh(url: str, name: str, namespace: str, library: Library | None) -> Node:
+    # Zenoh's package is an extra, and takes a while to import.
+    from rosglass.ros2.node import Ros2Node  # noqa: PLC0415
+    from rosglass.ros2.zenoh_options import ZenohOptions  # noqa: PLC0415
+
+    options = ZenohOptions.parse(url, os.environ)
+    from rosglass.ros2.zenoh import ZenohMiddleware  # noqa: PLC0415
+
+    return Ros2Node(ZenohMiddleware(options), url, name, namespace, library)

@@ -1,0 +1,160 @@
+"""ROS 2's names: which are valid, what they expand to, and how types are spelled on the wire.
+
+Rules: design article "Topic and Service name mapping to DDS" and the behaviour of ``rcl`` and
+``rmw`` (``rcl_expand_topic_name``, ``rmw_validate_full_topic_name``, ``rmw_validate_node_name``,
+``rmw_validate_namespace``).
+"""
+
+from __future__ import annotations
+
+import re
+
+from rosglass.errors import InvalidNameError
+
+__all__ = [
+    "MAX_NODE_NAME",
+    "MAX_TOPIC_NAME",
+    "demangle_type",
+    "expand",
+    "mangle_type",
+    "validate_namespace",
+    "validate_node_name",
+]
+
+#: Longest topic or service name in characters; DDS allows 255, less the prefix ``rq/`` + ``Reply``.
+MAX_TOPIC_NAME = 247
+#: Longest node name in characters.
+MAX_NODE_NAME = 255
+#: Longest namespace in characters.
+MAX_NAMESPACE = 245
+
+_FORBIDDEN = re.compile(r"[^A-Za-z0-9_/]")
+_FORBIDDEN_IN_PATTERN = re.compile(r"[^A-Za-z0-9_/~{}]")
+_FORBIDDEN_IN_NODE = re.compile(r"[^A-Za-z0-9_]")
+_DIGIT_FIRST = re.compile(r"(?:^|/)([0-9])")
+_SUBSTITUTION = re.compile(r"\{([^{}]*)\}")
+_DDS_TYPE = re.compile(r"([A-Za-z]\w*)::(\w+)::dds_::(\w+)_\Z")
+_ROS_TYPE = re.compile(r"([A-Za-z]\w*)/(\w+)/(\w+)\Z")
+
+
+def validate_node_name(name: str) -> None:
+    """Raise InvalidNameError unless `name` can be a node's base name."""
+    if not name:
+        raise InvalidNameError("a node name must not be empty")
+    _reject(_FORBIDDEN_IN_NODE, "node name", name, "only letters, digits and '_' are allowed")
+    if name[0].isdigit():
+        raise InvalidNameError(
+            f"node name {name!r} starts with a digit; put a letter or '_' before it"
+        )
+    _limit("node name", name, MAX_NODE_NAME)
+
+
+def validate_namespace(namespace: str) -> None:
+    """Raise InvalidNameError unless `namespace` is a valid absolute namespace."""
+    if not namespace.startswith("/"):
+        raise InvalidNameError(
+            f"namespace {namespace!r} is not absolute; write {'/' + namespace!r}"
+        )
+    if namespace != "/":
+        _validate_full("namespace", namespace, MAX_NAMESPACE)
+
+
+def expand(name: str, node: str, namespace: str) -> str:
+    """Return the absolute topic or service name that `name` means for a node.
+
+    Relative names get the namespace in front, ``~`` and ``~/rest`` the node's full name;
+    ``{node}``, ``{ns}`` and ``{namespace}`` are replaced.
+
+    Args:
+        name: As the user wrote it.
+        node: The node's base name.
+        namespace: The node's absolute namespace.
+
+    Raises:
+        InvalidNameError: `name`, or what it expands to, breaks the rules; the message says where.
+    """
+    what = "topic or service name"
+    if not isinstance(name, str) or not name:
+        raise InvalidNameError(f"a {what} must be a non-empty string, got {name!r}")
+    allowed = "only letters, digits, '_', '/', and '~', '{', '}' for expansion are allowed"
+    _reject(_FORBIDDEN_IN_PATTERN, what, name, allowed)
+    tilde = name.find("~", 1)
+    if tilde > 0:
+        raise InvalidNameError(
+            f"{what} {name!r}: '~' at position {tilde} must be the first character"
+        )
+    if name.startswith("~") and name[1:2] not in ("", "/"):
+        raise InvalidNameError(f"{what} {name!r}: write {'~/' + name[1:]!r}")
+    prefix = namespace.rstrip("/")
+    full = _SUBSTITUTION.sub(lambda match: _substitute(match, name, node, namespace), name)
+    if "{" in full or "}" in full:
+        position = min(name.find(brace) for brace in "{}" if brace in full)
+        raise InvalidNameError(f"{what} {name!r}: unbalanced brace at position {position}")
+    if full.startswith("~"):
+        full = f"{prefix}/{node}{full[1:]}"
+    elif not full.startswith("/"):
+        full = f"{prefix}/{full}"
+    # A substituted namespace brings a leading slash of its own: "/x{ns}" is what the user wrote.
+    _validate_full(what, full, MAX_TOPIC_NAME, name)
+    return full
+
+
+def mangle_type(type_name: str) -> str:
+    """Return the wire's spelling of a type: ``pkg/msg/T`` becomes ``pkg::msg::dds_::T_``."""
+    match = _ROS_TYPE.match(type_name)
+    if match is None:
+        raise InvalidNameError(
+            f"type name {type_name!r} is not of the form package/msg/Type, e.g. std_msgs/msg/String"
+        )
+    return "{}::{}::dds_::{}_".format(*match.groups())
+
+
+def demangle_type(dds_type: str) -> str:
+    """Return ``pkg/msg/T`` for ``pkg::msg::dds_::T_``; foreign spellings are returned unchanged."""
+    match = _DDS_TYPE.match(dds_type)
+    return "/".join(match.groups()) if match else dds_type
+
+
+def _substitute(match: re.Match[str], name: str, node: str, namespace: str) -> str:
+    values = {"node": node, "ns": namespace, "namespace": namespace}
+    if match[1] not in values:
+        raise InvalidNameError(
+            f"topic or service name {name!r}: unknown substitution {match[0]!r} at position "
+            f"{match.start()}; known are {{node}}, {{ns}} and {{namespace}}"
+        )
+    return values[match[1]]
+
+
+def _validate_full(what: str, name: str, limit: int, written: str = "") -> None:
+    label = f"{what} {name!r}"
+    if written and written != name:
+        label += f" (expanded from {written!r})"
+    _reject(_FORBIDDEN, what, name, "only letters, digits, '_' and '/' are allowed")
+    if name.endswith("/"):
+        raise InvalidNameError(f"{label} ends with '/'; leave that out")
+    if "//" in name:
+        raise InvalidNameError(
+            f"{label} has '//' at position {name.index('//')}; write a single '/'"
+        )
+    digit = _DIGIT_FIRST.search(name)
+    if digit:
+        raise InvalidNameError(
+            f"{label}: the part at position {digit.start(1)} starts with the digit {digit[1]!r}; "
+            "put a letter or '_' before it"
+        )
+    _limit(what, name, limit)
+
+
+def _reject(forbidden: re.Pattern[str], what: str, name: str, allowed: str) -> None:
+    match = forbidden.search(name)
+    if match:
+        raise InvalidNameError(
+            f"{what} {name!r} contains {match[0]!r} at position {match.start()}; {allowed}"
+        )
+
+
+def _limit(what: str, name: str, limit: int) -> None:
+    if len(name) > limit:
+        raise InvalidNameError(
+            f"{what} {name[:40] + '...'!r} has {len(name)} characters; at most {limit} are allowed"
+        )

@@ -1,0 +1,107 @@
+"""Publishing on a ROS 2 topic."""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING, Any
+
+from rosglass.comm import EndpointKind, Publisher
+from rosglass.errors import ConversionError, NodeClosedError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rosglass.comm import EndpointInfo, QoS
+    from rosglass.messages import Message, MessageType
+    from rosglass.ros2.graph import Graph
+    from rosglass.ros2.middleware import Writer
+
+__all__ = ["Ros2Publisher"]
+
+_log = logging.getLogger("rosglass.ros2")
+
+
+class Ros2Publisher(Publisher):
+    """A publisher; made by :meth:`Node.create_publisher`."""
+
+    def __init__(
+        self,
+        topic: str,
+        type: MessageType,
+        qos: QoS,
+        writer: Writer,
+        graph: Graph,
+        matches_qos: bool,
+        on_close: Callable[[Ros2Publisher], None],
+    ) -> None:
+        self.topic, self.type, self.qos = topic, type, qos
+        self._writer, self._graph, self._matches_qos = writer, graph, matches_qos
+        self._on_close = on_close
+        self._closed = False
+        self._warned: set[EndpointInfo] = set()
+
+    def publish(self, message: Message | dict[str, Any] | None = None, /, **fields: Any) -> None:
+        """Encode and send a message; see :meth:`rosglass.comm.Publisher.publish`."""
+        if message is not None and fields:
+            raise ConversionError(
+                "", fields, "either a message or keyword fields, not both", self.type.name
+            )
+        self._check_open()
+        value = fields if message is None else message
+        self._writer.write(self.type.encode(value, wire="cdr"))
+
+    def publish_serialized(self, data: bytes | bytearray | memoryview) -> None:
+        """Send `data`, which starts with its 4-byte encapsulation header, unchanged."""
+        self._check_open()
+        if not isinstance(data, (bytes, bytearray, memoryview)):
+            raise ConversionError("", data, "bytes, a bytearray or a memoryview", self.type.name)
+        # Copied: the caller may reuse its buffer at once.
+        payload = bytes(data)
+        if len(payload) < 4 or payload[0] != 0:
+            raise ConversionError(
+                "", payload, "CDR bytes with their 4-byte encapsulation header", self.type.name
+            )
+        self._writer.write(payload)
+
+    def subscription_count(self) -> int:
+        """Return how many subscriptions in the graph match now; 0 after closing."""
+        return 0 if self._closed else len(self._matching())
+
+    def follow(self) -> None:
+        """Follow a change of the graph; for the node."""
+        if not self._closed:
+            self._writer.match(self._matching())
+
+    def close(self) -> None:
+        """Withdraw the publisher; safe to call twice."""
+        if not self._closed:
+            self._closed = True
+            self._writer.close()
+            self._on_close(self)
+
+    def _matching(self) -> list[EndpointInfo]:
+        found = []
+        for endpoint in self._graph.endpoints(EndpointKind.SUBSCRIPTION, self.topic):
+            if endpoint.type != self.type.name:
+                continue
+            if endpoint.type_hash not in ("", self.type.rihs01):
+                self._warn(endpoint)
+            elif not (self._matches_qos and endpoint.qos.incompatibility(self.qos)):
+                found.append(endpoint)
+        return found
+
+    def _warn(self, endpoint: EndpointInfo) -> None:
+        if endpoint not in self._warned:
+            self._warned.add(endpoint)
+            _log.warning(
+                "%s: %s has another definition of %s (%s; ours is %s) and receives nothing from us",
+                self.topic,
+                endpoint.node,
+                self.type.name,
+                endpoint.type_hash,
+                self.type.rihs01,
+            )
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise NodeClosedError(f"the publisher of {self.topic} is closed; create another one")

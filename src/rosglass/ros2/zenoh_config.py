@@ -1,0 +1,106 @@
+"""Zenoh sessions and routers: their settings, chosen as rmw_zenoh's defaults are.
+
+A session is a peer that connects to a router, listens on the loopback interface only, and learns
+of other peers from those it is linked with (gossip), never by multicast.
+"""
+
+from __future__ import annotations
+
+import json
+import secrets
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import zenoh
+
+from rosglass.errors import ConversionError
+from rosglass.ros2.zenoh_options import ZenohOptions, locator
+
+__all__ = ["close_session", "router_config", "session_config"]
+
+#: Pause between two attempts to connect, in milliseconds: first, and at most.
+_RETRY = {"period_init_ms": 250, "period_max_ms": 1000, "period_increase_factor": 2}
+
+
+def session_config(options: ZenohOptions) -> tuple[zenoh.Config, str]:
+    """Return the configuration of a session, and the addresses it connects to in words.
+
+    Raises:
+        ConversionError: The configuration file cannot be read, or Zenoh rejects it.
+    """
+    settings: dict[str, Any] = {
+        # Opening returns at once; linking goes on in the background.
+        "open/return_conditions/connect_scouted": False,
+        "open/return_conditions/declares": False,
+        # The cache of transient local publishers needs time stamps.
+        "timestamping/enabled": True,
+        # Sets the id, so that the tokens are known before the session is open. Zenoh drops
+        # leading zeros.
+        "id": "f" + secrets.token_hex(16)[1:],
+    }
+    if options.config_file is None:
+        config = zenoh.Config()
+        settings["mode"] = options.mode or "peer"
+        settings["listen/endpoints"] = ["tcp/127.0.0.1:0"] if settings["mode"] == "peer" else []
+        settings["scouting/multicast/enabled"] = False
+        settings["scouting/gossip/enabled"] = True
+        settings["connect/retry"] = _RETRY
+        settings["transport/shared_memory/enabled"] = bool(options.shared_memory)
+        host = options.host or "127.0.0.1"
+    else:
+        config = _read(options.config_file)
+        if options.mode is not None:
+            settings["mode"] = options.mode
+        if options.shared_memory is not None:
+            settings["transport/shared_memory/enabled"] = options.shared_memory
+        host = options.host or ""
+    if host:
+        settings["connect/endpoints"] = [locator(host, options.port)]
+    for key, value in settings.items():
+        config.insert_json5(key, json.dumps(value))
+    return config, _endpoints(config)
+
+
+def router_config(listen: str) -> zenoh.Config:
+    """Return the configuration of a router that listens at a locator such as ``tcp/[::]:7447``."""
+    config = zenoh.Config()
+    settings: dict[str, Any] = {
+        "mode": "router",
+        "listen/endpoints": [listen],
+        "listen/exit_on_failure": True,
+        "connect/endpoints": [],
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": True,
+        "timestamping/enabled": True,
+        "open/return_conditions/connect_scouted": False,
+    }
+    for key, value in settings.items():
+        config.insert_json5(key, json.dumps(value))
+    return config
+
+
+def close_session(session: zenoh.Session) -> None:
+    """Close a session, whatever state it is in."""
+    with suppress(zenoh.ZError):  # one that is broken already is closed enough
+        session.close()  # type: ignore[no-untyped-call]
+
+
+def _read(file: str) -> zenoh.Config:
+    path = Path(file.removeprefix("file://"))
+    try:
+        config: zenoh.Config = zenoh.Config.from_file(path)
+    except zenoh.ZError as error:
+        raise ConversionError(
+            "ZENOH_SESSION_CONFIG_URI",
+            file,
+            f"a Zenoh configuration file that can be read ({error})",
+        ) from error
+    return config
+
+
+def _endpoints(config: zenoh.Config) -> str:
+    endpoints = json.loads(config.get_json("connect/endpoints"))
+    if isinstance(endpoints, dict):
+        endpoints = endpoints.get(json.loads(config.get_json("mode")) or "peer", [])
+    return ", ".join(map(str, endpoints)) or "any address (none is configured)"

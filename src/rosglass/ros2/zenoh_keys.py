@@ -1,0 +1,252 @@
+"""rmw_zenoh's key expressions: where data flows, and the tokens that make up the graph.
+
+Formats: ``docs/design.md`` of rmw_zenoh (https://github.com/ros2/rmw_zenoh) and its released
+behaviour. Everything here is text in, text out; no session is needed.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import xxhash
+
+from rosglass.comm import (
+    Durability,
+    Duration,
+    EndpointInfo,
+    EndpointKind,
+    History,
+    Liveliness,
+    NodeName,
+    QoS,
+    Reliability,
+)
+from rosglass.ros2.names import demangle_type, mangle_type
+
+__all__ = [
+    "HUMBLE_HASH",
+    "NO_ATTACHMENT",
+    "Attachment",
+    "Token",
+    "decode_qos",
+    "encode_qos",
+    "gid_of",
+    "graph_key",
+    "topic_key",
+]
+
+#: What Humble, which has no type hashes, writes in their place.
+HUMBLE_HASH = "TypeHashNotSupported"
+
+_SPACE = "@ros2_lv"
+_NODE_KIND = "NN"
+_KINDS = {
+    "MP": EndpointKind.PUBLISHER,
+    "MS": EndpointKind.SUBSCRIPTION,
+    "SS": EndpointKind.SERVICE_SERVER,
+    "SC": EndpointKind.SERVICE_CLIENT,
+}
+_CODES = {kind: code for code, kind in _KINDS.items()}
+
+# Values of rmw's enums (rmw/types.h).
+_RELIABILITY = {"1": Reliability.RELIABLE, "2": Reliability.BEST_EFFORT}
+_DURABILITY = {"1": Durability.TRANSIENT_LOCAL, "2": Durability.VOLATILE}
+_HISTORY = {"1": History.KEEP_LAST, "2": History.KEEP_ALL}
+_LIVELINESS = {"1": Liveliness.AUTOMATIC, "3": Liveliness.MANUAL_BY_TOPIC}
+_NUMBER_OF: dict[object, str] = {
+    value: number
+    for table in (_RELIABILITY, _DURABILITY, _HISTORY, _LIVELINESS)
+    for number, value in table.items()
+}
+#: Depth that an empty field stands for (RMW_ZENOH_DEFAULT_HISTORY_DEPTH).
+_DEFAULT_DEPTH = 42
+_NS = 1_000_000_000
+#: Spans of a century and more mean "infinite": rmw writes INT64_MAX or UINT64_MAX nanoseconds.
+_INFINITE = 100 * 365 * 86400 * _NS
+
+
+def topic_key(domain: int, topic: str, type_name: str, type_hash: str) -> str:
+    """Return the key that a topic's data is sent on; `type_hash` may be the wildcard ``*``."""
+    return f"{domain}/{topic.strip('/')}/{mangle_type(type_name)}/{type_hash}"
+
+
+def graph_key(domain: int) -> str:
+    """Return the key expression that all tokens of a domain match."""
+    return f"{_SPACE}/{domain}/**"
+
+
+@dataclass(frozen=True)
+class Token:
+    """A liveliness token: one node, or one endpoint of it.
+
+    Attributes:
+        domain: ROS domain.
+        session: The session's Zenoh id, hexadecimal.
+        node_id: The node's running number in its session; text, as some peers write a name.
+        entity_id: The entity's running number in its session.
+        node: Name of the node.
+        endpoint: The endpoint; None when the token stands for the node itself.
+    """
+
+    domain: int
+    session: str
+    node_id: str
+    entity_id: str
+    node: NodeName
+    endpoint: EndpointInfo | None = None
+
+    def key(self) -> str:
+        """Return the token's key expression."""
+        kind = _NODE_KIND if self.endpoint is None else _CODES[self.endpoint.kind]
+        parts = [
+            _SPACE,
+            str(self.domain),
+            self.session,
+            self.node_id,
+            self.entity_id,
+            kind,
+            _mangle(""),
+            _mangle("" if self.node.namespace == "/" else self.node.namespace),
+            self.node.name,
+        ]
+        if self.endpoint is not None:
+            parts += [
+                _mangle(self.endpoint.name),
+                mangle_type(self.endpoint.type),
+                self.endpoint.type_hash or HUMBLE_HASH,
+                encode_qos(self.endpoint.qos),
+            ]
+        return "/".join(parts)
+
+    @classmethod
+    def parse(cls, key: str) -> Token:
+        """Return the token that `key` stands for; raises ValueError with the reason.
+
+        Parts beyond those known are ignored, as newer versions append some.
+        """
+        parts = key.split("/")
+        if len(parts) < 9 or parts[0] != _SPACE:
+            raise ValueError(f"expected at least 9 parts beginning with {_SPACE}")
+        node = NodeName(_demangle(parts[7]) or "/", _demangle(parts[8]))
+        head = (int(parts[1]), parts[2], parts[3], parts[4], node)
+        if parts[5] == _NODE_KIND:
+            return cls(*head)
+        if parts[5] not in _KINDS:
+            raise ValueError(f"unknown kind of entity {parts[5]!r}")
+        if len(parts) < 13:
+            raise ValueError(f"expected at least 13 parts for an endpoint, got {len(parts)}")
+        name, dds_type, type_hash, qos = parts[9:13]
+        endpoint = EndpointInfo(
+            _KINDS[parts[5]],
+            # Some peers leave out the leading slash.
+            "/" + _demangle(name).lstrip("/"),
+            demangle_type(_demangle(dds_type)),
+            node,
+            decode_qos(qos),
+            "" if type_hash == HUMBLE_HASH else type_hash,
+            gid_of(key),
+        )
+        return cls(*head, endpoint)
+
+
+def gid_of(key: str) -> bytes:
+    """Return the 16-byte identity of the endpoint whose token is `key` (XXH3-128, low half first).
+
+    Peers other than rmw_zenoh may send another identity with their samples.
+    """
+    return xxhash.xxh3_128_intdigest(key.encode()).to_bytes(16, "little")
+
+
+def encode_qos(qos: QoS) -> str:
+    """Return the part of a token that says the quality of service.
+
+    The first three policies are always written out: what an empty field means has changed between
+    versions of rmw_zenoh.
+    """
+    liveliness = "" if qos.liveliness is Liveliness.AUTOMATIC else _NUMBER_OF[qos.liveliness]
+    return ":".join(
+        (
+            _NUMBER_OF[qos.reliability],
+            _NUMBER_OF[qos.durability],
+            f"{_NUMBER_OF[qos.history]},{qos.depth}",
+            _encode_duration(qos.deadline),
+            _encode_duration(qos.lifespan),
+            f"{liveliness},{_encode_duration(qos.lease_duration)}",
+        )
+    )
+
+
+def decode_qos(text: str) -> QoS:
+    """Return the profile that a token's last part says; raises ValueError.
+
+    Values without a counterpart here (system default, best available) count as the default.
+    """
+    fields = text.split(":")
+    if len(fields) < 6:
+        raise ValueError(f"expected 6 QoS fields separated by ':', got {text!r}")
+    history, _, depth = fields[2].partition(",")
+    liveliness, _, lease = fields[5].partition(",")
+    return QoS(
+        # Keep-all announces a depth of 0.
+        depth=max(1, int(depth)) if depth else _DEFAULT_DEPTH,
+        reliability=_RELIABILITY.get(fields[0], Reliability.RELIABLE),
+        durability=_DURABILITY.get(fields[1], Durability.VOLATILE),
+        history=_HISTORY.get(history, History.KEEP_LAST),
+        deadline=_decode_duration(fields[3]),
+        lifespan=_decode_duration(fields[4]),
+        liveliness=_LIVELINESS.get(liveliness, Liveliness.AUTOMATIC),
+        lease_duration=_decode_duration(lease),
+    )
+
+
+class Attachment(NamedTuple):
+    """What travels beside each sample.
+
+    Attributes:
+        sequence: The publisher's running number, -1 when unknown.
+        sent: Nanoseconds since the Unix epoch at which it was published, None when unknown.
+        gid: Identity of the publisher, empty when unknown.
+    """
+
+    sequence: int
+    sent: int | None
+    gid: bytes
+
+    def encode(self) -> bytes:
+        """Return the 33 bytes rmw_zenoh attaches: two integers, the identity with its length."""
+        return _ATTACHMENT.pack(self.sequence, self.sent or 0, len(self.gid), self.gid)
+
+    @classmethod
+    def decode(cls, data: bytes) -> Attachment:
+        """Return what `data` says; other programs' attachments give :data:`NO_ATTACHMENT`."""
+        if len(data) != _ATTACHMENT.size or data[16] != 16:
+            return NO_ATTACHMENT
+        sequence, sent, _, gid = _ATTACHMENT.unpack(data)
+        return cls(sequence, sent, gid)
+
+
+_ATTACHMENT = struct.Struct("<qqB16s")
+NO_ATTACHMENT = Attachment(-1, None, b"")
+
+
+def _mangle(name: str) -> str:
+    return name.replace("/", "%") or "%"
+
+
+def _demangle(part: str) -> str:
+    return "" if part == "%" else part.replace("%", "/")
+
+
+def _encode_duration(duration: Duration | None) -> str:
+    if duration is None:
+        return ","
+    return "{},{}".format(*divmod(duration.nanoseconds, _NS))
+
+
+def _decode_duration(text: str) -> Duration | None:
+    seconds, _, nanoseconds = text.partition(",")
+    total = int(seconds or 0) * _NS + int(nanoseconds or 0)
+    # An empty field and zero both mean "not limited", as in rmw's profiles.
+    return Duration(total) if 0 < total < _INFINITE else None
