@@ -9,7 +9,9 @@ __all__ = ["clean_comment", "find_unit"]
 _BRACKETS = re.compile(r"\[([^\[\],]{1,24})\]")
 # Starts like a unit (m, rad/s, °C, %, 1/s) and not like an index, a range or a sentence.
 _UNIT = re.compile(
-    r"(?:[A-Za-zµμΩ°%]|1\s*/)[A-Za-zµμΩ°%0-9²³⁻¹·.*/^()+-]*(?: ?[*/·] ?[A-Za-z0-9^²³]+)*"
+    r"(?:[A-Za-z\u00b5\u03bc\u03a9\u00b0%]|1 ?/)"
+    r"[A-Za-z0-9\u00b5\u03bc\u03a9\u00b0%\u00b2\u00b3\u207b\u00b9\u00b7.*/^()+-]*"
+    r"(?: ?[*/\u00b7] ?[A-Za-z0-9^\u00b2\u00b3]+)*"
 )
 
 

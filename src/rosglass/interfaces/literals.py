@@ -27,13 +27,14 @@ _FLOAT32_LIMIT = (2 - 2**-24) * 2.0**127
 # int() of very long digit strings takes quadratic time; no number needs more characters.
 _MAX_NUMBER = 400
 
+_INTEGER = re.compile(r"[+-]?(?:[0-9]+|(0[xX][0-9a-fA-F]+|0[oO][0-7]+|0[bB][01]+))")
 _QUOTED = re.compile(r"""(["'])((?:\\.|(?!\1)[^\\])*)\1""", re.DOTALL)
 _ESCAPE = re.compile(r"\\(x[0-9A-Fa-f]{2}|u[0-9A-Fa-f]{4}|U[0-9A-Fa-f]{8}|[0-7]{1,3}|.)", re.DOTALL)
 _ESCAPES = {
     "a": "\a", "b": "\b", "f": "\f", "n": "\n", "r": "\r", "t": "\t", "v": "\v",
     "\\": "\\", '"': '"', "'": "'",
 }  # fmt: skip
-_TEXT_UP_TO_COMMENT = re.compile(r"""(?:"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*'|[^#])*""")
+_QUOTE_OR_COMMENT = re.compile(r"""\\.|["'#]""", re.DOTALL)
 
 
 class LiteralError(ValueError):
@@ -45,10 +46,19 @@ def strip_comment(text: str) -> str:
     stripped = text.strip()
     if "#" not in stripped:
         return stripped
-    if stripped[0] in "\"'[":
-        match = _TEXT_UP_TO_COMMENT.match(stripped)
-        return match.group().rstrip() if match else stripped
-    return stripped.partition("#")[0].rstrip()
+    quote = ""
+    # Quotes count only where strings begin with them: an apostrophe in bare text is just that.
+    quoting = stripped[0] in "\"'["
+    for match in _QUOTE_OR_COMMENT.finditer(stripped):
+        sign = match.group()
+        if sign == quote:
+            quote = ""
+        elif not quote and sign == "#":
+            return stripped[: match.start()].rstrip()
+        elif not quote and quoting and sign in ("'", '"'):
+            quote = sign
+    # Without a closing quote the text isn't a quoted string after all.
+    return stripped.partition("#")[0].rstrip() if quote else stripped
 
 
 def parse_constant(type_name: str, text: str, ros: int) -> bool | int | float | str:
@@ -96,12 +106,11 @@ def parse_default(field_type: FieldType, text: str) -> Value:
         raise LiteralError(f"expected exactly {size} elements, got {len(elements)}")
     if size is not None and len(elements) > size:
         raise LiteralError(f"expected at most {size} elements, got {len(elements)}")
-    values = []
-    for index, element in enumerate(elements):
-        try:
-            values.append(_element(name, element, bound))
-        except LiteralError as error:
-            raise LiteralError(f"element {index}: {error}") from None
+    values: list[bool | int | float | str] = []
+    try:
+        values.extend(_element(name, element, bound) for element in elements)
+    except LiteralError as error:
+        raise LiteralError(f"element {len(values)}: {error}") from None
     return tuple(values)
 
 
@@ -133,12 +142,10 @@ def _number(name: str, text: str, ros: int) -> bool | int | float:
 
 def _int(text: str) -> int | None:
     # "010" is ten, "0x10" sixteen: rosidl tries base 10 first, then Python's prefixes.
-    for base in (10, 0):
-        try:
-            return int(text, base)
-        except ValueError:
-            continue
-    return None
+    match = _INTEGER.fullmatch(text)
+    if match is None:
+        return None
+    return int(text, 10 if match.group(1) is None else 0)
 
 
 def _bool(text: str, ros: int) -> bool:
