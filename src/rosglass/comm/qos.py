@@ -119,16 +119,18 @@ class QoS:
             Durability.VOLATILE,
         ):
             problems.append("durability: transient local requested, volatile offered")
-        if self.deadline is not None and (
-            offered.deadline is None or offered.deadline > self.deadline
-        ):
-            problems.append(
-                f"deadline: {self.deadline.seconds} s requested, "
-                f"{'none' if offered.deadline is None else f'{offered.deadline.seconds} s'} offered"
-            )
+        problems += _too_long("deadline", self.deadline, offered.deadline)
         if (self.liveliness, offered.liveliness) == (
             Liveliness.MANUAL_BY_TOPIC,
             Liveliness.AUTOMATIC,
         ):
             problems.append("liveliness: manual by topic requested, automatic offered")
+        problems += _too_long("lease duration", self.lease_duration, offered.lease_duration)
         return "; ".join(problems)
+
+
+def _too_long(what: str, requested: Duration | None, offered: Duration | None) -> list[str]:
+    if requested is None or (offered is not None and offered <= requested):
+        return []
+    told = "none" if offered is None else f"{offered.seconds} s"
+    return [f"{what}: {requested.seconds} s requested, {told} offered"]

@@ -39,6 +39,8 @@ _ROS_TYPE = re.compile(r"([A-Za-z]\w*)/(\w+)/(\w+)\Z")
 
 def validate_node_name(name: str) -> None:
     """Raise InvalidNameError unless `name` can be a node's base name."""
+    if not isinstance(name, str):
+        raise InvalidNameError(f"a node name must be a text, got {name!r}")
     if not name:
         raise InvalidNameError("a node name must not be empty")
     _reject(_FORBIDDEN_IN_NODE, "node name", name, "only letters, digits and '_' are allowed")
@@ -51,6 +53,8 @@ def validate_node_name(name: str) -> None:
 
 def validate_namespace(namespace: str) -> None:
     """Raise InvalidNameError unless `namespace` is a valid absolute namespace."""
+    if not isinstance(namespace, str):
+        raise InvalidNameError(f"a namespace must be a text, got {namespace!r}")
     if not namespace.startswith("/"):
         raise InvalidNameError(
             f"namespace {namespace!r} is not absolute; write {'/' + namespace!r}"
@@ -94,7 +98,6 @@ def expand(name: str, node: str, namespace: str) -> str:
         full = f"{prefix}/{node}{full[1:]}"
     elif not full.startswith("/"):
         full = f"{prefix}/{full}"
-    # A substituted namespace brings a leading slash of its own: "/x{ns}" is what the user wrote.
     _validate_full(what, full, MAX_TOPIC_NAME, name)
     return full
 

@@ -98,7 +98,8 @@ class Ros2Node(Node):
     ) -> Publisher:
         """Announce `topic`; see :meth:`rosglass.comm.Node.create_publisher`."""
         self._check_open()
-        full, message_type, profile = self.resolve(topic), self._load(type), _profile(qos)
+        full, profile = self.resolve(topic), _profile(qos)
+        message_type = self._find(type) if isinstance(type, str) else self._check_type(type)
         writer = self._middleware.create_writer(
             self._full_name, full, message_type.name, message_type.rihs01, profile
         )
@@ -113,6 +114,9 @@ class Ros2Node(Node):
         )
         with self._lock:
             self._publishers.append(publisher)
+        if self._closed:
+            publisher.close()
+        self._check_open()
         publisher.follow()
         return publisher
 
@@ -128,10 +132,13 @@ class Ros2Node(Node):
     ) -> Subscription:
         """Subscribe to `topic`; see :meth:`rosglass.comm.Node.create_subscription`."""
         self._check_open()
-        wanted = None if type is None else self._load(type)
+        if isinstance(type, str):
+            known: MessageType | None = self._find(type)
+        else:
+            known = None if type is None else self._check_type(type)
         subscription = Subscription(
             self.resolve(topic),
-            wanted,
+            known,
             _profile(qos),
             executor or self._dispatcher,
             callback,
@@ -140,15 +147,19 @@ class Ros2Node(Node):
         )
         reading = Reading(
             subscription,
-            wanted,
+            type,
             self._middleware,
             self._full_name,
-            self._load,
+            self._find,
             self._on_graph,
         )
+        if known is not None:
+            reading.read(known)
         with self._lock:
             self._readings[subscription] = reading
-        reading.start()
+        if self._closed:
+            subscription.close()
+        self._check_open()
         self._on_graph()
         return subscription
 
@@ -214,13 +225,17 @@ class Ros2Node(Node):
         self._dispatcher.close()
         self._status_listeners.clear()
 
-    def _load(self, type: str | MessageType) -> MessageType:
-        from rosglass.messages import MessageType, load  # noqa: PLC0415 - brings in numpy
+    def _find(self, name: str, hash: str = "") -> MessageType:
+        from rosglass.messages import load  # noqa: PLC0415 - brings in numpy
 
-        found = load(type, ros=2, library=self._library) if isinstance(type, str) else type
+        return self._check_type(load(name, ros=2, library=self._library, hash=hash))
+
+    def _check_type(self, found: object) -> MessageType:
+        from rosglass.messages import MessageType  # noqa: PLC0415 - brings in numpy
+
         if not isinstance(found, MessageType):
             raise TypeNotFoundError(
-                f"{type!r} is not a message type; give a name such as std_msgs/msg/String "
+                f"{found!r} is not a message type; give a name such as std_msgs/msg/String "
                 "or what rosglass.load() returns for a message"
             )
         if found.definition.ros != 2:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from rosglass.comm import Sample, Time
 from rosglass.errors import Error
@@ -14,47 +14,80 @@ if TYPE_CHECKING:
 
     from rosglass.comm import EndpointInfo, Handle, NodeName, Subscription
     from rosglass.messages import MessageType
-    from rosglass.ros2.middleware import Middleware
+    from rosglass.ros2.middleware import Middleware, OnSample
 
-__all__ = ["Reading"]
+__all__ = ["LoadType", "Reading"]
+
+
+class LoadType(Protocol):
+    """Finds types by name."""
+
+    def __call__(self, name: str, hash: str = "") -> MessageType:
+        """Return the type `name`, in the version that has `hash` if one is given.
+
+        Raises:
+            Error: Nobody has it, or it has an error.
+        """
 
 
 class Reading:
     """Serves a subscription.
 
+    A subscription created with a type keeps it. One created with a type's name takes the version
+    of it that the robot publishes, if the library has it; one created without takes the type that
+    is published.
+
     Args:
         subscription: Whom to serve.
-        wanted: The type it was created with, None to take what is published.
+        wanted: Type or type name it was created with; None to take what is published.
         middleware: Where samples come from.
         node: The node it belongs to.
-        load: Finds a type by name; raises a rosglass error when it cannot.
+        load: Finds types.
         wake: Asks for an :meth:`update` soon.
     """
 
     def __init__(
         self,
         subscription: Subscription,
-        wanted: MessageType | None,
+        wanted: MessageType | str | None,
         middleware: Middleware,
         node: NodeName,
-        load: Callable[[str], MessageType],
+        load: LoadType,
         wake: Callable[[], None],
     ) -> None:
         self.subscription = subscription
-        self._wanted = wanted
+        self._discovers = wanted is None
+        self._fixed = not (wanted is None or isinstance(wanted, str))
         self._middleware, self._node, self._load, self._wake = middleware, node, load, wake
         self._lock = threading.Lock()
         self._reader: Handle | None = None
         self._type: MessageType | None = None
         self._closed = False
-        self._failed = ""
+        self._failed: tuple[str, str] | None = None
         self._failure = ""
         self._strangers: set[str] = set()
 
-    def start(self) -> None:
-        """Begin to receive, if the type is known already."""
-        if self._wanted is not None:
-            self._read(self._wanted)
+    def read(self, message_type: MessageType) -> None:
+        """Receive samples of `message_type` from now on, instead of any before."""
+        self._strangers.clear()
+        self._type = message_type
+        self.subscription.set_type(message_type)
+        reader = self._middleware.create_reader(
+            self._node,
+            self.subscription.topic,
+            message_type.name,
+            message_type.rihs01,
+            self.subscription.qos,
+            self._receiver(message_type),
+        )
+        with self._lock:
+            old, self._reader = self._reader, reader
+            if self._closed:
+                self._reader = None
+        if old is not None:
+            old.close()
+        if self._reader is None:
+            reader.close()
 
     def update(self, publishers: Sequence[EndpointInfo], retry: bool) -> None:
         """Follow a change of the graph.
@@ -65,7 +98,10 @@ class Reading:
         """
         if self._closed:
             return
-        problems = [] if self._wanted else self._discover(publishers, retry)
+        problems: list[str] = []
+        name = self._name(publishers, problems)
+        if name and not self._fixed:
+            self._select(name, publishers, retry, problems)
         if self._type is not None:
             problems += self._compare(self._type, publishers)
         self.subscription.set_problem("; ".join(problems))
@@ -78,33 +114,47 @@ class Reading:
         if reader is not None:
             reader.close()
 
-    def _discover(self, publishers: Sequence[EndpointInfo], retry: bool) -> list[str]:
-        by_type: dict[str, list[EndpointInfo]] = {}
-        for publisher in publishers:
-            by_type.setdefault(publisher.type, []).append(publisher)
-        if not by_type or (self._type is not None and self._type.name in by_type):
-            return []
-        if len(by_type) > 1:
-            told = ", ".join(f"{name} by {_nodes(who)}" for name, who in sorted(by_type.items()))
-            example = f"create_subscription({self.subscription.topic!r}, {min(by_type)!r})"
-            return [f"published with several types ({told}); choose one, e.g. {example}"]
-        (name,) = by_type
-        if name == self._failed and not retry:
-            return [self._failure]
-        try:
-            found = self._load(name)
-        except Error as error:
-            self._failed = name
-            self._failure = (
-                f"{_nodes(by_type[name])} publishes {name}, which cannot be decoded: {error}; "
-                "it is tried again until a definition is found"
-            )
-            return [self._failure]
-        self._failed = ""
-        self._read(found)
-        return []
+    def _name(self, publishers: Sequence[EndpointInfo], problems: list[str]) -> str:
+        """Return the name of the type to receive, empty while that is open."""
+        ours = "" if self._type is None else self._type.name
+        types = sorted({publisher.type for publisher in publishers})
+        if not self._discovers or ours in types or not types:
+            return ours
+        if len(types) == 1:
+            return types[0]
+        told = ", ".join(f"{t} by {_nodes([p for p in publishers if p.type == t])}" for t in types)
+        example = f"create_subscription({self.subscription.topic!r}, {types[0]!r})"
+        problems.append(f"published with several types ({told}); choose one, e.g. {example}")
+        return ours
+
+    def _select(
+        self, name: str, publishers: Sequence[EndpointInfo], retry: bool, problems: list[str]
+    ) -> None:
+        """Load and read the version of the type that publishers announce."""
+        hashes = {p.type_hash for p in publishers if p.type == name and p.type_hash}
+        ours = self._type if self._type is not None and self._type.name == name else None
+        if ours is not None and (len(hashes) != 1 or ours.rihs01 in hashes):
+            return
+        wanted = (name, hashes.pop() if len(hashes) == 1 else "")
+        if wanted != self._failed or retry:
+            try:
+                found = self._load(*wanted)
+            except Error as error:
+                self._failed = wanted
+                who = _nodes([p for p in publishers if p.type == name])
+                self._failure = (
+                    f"{who} publishes {name}, which cannot be decoded: {error}; "
+                    "this is tried again until a definition is found"
+                )
+            else:
+                self._failed = None
+                self.read(found)
+                return
+        if self._type is None:
+            problems.append(self._failure)
 
     def _compare(self, ours: MessageType, publishers: Sequence[EndpointInfo]) -> list[str]:
+        """Say what keeps publishers' samples away."""
         problems = []
         others = [p for p in publishers if p.type != ours.name]
         if others:
@@ -112,61 +162,44 @@ class Reading:
             problems.append(f"{_nodes(others)} publishes {types} here, not {ours.name}")
         strangers = dict.fromkeys(self._strangers, "")
         for publisher in publishers:
-            if publisher.type == ours.name and not self._understands(ours, publisher.type_hash):
+            if publisher.type != ours.name:
+                continue
+            if publisher.type_hash not in ("", ours.rihs01):
                 strangers[publisher.type_hash] = f" of {publisher.node}"
-        problems += [
-            f"the publisher{who} has another definition of {ours.name} ({name}; ours is "
-            f"{ours.rihs01}): its samples are refused; add the robot's definition to the library"
-            for name, who in strangers.items()
-        ]
-        for publisher in publishers:
             conflict = self.subscription.qos.incompatibility(publisher.qos)
-            if publisher.type == ours.name and conflict:
-                so = (
+            if conflict:
+                effect = (
                     "nothing is received from it"
                     if self._middleware.matches_qos
                     else "it is received without that guarantee"
                 )
                 problems.append(
-                    f"quality of service of {publisher.node} does not match ({conflict}): {so}; "
-                    "subscribe with what it offers"
+                    f"quality of service offered by {publisher.node} does not match ({conflict}): "
+                    f"{effect}; ask for no more than it offers"
                 )
+        problems += [
+            f"the publisher{who} has another definition of {ours.name} ({type_hash}, ours is "
+            f"{ours.rihs01}): its samples are refused; add the robot's definition to the library"
+            for type_hash, who in sorted(strangers.items())
+        ]
         return problems
 
-    def _read(self, message_type: MessageType) -> None:
-        name, type_hash = message_type.name, message_type.rihs01
-        repeats = Repeats()
-        deliver, strangers = self.subscription.deliver, self._strangers
-        strangers.clear()
+    def _receiver(self, message_type: MessageType) -> OnSample:
+        ours, strangers, repeats = message_type.rihs01, self._strangers, Repeats()
+        deliver, wire = self.subscription.deliver, "cdr"
 
-        def on_sample(
+        def receive(
             data: bytes, received: int, sent: int | None, gid: bytes, sequence: int, hash: str
         ) -> None:
-            if hash not in ("", type_hash):
+            if hash not in ("", ours):
                 if hash not in strangers:
                     strangers.add(hash)
                     self._wake()
             elif not repeats.seen(gid, sequence, sent):
                 stamp = None if sent is None else Time(sent)
-                deliver(Sample(data, self.WIRE, message_type, Time(received), stamp, gid, sequence))
+                deliver(Sample(data, wire, message_type, Time(received), stamp, gid, sequence))
 
-        self._type = message_type
-        self.subscription.set_type(message_type)
-        reader = self._middleware.create_reader(
-            self._node, self.subscription.topic, name, type_hash, self.subscription.qos, on_sample
-        )
-        with self._lock:
-            old, self._reader = self._reader, reader
-            if self._closed:
-                old, self._reader = reader, None
-        if old is not None:
-            old.close()
-
-    WIRE = "cdr"
-
-    @staticmethod
-    def _understands(ours: MessageType, type_hash: str) -> bool:
-        return type_hash in ("", ours.rihs01)
+        return receive
 
 
 def _nodes(endpoints: Sequence[EndpointInfo]) -> str:

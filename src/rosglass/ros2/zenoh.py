@@ -379,14 +379,19 @@ class _ZenohWriter(_Declaration, Writer):
         key = topic_key(self._options.domain, self._topic, self._type_name, type_hash)
         reliable = self._qos.reliability is Reliability.RELIABLE
         keep_all = self._qos.history is History.KEEP_ALL
+        # rmw_zenoh's choice: only who keeps everything waits for a full queue.
         block = reliable and keep_all
         congestion = zenoh.CongestionControl.BLOCK if block else zenoh.CongestionControl.DROP
+        # Each priority has its own queue: a stop command must not be thrown away because camera
+        # pictures, sent best effort by the same program, fill theirs while the network is stuck.
+        priority = zenoh.Priority.INTERACTIVE_LOW if reliable else zenoh.Priority.DATA
         if self._qos.durability is Durability.VOLATILE:
-            return session.declare_publisher(key, congestion_control=congestion)
+            return session.declare_publisher(key, congestion_control=congestion, priority=priority)
         return zenoh.ext.declare_advanced_publisher(
             session,
             key,
             congestion_control=congestion,
+            priority=priority,
             cache=zenoh.ext.CacheConfig(max_samples=self._qos.depth),
             publisher_detection=True,
             sample_miss_detection=zenoh.ext.MissDetectionConfig(

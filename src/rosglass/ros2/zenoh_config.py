@@ -64,7 +64,7 @@ def session_config(options: ZenohOptions) -> tuple[zenoh.Config, str]:
 
 def router_config(listen: str) -> zenoh.Config:
     """Return the configuration of a router that listens at a locator such as ``tcp/[::]:7447``."""
-    config = zenoh.Config()
+    config: zenoh.Config = zenoh.Config()
     settings: dict[str, Any] = {
         "mode": "router",
         "listen/endpoints": [listen],

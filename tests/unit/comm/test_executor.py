@@ -1,0 +1,134 @@
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+from rosglass.comm import IMMEDIATE, Dispatcher, Listeners, Worker
+
+
+@pytest.fixture
+def dispatcher():
+    made = Dispatcher("test callbacks")
+    yield made
+    made.close()
+
+
+def run_all(dispatcher):
+    done = threading.Event()
+    dispatcher.post(done.set)
+    assert done.wait(5)
+
+
+def test_jobs_run_in_order_on_one_other_thread(dispatcher):
+    seen = []
+    for number in range(100):
+        dispatcher.post(lambda n=number: seen.append((n, threading.current_thread().name)))
+    run_all(dispatcher)
+    assert seen == [(n, "test callbacks") for n in range(100)]
+
+
+@pytest.mark.parametrize("kind", ["dispatcher", "immediate"])
+def test_a_failing_job_is_logged_and_the_next_one_runs(kind, dispatcher, caplog):
+    executor = dispatcher if kind == "dispatcher" else IMMEDIATE
+    executor.post(lambda: 1 / 0)
+    seen = []
+    executor.post(lambda: seen.append(1))
+    run_all(dispatcher)
+    assert seen == [1]
+    assert "ZeroDivisionError" in caplog.text
+
+
+def test_closing_ends_the_thread_and_forgets_what_waits(dispatcher):
+    started, go_on, seen = threading.Event(), threading.Event(), []
+    dispatcher.post(lambda: (started.set(), go_on.wait(5)))
+    dispatcher.post(lambda: seen.append("forgotten"))
+    assert started.wait(5)
+    closing = threading.Thread(target=dispatcher.close)
+    closing.start()
+    go_on.set()
+    closing.join(5)
+    assert not closing.is_alive()
+    dispatcher.close()
+    dispatcher.post(lambda: seen.append("late"))
+    assert seen == []
+    assert "test callbacks" not in [t.name for t in threading.enumerate()]
+
+
+def test_a_job_may_close_its_dispatcher(dispatcher):
+    closed = threading.Event()
+    dispatcher.post(lambda: (dispatcher.close(), closed.set()))
+    assert closed.wait(5)
+
+
+def test_a_job_that_hangs_does_not_hang_closing(dispatcher, monkeypatch, caplog):
+    monkeypatch.setattr("rosglass.comm.executor._PATIENCE", 0.05)
+    started, go_on = threading.Event(), threading.Event()
+    dispatcher.post(lambda: (started.set(), go_on.wait(5)))
+    assert started.wait(5)
+    dispatcher.close()
+    assert "still runs" in caplog.text
+    go_on.set()
+
+
+def test_listeners_hear_every_value_until_they_close():
+    listeners = Listeners()
+    seen = []
+    handle = listeners.add(seen.append, IMMEDIATE)
+    listeners.notify(1)
+    listeners.notify(2)
+    handle.close()
+    handle.close()
+    listeners.notify(3)
+    assert seen == [1, 2]
+
+
+def test_merging_listeners_hear_the_newest_value_once(dispatcher):
+    listeners = Listeners(merge=True)
+    go_on, seen = threading.Event(), []
+    dispatcher.post(lambda: go_on.wait(5))
+    listeners.add(seen.append, dispatcher)
+    for value in range(10):
+        listeners.notify(value)
+    go_on.set()
+    run_all(dispatcher)
+    assert seen == [9]
+
+
+def test_a_listener_closed_while_its_call_waits_is_not_called(dispatcher):
+    listeners = Listeners()
+    go_on, seen = threading.Event(), []
+    dispatcher.post(lambda: go_on.wait(5))
+    handle = listeners.add(seen.append, dispatcher)
+    listeners.notify(1)
+    handle.close()
+    go_on.set()
+    run_all(dispatcher)
+    assert seen == []
+
+
+def test_a_worker_runs_when_asked_and_when_its_pause_is_over(caplog):
+    ran, idle = threading.Event(), threading.Event()
+    worker = Worker("test worker", lambda paused: (idle if paused else ran).set(), pause=0.01)
+    worker.wake()
+    assert ran.wait(5)
+    assert idle.wait(5)
+    worker.close()
+    worker.close()
+    assert "test worker" not in [t.name for t in threading.enumerate()]
+
+
+def test_a_worker_survives_an_error_in_its_job(caplog):
+    calls = []
+    twice = threading.Event()
+
+    def job(_):
+        calls.append(1)
+        if len(calls) == 2:
+            twice.set()
+        raise RuntimeError("of the job")
+
+    worker = Worker("test worker", job, pause=0.01)
+    assert twice.wait(5)
+    worker.close()
+    assert "of the job" in caplog.text

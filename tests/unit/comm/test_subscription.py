@@ -1,0 +1,189 @@
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+from rosglass import QoS, Time
+from rosglass.comm import IMMEDIATE, Executor, History, Sample, Subscription
+
+
+class Manual(Executor):
+    """Runs jobs when told to."""
+
+    def __init__(self):
+        self.jobs = []
+
+    def post(self, job):
+        self.jobs.append(job)
+
+    def run(self):
+        jobs, self.jobs = self.jobs, []
+        for job in jobs:
+            job()
+
+
+class FakeType:
+    def decode(self, data, wire):
+        if data == b"bad":
+            raise ValueError("bad data")
+        return data.decode()
+
+
+def sample(text="x"):
+    return Sample(text.encode(), "cdr", FakeType(), Time(1))
+
+
+def subscription(executor=IMMEDIATE, **kwargs):
+    kwargs.setdefault("qos", QoS(depth=3))
+    qos = kwargs.pop("qos")
+    return Subscription("/t", None, qos, executor, **kwargs)
+
+
+def feed(target, *texts):
+    for text in texts:
+        target.deliver(sample(text))
+
+
+def test_the_inbox_keeps_the_newest_and_counts_what_it_drops():
+    sub = subscription()
+    feed(sub, *"abcde")
+    assert [sub.take().data for _ in range(3)] == [b"c", b"d", b"e"]
+    assert sub.take() is None
+    assert (sub.statistics().received, sub.statistics().dropped) == (5, 2)
+
+
+def test_keep_all_keeps_all():
+    sub = subscription(qos=QoS(depth=1, history=History.KEEP_ALL))
+    feed(sub, *"abcde")
+    assert sub.statistics().dropped == 0
+    assert sub.take().data == b"a"
+
+
+def test_take_latest_forgets_the_older_ones():
+    sub = subscription()
+    feed(sub, *"abc")
+    assert sub.take_latest().data == b"c"
+    assert sub.take_latest() is None
+    assert sub.statistics().dropped == 2
+
+
+def test_wait_returns_a_sample_that_comes_later_and_none_after_the_timeout():
+    sub = subscription()
+    assert sub.wait(0.01) is None
+    later = threading.Timer(0.02, lambda: feed(sub, "a"))
+    later.start()
+    assert sub.wait(5).data == b"a"
+    later.join()
+
+
+def test_closing_wakes_who_waits():
+    sub = subscription()
+    later = threading.Timer(0.02, sub.close)
+    later.start()
+    assert sub.wait(5) is None
+    assert sub.closed
+    later.join()
+
+
+def test_callbacks_get_decoded_messages_on_the_executor():
+    executor, seen = Manual(), []
+    sub = subscription(executor, callback=seen.append)
+    feed(sub, "a", "b")
+    assert seen == []
+    assert len(executor.jobs) == 1, "one job drains the inbox"
+    executor.run()
+    assert seen == ["a", "b"]
+
+
+def test_raw_callbacks_get_samples():
+    seen = []
+    feed(subscription(raw_callback=seen.append), "a")
+    assert seen[0].data == b"a"
+
+
+def test_a_slow_callback_gets_the_newest_samples():
+    executor, seen = Manual(), []
+    sub = subscription(executor, callback=seen.append)
+    feed(sub, *"abcdef")
+    executor.run()
+    assert seen == ["d", "e", "f"]
+    assert sub.statistics().dropped == 3
+
+
+def test_samples_that_come_during_a_callback_wait_for_their_turn():
+    executor, seen = Manual(), []
+    sub = subscription(executor, callback=lambda m: (seen.append(m), feed(sub, "b")))
+    feed(sub, "a")
+    executor.run()
+    assert seen == ["a"]
+    executor.run()
+    assert seen == ["a", "b"]
+
+
+@pytest.mark.parametrize("kind", ["callback", "raw_callback"])
+def test_a_failing_callback_is_logged_with_the_topic_and_the_next_sample_arrives(kind, caplog):
+    seen = []
+
+    def callback(thing):
+        seen.append(thing)
+        raise RuntimeError("of the callback")
+
+    sub = subscription(**{kind: callback})
+    feed(sub, "a", "b")
+    assert len(seen) == 2
+    assert "callback of subscription /t failed" in caplog.text
+
+
+def test_a_message_that_cannot_be_decoded_is_logged_and_the_next_one_arrives(caplog):
+    seen = []
+    feed(subscription(callback=seen.append), "bad", "good")
+    assert seen == ["good"]
+    assert "bad data" in caplog.text
+
+
+def test_a_callback_may_close_its_subscription_and_gets_nothing_more():
+    closed, seen = [], []
+    executor = Manual()
+    sub = subscription(
+        executor,
+        callback=lambda m: (seen.append(m), sub.close()),
+        on_close=closed.append,
+    )
+    feed(sub, "a", "b")
+    executor.run()
+    feed(sub, "c")
+    executor.run()
+    sub.close()
+    assert seen == ["a"]
+    assert closed == [sub]
+    assert sub.take() is None
+
+
+def test_statistics_before_the_first_sample():
+    now = subscription().statistics()
+    assert (now.received, now.frequency, now.bandwidth, now.age) == (0, 0.0, 0.0, None)
+
+
+def test_frequency_and_bandwidth_fall_when_samples_stop(monkeypatch):
+    clock = [100.0]
+    monkeypatch.setattr("rosglass.comm.subscription.time.monotonic", lambda: clock[0])
+    sub = subscription()
+    for _ in range(40):
+        feed(sub, "1234")
+        clock[0] += 0.1
+    live = sub.statistics()
+    assert live.frequency == pytest.approx(10, rel=0.05)
+    assert live.bandwidth == pytest.approx(40, rel=0.05)
+    clock[0] += 10
+    stale = sub.statistics()
+    assert stale.frequency < 3
+    assert stale.age.seconds == pytest.approx(10.1)
+
+
+def test_a_problem_is_logged_once_and_goes_away():
+    sub = subscription()
+    sub.set_problem("no type")
+    assert sub.problem == "no type"
+    sub.set_problem("")
+    assert sub.problem == ""

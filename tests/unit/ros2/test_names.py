@@ -1,0 +1,134 @@
+from __future__ import annotations
+
+import pytest
+
+from rosglass import InvalidNameError
+from rosglass.ros2.names import (
+    demangle_type,
+    expand,
+    mangle_type,
+    validate_namespace,
+    validate_node_name,
+)
+
+
+@pytest.mark.parametrize(
+    ("written", "namespace", "full"),
+    [
+        ("/abs", "/arm", "/abs"),
+        ("/a/b", "/", "/a/b"),
+        ("chatter", "/", "/chatter"),
+        ("chatter", "/arm", "/arm/chatter"),
+        ("a/b", "/arm/left", "/arm/left/a/b"),
+        ("~", "/", "/talker"),
+        ("~", "/arm", "/arm/talker"),
+        ("~/state", "/arm", "/arm/talker/state"),
+        ("~/state", "/", "/talker/state"),
+        ("{node}/x", "/arm", "/arm/talker/x"),
+        ("/p/{node}", "/arm", "/p/talker"),
+        ("{ns}/x", "/arm", "/arm/x"),
+        ("{namespace}/x", "/arm", "/arm/x"),
+        ("_hidden", "/", "/_hidden"),
+        ("a1/_2", "/", "/a1/_2"),
+    ],
+)
+def test_names_expand_as_in_rcl(written, namespace, full):
+    assert expand(written, "talker", namespace) == full
+
+
+@pytest.mark.parametrize(
+    ("written", "told"),
+    [
+        ("", "non-empty string"),
+        (None, "non-empty string"),
+        ("/", "ends with '/'"),
+        ("chatter/", "'/chatter/' (expanded from 'chatter/') ends with '/'"),
+        ("a//b", "'//' at position 2; write a single '/'"),
+        ("my topic", "contains ' ' at position 2"),
+        ("a-b", "contains '-' at position 1; only letters, digits"),
+        ("ä", "contains 'ä' at position 0"),
+        ("1abc", "starts with the digit '1'; put a letter or '_' before it"),
+        ("a/2b", "the part at position 3 starts with the digit '2'"),
+        ("a~b", "'~' at position 1 must be the first character"),
+        ("/~/b", "'~' at position 1 must be the first character"),
+        ("~b", "write '~/b'"),
+        ("{other}/x", "unknown substitution '{other}' at position 0"),
+        ("{node", "unbalanced brace at position 0"),
+        ("node}", "unbalanced brace at position 4"),
+        ("{}", "unknown substitution '{}'"),
+        ("{{node}}", "unbalanced brace"),
+        ("x" * 300, "has 301 characters; at most 247"),
+    ],
+)
+def test_bad_topic_names_are_refused_with_the_place_and_the_fix(written, told):
+    with pytest.raises(InvalidNameError) as error:
+        expand(written, "talker", "/")
+    assert told in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["a", "talker_2", "_x", "A" * 255])
+def test_good_node_names(name):
+    validate_node_name(name)
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("", "must not be empty"),
+        (None, "must be a text"),
+        ("a/b", "contains '/' at position 1"),
+        ("my node", "contains ' '"),
+        ("1a", "starts with a digit"),
+        ("a" * 256, "at most 255"),
+    ],
+)
+def test_bad_node_names(name, told):
+    with pytest.raises(InvalidNameError, match=told):
+        validate_node_name(name)
+
+
+@pytest.mark.parametrize("namespace", ["/", "/arm", "/arm/left_2"])
+def test_good_namespaces(namespace):
+    validate_namespace(namespace)
+
+
+@pytest.mark.parametrize(
+    ("namespace", "told"),
+    [
+        ("", "write '/'"),
+        ("arm", "write '/arm'"),
+        (None, "must be a text"),
+        ("/arm/", "ends with '/'"),
+        ("/a//b", "'//' at position 2"),
+        ("/a b", "contains ' '"),
+        ("/2a", "starts with the digit"),
+        ("/" + "a" * 250, "at most 245"),
+    ],
+)
+def test_bad_namespaces(namespace, told):
+    with pytest.raises(InvalidNameError, match=told):
+        validate_namespace(namespace)
+
+
+@pytest.mark.parametrize(
+    ("ros", "dds"),
+    [
+        ("std_msgs/msg/String", "std_msgs::msg::dds_::String_"),
+        ("example_interfaces/srv/AddTwoInts", "example_interfaces::srv::dds_::AddTwoInts_"),
+        ("a/action/B_SendGoal", "a::action::dds_::B_SendGoal_"),
+    ],
+)
+def test_type_names_on_the_wire(ros, dds):
+    assert mangle_type(ros) == dds
+    assert demangle_type(dds) == ros
+
+
+@pytest.mark.parametrize("foreign", ["HelloWorld", "a::b", "std_msgs::msg::dds_::String", ""])
+def test_foreign_type_names_stay_as_they_are(foreign):
+    assert demangle_type(foreign) == foreign
+
+
+@pytest.mark.parametrize("bad", ["String", "std_msgs/String", "a/msg/b/c", "a/msg/", "a b/msg/C"])
+def test_incomplete_type_names_are_refused(bad):
+    with pytest.raises(InvalidNameError, match="package/msg/Type"):
+        mangle_type(bad)
