@@ -1,1 +1,24 @@
 """What a message is: lazy trees over received bytes, and the codecs behind them."""
+
+from rosglass.messages.message import Message, type_of
+from rosglass.messages.sequences import MessageSequence
+from rosglass.messages.types import (
+    ActionType,
+    Constants,
+    MessageType,
+    ServiceType,
+    default_library,
+    load,
+)
+
+__all__ = [
+    "ActionType",
+    "Constants",
+    "Message",
+    "MessageSequence",
+    "MessageType",
+    "ServiceType",
+    "default_library",
+    "load",
+    "type_of",
+]

@@ -1,0 +1,361 @@
+"""Strict conversion of Python values into messages, with the field path in every error.
+
+One rule set for all places. Integers take integers and floats without a fraction, in range;
+floats take integers and floats (a finite value that float32 cannot hold is refused); bools take
+bools; strings take str. Nothing is truncated, wrapped or guessed. Missing fields get the type's
+defaults.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from functools import partial
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from rosglass.errors import ConversionError
+from rosglass.interfaces.definition import ArrayKind
+from rosglass.messages.message import Message, plain_class
+from rosglass.messages.runtime import MAX_EMPTY, number_type
+from rosglass.messages.schema import Kind
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import numpy as np
+
+    from rosglass.messages.layout import Wire
+    from rosglass.messages.schema import Member, Number, Schema
+
+__all__ = ["array_packer", "as_bool", "as_float", "as_int", "convert", "convert_member", "default"]
+
+_FLOAT32_MAX = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]
+_NANO = 1_000_000_000
+
+
+# -- numbers -------------------------------------------------------------------------------------
+
+
+def as_bool(value: Any) -> bool:
+    """Return a bool; raises ConversionError for anything but Python's and numpy's bools."""
+    if value is True or value is False:
+        return bool(value)
+    if _numpy_kind(value) == "b":
+        return bool(value)
+    raise ConversionError("", value, "a bool")
+
+
+def as_int(value: Any) -> int:
+    """Return an int; floats must be whole. Raises ConversionError; the range is not checked."""
+    if isinstance(value, int) and not isinstance(value, bool):
+        return int(value)
+    if isinstance(value, float) or _numpy_kind(value) in ("i", "u", "f"):
+        whole = math.isfinite(value) and int(value) == value
+        if whole:
+            return int(value)
+    raise ConversionError("", value, "an integer")
+
+
+def as_float(value: Any) -> float:
+    """Return a float; raises ConversionError for anything but numbers that are no bools."""
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        try:
+            return float(value)
+        except OverflowError:
+            raise ConversionError("", value, "a number within the range of float64") from None
+    if _numpy_kind(value) in ("i", "u", "f"):
+        return float(value)
+    raise ConversionError("", value, "a number")
+
+
+def _numpy_kind(value: Any) -> str:
+    """Return the kind of a numpy scalar, '' for everything else (arrays included)."""
+    dtype = getattr(value, "dtype", None)
+    return dtype.kind if dtype is not None and getattr(value, "shape", None) == () else ""
+
+
+def _number(number: Number, value: Any, path: str) -> Any:
+    try:
+        if number.python is bool:
+            return as_bool(value)
+        if number.python is int:
+            found = as_int(value)
+            assert number.low is not None
+            assert number.high is not None
+            if not number.low <= found <= number.high:
+                expected = f"an integer from {number.low} to {number.high} ({number.name})"
+                raise ConversionError(path, value, expected)
+            return found
+        made = as_float(value)
+    except ConversionError as error:
+        expected = {bool: "a bool (True or False)", int: f"an integer ({number.name})"}.get(
+            number.python, f"a number ({number.name})"
+        )
+        raise ConversionError(path, value, error.expected if error.path else expected) from None
+    if number.code == "f" and math.isfinite(made):
+        _check_float32(made, value, path)
+    return made
+
+
+def _check_float32(made: float, value: Any, path: str) -> None:
+    try:
+        struct.pack("<f", made)
+    except OverflowError:
+        limit = f"a number within +-{_FLOAT32_MAX:.8g} (float32)"
+        raise ConversionError(path, value, limit) from None
+
+
+# -- text ----------------------------------------------------------------------------------------
+
+
+def _text(member: Member, value: Any, path: str) -> str:
+    if not isinstance(value, str):
+        hint = " (decode the bytes first)" if isinstance(value, (bytes, bytearray)) else ""
+        raise ConversionError(path, value, f"a str{hint}")
+    try:
+        if member.wide:
+            units = len(value.encode("utf-16-le", "surrogatepass")) // 2
+        else:
+            units = len(value.encode("utf-8", "surrogateescape"))
+    except UnicodeEncodeError:
+        raise ConversionError(path, value, "text that UTF-8 can encode") from None
+    if member.bound is not None and units > member.bound:
+        what = "UTF-16 units" if member.wide else "bytes of UTF-8"
+        raise ConversionError(path, value, f"at most {member.bound} {what}, not {units}")
+    return str(value)
+
+
+# -- arrays --------------------------------------------------------------------------------------
+
+
+def _check_length(member: Member, count: int, value: Any, path: str) -> None:
+    if member.array is ArrayKind.FIXED and count != member.size:
+        raise ConversionError(path, value, f"exactly {member.size} elements, not {count}")
+    if member.size is not None and count > member.size:
+        raise ConversionError(path, value, f"at most {member.size} elements, not {count}")
+    if count > 0xFFFFFFFF:
+        raise ConversionError(path, value, "fewer than 2**32 elements")
+
+
+def _sequence(value: Any, path: str, what: str) -> Sequence[Any]:
+    """Return `value` if it is an ordered collection of elements."""
+    if isinstance(value, Sequence) and not isinstance(value, (str, bytes, bytearray, memoryview)):
+        return value
+    if getattr(value, "typecode", None) is not None:  # array.array
+        return value  # type: ignore[no-any-return]
+    if getattr(value, "ndim", 0) == 1:
+        return value.tolist()  # type: ignore[no-any-return]
+    raise ConversionError(path, value, f"a list of {what}")
+
+
+def _numbers(member: Member, value: Any, path: str) -> np.ndarray:
+    """Return a numeric array in the machine's byte order, or little endian."""
+    number = member.number
+    assert number is not None
+    numpy = import_module("numpy")
+    dtype = numpy.dtype(bool) if number.python is bool else number_type(number.dtype, "<")
+    if isinstance(value, (bytes, bytearray, memoryview)):
+        if number.python is not int or number.size != 1:
+            raise ConversionError(path, value, f"a list or numpy array of {number.name}")
+        made = numpy.frombuffer(bytes(value), dtype)
+    elif isinstance(value, numpy.ndarray):
+        made = _from_array(number, dtype, value, path)
+    else:
+        items = _sequence(value, path, number.name)
+        plain = [_number(number, item, f"{path}[{index}]") for index, item in enumerate(items)]
+        made = numpy.array(plain, dtype)
+    _check_length(member, len(made), value, path)
+    return made  # type: ignore[no-any-return]
+
+
+def _from_array(number: Number, dtype: Any, value: np.ndarray, path: str) -> np.ndarray:
+    numpy = import_module("numpy")
+    if value.ndim != 1:
+        raise ConversionError(path, value, f"one dimension, not {value.ndim}; use .ravel()")
+    kind = value.dtype.kind
+    if kind == "O":
+        items = [_number(number, item, f"{path}[{i}]") for i, item in enumerate(value.tolist())]
+        return numpy.array(items, dtype)  # type: ignore[no-any-return]
+    allowed = "b" if number.python is bool else "iuf"
+    if kind not in allowed:
+        raise ConversionError(path, value, f"an array of {number.name}, not of {value.dtype}")
+    if value.dtype == dtype:
+        return value
+    with numpy.errstate(all="ignore"):
+        made = value.astype(dtype)
+        wrong = _changed(number, value, made)
+    if wrong is not None and wrong.any():
+        index = int(wrong.argmax())
+        _number(number, value[index].item(), f"{path}[{index}]")
+        raise ConversionError(f"{path}[{index}]", value[index], number.name)
+    return made
+
+
+def _changed(number: Number, value: Any, made: Any) -> Any:
+    """Return which elements of `value` did not survive the cast to `made`, None if all did."""
+    numpy = import_module("numpy")
+    if number.python is float:
+        return numpy.isfinite(value) & ~numpy.isfinite(made)
+    if numpy.can_cast(value.dtype, made.dtype, "safe"):
+        return None
+    # High bounds are compared as powers of two, which every float represents exactly.
+    assert number.high is not None
+    if value.dtype.kind == "f":
+        limit = float(number.high + 1)
+        fits = (value >= float(number.low or 0)) & (value < limit) & (value == numpy.floor(value))
+        return ~fits
+    return (value < number.low) | (value > number.high) | (made != value)
+
+
+def array_packer(member: Member, wire: Wire) -> Callable[[Any], tuple[Any, int]]:
+    """Return ``pack(value) -> (buffer, count)`` for a numeric array on a wire.
+
+    The buffer is bytes or an array that has them; large arrays are not copied.
+    """
+    number = member.number
+    assert number is not None
+    order, code, kind, size = wire.order, number.code, number.python, number.size
+    raw_allowed = kind is int and size == 1
+    fixed, limit = member.fixed_count, member.size
+
+    def target() -> Any:
+        numpy = import_module("numpy")
+        return numpy.dtype(bool) if kind is bool else number_type(number.dtype, order)
+
+    wanted = None
+
+    def pack(value: Any) -> tuple[Any, int]:
+        nonlocal wanted
+        found = type(value)
+        if found is list or found is tuple:
+            count = len(value)
+            if count and set(map(type, value)) != {kind}:
+                value = _numbers(member, value, "").tolist()
+            data: Any = struct.pack(f"{order}{count}{code}", *value)
+        elif found is bytes and raw_allowed:
+            data, count = value, len(value)
+        else:
+            if wanted is None:
+                wanted = target()
+            if getattr(value, "dtype", None) is not wanted or value.ndim != 1:
+                value = _numbers(member, value, "")
+                if value.dtype != wanted:
+                    value = value.astype(wanted)
+            count = len(value)
+            data = value if value.flags.c_contiguous else value.copy()
+        if limit is not None and (count > limit or (fixed is not None and count != fixed)):
+            _check_length(member, count, value, "")
+        return data, count
+
+    return pack
+
+
+# -- messages ------------------------------------------------------------------------------------
+
+
+def convert(schema: Schema, value: Any, path: str = "") -> Message:
+    """Return a plain message made from a dict, a message of the type, or something like a time.
+
+    Raises:
+        ConversionError: A value does not fit; its path is the field's from the root.
+    """
+    cls = plain_class(schema)
+    if isinstance(value, Message):
+        if value._schema__ is not schema:
+            raise ConversionError(path, value, _expected(schema, value._schema__))
+        given = {m.name: getattr(value, m.attr) for m in schema.members}
+    elif isinstance(value, Mapping):
+        given = _known_fields(schema, value, path)
+    elif schema.is_time and (parts := _time_parts(value)) is not None:
+        given = dict(zip((m.name for m in schema.members), parts, strict=True))
+    else:
+        raise ConversionError(path, value, f"a dict or a {schema.name}")
+    made: Message = object.__new__(cls)
+    for member in schema.members:
+        if member.name in given:
+            inner = f"{path}.{member.name}" if path else member.name
+            found = convert_member(member, given[member.name], inner)
+        else:
+            found = default(member)
+        setattr(made, member.attr, found)
+    return made
+
+
+def _expected(schema: Schema, other: Schema) -> str:
+    text = f"a {schema.name}"
+    if schema.name == other.name:
+        text += f" of ROS {schema.ros}" if schema.ros != other.ros else " with the same definition"
+    return text
+
+
+def _known_fields(schema: Schema, value: Mapping[Any, Any], path: str) -> dict[str, Any]:
+    given = {}
+    for key, item in value.items():
+        member = schema.by_name.get(key) if isinstance(key, str) else None
+        if member is None:
+            names = [known.name for known in schema.members]
+            near = get_close_matches(key, names, 1) if isinstance(key, str) else []
+            hint = f"did you mean {near[0]!r}?" if near else f"it has: {', '.join(names) or 'none'}"
+            where = f"{path}.{key}" if path else str(key)
+            raise ConversionError(where, item, f"no such field in {schema.name} ({hint})")
+        if member.name in given:
+            raise ConversionError(f"{path}.{key}" if path else str(key), item, "each field once")
+        given[member.name] = item
+    return given
+
+
+def _time_parts(value: Any) -> tuple[Any, Any] | None:
+    for names in (("secs", "nsecs"), ("sec", "nanosec")):
+        if all(hasattr(value, name) for name in names):
+            return getattr(value, names[0]), getattr(value, names[1])
+    total = getattr(value, "nanoseconds", None)
+    if isinstance(total, int) and not isinstance(total, bool):
+        return divmod(total, _NANO)
+    return None
+
+
+def convert_member(member: Member, value: Any, path: str) -> Any:
+    """Return the value of a field, checked and in its canonical Python form."""
+    if not member.is_array:
+        return _element(member, value, path)
+    if member.number is not None:
+        return _numbers(member, value, path)
+    items = _sequence(value, path, member.field.type.name)
+    _check_length(member, len(items), value, path)
+    if member.struct is not None and not member.struct.members and len(items) > MAX_EMPTY:
+        raise ConversionError(path, value, f"at most {MAX_EMPTY} empty messages")
+    return [_element(member, item, f"{path}[{index}]") for index, item in enumerate(items)]
+
+
+def _element(member: Member, value: Any, path: str) -> Any:
+    if member.number is not None:
+        return _number(member.number, value, path)
+    if member.kind is Kind.TEXT:
+        return _text(member, value, path)
+    assert member.struct is not None
+    return convert(member.struct, value, path)
+
+
+def default(member: Member) -> Any:
+    """Return a fresh default value of a field: the definition's, or zero and empty."""
+    given = member.field.default
+    if given is not None:
+        return convert_member(
+            member, list(given) if isinstance(given, tuple) else given, member.name
+        )
+    count = member.fixed_count or 0
+    one: Callable[[], Any]
+    if member.number is not None:
+        if member.is_array:
+            kind = bool if member.number.python is bool else number_type(member.number.dtype, "<")
+            return import_module("numpy").zeros(count, kind)
+        one = member.number.python
+    elif member.kind is Kind.TEXT:
+        one = str
+    else:
+        assert member.struct is not None
+        one = partial(convert, member.struct, {})
+    return [one() for _ in range(count)] if member.is_array else one()

@@ -1,0 +1,322 @@
+"""How schemas lie on the wire: sizes, alignment, and what is known of an offset beforehand.
+
+CDR (XCDR1, OMG DDSI-RTPS 2.3 section 10 and CORBA 3.0 section 15.3) aligns every primitive to its
+own size, counted from the byte after the 4-byte encapsulation header. ROS 1 does not align.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import gcd
+from typing import TYPE_CHECKING
+
+from rosglass.interfaces.definition import ArrayKind
+from rosglass.messages.schema import Kind, Member, Schema
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rosglass.messages.source import Source
+
+__all__ = ["Cursor", "Knowledge", "Wire", "constant_stride", "leaves", "min_size", "span"]
+
+
+@dataclass(frozen=True, slots=True)
+class Wire:
+    """A wire format.
+
+    Attributes:
+        name: ``cdr`` or ``ros1``.
+        big: Whether numbers are big endian.
+        wide: Bytes for each character of a ``wstring``: 2 (Fast CDR 2 and later) or 4 (before).
+    """
+
+    name: str
+    big: bool = False
+    wide: int = 2
+
+    @property
+    def aligned(self) -> bool:
+        """Whether primitives are aligned to their size."""
+        return self.name == "cdr"
+
+    @property
+    def origin(self) -> int:
+        """Offset of the first field."""
+        return 4 if self.name == "cdr" else 0
+
+    @property
+    def order(self) -> str:
+        """The byte order as :mod:`struct` and numpy write it."""
+        return ">" if self.big else "<"
+
+    @property
+    def title(self) -> str:
+        """Its name for people."""
+        return f"{self.name} big endian" if self.big else self.name
+
+
+def align_of(member: Member, wire: Wire) -> int:
+    """Return the alignment of the member's first byte (a schema's is that of its first member)."""
+    if not wire.aligned:
+        return 1
+    if member.kind is Kind.TEXT or (member.is_array and member.fixed_count is None):
+        return 4
+    if member.number is not None:
+        return member.number.size
+    assert member.struct is not None
+    inner = member.struct.members
+    return align_of(inner[0], wire) if inner else 1
+
+
+def _max_align(schema: Schema, wire: Wire) -> int:
+    if not wire.aligned:
+        return 1
+    found = 1
+    for member in schema.members:
+        if member.kind is Kind.STRUCT:
+            assert member.struct is not None
+            found = max(found, _max_align(member.struct, wire))
+        elif member.number is not None:
+            found = max(found, member.number.size)
+    return found
+
+
+def span(schema: Schema, wire: Wire, position: int) -> int | None:
+    """Return the position after a schema that starts at `position`, None if its size varies.
+
+    Positions count from the origin; leading padding belongs to the schema.
+    """
+    start = position % 8
+    end: int | None = schema.cached(
+        ("span", wire.aligned, start), lambda: _span(schema, wire, start)
+    )
+    return None if end is None else position - start + end
+
+
+def _span(schema: Schema, wire: Wire, position: int) -> int | None:
+    if not schema.members:
+        return position + (1 if wire.aligned else 0)
+    for member in schema.members:
+        if member.kind is Kind.TEXT or (member.is_array and member.fixed_count is None):
+            return None
+        count = 1 if member.fixed_count is None else member.fixed_count
+        if member.number is not None:
+            size = member.number.size
+            if wire.aligned and count:
+                position += -position % size
+            position += size * count
+        else:
+            assert member.struct is not None
+            for index in range(count):
+                end = span(member.struct, wire, position)
+                if end is None:
+                    return None
+                step, position = end - position, end
+                # Once an element starts where the last one did (modulo 8), all others do too.
+                if step % 8 == 0 or not wire.aligned:
+                    position += step * (count - index - 1)
+                    break
+    return position
+
+
+def constant_stride(schema: Schema, wire: Wire) -> tuple[int, int] | None:
+    """Return (stride, size) of the elements of an array of `schema`, None if they vary.
+
+    With alignment the stride is constant only if the first member needs the largest alignment of
+    all, so that every element starts on it; the last element has no padding behind it.
+    """
+    size = span(schema, wire, 0)
+    if size is None:
+        return None
+    largest = _max_align(schema, wire)
+    if schema.members and align_of(schema.members[0], wire) != largest:
+        return None
+    return size + -size % largest, size
+
+
+def min_size(schema: Schema, wire: Wire) -> int:
+    """Return the least number of bytes a value can take, paddings left out."""
+    total: int = schema.cached(("min", wire.aligned, wire.wide), lambda: _min_size(schema, wire))
+    return total
+
+
+def _min_size(schema: Schema, wire: Wire) -> int:
+    if not schema.members:
+        return 1 if wire.aligned else 0
+    total = 0
+    for member in schema.members:
+        if member.is_array and member.fixed_count is None:
+            total += 4
+            continue
+        total += element_size(member, wire) * (
+            1 if member.fixed_count is None else member.fixed_count
+        )
+    return total
+
+
+def element_size(member: Member, wire: Wire) -> int:
+    """Return the least number of bytes an element of the member can take."""
+    if member.kind is Kind.TEXT:
+        return 4
+    if member.number is not None:
+        return member.number.size
+    assert member.struct is not None
+    return min_size(member.struct, wire)
+
+
+#: What an array of messages counts as in :func:`leaves`.
+MANY = 1000
+
+
+def leaves(schema: Schema) -> int:
+    """Return how many values the schema holds; arrays of messages count as very many."""
+    total = 0
+    for member in schema.members:
+        if member.struct is None:
+            total += 1
+        elif member.array is ArrayKind.NONE:
+            total += leaves(member.struct)
+        else:
+            total += MANY
+    return total
+
+
+@dataclass(frozen=True, slots=True)
+class Knowledge:
+    """What is known of a position when code is generated: it is `residue` modulo `modulus`."""
+
+    modulus: int = 1
+    residue: int = 0
+
+    def after(self, size: int) -> Knowledge:
+        """Return what is known `size` bytes later."""
+        return Knowledge(self.modulus, (self.residue + size) % self.modulus)
+
+    def to(self, align: int) -> Knowledge:
+        """Return what is known after padding to a multiple of `align`."""
+        if self.modulus >= align:
+            return self.after(-self.residue % align)
+        return Knowledge(align, 0)
+
+    def repeated(self, step: Callable[[Knowledge], Knowledge]) -> Knowledge:
+        """Return what holds before and after every round of a loop that does `step`."""
+        known = self
+        while (both := known.meet(step(known))) != known:
+            known = both
+        return known
+
+    def meet(self, other: Knowledge) -> Knowledge:
+        """Return what holds in both cases."""
+        modulus = gcd(self.modulus, other.modulus, abs(self.residue - other.residue) or 8)
+        return Knowledge(modulus, self.residue % modulus)
+
+    def many(self, size: int) -> Knowledge:
+        """Return what is known after an unknown number of steps of `size` bytes."""
+        modulus = gcd(self.modulus, size or 8)
+        return Knowledge(modulus, self.residue % modulus)
+
+
+ANYWHERE = Knowledge()
+START = Knowledge(8, 0)
+
+
+def after_text(known: Knowledge, wire: Wire, wide: bool) -> Knowledge:
+    """Return what is known of the position after a string."""
+    return known.to(4).after(4).many(wire.wide if wide else 1)
+
+
+def after_elements(known: Knowledge, align: int, step: int, size: int) -> Knowledge:
+    """Return what is known after any number of elements, no padding behind the last."""
+    return known.meet(known.to(align).many(step).after(size))
+
+
+def after_schema(known: Knowledge, wire: Wire, schema: Schema) -> Knowledge:
+    """Return what is known of the position after a message."""
+    if not wire.aligned:
+        return ANYWHERE
+    if not schema.members:
+        return known.after(1)
+    for member in schema.members:
+        known = after_member(known, wire, member)
+    return known
+
+
+def after_member(known: Knowledge, wire: Wire, member: Member) -> Knowledge:
+    """Return what is known of the position after a field."""
+
+    def one(known: Knowledge) -> Knowledge:
+        if member.kind is Kind.TEXT:
+            return after_text(known, wire, member.wide)
+        if member.number is not None:
+            return known.to(member.number.size).after(member.number.size)
+        assert member.struct is not None
+        return after_schema(known, wire, member.struct)
+
+    if not wire.aligned:
+        return ANYWHERE
+    if not member.is_array:
+        return one(known)
+    if member.fixed_count is not None:
+        if member.number is not None:
+            size = member.number.size
+            return known.to(size).after(size * member.fixed_count)
+        return known.repeated(one)
+    return known.to(4).after(4).repeated(one)
+
+
+class Cursor:
+    """An offset in generated code: a variable (or none: a constant) plus a known distance."""
+
+    def __init__(self, wire: Wire, var: str, delta: int, known: Knowledge) -> None:
+        self.wire, self.var, self.delta, self.known = wire, var, delta, known
+        # Positions count from the origin of alignment, offsets from the start of the buffer.
+        self.shift = wire.origin
+
+    def copy(self) -> Cursor:
+        """Return an independent cursor at the same place."""
+        twin = Cursor(self.wire, self.var, self.delta, self.known)
+        twin.shift = self.shift
+        return twin
+
+    def at(self, extra: int = 0) -> str:
+        """Return the expression for the offset, `extra` bytes further."""
+        delta = self.delta + extra
+        if not self.var:
+            return str(delta)
+        return f"{self.var} + {delta}" if delta > 0 else self.var
+
+    def advance(self, size: int) -> None:
+        """Move on by a known number of bytes."""
+        self.delta += size
+        self.known = self.known.after(size)
+
+    def move(self, var: str, known: Knowledge) -> None:
+        """Stand where `var` says."""
+        self.var, self.delta, self.known = var, 0, known
+
+    def padding(self, align: int) -> int | None:
+        """Return the number of padding bytes before `align`, None if only known at run time."""
+        if not self.wire.aligned or align == 1:
+            return 0
+        if self.known.modulus < align:
+            return None
+        return -self.known.residue % align
+
+    def aligned(self, align: int) -> str:
+        """Return the expression for the offset rounded up to `align`."""
+        pad = self.padding(align)
+        if pad is not None:
+            return self.at(pad)
+        origin = self.shift % align
+        text = f"({self.at(align - 1 - origin)} & -{align})"
+        return f"{text} + {origin}" if origin else text
+
+    def align(self, source: Source, align: int, var: str = "o") -> None:
+        """Move to the next multiple of `align`, with a line of code if it takes one."""
+        pad = self.padding(align)
+        if pad is None:
+            source.line(f"{var} = {self.aligned(align)}")
+            self.move(var, Knowledge(align, 0))
+        elif pad:
+            self.advance(pad)

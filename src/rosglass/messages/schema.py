@@ -1,0 +1,279 @@
+"""A definition, resolved: every member with its Python attribute, its kind and its nested schema.
+
+Schemas are interned by structure: two definitions that say the same (comments aside) share one
+schema, hence one Python class, wherever they came from.
+"""
+
+from __future__ import annotations
+
+import keyword
+import threading
+import weakref
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from rosglass.errors import CyclicTypeError, DefinitionError
+from rosglass.interfaces.definition import ArrayKind, Definition, Field, FieldType
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Hashable, Mapping
+
+    from rosglass.messages.types import MessageType
+
+__all__ = ["Kind", "Member", "Number", "Schema", "schema_of"]
+
+_MAX_DEPTH = 64
+#: Slots of :class:`~rosglass.messages.message.Message` that no field may take.
+PRIVATE_SLOTS = ("_buffer__", "_offset__")
+
+
+class Kind(Enum):
+    """What one element of a member is."""
+
+    NUMBER = "number"
+    TEXT = "text"
+    STRUCT = "message"
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A primitive of fixed size.
+
+    Attributes:
+        name: Its name in definitions.
+        code: Its :mod:`struct` format character.
+        size: Bytes, which is also its alignment in CDR.
+        dtype: Its numpy type without byte order; ``u1`` for ``bool``.
+        low: Smallest integer it holds; None for floats and ``bool``.
+        high: Largest integer it holds; None for floats and ``bool``.
+    """
+
+    name: str
+    code: str
+    size: int
+    dtype: str
+    low: int | None = None
+    high: int | None = None
+
+    @property
+    def python(self) -> type:
+        """The Python class of its values."""
+        return bool if self.code == "?" else float if self.low is None else int
+
+
+def _integer(name: str, code: str, size: int, signed: bool) -> Number:
+    bits = 8 * size
+    low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if signed else (0, (1 << bits) - 1)
+    return Number(name, code, size, f"{'i' if signed else 'u'}{size}", low, high)
+
+
+_NUMBERS = {
+    number.name: number
+    for number in (
+        Number("bool", "?", 1, "u1"),
+        _integer("int8", "b", 1, True),
+        _integer("uint8", "B", 1, False),
+        _integer("char", "B", 1, False),
+        _integer("byte", "B", 1, False),
+        _integer("int16", "h", 2, True),
+        _integer("uint16", "H", 2, False),
+        _integer("int32", "i", 4, True),
+        _integer("uint32", "I", 4, False),
+        _integer("int64", "q", 8, True),
+        _integer("uint64", "Q", 8, False),
+        Number("float32", "f", 4, "f4"),
+        Number("float64", "d", 8, "f8"),
+    )
+}
+# ROS 1 says byte is int8 (genmsg), ROS 2 says it is an octet (rosidl).
+_NUMBERS_ROS1 = {**_NUMBERS, "byte": _integer("byte", "b", 1, True)}
+_COUNT = FieldType("uint32")
+
+
+def _stamp_definition(name: str, part: str) -> Definition:
+    return Definition(name, 1, (Field("secs", FieldType(part)), Field("nsecs", FieldType(part))))
+
+
+# ROS 1's built-in times behave like messages of two fields.
+_BUILTIN_ROS1 = {
+    "time": _stamp_definition("time", "uint32"),
+    "duration": _stamp_definition("duration", "int32"),
+}
+_TIME_TYPES = {"builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration", *_BUILTIN_ROS1}
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """A field of a schema.
+
+    Attributes:
+        name: Name on the wire and in dicts.
+        attr: Name of the Python attribute.
+        field: The definition's field.
+        kind: What an element is.
+        array: Whether and how it repeats.
+        size: Count of a fixed array, maximum of a bounded sequence.
+        number: The primitive, for numbers.
+        struct: The nested schema, for messages.
+        wide: Whether it is a ``wstring``.
+        bound: Maximum length of a bounded string, in code units.
+    """
+
+    name: str
+    attr: str
+    field: Field
+    kind: Kind
+    array: ArrayKind
+    size: int | None
+    number: Number | None = None
+    struct: Schema | None = None
+    wide: bool = False
+    bound: int | None = None
+
+    @property
+    def is_array(self) -> bool:
+        """Whether the member holds several elements."""
+        return self.array is not ArrayKind.NONE
+
+    @property
+    def fixed_count(self) -> int | None:
+        """The number of elements of a fixed array, otherwise None."""
+        return self.size if self.array is ArrayKind.FIXED else None
+
+
+class Schema:
+    """A message type, ready for the codecs.
+
+    Attributes:
+        definition: What it was made from.
+        name: Full name, ``pkg/msg/Type``.
+        ros: 1 or 2.
+        members: The fields in wire order.
+        by_name: The same, by wire name and by attribute.
+        is_time: Whether it is a time or duration (two numbers: seconds and nanoseconds).
+        has_wide: Whether a ``wstring`` occurs anywhere in it.
+        cache: What other modules derive from the schema (class, codecs), by key.
+    """
+
+    #: Makes the public type of a schema; :mod:`rosglass.messages.types` puts itself here.
+    make_type: ClassVar[Callable[[Schema], MessageType]]
+
+    def __init__(self, definition: Definition, members: tuple[Member, ...]) -> None:
+        self.definition = definition
+        self.name, self.ros = definition.name, definition.ros
+        self.members = members
+        self.by_name = {member.attr: member for member in members}
+        self.by_name.update({member.name: member for member in members})
+        self.is_time = self.name in _TIME_TYPES and len(members) == 2
+        self.has_wide: bool = any(m.wide or (m.struct and m.struct.has_wide) for m in members)
+        self.cache: dict[Hashable, Any] = {}
+        self.lock = threading.RLock()
+
+    def __repr__(self) -> str:
+        return f"<Schema {self.name} (ROS {self.ros})>"
+
+    def cached(self, key: Hashable, make: Callable[[], Any]) -> Any:
+        """Return what is cached under `key`, making it once."""
+        try:
+            return self.cache[key]
+        except KeyError:
+            with self.lock:
+                if key not in self.cache:
+                    self.cache[key] = make()
+                return self.cache[key]
+
+    @property
+    def type(self) -> MessageType:
+        """The public type of this schema."""
+        kept: MessageType = self.cached("type", lambda: Schema.make_type(self))
+        return kept
+
+
+_interned: weakref.WeakValueDictionary[Hashable, Schema] = weakref.WeakValueDictionary()
+_intern_lock = threading.RLock()
+
+
+def schema_of(definition: Definition) -> Schema:
+    """Return the schema of a definition.
+
+    Raises:
+        CyclicTypeError: The type contains itself.
+        DefinitionError: A nested type is missing, a field name repeats, nesting is too deep.
+    """
+    with _intern_lock:
+        return _resolve(definition, definition.nested, ())
+
+
+def _resolve(
+    definition: Definition, nested: Mapping[str, Definition], above: tuple[str, ...]
+) -> Schema:
+    file = definition.source.file
+    if definition.name in above:
+        chain = " -> ".join((*above[above.index(definition.name) :], definition.name))
+        raise CyclicTypeError(f"cyclic type: {chain}", file)
+    if len(above) >= _MAX_DEPTH:
+        raise DefinitionError(f"types nest deeper than {_MAX_DEPTH} levels", file)
+    numbers = _NUMBERS_ROS1 if definition.ros == 1 else _NUMBERS
+    members = []
+    taken: set[str] = set(PRIVATE_SLOTS)
+    used: dict[str, Definition] = {}
+    for field in definition.fields:
+        if any(field.name == member.name for member in members):
+            raise DefinitionError(f"field {field.name!r} appears twice in {definition.name}", file)
+        attr = _attribute(field.name, taken)
+        taken.add(attr)
+        ftype = field.type
+        kind, number, struct = Kind.NUMBER, numbers.get(ftype.name), None
+        if ftype.name in ("string", "wstring"):
+            kind = Kind.TEXT
+        elif number is None:
+            inner = _BUILTIN_ROS1.get(ftype.name) if definition.ros == 1 else None
+            inner = inner or nested.get(ftype.name)
+            if inner is None:
+                raise DefinitionError(
+                    f"{definition.name}.{field.name}: no definition of {ftype.name!r}", file
+                )
+            kind = Kind.STRUCT
+            inside = inner.nested if inner.nested else nested
+            struct = _resolve(inner, inside, (*above, definition.name))
+            if inner.name not in _BUILTIN_ROS1:
+                used[inner.name] = struct.definition
+                used.update(struct.definition.nested)
+        members.append(
+            Member(
+                field.name,
+                attr,
+                field,
+                kind,
+                ftype.array,
+                ftype.size,
+                number,
+                struct,
+                ftype.name == "wstring",
+                ftype.string_bound,
+            )
+        )
+    key = (
+        definition.ros,
+        definition.name,
+        tuple((m.name, str(m.field.type), repr(m.field.default), id(m.struct)) for m in members),
+        tuple((c.name, c.type, repr(c.value)) for c in definition.constants),
+    )
+    schema = _interned.get(key)
+    if schema is None:
+        if not definition.nested and used:
+            definition = replace(definition, nested=used)
+        schema = _interned[key] = Schema(definition, tuple(members))
+    return schema
+
+
+def _attribute(name: str, taken: set[str]) -> str:
+    attr = name
+    if attr.startswith("__"):
+        attr = attr.strip("_") + "_"
+    if keyword.iskeyword(attr) or not attr.isidentifier():
+        attr += "_"
+    while attr in taken:
+        attr += "_"
+    return attr

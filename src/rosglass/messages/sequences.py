@@ -1,0 +1,191 @@
+"""Arrays of messages: lists that decode their elements when they are asked for them."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterable, Iterator, MutableSequence
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, ClassVar, overload
+
+from rosglass.errors import UnsupportedError
+from rosglass.messages.schema import Kind
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from rosglass.messages.codec import Codec
+    from rosglass.messages.layout import Wire
+    from rosglass.messages.message import Message
+    from rosglass.messages.schema import Schema
+
+__all__ = ["MessageSequence", "record_type"]
+
+_lock = threading.RLock()
+
+
+class MessageSequence(MutableSequence["Message"]):
+    """The elements of an array field, as received; behaves as a list.
+
+    One element asked for is found and decoded alone (at once when all have the same size);
+    iterating and changing the sequence decodes them all.
+    """
+
+    __slots__ = ("_buffer", "_count", "_items", "_known", "_offsets", "_start")
+    _codec: ClassVar[Codec]
+    _items: list[Message] | None
+    _buffer: bytes
+    _start: int
+    _count: int
+
+    def _all(self) -> list[Message]:
+        items = self._items
+        if items is None:
+            with _lock:
+                items = self._items
+                if items is None:
+                    items = self._codec.read_many(self._buffer, self._start, self._count)
+                    for index, element in getattr(self, "_known", {}).items():
+                        items[index] = element
+                    self._items = items
+                    self._buffer = b""
+        return items
+
+    def _one(self, index: int) -> Message:
+        with _lock:
+            if self._items is not None:
+                return self._items[index]
+            known: dict[int, Message] = getattr(self, "_known", None) or {}
+            self._known = known
+            if index not in known:
+                known[index] = self._codec.element(self._buffer, self._offset(index))
+            return known[index]
+
+    def _offset(self, index: int) -> int:
+        codec = self._codec
+        if codec.stride is not None:
+            return self._start + index * codec.stride[0]
+        offsets: list[int] = getattr(self, "_offsets", None) or [self._start]
+        self._offsets = offsets
+        while len(offsets) <= index:
+            offsets.append(codec.skip(self._buffer, offsets[-1]))
+        return offsets[index]
+
+    def __len__(self) -> int:
+        items = self._items
+        return self._count if items is None else len(items)
+
+    @overload
+    def __getitem__(self, index: int) -> Message: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Message]: ...
+    def __getitem__(self, index: int | slice) -> Message | list[Message]:
+        items = self._items
+        if items is not None:
+            return items[index]
+        if isinstance(index, slice):
+            return self._all()[index]
+        place = index + self._count if index < 0 else index
+        if not 0 <= place < self._count:
+            raise IndexError(f"index {index} of an array of {self._count} messages")
+        return self._one(place)
+
+    def __setitem__(self, index: Any, value: Any) -> None:
+        self._all()[index] = value
+
+    def __delitem__(self, index: Any) -> None:
+        del self._all()[index]
+
+    def insert(self, index: int, value: Message) -> None:
+        """Insert `value` before `index`."""
+        self._all().insert(index, value)
+
+    def __iter__(self) -> Iterator[Message]:
+        return iter(self._all())
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, (MessageSequence, list, tuple)):
+            return NotImplemented
+        return self._all() == list(other)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __add__(self, other: Iterable[Message]) -> list[Message]:
+        return [*self._all(), *other]
+
+    def __repr__(self) -> str:
+        return repr(self._all())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return list, (list(self._all()),)
+
+    @property
+    def array(self) -> np.ndarray:
+        """All elements as one structured numpy array, without decoding them one by one.
+
+        Raises:
+            UnsupportedError: The elements hold strings or sequences, or vary in size.
+        """
+        codec = self._codec
+        dtype = record_type(codec.schema, codec.wire)
+        if dtype is None or codec.stride is None:
+            raise UnsupportedError(f"{codec.schema.name}: its elements are not of constant size")
+        numpy = import_module("numpy")
+        with _lock:
+            if self._items is None:
+                made = numpy.ndarray(
+                    (self._count,), dtype, self._buffer, self._start, codec.stride[:1]
+                )
+            else:
+                made = numpy.array([_row(item) for item in self._items], dtype)
+        return made  # type: ignore[no-any-return]
+
+
+def _row(message: Message) -> tuple[Any, ...]:
+    return tuple(
+        _row(value) if member.kind is Kind.STRUCT and not member.is_array else value
+        for member in message._schema__.members
+        for value in (getattr(message, member.attr),)
+    )
+
+
+def record_type(schema: Schema, wire: Wire) -> np.dtype | None:
+    """Return the structured numpy type of a schema of constant layout, None if it has none."""
+    found: np.dtype | None = schema.cached(
+        ("record", wire.aligned, wire.big), lambda: _record_type(schema, wire)
+    )
+    return found
+
+
+def _record_type(schema: Schema, wire: Wire, start: int = 0) -> np.dtype | None:
+    from rosglass.messages import layout  # noqa: PLC0415 - not needed unless asked for
+
+    numpy = import_module("numpy")
+    names, formats, offsets, position = [], [], [], start
+    for member in schema.members:
+        count = 1 if member.fixed_count is None else member.fixed_count
+        if member.kind is Kind.TEXT or (member.is_array and member.fixed_count is None):
+            return None
+        inner: Any
+        if member.number is not None:
+            size = member.number.size
+            position += -position % size if wire.aligned else 0
+            inner, end = wire.order + member.number.dtype, position + size * count
+            if member.number.code == "?":
+                inner = "?"
+        else:
+            assert member.struct is not None
+            if member.is_array:
+                return None
+            after = layout.span(member.struct, wire, position)
+            inner = _record_type(member.struct, wire, position)
+            if after is None or inner is None:
+                return None
+            end = after
+        names.append(member.name)
+        formats.append((inner, (count,)) if member.is_array else inner)
+        offsets.append(position - start)
+        position = end
+    dtype: np.dtype = numpy.dtype(
+        {"names": names, "formats": formats, "offsets": offsets, "itemsize": position - start}
+    )
+    return dtype

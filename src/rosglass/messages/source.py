@@ -1,0 +1,73 @@
+"""Writing Python functions as text, and making them functions that debuggers can show."""
+
+from __future__ import annotations
+
+import itertools
+import linecache
+import struct
+from contextlib import contextmanager
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+__all__ = ["Source", "packer", "unpacker"]
+
+_numbers = itertools.count(1)
+
+
+@lru_cache(maxsize=4096)
+def unpacker(fmt: str) -> Callable[..., tuple[Any, ...]]:
+    """Return ``struct.Struct(fmt).unpack_from``, shared between all generated functions."""
+    return struct.Struct(fmt).unpack_from
+
+
+@lru_cache(maxsize=4096)
+def packer(fmt: str) -> Callable[..., bytes]:
+    """Return ``struct.Struct(fmt).pack``, shared between all generated functions."""
+    return struct.Struct(fmt).pack
+
+
+class Source:
+    """The text of one function and the objects its names stand for."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.globals: dict[str, Any] = {}
+        self._names: dict[int, str] = {}
+        self._depth = 1
+        self._fresh = itertools.count(1)
+
+    def line(self, text: str) -> None:
+        """Add a line at the current indentation."""
+        self.lines.append("    " * self._depth + text)
+
+    @contextmanager
+    def block(self, head: str) -> Iterator[None]:
+        """Add `head` and indent what follows."""
+        self.line(head)
+        self._depth += 1
+        yield
+        self._depth -= 1
+
+    def bind(self, value: Any, hint: str) -> str:
+        """Return the name that stands for `value` in the text, made from `hint`."""
+        name = self._names.get(id(value))
+        if name is None:
+            name = hint if hint not in self.globals else f"{hint}_{len(self.globals)}"
+            self._names[id(value)] = name
+            self.globals[name] = value
+        return name
+
+    def fresh(self, prefix: str) -> str:
+        """Return a local name not used before."""
+        return f"{prefix}{next(self._fresh)}"
+
+    def compile(self, head: str, title: str) -> Any:
+        """Return the function ``def head: lines``; `title` names it in tracebacks."""
+        text = "\n".join((f"def {head}:", *self.lines, ""))
+        filename = f"<rosglass {title} #{next(_numbers)}>"
+        exec(compile(text, filename, "exec"), self.globals)
+        linecache.cache[filename] = (len(text), None, text.splitlines(True), filename)
+        return self.globals[head[: head.index("(")]]

@@ -1,0 +1,543 @@
+"""Types: what a message, service or action is, and the way between its values and its bytes."""
+
+from __future__ import annotations
+
+import threading
+import weakref
+from dataclasses import replace
+from functools import partial
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from rosglass.errors import DecodeError, Error, UnsupportedError
+from rosglass.interfaces.definition import (
+    ActionDefinition,
+    Definition,
+    InterfaceDefinition,
+    ServiceDefinition,
+)
+from rosglass.messages.codec import Codec, codec_of
+from rosglass.messages.conversion import convert
+from rosglass.messages.diagnosis import encapsulation_error
+from rosglass.messages.emit_path import path_function
+from rosglass.messages.layout import Wire
+from rosglass.messages.schema import Schema, schema_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rosglass.interfaces import Library
+    from rosglass.interfaces.definition import Field
+    from rosglass.messages.message import Message
+
+__all__ = ["ActionType", "Constants", "MessageType", "ServiceType", "default_library", "load"]
+
+_WIRES = {
+    (name, big, wide): Wire(name, big, wide)
+    for name in ("cdr", "ros1")
+    for big in (False, True)
+    for wide in (2, 4)
+    if not (name == "ros1" and big)
+}
+_ORDERS = {"little": False, "big": True}
+_PADDING = 3
+
+
+class Constants(dict[str, Any]):
+    """A message's constants: ``constants["OK"]`` or ``constants.OK``; read-only by convention."""
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return self[name]
+        except KeyError:
+            known = ", ".join(self) or "none"
+            raise AttributeError(f"no constant {name!r}; there are: {known}") from None
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self]
+
+
+class MessageType:
+    """A message type: decodes, encodes and makes its messages.
+
+    Attributes:
+        definition: The definition it was made from.
+        name: Full name, ``pkg/msg/Type``.
+        ros: 1 or 2.
+        wire: The wire format used unless another is asked for: ``cdr`` for ROS 2, ``ros1``.
+    """
+
+    def __init__(self, definition: Definition) -> None:
+        if not isinstance(definition, Definition):
+            raise UnsupportedError(
+                f"a MessageType is made from a message Definition, not {definition!r}; "
+                "use rosglass.load(name) to make one from a name"
+            )
+        self._set(schema_of(definition), definition)
+
+    def _set(self, schema: Schema, definition: Definition) -> None:
+        self._schema = schema
+        self.definition = definition
+        self.name, self.ros = schema.name, schema.ros
+        self.wire = "cdr" if schema.ros == 2 else "ros1"
+        self._codecs: dict[Any, Codec] = {}
+        self._shells: dict[str | None, tuple[type[Any], bool]] = {}
+        self._paths: dict[Any, Callable[[Any], Any]] = {}
+
+    @classmethod
+    def _of_schema(cls, schema: Schema) -> MessageType:
+        made: MessageType = object.__new__(cls)
+        made._set(schema, schema.definition)
+        return made
+
+    def __repr__(self) -> str:
+        return f"<MessageType {self.name} (ROS {self.ros})>"
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, MessageType):
+            return NotImplemented
+        return self._schema is other._schema
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.ros))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return MessageType, (_portable(self.definition),)
+
+    @property
+    def md5(self) -> str:
+        """ROS 1's md5 sum of the definition."""
+        return hashes().md5(self.definition)
+
+    @property
+    def rihs01(self) -> str:
+        """ROS 2's type hash (REP 2016), ``RIHS01_`` and 64 hexadecimal digits."""
+        return hashes().rihs01(self.definition)
+
+    @property
+    def fields(self) -> tuple[Field, ...]:
+        """The fields in wire order."""
+        return self.definition.fields
+
+    @property
+    def constants(self) -> Constants:
+        """The constants by name."""
+        return Constants({constant.name: constant.value for constant in self.definition.constants})
+
+    # -- making ----------------------------------------------------------------------------------
+
+    def create(self, value: dict[str, Any] | Message | None = None, /, **fields: Any) -> Message:
+        """Return a new message; missing fields have the type's defaults.
+
+        Args:
+            value: A dict of fields, or a message of this type to start from.
+            fields: Fields by name, instead of or on top of `value`.
+
+        Raises:
+            ConversionError: A value does not fit its field.
+        """
+        return convert(self._schema, self._merged(value, fields))
+
+    def __call__(self, value: Any = None, /, **fields: Any) -> Message:
+        """Return a new message, as :meth:`create` does."""
+        return self.create(value, **fields)
+
+    def _merged(self, value: Any, fields: dict[str, Any]) -> Any:
+        if value is None:
+            return fields
+        if not fields:
+            return value
+        base = convert(self._schema, value)
+        for name, item in fields.items():
+            member = self._schema.by_name.get(name)
+            if member is None:
+                convert(self._schema, {name: item})  # raises, with a hint at the right name
+            else:
+                setattr(base, member.attr, item)
+        return base
+
+    # -- reading ---------------------------------------------------------------------------------
+
+    def decode(
+        self, buffer: Any, wire: str | None = None, *, wstring_width: int | None = None
+    ) -> Message:
+        """Return the message in `buffer`; fields are decoded when they are read.
+
+        Args:
+            buffer: The bytes as received, for CDR with the encapsulation header. ``bytes`` are
+                kept, not copied; anything else with bytes in it is copied first.
+            wire: ``cdr`` or ``ros1``; None for the type's own.
+            wstring_width: Bytes for each character of wstrings, 2 or 4; None finds out.
+
+        Raises:
+            DecodeError: The buffer is no bytes, or its header announces another representation.
+                Other damage shows when fields are read; :meth:`validate` finds it at once.
+        """
+        fast = self._shells.get(wire)
+        if fast is not None and type(buffer) is bytes:
+            shell, aligned = fast
+            if not aligned or (len(buffer) > 3 and buffer[1] == 1 and not buffer[0]):
+                message: Message = shell()
+                message._buffer__ = buffer
+                return message
+        return self._decode(buffer, wire, wstring_width)
+
+    def _decode(self, buffer: Any, wire: str | None, wide: int | None) -> Message:
+        data = self._bytes(buffer)
+        codec = self._codec_for(data, wire, wide)
+        if not self._schema.has_wide and not codec.wire.big:
+            self._shells[wire] = codec.root, codec.wire.aligned
+        message = codec.root()
+        message._buffer__ = data  # type: ignore[attr-defined]
+        return message
+
+    def _bytes(self, buffer: Any) -> bytes:
+        if type(buffer) is bytes:
+            return buffer
+        try:
+            return memoryview(buffer).tobytes()
+        except TypeError:
+            kind = type(buffer).__name__
+            raise DecodeError(self.name, f"expected bytes to decode, got {kind}") from None
+
+    def _wire_name(self, wire: str | None) -> str:
+        if wire is None:
+            return self.wire
+        if wire not in ("cdr", "ros1"):
+            raise UnsupportedError(f"wire format {wire!r} is unknown; there are 'cdr' and 'ros1'")
+        return wire
+
+    def _codec_for(self, data: bytes, wire: str | None, wide: int | None) -> Codec:
+        """Return the codec for received bytes: their header tells the byte order."""
+        name = self._wire_name(wire)
+        big = name == "cdr" and _encapsulation(self.name, data)
+        if wide is None and self._schema.has_wide:
+            wide = self._plausible_width(data, name, big)
+        return self._codec(name, big, _width(wide))
+
+    def _codec(self, name: str, big: bool, wide: int) -> Codec:
+        return codec_of(self._schema, _WIRES[name, big, wide])
+
+    def _plausible_width(self, data: bytes, name: str, big: bool) -> int:
+        """Return the wstring width that makes the message end where its bytes end.
+
+        If both do, the padding that the encapsulation header announces decides, then the newer.
+        """
+        fitting = []
+        for wide in (2, 4):
+            try:
+                left = len(data) - self._codec(name, big, wide).end(data)
+            except DecodeError:
+                continue
+            if left <= (_PADDING if name == "cdr" else 0):
+                announced = data[3] & _PADDING if name == "cdr" else 0
+                fitting.append((left != announced, wide))
+        return min(fitting)[1] if fitting else 2
+
+    def decode_all(
+        self, buffer: Any, wire: str | None = None, *, wstring_width: int | None = None
+    ) -> Message:
+        """Return the message in `buffer` with every field decoded; arguments as :meth:`decode`.
+
+        Raises:
+            DecodeError: The buffer is no such message.
+        """
+        data = self._bytes(buffer)
+        return self._codec_for(data, wire, wstring_width).decode_all(data)
+
+    def validate(
+        self, buffer: Any, wire: str | None = None, *, wstring_width: int | None = None
+    ) -> None:
+        """Check that `buffer` is one message and nothing else, without decoding it.
+
+        Raises:
+            DecodeError: A length does not fit the buffer, or bytes are left over (up to three
+                bytes of padding are normal in CDR).
+        """
+        data = self._bytes(buffer)
+        codec = self._codec_for(data, wire, wstring_width)
+        end = codec.end(data)
+        left = len(data) - end
+        if left > (_PADDING if codec.wire.aligned else 0):
+            raise DecodeError(self.name, f"{left} bytes left over after the message", "", end)
+
+    def path(
+        self,
+        path: str,
+        /,
+        *more: str,
+        wire: str | None = None,
+        wstring_width: int | None = None,
+    ) -> Callable[[Any], Any]:
+        """Return a function from a message's bytes to the value at a field path.
+
+        Args:
+            path: E.g. ``pose.position.x``, ``ranges[3]``, ``ranges[-1]``, ``name[1:5]``,
+                ``poses[*].pose.position.x`` (a numpy array of all, or a list of strings).
+            more: More paths; the function then returns a tuple.
+            wire: ``cdr`` or ``ros1``; None for the type's own.
+            wstring_width: As for :meth:`decode`.
+
+        Raises:
+            FieldPathError: The path does not exist in the type; from the function: an index is
+                beyond the array.
+        """
+        name = self._wire_name(wire)
+        if self._schema.has_wide and wstring_width is None:
+            # Only the bytes tell the width.
+            self._path(name, 2, False, (path, *more), not more)
+            return partial(self._path_by_bytes, name, (path, *more), not more)
+        return self._path(name, _width(wstring_width), False, (path, *more), not more)
+
+    def _path(
+        self, name: str, wide: int, big: bool, paths: tuple[str, ...], single: bool
+    ) -> Callable[[Any], Any]:
+        key = (name, wide, big, paths, single)
+        known = self._paths.get(key)
+        if known is not None:
+            return known
+        codec = self._codec(name, big, wide)
+
+        def other(buffer: Any) -> Any:
+            data = self._bytes(buffer)
+            return self._path(name, wide, _encapsulation(self.name, data), paths, single)(data)
+
+        def failed(buffer: Any, error: Exception) -> Any:
+            if type(buffer) is not bytes:
+                return function(self._bytes(buffer))
+            if isinstance(error, Error):
+                raise error
+            found = codec
+            if name == "cdr":
+                found = self._codec(name, _encapsulation(self.name, buffer), wide)
+            raise found.explain(buffer, error) from None
+
+        function = self._paths[key] = path_function(codec, paths, single, other, failed)
+        return function
+
+    def _path_by_bytes(self, name: str, paths: tuple[str, ...], single: bool, buffer: Any) -> Any:
+        data = self._bytes(buffer)
+        codec = self._codec_for(data, name, None)
+        return self._path(name, codec.wire.wide, codec.wire.big, paths, single)(data)
+
+    # -- writing ---------------------------------------------------------------------------------
+
+    def encode(
+        self,
+        value: Message | dict[str, Any] | None = None,
+        /,
+        *,
+        wire: str | None = None,
+        byteorder: str = "little",
+        wstring_width: int | None = None,
+        **fields: Any,
+    ) -> bytes:
+        """Return the bytes of a message.
+
+        Args:
+            value: A message of this type, or a dict of fields; missing fields get the defaults.
+            wire: ``cdr`` or ``ros1``; None for the type's own.
+            byteorder: ``little`` or ``big``; ROS 1 knows only little.
+            wstring_width: Bytes for each character of wstrings: 2 (default) or 4.
+            fields: The fields as keyword arguments, instead of or on top of `value`.
+
+        Raises:
+            ConversionError: A value does not fit its field.
+        """
+        if value is None:
+            value = fields
+        elif fields:
+            value = self._merged(value, fields)
+        codec = self._writing_codec(wire, byteorder, wstring_width)
+        if type(value) is dict:
+            data: bytes = codec.writer(True, True)(value)
+            return data
+        if getattr(value, "_root__", None) is codec:
+            untouched = getattr(value, "_buffer__", None)
+            if untouched is not None:
+                return untouched  # type: ignore[no-any-return]
+        data = codec.writer(False, True)(value)
+        return data
+
+    def encode_parts(
+        self,
+        value: Message | dict[str, Any] | None = None,
+        /,
+        *,
+        wire: str | None = None,
+        byteorder: str = "little",
+        wstring_width: int | None = None,
+        **fields: Any,
+    ) -> list[bytes | memoryview]:
+        """Return the bytes of a message in parts, for ``writev``; arguments as :meth:`encode`.
+
+        Big arrays are not copied: the parts are views of the arrays in `value`, which must not
+        change until the parts are sent.
+        """
+        if value is None:
+            value = fields
+        elif fields:
+            value = self._merged(value, fields)
+        codec = self._writing_codec(wire, byteorder, wstring_width)
+        if getattr(value, "_root__", None) is codec:
+            untouched = getattr(value, "_buffer__", None)
+            if untouched is not None:
+                return [untouched]
+        parts = codec.writer(type(value) is dict, False)(value)
+        return [part if type(part) is bytes else _flat(part) for part in parts]
+
+    def _writing_codec(self, wire: str | None, byteorder: str, wide: int | None) -> Codec:
+        try:
+            return self._codecs[wire, byteorder, wide]
+        except KeyError:
+            name = self._wire_name(wire)
+        except TypeError:
+            name = self._wire_name(str(wire))
+        if byteorder not in _ORDERS:
+            raise UnsupportedError(f"byteorder is 'little' or 'big', not {byteorder!r}")
+        big = _ORDERS[byteorder]
+        if big and name == "ros1":
+            raise UnsupportedError("ROS 1 messages are little endian; byteorder='big' is for CDR")
+        codec = self._codecs[wire, byteorder, wide] = self._codec(name, big, _width(wide))
+        return codec
+
+
+def _flat(part: Any) -> memoryview:
+    view = memoryview(part)
+    return view.cast("B") if view.nbytes else memoryview(b"")
+
+
+def _encapsulation(type_name: str, data: bytes) -> bool:
+    """Return whether a CDR message is big endian; raises DecodeError for what we cannot read."""
+    if len(data) < 4 or data[0] or data[1] > 1:
+        raise encapsulation_error(type_name, data)
+    return not data[1]
+
+
+def _width(wide: int | None) -> int:
+    if wide not in (None, 2, 4):
+        raise UnsupportedError(f"a wstring's character takes 2 or 4 bytes, not {wide!r}")
+    return wide or 2
+
+
+def _portable(definition: Definition) -> Definition:
+    """Return the definition with plain dicts inside, for pickling."""
+    inner = {name: replace(nested, nested={}) for name, nested in definition.nested.items()}
+    return replace(definition, nested=inner)
+
+
+Schema.make_type = MessageType._of_schema
+
+
+class ServiceType:
+    """A service type.
+
+    Attributes:
+        definition: The definition it was made from.
+        name: Full name, ``pkg/srv/Type``.
+        ros: 1 or 2.
+        request: Type of the request.
+        response: Type of the response.
+    """
+
+    def __init__(self, definition: ServiceDefinition) -> None:
+        self.definition = definition
+        self.name, self.ros = definition.name, definition.ros
+        self.request = MessageType(definition.request)
+        self.response = MessageType(definition.response)
+
+    @property
+    def md5(self) -> str:
+        """ROS 1's md5 sum of the definition."""
+        return hashes().md5(self.definition)
+
+    @property
+    def rihs01(self) -> str:
+        """ROS 2's type hash (REP 2016)."""
+        return hashes().rihs01(self.definition)
+
+    def __repr__(self) -> str:
+        return f"<ServiceType {self.name} (ROS {self.ros})>"
+
+
+class ActionType:
+    """An action type.
+
+    Attributes:
+        definition: The definition it was made from.
+        name: Full name, ``pkg/action/Type``.
+        ros: 1 or 2.
+        goal: Type of the goal.
+        result: Type of the result.
+        feedback: Type of the feedback.
+    """
+
+    def __init__(self, definition: ActionDefinition) -> None:
+        self.definition = definition
+        self.name, self.ros = definition.name, definition.ros
+        self.goal = MessageType(definition.goal)
+        self.result = MessageType(definition.result)
+        self.feedback = MessageType(definition.feedback)
+
+    @property
+    def md5(self) -> str:
+        """ROS 1's md5 sum of the definition."""
+        return hashes().md5(self.definition)
+
+    @property
+    def rihs01(self) -> str:
+        """ROS 2's type hash (REP 2016)."""
+        return hashes().rihs01(self.definition)
+
+    def __repr__(self) -> str:
+        return f"<ActionType {self.name} (ROS {self.ros})>"
+
+
+def hashes() -> Any:
+    """Return the module that computes type hashes; it is loaded only when one is asked for."""
+    return import_module("rosglass.interfaces")
+
+
+_lock = threading.RLock()
+_libraries: weakref.WeakKeyDictionary[Any, dict[tuple[str, int], Any]]
+_libraries = weakref.WeakKeyDictionary()
+_default: list[Library] = []
+
+
+def default_library() -> Library:
+    """Return the library that :func:`load` uses unless given another; made on first use."""
+    with _lock:
+        if not _default:
+            _default.append(import_module("rosglass.interfaces").Library())
+        return _default[0]
+
+
+def load(
+    name: str, ros: int = 2, library: Library | None = None
+) -> MessageType | ServiceType | ActionType:
+    """Return the type called `name`.
+
+    Args:
+        name: ``pkg/msg/Type`` or ``pkg/Type`` (also ``srv`` and ``action``).
+        ros: 2 for ROS 2's definition, 1 for ROS 1's.
+        library: Where to look it up; None for :func:`default_library`.
+
+    Raises:
+        TypeNotFoundError: No provider has a definition.
+        DefinitionError: The definition has errors, or is cyclic.
+    """
+    source = default_library() if library is None else library
+    with _lock:
+        types = _libraries.setdefault(source, {})
+        found = types.get((name, ros))
+        if found is None:
+            found = types[name, ros] = _make(source.definition(name, ros=ros))
+    return found  # type: ignore[no-any-return]
+
+
+def _make(definition: InterfaceDefinition) -> MessageType | ServiceType | ActionType:
+    if isinstance(definition, ServiceDefinition):
+        return ServiceType(definition)
+    if isinstance(definition, ActionDefinition):
+        return ActionType(definition)
+    return MessageType(definition)
