@@ -1,0 +1,89 @@
+"""``rosglass robot``: the simulated robot, in a process of its own."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from typing import TYPE_CHECKING
+
+from rosglass.comm import ConnectionState
+
+if TYPE_CHECKING:
+    import argparse
+
+    from rosglass.comm import Status
+
+__all__ = ["configure", "run"]
+
+DEFAULT_URL = "zenoh://127.0.0.1:7447"
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's options."""
+    parser.add_argument(
+        "--url", default=DEFAULT_URL, help="where to find the other nodes (default: %(default)s)"
+    )
+    parser.add_argument("--name", default="robot", help="name of the node (default: %(default)s)")
+    parser.add_argument(
+        "--fps", type=float, default=30.0, help="camera pictures per second (default: 30)"
+    )
+    parser.add_argument(
+        "--no-raw", action="store_true", help="do not send uncompressed camera pictures"
+    )
+    parser.add_argument(
+        "--no-compressed", action="store_true", help="do not send compressed camera pictures"
+    )
+    parser.add_argument(
+        "--jpeg-quality", type=int, default=80, metavar="1-100", help="default: %(default)s"
+    )
+    parser.add_argument(
+        "--leash",
+        action="store_true",
+        help="end when standard input closes, that is, with the program that started the robot",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the robot until it is told to end."""
+    import rosglass
+    from rosglass.demo.robot import Robot, RobotOptions
+
+    options = RobotOptions(
+        fps=args.fps,
+        raw=not args.no_raw,
+        compressed=not args.no_compressed,
+        jpeg_quality=args.jpeg_quality,
+    )
+    end = threading.Event()
+    signal.signal(signal.SIGTERM, lambda *_: end.set())
+    if args.leash:
+        threading.Thread(target=_follow_leash, args=(end,), daemon=True).start()
+    node = rosglass.connect(args.url, name=args.name)
+    try:
+        robot = Robot(node, options)
+        try:
+            node.on_status_change(_tell)
+            print(f"robot: simulated, node /{args.name} on {args.url}; Ctrl-C ends it", flush=True)
+            _tell(node.status())
+            robot.start()
+            while not end.is_set() and not robot.wait(0.1):
+                pass
+            failed = not end.is_set()
+        finally:
+            robot.close()
+    finally:
+        node.close()
+    return 1 if failed else 0
+
+
+def _tell(status: Status) -> None:
+    if status.state is not ConnectionState.CLOSED:
+        print(f"robot: {status.state.value}: {status.detail}", flush=True)
+
+
+def _follow_leash(end: threading.Event) -> None:
+    # Whoever started us holds the other end; it closes however that program ends, SIGKILL included.
+    while sys.stdin.buffer.read(4096):
+        pass
+    end.set()

@@ -1,0 +1,146 @@
+// The camera picture. It never passes off an old picture as live: once pictures stop, or arrive
+// late, it turns grey under a red frame that says how old they are.
+import QtQuick
+import QtQuick.Effects
+import Ros2 1.0
+
+Item {
+    id: view
+
+    property alias topic: camera.topic
+    property alias transport: camera.defaultTransport
+    // Why there may be no picture at all, from the connection.
+    property string reason
+    readonly property bool received: camera.age >= 0
+    readonly property real age: camera.age
+    // Milliseconds from the robot's stamp to here; means something while the clocks agree.
+    readonly property real latency: camera.latency
+    readonly property bool late: received && !camera.stale && latency > 1000
+    readonly property bool live: received && !camera.stale && !late
+    readonly property real framerate: camera.framerate
+
+    ImageTransportSubscription {
+        id: camera
+        topic: "/camera/image_raw"
+        defaultTransport: "raw"
+        // Half a second: at 30 pictures a second the loss of fifteen is no hiccup any more.
+        timeout: 500
+    }
+
+    Rectangle {
+        anchors.fill: parent
+        color: "black"
+    }
+    VideoOutput {
+        id: output
+        objectName: "picture"
+        anchors.fill: parent
+        source: camera
+        layer.enabled: !view.live
+        layer.effect: MultiEffect {
+            saturation: -1
+            brightness: -0.25
+            contrast: -0.2
+        }
+    }
+
+    // Name, rate and latency of the stream.
+    Rectangle {
+        x: output.contentRect.x + 12
+        y: output.contentRect.y + 12
+        width: label.width + 24
+        height: 28
+        radius: 14
+        color: Theme.shade
+        visible: view.live
+        Row {
+            id: label
+            anchors.centerIn: parent
+            spacing: 8
+            Rectangle {
+                anchors.verticalCenter: parent.verticalCenter
+                width: 8; height: 8; radius: 4
+                color: Theme.bad
+                SequentialAnimation on opacity {
+                    running: view.live
+                    loops: Animation.Infinite
+                    PropertyAction { value: 1 }
+                    PauseAnimation { duration: 700 }
+                    PropertyAction { value: 0.25 }
+                    PauseAnimation { duration: 500 }
+                }
+            }
+            Text {
+                anchors.verticalCenter: parent.verticalCenter
+                text: "LIVE"
+                color: Theme.text
+                font { pixelSize: Theme.small; weight: Font.Bold; letterSpacing: 1 }
+            }
+            Text {
+                anchors.verticalCenter: parent.verticalCenter
+                text: "front camera   " + view.framerate.toFixed(0) + " Hz   "
+                    + (view.latency >= 0 ? view.latency.toFixed(0) + " ms" : "")
+                color: Theme.dim
+                font.pixelSize: Theme.small
+            }
+        }
+    }
+
+    // Nobody must take what is below this for the robot's present.
+    Rectangle {
+        objectName: "noSignal"
+        anchors.fill: parent
+        visible: !view.live
+        color: view.received ? "#60200008" : "#160a0e"
+        border { color: Theme.bad; width: 6 }
+
+        Rectangle {
+            anchors.centerIn: parent
+            width: Math.min(parent.width - 40, Math.max(380, banner.implicitWidth + 56))
+            height: banner.height + 36
+            radius: Theme.radius
+            color: "#f0200409"
+            border { color: Theme.bad; width: 2 }
+            Column {
+                id: banner
+                anchors.centerIn: parent
+                width: Math.min(implicitWidth, view.width - 80)
+                spacing: 8
+                Text {
+                    anchors.horizontalCenter: parent.horizontalCenter
+                    text: view.late ? "PICTURE DELAYED" : "NO SIGNAL"
+                    color: Theme.bad
+                    font { pixelSize: 38; weight: Font.Black; letterSpacing: 3 }
+                    SequentialAnimation on opacity {
+                        running: !view.live
+                        loops: Animation.Infinite
+                        PropertyAction { value: 1 }
+                        PauseAnimation { duration: 600 }
+                        PropertyAction { value: 0.45 }
+                        PauseAnimation { duration: 300 }
+                    }
+                }
+                Text {
+                    objectName: "noSignalText"
+                    anchors.horizontalCenter: parent.horizontalCenter
+                    text: !view.received ? "no picture received yet"
+                        : view.late
+                            ? "by " + (view.latency / 1000).toFixed(1) + " s"
+                            : "last image " + view.age.toFixed(1) + " s old"
+                    color: Theme.text
+                    font.pixelSize: Theme.large
+                }
+                Text {
+                    anchors.horizontalCenter: parent.horizontalCenter
+                    width: Math.min(implicitWidth, view.width - 90)
+                    visible: text !== ""
+                    text: view.reason || camera.problem
+                    color: Theme.dim
+                    wrapMode: Text.Wrap
+                    horizontalAlignment: Text.AlignHCenter
+                    font.pixelSize: Theme.normal
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,87 @@
+// What the operator wants the robot to do, as a stream of geometry_msgs/msg/Twist.
+//
+// Sends 20 times a second while a stick or key is held; several zeros when it is let go, however
+// that happens; nothing otherwise, so that others may drive. Once blocked (emergency stop, no
+// picture, window not in front) it stays off until everything was let go.
+import QtQuick
+import Ros2 1.0
+
+QtObject {
+    id: drive
+
+    property string topic: "/cmd_vel"
+    property real maxSpeed: 0.9
+    property real maxTurn: 1.2
+    // Why driving is not allowed now; empty when it is.
+    property string obstacle
+    // Wanted motion, each from -1 to 1: forwards, and to the left.
+    property real forward: 0
+    property real left: 0
+    property bool held: false
+    property bool armed: false
+    readonly property bool active: held && armed
+    property string problem
+
+    property var publisher: null
+    property int zeros: 0
+
+    // Take or change what is wanted; the stick and the keys call this.
+    function steer(forward, left) {
+        if (!held) {
+            held = true
+            armed = obstacle === ""
+        }
+        drive.forward = Math.max(-1, Math.min(1, forward))
+        drive.left = Math.max(-1, Math.min(1, left))
+        if (armed && !timer.running) {
+            send()
+            timer.start()
+        }
+    }
+
+    // Let go: the robot is told to stop, more than once in case a message gets lost.
+    function release() {
+        const was = active
+        held = armed = false
+        forward = left = 0
+        if (was)
+            halt()
+    }
+
+    function halt() {
+        zeros = 8
+        send()
+        timer.start()
+    }
+
+    function send() {
+        if (publisher === null)
+            publisher = Ros2.createPublisher(topic, "geometry_msgs/msg/Twist", 1)
+        try {
+            publisher.publish({
+                linear: { x: active ? maxSpeed * forward : 0 },
+                angular: { z: active ? maxTurn * left : 0 }
+            })
+            problem = ""
+        } catch (error) {
+            problem = String(error.message || error)
+        }
+    }
+
+    onObstacleChanged: {
+        if (obstacle !== "" && armed) {
+            armed = false
+            halt()
+        }
+    }
+
+    property Timer timer: Timer {
+        interval: 50
+        repeat: true
+        onTriggered: {
+            if (!drive.active && --drive.zeros <= 0)
+                stop()
+            drive.send()
+        }
+    }
+}

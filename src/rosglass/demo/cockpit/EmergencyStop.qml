@@ -1,0 +1,197 @@
+// The emergency stop. It shows what the robot confirms, not what was clicked: a stop that is not
+// confirmed is sent again and again, and said to be unconfirmed after half a second. A stop pressed
+// here stays wanted until it is released here, even when the robot forgets it (a restart).
+import QtQuick
+import Ros2 1.0
+
+Item {
+    id: stop
+
+    property string topic: "/emergency_stop"
+    // True: wants the robot stopped; false: wants it released; null: content with what it is.
+    property var wanted: null
+    readonly property bool known: state_.fresh
+    readonly property bool stopped: known && state_.message.data
+    readonly property bool pending: wanted !== null && (!known || stopped !== wanted)
+    property bool overdue: false
+    property int sent: 0
+    property string problem
+    // For others: whether driving makes sense.
+    readonly property bool blocks: wanted === true || stopped
+
+    property var publisher: null
+
+    implicitWidth: 168
+    implicitHeight: 168
+
+    function press() {
+        wanted = true
+        begin()
+    }
+
+    function release() {
+        wanted = false
+        begin()
+    }
+
+    function begin() {
+        overdue = false
+        deadline.restart()
+        send()
+        settle()
+    }
+
+    function send() {
+        if (publisher === null)
+            publisher = Ros2.createPublisher(topic, "std_msgs/msg/Bool", 10)
+        try {
+            publisher.publish({ data: wanted })
+            sent += 1
+            problem = ""
+        } catch (error) {
+            problem = String(error.message || error)
+        }
+    }
+
+    function settle() {
+        if (!pending) {
+            overdue = false
+            deadline.stop()
+            if (wanted === false)
+                wanted = null
+        } else if (!deadline.running) {
+            deadline.restart()
+        }
+    }
+
+    onPendingChanged: settle()
+
+    property Feed state_: Feed {
+        topic: "/emergency_stop/state"
+        messageType: "std_msgs/msg/Bool"
+        throttleRate: 0
+    }
+    Timer {
+        interval: 100
+        repeat: true
+        running: stop.pending
+        onTriggered: stop.send()
+    }
+    Timer {
+        id: deadline
+        interval: 500
+        onTriggered: stop.overdue = stop.pending
+    }
+    // A stop is never given up. A release is: it must not undo, much later, somebody else's stop.
+    Timer {
+        interval: 3000
+        running: stop.wanted === false
+        onTriggered: stop.wanted = null
+    }
+
+    Rectangle {
+        id: collar
+        anchors.fill: parent
+        radius: width / 2
+        color: "#e8c21c"
+        border { color: "#20000000"; width: 3 }
+        Rectangle {
+            anchors { fill: parent; margins: 6 }
+            radius: width / 2
+            color: "transparent"
+            border { color: "#40000000"; width: 1 }
+        }
+    }
+    Rectangle {
+        id: mushroom
+        objectName: "mushroom"
+        anchors.centerIn: parent
+        width: parent.width * (stop.blocks ? 0.76 : 0.82)
+        height: width
+        radius: width / 2
+        border { color: "#5a0008"; width: 3 }
+        gradient: Gradient {
+            GradientStop { position: 0; color: stop.blocks ? "#b4000f" : "#ff4a55" }
+            GradientStop { position: 1; color: stop.blocks ? "#5a0008" : "#b20012" }
+        }
+        Column {
+            anchors.centerIn: parent
+            Text {
+                anchors.horizontalCenter: parent.horizontalCenter
+                text: stop.stopped ? "STOPPED" : "STOP"
+                color: "white"
+                font { pixelSize: stop.stopped ? 23 : 34; weight: Font.Black; letterSpacing: 1 }
+            }
+            Text {
+                objectName: "confirmation"
+                anchors.horizontalCenter: parent.horizontalCenter
+                horizontalAlignment: Text.AlignHCenter
+                text: stop.overdue ? "NOT CONFIRMED\nsending…"
+                    : stop.pending ? "sending…"
+                    : stop.stopped ? (stop.wanted ? "confirmed" : "by someone else")
+                    : stop.known ? "space bar" : "state unknown"
+                color: stop.overdue ? "#ffe24a" : "#ffd9dc"
+                font { pixelSize: 12; weight: stop.overdue ? Font.Black : Font.Medium }
+            }
+        }
+    }
+    SequentialAnimation {
+        running: stop.overdue
+        loops: Animation.Infinite
+        onStopped: collar.color = "#e8c21c"
+        ColorAnimation { target: collar; property: "color"; to: "#ff1028"; duration: 160 }
+        ColorAnimation { target: collar; property: "color"; to: "#fff04a"; duration: 160 }
+    }
+    // Acts on touch-down, with any finger: nobody lifts a finger gracefully in an emergency.
+    MultiPointTouchArea {
+        anchors.fill: parent
+        onPressed: stop.press()
+    }
+
+    // Releasing takes a deliberate long press.
+    Rectangle {
+        id: unlock
+        objectName: "unlock"
+        anchors { horizontalCenter: parent.horizontalCenter; bottom: parent.top; bottomMargin: 10 }
+        visible: stop.blocks
+        width: 150
+        height: 34
+        radius: 17
+        color: Theme.shade
+        border { color: Theme.warn; width: 1 }
+        property real progress: 0
+        clip: true
+        Rectangle {
+            height: parent.height
+            radius: parent.radius
+            width: parent.width * unlock.progress
+            color: Theme.warn
+            opacity: 0.5
+        }
+        Text {
+            anchors.centerIn: parent
+            text: "hold to release"
+            color: Theme.text
+            font { pixelSize: Theme.normal; weight: Font.DemiBold }
+        }
+        NumberAnimation {
+            id: hold
+            target: unlock
+            property: "progress"
+            from: 0
+            to: 1
+            duration: 700
+            onFinished: {
+                unlock.progress = 0
+                stop.release()
+            }
+        }
+        MultiPointTouchArea {
+            anchors.fill: parent
+            maximumTouchPoints: 1
+            onPressed: hold.restart()
+            onReleased: { hold.stop(); unlock.progress = 0 }
+            onCanceled: { hold.stop(); unlock.progress = 0 }
+        }
+    }
+}

@@ -1,0 +1,17 @@
+// Whether the robot is there: judged by what it sends, not by what the middleware believes.
+import QtQuick
+import Ros2 1.0
+
+QtObject {
+    id: link
+
+    // The feed that beats fastest.
+    required property var pulse
+    // What the middleware says about its own connection.
+    property string detail
+    readonly property bool alive: pulse.fresh
+    readonly property string text: alive ? "CONNECTED"
+        : pulse.received ? "ROBOT LOST " + pulse.age.toFixed(0) + " s AGO" : "WAITING FOR THE ROBOT"
+    // Why there is nothing to see, for the places that have room for it.
+    readonly property string reason: alive ? "" : detail
+}

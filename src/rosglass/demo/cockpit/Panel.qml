@@ -1,0 +1,42 @@
+// A titled card. What it shows is dimmed, and said to be old, as soon as it is not fresh any more.
+import QtQuick
+
+Rectangle {
+    id: panel
+
+    property string title
+    property bool fresh: true
+    // Seconds since the newest data, -1 for never.
+    property real age: 0
+    property string note
+    default property alias content: body.data
+
+    color: Theme.panel
+    radius: Theme.radius
+    border.color: fresh ? Theme.panelEdge : Theme.bad
+    border.width: 1
+
+    Text {
+        id: heading
+        anchors { left: parent.left; top: parent.top; leftMargin: 12; topMargin: 9 }
+        text: panel.title.toUpperCase()
+        color: Theme.dim
+        font { pixelSize: Theme.small; letterSpacing: 1.2; weight: Font.DemiBold }
+    }
+    Text {
+        anchors { right: parent.right; baseline: heading.baseline; rightMargin: 12 }
+        text: panel.fresh ? panel.note
+            : panel.age < 0 ? "NO DATA YET" : "OLD: " + panel.age.toFixed(0) + " s"
+        color: panel.fresh ? Theme.dim : Theme.bad
+        font { pixelSize: Theme.small; weight: panel.fresh ? Font.Normal : Font.Bold }
+    }
+    Item {
+        id: body
+        anchors {
+            fill: parent
+            leftMargin: 12; rightMargin: 12; topMargin: 30; bottomMargin: 10
+        }
+        opacity: panel.fresh ? 1 : 0.28
+        Behavior on opacity { NumberAnimation { duration: 120 } }
+    }
+}

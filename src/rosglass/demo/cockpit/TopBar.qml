@@ -1,0 +1,107 @@
+// Who we are connected to and how well.
+import QtQuick
+import Ros2 1.0
+
+Rectangle {
+    id: bar
+
+    required property var link
+    property real framerate: 0
+    property real latency: -1
+    height: 44
+    color: Theme.panel
+
+    Rectangle {
+        anchors { left: parent.left; right: parent.right; bottom: parent.bottom }
+        height: 1
+        color: Theme.panelEdge
+    }
+    Row {
+        anchors { left: parent.left; leftMargin: 16; verticalCenter: parent.verticalCenter }
+        spacing: 10
+        Rectangle {
+            anchors.verticalCenter: parent.verticalCenter
+            width: 20; height: 20; radius: 5
+            rotation: 45
+            color: "transparent"
+            border { color: Theme.accent; width: 2 }
+            Rectangle {
+                anchors.centerIn: parent
+                width: 7; height: 7; radius: 2
+                color: Theme.accent
+            }
+        }
+        Text {
+            anchors.verticalCenter: parent.verticalCenter
+            text: "rosglass"
+            color: Theme.text
+            font { pixelSize: 18; weight: Font.DemiBold; letterSpacing: 0.5 }
+        }
+    }
+    Rectangle {
+        objectName: "linkPill"
+        anchors.centerIn: parent
+        width: state_.width + 44
+        height: 28
+        radius: 14
+        color: bar.link.alive ? "#12291f" : "#33060c"
+        border { color: bar.link.alive ? Theme.good : Theme.bad; width: 1 }
+        Row {
+            id: state_
+            anchors.centerIn: parent
+            spacing: 8
+            Rectangle {
+                anchors.verticalCenter: parent.verticalCenter
+                width: 9; height: 9; radius: 5
+                color: bar.link.alive ? Theme.good : Theme.bad
+            }
+            Text {
+                objectName: "linkText"
+                anchors.verticalCenter: parent.verticalCenter
+                text: bar.link.text
+                color: bar.link.alive ? Theme.text : Theme.bad
+                font { pixelSize: Theme.normal; weight: Font.DemiBold }
+            }
+        }
+    }
+    Row {
+        anchors { right: parent.right; rightMargin: 16; verticalCenter: parent.verticalCenter }
+        spacing: 18
+        component Figure: Column {
+            property string value
+            property string label
+            Text {
+                anchors.right: parent.right
+                text: parent.value
+                color: Theme.text
+                font { pixelSize: Theme.normal; weight: Font.DemiBold }
+            }
+            Text {
+                anchors.right: parent.right
+                text: parent.label
+                color: Theme.dim
+                font.pixelSize: 9
+            }
+        }
+        Figure {
+            label: "camera"
+            value: bar.link.alive ? bar.framerate.toFixed(0) + " Hz" : "–"
+        }
+        Figure {
+            label: "latency"
+            value: bar.link.alive && bar.latency >= 0 ? bar.latency.toFixed(0) + " ms" : "–"
+        }
+        Figure {
+            label: "time"
+            value: clock.text
+            Timer {
+                id: clock
+                property string text: Qt.formatTime(new Date(), "HH:mm:ss")
+                interval: 250
+                running: true
+                repeat: true
+                onTriggered: text = Qt.formatTime(new Date(), "HH:mm:ss")
+            }
+        }
+    }
+}

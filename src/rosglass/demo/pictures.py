@@ -1,0 +1,326 @@
+"""The map and the laser scan as pictures, painted outside the GUI thread.
+
+QML types ``MapPicture`` and ``ScanPicture`` of the module ``RosglassDemo 1.0``. Both take a topic
+and give a `source` for a QML ``Image``; cells and points never pass through JavaScript.
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import math
+import time
+from abc import abstractmethod
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rosglass.comm import Dispatcher, QoS
+from rosglass.errors import Error
+from rosglass.qml.element import TopicElement
+from rosglass.qt import Property, QtCore, QtGui, QtQml, QtQuick, Signal, engine_of
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from rosglass.comm import Node, Subscription
+    from rosglass.messages import Message
+
+__all__ = ["MapPicture", "ScanPicture", "paint_map", "paint_scan", "register"]
+
+_log = logging.getLogger("rosglass.demo")
+#: Most cells of a map that is shown; a bigger one is refused rather than eating all memory.
+_MOST_CELLS = 100_000_000
+_numbers = itertools.count(1)
+
+
+def paint_map(cells: npt.NDArray[np.int8], width: int, height: int) -> QtGui.QImage:
+    """Return an occupancy grid as a picture in the cockpit's colours, north up.
+
+    Args:
+        cells: Rows from south to north, -1 unknown, 0 free to 100 occupied.
+        width: Columns.
+        height: Rows.
+
+    Raises:
+        Error: The number of cells is not `width` times `height`.
+    """
+    if width * height != cells.size or not cells.size:
+        raise Error(f"the map says {width} x {height} cells but brings {cells.size}")
+    colours = np.empty((256, 4), np.uint8)
+    share = np.linspace(0.0, 1.0, 101)[:, None] ** 0.8
+    free, taken = np.array([27, 38, 49, 255]), np.array([126, 151, 173, 255])
+    colours[:101] = (free + (taken - free) * share).astype(np.uint8)
+    # Unknown and invalid values stay transparent: the panel shows through.
+    colours[101:] = 0
+    pixels = np.ascontiguousarray(colours[cells.view(np.uint8).reshape(height, width)[::-1]])
+    kind = QtGui.QImage.Format.Format_RGBA8888
+    return QtGui.QImage(pixels.data, width, height, 4 * width, kind).copy()
+
+
+def paint_scan(
+    ranges: npt.NDArray[np.float32], start: float, step: float, size: int, metres: float
+) -> QtGui.QImage:
+    """Return a laser scan as a picture, the scanner in the middle looking to the right.
+
+    Args:
+        ranges: Distances in metres; what is not finite is left out.
+        start: Direction of the first beam, radians, counter-clockwise from ahead.
+        step: From beam to beam, radians.
+        size: Side of the picture, pixels.
+        metres: Side of the picture, metres.
+    """
+    picture = QtGui.QImage(size, size, QtGui.QImage.Format.Format_ARGB32_Premultiplied)
+    picture.fill(QtCore.Qt.GlobalColor.transparent)
+    angles = start + step * np.arange(ranges.size)
+    hit = np.isfinite(ranges) & (ranges > 0)
+    reach = np.where(hit, ranges, metres / 2)
+    scale, middle = size / metres, size / 2
+    xs = middle + np.cos(angles) * reach * scale
+    ys = middle - np.sin(angles) * reach * scale
+    points = [QtCore.QPointF(x, y) for x, y in zip(xs.tolist(), ys.tolist(), strict=True)]
+    painter = QtGui.QPainter(picture)
+    try:
+        painter.setRenderHint(QtGui.QPainter.RenderHint.Antialiasing)
+        glow = QtGui.QRadialGradient(middle, middle, 7 * scale)
+        glow.setColorAt(0.0, QtGui.QColor(63, 210, 232, 74))
+        glow.setColorAt(1.0, QtGui.QColor(63, 210, 232, 16))
+        painter.setPen(QtCore.Qt.PenStyle.NoPen)
+        painter.setBrush(glow)
+        painter.drawPolygon(QtGui.QPolygonF(points))
+        pen = QtGui.QPen(QtGui.QColor(255, 92, 108, 235), 0.09 * scale)
+        pen.setCapStyle(QtCore.Qt.PenCapStyle.RoundCap)
+        painter.setPen(pen)
+        seen = [point for point, good in zip(points, hit.tolist(), strict=True) if good]
+        if seen:
+            painter.drawPoints(seen)
+    finally:
+        painter.end()
+    return picture
+
+
+class _Provider(QtQuick.QQuickImageProvider):
+    """Hands the newest picture of one element to QML's ``Image``."""
+
+    def __init__(self) -> None:
+        super().__init__(QtQuick.QQuickImageProvider.ImageType.Image)
+        self.picture = QtGui.QImage()
+
+    def requestImage(self, name: str, size: QtCore.QSize, _: QtCore.QSize) -> QtGui.QImage:  # noqa: ARG002, N802 - Qt's
+        """Return the picture; called by Qt."""
+        picture = self.picture
+        size.setWidth(picture.width())
+        size.setHeight(picture.height())
+        return picture
+
+
+class _Picture(TopicElement):
+    """A topic shown as a picture; subclasses say how to paint it."""
+
+    #: Type of the messages, and how they are asked for.
+    kind: str
+    qos: QoS
+
+    topicChanged, limitChanged = Signal(), Signal()  # noqa: N815 - Qt's
+    changed, ageChanged = Signal(), Signal()  # noqa: N815 - Qt's
+    staleChanged, problemChanged = Signal(), Signal()  # noqa: N815 - Qt's
+    _painted = Signal(object)
+
+    def __init__(self, parent: QtCore.QObject | None = None) -> None:
+        super().__init__(parent)
+        self._limit, self._age = 0.0, -1.0
+        self._name, self._version = f"rosglass-picture-{next(_numbers)}", 0
+        self._stamp = 0.0
+        self._provider: _Provider | None = None
+        self._painter = Dispatcher(self._name)
+        self._have: tuple[Node, str] | None = None
+        self._subscription: Subscription | None = None
+        self._painted.connect(self._show, QtCore.Qt.ConnectionType.QueuedConnection)
+        self.destroyed.connect(self._painter.close)
+
+    @abstractmethod
+    def paint(self, message: Message) -> tuple[QtGui.QImage, tuple[float, ...]]:
+        """Paint a message, on the painting thread; the numbers go to :meth:`take`."""
+
+    @abstractmethod
+    def take(self, numbers: tuple[float, ...]) -> None:
+        """Take what belongs to the picture that is shown from now on, on the GUI thread."""
+
+    def _update(self) -> None:
+        node, topic = self.node, self._resolve(self._topic)
+        want = (node, topic) if node is not None and topic else None
+        if want == self._have:
+            return
+        self._have = want
+        if self._subscription is not None:
+            self._subscription.close()
+            self._subscription = None
+        if want is None:
+            self._suspect = True
+            self._judge()
+            return
+        engine = engine_of(self)
+        if self._provider is None and engine is not None:
+            self._provider = _Provider()
+            engine.addImageProvider(self._name, self._provider)
+        try:
+            self._subscription = want[0].create_subscription(
+                topic, self.kind, self._on_message, self.qos, executor=self._painter
+            )
+            self._say("")
+        except Error as error:
+            self._say(str(error))
+
+    def _on_message(self, message: Message) -> None:
+        try:
+            result: object = self.paint(message)
+        except Error as error:
+            result = error
+        except Exception as error:
+            _log.exception("%s: cannot be painted", self._topic)
+            result = Error(f"internal error: {error}")
+        with suppress(RuntimeError):  # the QML object went while its picture was painted
+            self._painted.emit(result)
+
+    def _show(self, result: object) -> None:
+        if isinstance(result, Error):
+            self._say(f"{self._topic}: {result}")
+            return
+        assert isinstance(result, tuple)
+        picture, numbers = result
+        if self._provider is None:
+            return
+        self._provider.picture = picture
+        self._version += 1
+        self._stamp, self._age = time.monotonic(), 0.0
+        self._suspect = False
+        self.take(numbers)
+        self._say("")
+        self.changed.emit()
+        self.ageChanged.emit()
+        self._judge()
+
+    def _on_tick(self) -> None:
+        if self._version:
+            self._age = time.monotonic() - self._stamp
+            self.ageChanged.emit()
+        super()._on_tick()
+
+    def _is_old(self) -> bool:
+        if not self._version:
+            return True
+        return 0 < self._limit < time.monotonic() - self._stamp
+
+    def _stale_changed(self) -> None:
+        self.staleChanged.emit()
+
+    def _problem_changed(self) -> None:
+        self.problemChanged.emit()
+
+    def _set_topic(self, topic: str) -> None:
+        if topic != self._topic:
+            self._topic = topic
+            self.topicChanged.emit()
+            self._schedule()
+
+    def _set_limit(self, limit: float) -> None:
+        if limit != self._limit:
+            self._limit = limit
+            self.limitChanged.emit()
+            self._judge()
+
+    def _source(self) -> QtCore.QUrl:
+        return QtCore.QUrl(f"image://{self._name}/{self._version}" if self._version else "")
+
+    topic = Property(str, lambda self: self._topic, _set_topic, notify=topicChanged)
+    #: Seconds without a message after which the picture is not true any more; 0 for never.
+    limit = Property(float, lambda self: self._limit, _set_limit, notify=limitChanged)
+    source = Property(QtCore.QUrl, _source, notify=changed)
+    received = Property(bool, lambda self: self._version > 0, notify=changed)
+    #: Seconds since the newest message, -1 before the first.
+    age = Property(float, lambda self: self._age, notify=ageChanged)
+    stale = Property(bool, lambda self: self._stale, notify=staleChanged)
+    problem = Property(str, lambda self: self._problem, notify=problemChanged)
+
+
+class MapPicture(_Picture):
+    """A ``nav_msgs/msg/OccupancyGrid`` as a picture, north up.
+
+    `left` and `bottom` say where its lower left corner lies in the map, `metresWide` and
+    `metresHigh` how big it is. The map's own rotation is not supported and reported as a problem.
+    """
+
+    kind, qos = "nav_msgs/msg/OccupancyGrid", QoS.latched()
+    placed = Signal()
+
+    def __init__(self, parent: QtCore.QObject | None = None) -> None:
+        super().__init__(parent)
+        self._numbers: tuple[float, ...] = (0.0, 0.0, 1.0, 1.0)
+
+    def paint(self, message: Message) -> tuple[QtGui.QImage, tuple[float, ...]]:
+        """Paint the grid."""
+        info = message.info
+        if info.width * info.height > _MOST_CELLS:
+            raise Error(f"{info.width} x {info.height} cells are too many to be shown")
+        if abs(info.origin.orientation.z) > 1e-3:
+            raise Error("the map is rotated, which is not supported")
+        resolution = info.resolution
+        if not (math.isfinite(resolution) and resolution > 0):
+            raise Error(f"the map's resolution is {resolution} m per cell")
+        cells = np.asarray(message.data, dtype=np.int8)
+        corner = info.origin.position
+        size = (info.width * resolution, info.height * resolution)
+        return paint_map(cells, info.width, info.height), (corner.x, corner.y, *size)
+
+    def take(self, numbers: tuple[float, ...]) -> None:
+        """Remember where the map lies."""
+        if numbers != self._numbers:
+            self._numbers = numbers
+            self.placed.emit()
+
+    left = Property(float, lambda self: self._numbers[0], notify=placed)
+    bottom = Property(float, lambda self: self._numbers[1], notify=placed)
+    metresWide = Property(float, lambda self: self._numbers[2], notify=placed)  # noqa: N815
+    metresHigh = Property(float, lambda self: self._numbers[3], notify=placed)  # noqa: N815
+
+
+class ScanPicture(_Picture):
+    """A ``sensor_msgs/msg/LaserScan`` as a picture, the scanner in the middle looking right.
+
+    `metres` is the length of the picture's side.
+    """
+
+    kind, qos = "sensor_msgs/msg/LaserScan", QoS.sensor_data().with_depth(1)
+    placed = Signal()
+    _PIXELS_PER_METRE = 20
+
+    def __init__(self, parent: QtCore.QObject | None = None) -> None:
+        super().__init__(parent)
+        self._metres = 1.0
+
+    def paint(self, message: Message) -> tuple[QtGui.QImage, tuple[float, ...]]:
+        """Paint the scan."""
+        ranges = np.asarray(message.ranges, dtype=np.float32)
+        finite = ranges[np.isfinite(ranges)]
+        # Steps of a metre, so that the picture's size does not change with every scan.
+        far = math.ceil(min(float(finite.max()), 30.0)) if finite.size else 1
+        metres = 2.0 * max(1, far)
+        size = round(metres * self._PIXELS_PER_METRE)
+        picture = paint_scan(ranges, message.angle_min, message.angle_increment, size, metres)
+        return picture, (metres,)
+
+    def take(self, numbers: tuple[float, ...]) -> None:
+        """Remember how big the picture is."""
+        if numbers[0] != self._metres:
+            self._metres = numbers[0]
+            self.placed.emit()
+
+    metres = Property(float, lambda self: self._metres, notify=placed)
+
+
+def register() -> None:
+    """Make the types known to QML as ``RosglassDemo 1.0``."""
+    for kind in (MapPicture, ScanPicture):
+        register_type: Any = QtQml.qmlRegisterType  # PySide6's annotation wants bytes for names
+        register_type(kind, "RosglassDemo", 1, 0, kind.__name__)

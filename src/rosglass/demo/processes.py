@@ -1,0 +1,169 @@
+"""Programs that the demo starts and never leaves behind: the robot, a virtual screen."""
+
+from __future__ import annotations
+
+import os
+import select
+import shutil
+import subprocess
+import sys
+import time
+from typing import TYPE_CHECKING
+
+from rosglass.errors import Error
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from types import TracebackType
+
+__all__ = ["Child", "VirtualScreen", "start_robot"]
+
+_PATIENCE = 3.0
+
+
+class Child:
+    """A program that ends when this one does.
+
+    Its standard input is a pipe that nothing is ever written to; a program started with
+    ``--leash`` ends when the pipe breaks, which the system sees to even when this program is
+    killed.
+
+    Args:
+        command: Program and arguments.
+        name: For messages.
+
+    Raises:
+        Error: The program cannot be started.
+    """
+
+    def __init__(self, command: Sequence[str], name: str) -> None:
+        self.name = name
+        try:
+            # A session of its own: Ctrl-C is for us, and we end our children in good order.
+            self._process = subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True)
+        except OSError as error:
+            raise Error(f"cannot start {name} ({command[0]}): {error}") from error
+
+    @property
+    def pid(self) -> int:
+        """Its process id."""
+        return self._process.pid
+
+    def poll(self) -> int | None:
+        """Return its exit code, negative for a signal; None while it runs."""
+        return self._process.poll()
+
+    def close(self) -> None:
+        """End it: politely, after 3 s by force. Safe to call twice."""
+        if self._process.stdin is not None:
+            self._process.stdin.close()
+        if self._process.poll() is not None:
+            return
+        self._process.terminate()
+        try:
+            self._process.wait(_PATIENCE)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def __enter__(self) -> Child:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def start_robot(url: str, options: Sequence[str] = ()) -> Child:
+    """Start ``rosglass robot`` in a process of its own.
+
+    Args:
+        url: Where it finds the other nodes.
+        options: Further options of the command.
+    """
+    command = [sys.executable, "-m", "rosglass", "robot", "--url", url, "--leash", *options]
+    return Child(command, "the robot")
+
+
+class VirtualScreen:
+    """A screen in memory (Xvfb); :attr:`display` is its ``DISPLAY``.
+
+    Args:
+        width: Pixels.
+        height: Pixels.
+
+    Raises:
+        Error: Xvfb is missing or does not start; the message says what to do.
+    """
+
+    def __init__(self, width: int = 1280, height: int = 800) -> None:
+        program = shutil.which("Xvfb")
+        if program is None:
+            raise Error(
+                "there is no display, and Xvfb, which would replace one, is not installed; "
+                "install it with: apt install xvfb"
+            )
+        read, write = os.pipe()
+        try:
+            # -terminate: it ends with its last window, even when we end without closing it.
+            self._process = subprocess.Popen(
+                [
+                    program,
+                    *("-displayfd", str(write)),
+                    *("-screen", "0", f"{width}x{height}x24"),
+                    *("-nolisten", "tcp", "-terminate"),
+                ],
+                pass_fds=(write,),
+                stdin=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,
+            )
+            os.close(write)
+            number = _read_line(read, 10.0)
+        finally:
+            os.close(read)
+        if not number:
+            self.close()
+            raise Error(
+                f"Xvfb ({program}) did not start within 10 s; try it by hand: Xvfb -displayfd 1"
+            )
+        self.display = f":{number}"
+
+    def close(self) -> None:
+        """Switch it off; safe to call twice."""
+        if self._process.poll() is None:
+            self._process.terminate()
+            try:
+                self._process.wait(_PATIENCE)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait()
+
+    def __enter__(self) -> VirtualScreen:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def _read_line(descriptor: int, timeout: float) -> str:
+    """Return the line that comes within `timeout` seconds, empty when none does."""
+    deadline = time.monotonic() + timeout
+    text = b""
+    while b"\n" not in text:
+        left = max(0.0, deadline - time.monotonic())
+        ready, _, _ = select.select([descriptor], [], [], left)
+        part = os.read(descriptor, 64) if ready else b""
+        if not part:
+            return ""
+        text += part
+    return text.partition(b"\n")[0].decode().strip()

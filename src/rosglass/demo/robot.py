@@ -1,0 +1,324 @@
+"""The simulated robot as a ROS 2 node: its threads, its topics and the commands it obeys.
+
+Three threads, so that none waits for another: the body moves at 100 Hz and never sends anything;
+the reporter sends the small topics; the camera renders and sends pictures. Commands arrive on the
+node's own thread and take effect with the body's next step.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from rosglass.comm import QoS, Time
+from rosglass.demo import telemetry
+from rosglass.demo.scan import LaserScanner, occupancy
+from rosglass.demo.simulation import CommandRejectedError, Simulation
+from rosglass.errors import Error, NodeClosedError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rosglass.comm import Node, Publisher
+    from rosglass.demo.simulation import RobotState
+    from rosglass.messages import Message
+
+__all__ = ["Robot", "RobotOptions"]
+
+_log = logging.getLogger("rosglass.demo.robot")
+_BODY_PERIOD = 0.01
+_REPORT_PERIOD = 1 / 30
+#: Every how many reports a topic is sent.
+_EVERY = {"scan": 3, "joints": 2, "confirm": 5, "battery": 15, "diagnostics": 15}
+_GRID_RESOLUTION = 0.05
+_LOG_EVERY = 2.0
+
+
+@dataclass(frozen=True)
+class RobotOptions:
+    """What the robot sends.
+
+    Attributes:
+        fps: Pictures per second, more than 0 and at most 120.
+        raw: Whether to send ``/camera/image_raw``.
+        compressed: Whether to send ``/camera/image_raw/compressed`` (while somebody listens).
+        jpeg_quality: 1 to 100.
+    """
+
+    fps: float = 30.0
+    raw: bool = True
+    compressed: bool = True
+    jpeg_quality: int = 80
+
+    def __post_init__(self) -> None:
+        if not 0 < self.fps <= 120:
+            raise Error(f"--fps {self.fps}: expected more than 0 and at most 120")
+        if not 1 <= self.jpeg_quality <= 100:
+            raise Error(f"--jpeg-quality {self.jpeg_quality}: expected 1 to 100")
+
+
+class Robot:
+    """A simulated robot on a node.
+
+    Args:
+        node: Where it lives; stays the caller's, who closes it after the robot.
+        options: What it sends.
+        simulation: Its body; a new one in the standard world by default.
+
+    Raises:
+        ModuleNotFoundError: OpenCV is not installed.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        options: RobotOptions | None = None,
+        simulation: Simulation | None = None,
+    ) -> None:
+        from rosglass.demo.camera import Camera  # noqa: PLC0415 - needs OpenCV and paints a while
+
+        self.options = options if options is not None else RobotOptions()
+        self._simulation = simulation if simulation is not None else Simulation()
+        self._camera = Camera(self._simulation.world)
+        self._scanner = LaserScanner(self._simulation.world)
+        self._lock = threading.Lock()
+        self._ending = threading.Event()
+        self._threads: list[threading.Thread] = []
+        self._rejected, self._logged_at = 0, -_LOG_EVERY
+        self._pictures_skipped = 0
+        self._frame_rate, self._render_time = 0.0, 0.0
+        self._send = _publishers(node, self.options)
+        self._subscriptions = [
+            node.create_subscription(topic, kind, self._guarded(topic, take), qos)
+            for topic, kind, take, qos in (
+                # Only the newest command counts: an old one must not be driven after it.
+                ("/cmd_vel", "geometry_msgs/msg/Twist", self._on_velocity, 1),
+                ("/emergency_stop", "std_msgs/msg/Bool", self._on_stop, 10),
+                ("/flashlight", "std_msgs/msg/Bool", self._on_flashlight, 10),
+                (
+                    "/flipper_controller/commands",
+                    "std_msgs/msg/Float64MultiArray",
+                    self._on_flippers,
+                    1,
+                ),
+            )
+        ]
+
+    @property
+    def state(self) -> RobotState:
+        """How the robot is now."""
+        return self._simulation.state
+
+    def start(self) -> None:
+        """Come to life."""
+        now = Time.now()
+        cells = occupancy(self._simulation.world, _GRID_RESOLUTION)
+        self._send["/tf_static"].publish(telemetry.static_frames(now))
+        self._send["/map"].publish(telemetry.occupancy_grid(cells, _GRID_RESOLUTION, now))
+        for name, work in (
+            ("body", self._live),
+            ("reporter", self._report),
+            ("camera", self._film),
+        ):
+            thread = threading.Thread(target=self._guard(work), name=f"robot {name}", daemon=True)
+            self._threads.append(thread)
+            thread.start()
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait until :meth:`close` is called or a thread failed; True when the robot has ended."""
+        return self._ending.wait(timeout)
+
+    def close(self) -> None:
+        """Stop moving and end the threads; safe to call twice, from any thread but the robot's."""
+        self._ending.set()
+        for subscription in self._subscriptions:
+            subscription.close()
+        for thread in self._threads:
+            thread.join(2.0)
+
+    def _guard(self, work: Callable[[], None]) -> Callable[[], None]:
+        def run() -> None:
+            try:
+                work()
+            except NodeClosedError:
+                pass  # the node went first: nothing is left to do
+            except Exception:
+                # A robot that can't see or report must not go on driving.
+                _log.exception("the robot failed")
+            finally:
+                self._ending.set()
+
+        return run
+
+    def _guarded(self, topic: str, take: Callable[[Message], None]) -> Callable[[Message], None]:
+        def run(message: Message) -> None:
+            try:
+                take(message)
+            except Error as error:
+                self._refuse(topic, error)
+
+        return run
+
+    def _refuse(self, topic: str, error: Error) -> None:
+        self._rejected += 1
+        now = time.monotonic()
+        if now - self._logged_at >= _LOG_EVERY:
+            self._logged_at = now
+            _log.warning("%s: %s (%d refused so far)", topic, error, self._rejected)
+
+    def _on_velocity(self, message: Message) -> None:
+        speed, turn = message.linear.x, message.angular.z
+        for value in (message.linear.y, message.linear.z, message.angular.x, message.angular.y):
+            # Also true for NaN. Tracks can't do it: better refused than half obeyed.
+            if not abs(value) < 1e-6:
+                raise CommandRejectedError(
+                    f"a motion only along linear.x and angular.z expected, "
+                    f"got another component {value}"
+                )
+        with self._lock:
+            self._simulation.command_velocity(speed, turn)
+
+    def _on_stop(self, message: Message) -> None:
+        with self._lock:
+            changed = self.state.emergency_stop != message.data
+            self._simulation.set_emergency_stop(message.data)
+        if changed:
+            _log.info("emergency stop %s", "latched" if message.data else "released")
+        self._confirm()
+
+    def _on_flashlight(self, message: Message) -> None:
+        with self._lock:
+            self._simulation.set_flashlight(message.data)
+        self._send["/flashlight/state"].publish(data=self.state.flashlight)
+
+    def _on_flippers(self, message: Message) -> None:
+        with self._lock:
+            self._simulation.command_flippers([float(angle) for angle in message.data])
+
+    def _confirm(self) -> None:
+        self._send["/emergency_stop/state"].publish(data=self.state.emergency_stop)
+
+    def _live(self) -> None:
+        last = time.monotonic()
+        while not self._ending.wait(_BODY_PERIOD):
+            now = time.monotonic()
+            with self._lock:
+                self._simulation.advance(now - last)
+            last = now
+
+    def _report(self) -> None:
+        beat = _Beat(_REPORT_PERIOD)
+        send, count = self._send, 0
+        while not self._ending.wait(beat.rest()):
+            state, now = self.state, Time.now()
+            send["/odom"].publish(telemetry.odometry(state, now))
+            send["/tf"].publish(telemetry.moving_frames(state, now))
+            send["/imu"].publish(telemetry.imu(state, now))
+            if count % _EVERY["joints"] == 0:
+                send["/joint_states"].publish(telemetry.joints(state, now))
+            if count % _EVERY["scan"] == 0:
+                ranges = self._scanner.scan(state.x, state.y, state.yaw, state.carrier_phase)
+                send["/scan"].publish(telemetry.scan(ranges, now))
+            if count % _EVERY["confirm"] == 1:
+                self._confirm()
+                send["/flashlight/state"].publish(data=state.flashlight)
+            if count % _EVERY["battery"] == 2:
+                send["/battery_state"].publish(telemetry.battery(state, now))
+            if count % _EVERY["diagnostics"] == 7:
+                send["/diagnostics"].publish(
+                    telemetry.diagnostics(
+                        state,
+                        now,
+                        frames_per_second=self._frame_rate,
+                        render_time=self._render_time,
+                        rejected=self._rejected,
+                    )
+                )
+            count += 1
+
+    def _film(self) -> None:
+        import cv2  # noqa: PLC0415 - an extra
+
+        # Two cores have to do for the robot, the cockpit and the middleware between them.
+        cv2.setNumThreads(1)
+        beat = _Beat(1 / self.options.fps)
+        number, since = 0, time.monotonic()
+        while not self._ending.wait(beat.rest()):
+            begin = time.perf_counter()
+            picture = self._camera.render(self.state)
+            stamp = Time.now()
+            self._camera.stamp(picture, stamp.nanoseconds, number)
+            self._render_time += 0.1 * (time.perf_counter() - begin - self._render_time)
+            self._send_picture(picture, stamp)
+            number += 1
+            now = time.monotonic()
+            self._frame_rate += 0.1 * (1 / max(1e-6, now - since) - self._frame_rate)
+            since = now
+
+    def _send_picture(self, picture: Any, stamp: Time) -> None:
+        height, width = picture.shape[:2]
+        header = telemetry.header(stamp, "camera_optical_frame")
+        raw = self._send.get("/camera/image_raw")
+        if raw is not None:
+            raw.publish(
+                header=header,
+                height=height,
+                width=width,
+                encoding="rgb8",
+                is_bigendian=0,
+                step=3 * width,
+                data=picture.reshape(-1),
+            )
+        self._send["/camera/camera_info"].publish(telemetry.camera_info(stamp))
+        compressed = self._send.get("/camera/image_raw/compressed")
+        if compressed is not None and compressed.subscription_count():
+            import cv2  # noqa: PLC0415 - an extra
+
+            _, data = cv2.imencode(
+                ".jpg",
+                cv2.cvtColor(picture, cv2.COLOR_RGB2BGR),
+                [cv2.IMWRITE_JPEG_QUALITY, self.options.jpeg_quality],
+            )
+            compressed.publish(header=header, format="rgb8; jpeg compressed bgr8", data=data)
+
+
+class _Beat:
+    """Keeps a rhythm: beats that were missed are left out, not made up for."""
+
+    def __init__(self, period: float) -> None:
+        self._period = period
+        self._next = time.monotonic()
+
+    def rest(self) -> float:
+        """Return the seconds until the next beat."""
+        self._next += self._period
+        left = self._next - time.monotonic()
+        if left < -self._period:
+            self._next -= left
+        return max(0.0, left)
+
+
+def _publishers(node: Node, options: RobotOptions) -> dict[str, Publisher]:
+    sensor, latched = QoS.sensor_data(), QoS.latched()
+    topics: list[tuple[str, str, QoS | int]] = [
+        ("/odom", "nav_msgs/msg/Odometry", 10),
+        ("/tf", "tf2_msgs/msg/TFMessage", 100),
+        ("/tf_static", "tf2_msgs/msg/TFMessage", latched),
+        ("/imu", "sensor_msgs/msg/Imu", sensor),
+        ("/scan", "sensor_msgs/msg/LaserScan", sensor),
+        ("/joint_states", "sensor_msgs/msg/JointState", 10),
+        ("/battery_state", "sensor_msgs/msg/BatteryState", 10),
+        ("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", 10),
+        ("/map", "nav_msgs/msg/OccupancyGrid", latched),
+        ("/emergency_stop/state", "std_msgs/msg/Bool", latched),
+        ("/flashlight/state", "std_msgs/msg/Bool", latched),
+        ("/camera/camera_info", "sensor_msgs/msg/CameraInfo", sensor),
+    ]
+    if options.raw:
+        topics.append(("/camera/image_raw", "sensor_msgs/msg/Image", sensor))
+    if options.compressed:
+        topics.append(("/camera/image_raw/compressed", "sensor_msgs/msg/CompressedImage", sensor))
+    return {topic: node.create_publisher(topic, kind, qos) for topic, kind, qos in topics}
