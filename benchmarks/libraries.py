@@ -56,8 +56,10 @@ def rosglass(sample: Sample, ros: int, value: Value) -> Library:
 
     wire = "ros1" if ros == 1 else "cdr"
     kind = rosglass.load(sample.type, ros=ros)
-    text = definition(sample.type, ros)
-    leaf = compile(f"m.{sample.leaf}", "<leaf>", "eval")
+    text, path = definition(sample.type, ros), sample.leaf
+    if ros == 1:
+        value, path = _ros1_times(value), path.replace(".sec", ".secs")
+    leaf = compile(f"m.{path}", "<leaf>", "eval")
     # A new constant each time, so that no cache knows the text.
     fresh = itertools.count()
 
@@ -70,8 +72,8 @@ def rosglass(sample: Sample, ros: int, value: Value) -> Library:
         "decode": kind.decode,
         "encode": kind.encode,
         "parts": kind.encode_parts,
-        "path": kind.path(sample.leaf, wire=wire),
-        "walk": walker(sample.type, ros),
+        "path": kind.path(path, wire=wire),
+        "walk": walker(sample.type, ros, ("secs", "nsecs") if ros == 1 else ("sec", "nanosec")),
         "value": value,
     }
     given = f"wire={wire!r}"
@@ -87,7 +89,7 @@ def rosglass(sample: Sample, ros: int, value: Value) -> Library:
         statements={
             "decode": (f"decode(data, {given})", names),
             "path": ("path(data)", names),
-            "attribute": (f"decode(data, {given}).{sample.leaf}", names),
+            "attribute": (f"decode(data, {given}).{path}", names),
             "every leaf": (f"walk(decode(data, {given}))", names),
             "encode": (f"encode(value, {given})", names),
             "parts": (f"parts(value, {given})", names),
@@ -228,6 +230,15 @@ LIBRARIES: dict[str, Callable[[Sample, int, Value], Library | None]] = {
     "genpy": genpy,
     "mcap-ros2": mcap_ros2,
 }
+
+
+def _ros1_times(value: Any) -> Any:
+    # ROS 1 calls the parts of a time secs and nsecs.
+    if isinstance(value, dict):
+        if value.keys() == {"sec", "nanosec"}:
+            return {"secs": value["sec"], "nsecs": value["nanosec"]}
+        return {key: _ros1_times(item) for key, item in value.items()}
+    return [_ros1_times(item) for item in value] if isinstance(value, list) else value
 
 
 def _listed(value: Any) -> Any:

@@ -200,7 +200,7 @@ def _single(
         nanoseconds = {"zero": 0, "low": 0, "high": 999_999_999}.get(
             style, rng.randint(0, 999_999_999)
         )
-        return {"sec": seconds, "nanosec": nanoseconds}
+        return {"secs": seconds, "nsecs": nanoseconds}
     if base == "string":
         return _string(field, style, rng)
     if base == "bool":

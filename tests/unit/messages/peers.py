@@ -98,9 +98,9 @@ class Rosbags:
             return self.build(field.base, value)
         if field.base in TIMES:
             # Fault 4: time's seconds are signed there, duration's nanoseconds unsigned.
-            seconds = value["sec"] - 2**32 if value["sec"] >= 2**31 else value["sec"]
+            seconds = value["secs"] - 2**32 if value["secs"] >= 2**31 else value["secs"]
             kind = self.store.types[f"builtin_interfaces/msg/{field.base.capitalize()}"]
-            return kind(sec=seconds, nanosec=value["nanosec"] & 0xFFFFFFFF)
+            return kind(sec=seconds, nanosec=value["nsecs"] & 0xFFFFFFFF)
         if field.base == "byte" and self.ros == 2 and value > 127:
             return value - 256  # fault 2
         return value
@@ -122,7 +122,7 @@ class Rosbags:
                 seconds &= 0xFFFFFFFF  # fault 4
             elif nanoseconds >= 2**31:
                 nanoseconds -= 2**32  # fault 4
-            return {"sec": seconds, "nanosec": nanoseconds}
+            return {"secs": seconds, "nsecs": nanoseconds}
         if field.base == "byte" and self.ros == 2:
             return int(value) & 0xFF  # fault 2
         return corpus.plain(value)
@@ -175,7 +175,7 @@ class Genpy:
 
             stamp = genpy.Time() if field.base == "time" else genpy.Duration()
             # Set one by one: the constructors rewrite what they think is not canonical.
-            stamp.secs, stamp.nsecs = value["sec"], value["nanosec"]
+            stamp.secs, stamp.nsecs = value["secs"], value["nsecs"]
             return stamp
         return value
 
@@ -191,7 +191,7 @@ class Genpy:
         if field.is_compound:
             return self._plain(field.base, value)
         if field.base in TIMES:
-            return {"sec": value.secs, "nanosec": value.nsecs}
+            return {"secs": value.secs, "nsecs": value.nsecs}
         return bool(value) if field.base == "bool" else value
 
 
