@@ -58,35 +58,24 @@ def definition_text(name: str, store: Any, ros: int, notes: dict[tuple[str, str]
     return "\n".join(lines)
 
 
-def read_notes(ros: int) -> dict[tuple[str, str], str]:
-    """Read lines ``[ros1|ros2] pkg/Type.field [default] [# comment]``; no world means both."""
+def read_notes() -> dict[tuple[str, str], str]:
+    """Read the lines ``pkg/Type.field [default] [# comment]``."""
     notes = {}
-    for line in NOTES.read_text().splitlines():
-        if not line or line[0] == "#":
-            continue
-        place, _, note = line.partition(" ")
-        world, _, place = place.rpartition(":")
-        if world in ("", f"ros{ros}"):
+    for line in NOTES.read_text(encoding="utf-8").splitlines():
+        if line and not line.startswith("#"):
+            place, _, note = line.partition(" ")
             name, _, field = place.partition(".")
-            notes[f"{name.replace('/', '/msg/')}", field] = note.strip()
+            notes[name.replace("/", "/msg/"), field] = note.strip()
     return notes
 
 
-def bundle(distributions: dict[str, Any], ros: int) -> str:
+def bundle(distributions: dict[str, Any], ros: int, notes: dict[tuple[str, str], str]) -> str:
     """Join definitions; one that differs between distributions appears once per variant."""
-    notes = read_notes(ros)
-    if ros == 1:
-        notes = {key: note for key, note in notes.items() if note.startswith("#")}
     variants: dict[str, dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
     for distribution, store in distributions.items():
         for name in store:
             if ros == 2 or name not in ROS1_TIME:
                 variants[name][definition_text(name, store, ros, notes)].append(distribution)
-    known = {(name, field) for store in distributions.values() for name in store
-             for field, _ in store[name][1]}  # fmt: skip
-    unknown = sorted(set(notes) - known)
-    if unknown:
-        raise SystemExit(f"{NOTES.name} names fields that rosbags doesn't know: {unknown}")
     parts = []
     for name in sorted(variants):
         for text, found in variants[name].items():
@@ -97,12 +86,27 @@ def bundle(distributions: dict[str, Any], ros: int) -> str:
 
 
 def main() -> None:
+    worlds = {
+        1: {"noetic": get_typestore(Stores.ROS1_NOETIC).fielddefs},
+        2: {name: get_typestore(Stores(f"ros2_{name}")).fielddefs for name in ROS2},
+    }
+    notes = read_notes()
+    known = {
+        (name, field)
+        for stores in worlds.values()
+        for store in stores.values()
+        for name, (_, fields) in store.items()
+        for field, _ in fields
+    }
+    unknown = sorted(set(notes) - known)
+    if unknown:
+        raise SystemExit(f"{NOTES.name} names fields that rosbags doesn't know: {unknown}")
     TARGET.mkdir(exist_ok=True)
-    noetic = {"noetic": get_typestore(Stores.ROS1_NOETIC).fielddefs}
-    ros2 = {name: get_typestore(Stores(f"ros2_{name}")).fielddefs for name in ROS2}
-    for ros, distributions in ((1, noetic), (2, ros2)):
+    for ros, distributions in worlds.items():
+        # Default values exist in ROS 2 only.
+        usable = {key: note for key, note in notes.items() if ros == 2 or note.startswith("#")}
         path = TARGET / f"ros{ros}.txt"
-        path.write_text(bundle(distributions, ros))
+        path.write_text(bundle(distributions, ros, usable), encoding="utf-8")
         print(f"{path.relative_to(ROOT)}: {path.stat().st_size} bytes")
 
 

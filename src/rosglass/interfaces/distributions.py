@@ -5,12 +5,15 @@ The bundles in ``distributions/`` are written from rosbags by ``scripts/bundle_d
 messages only; ``definitions/`` holds services, actions and a few more messages of common packages.
 """
 
+# pathlib takes longer to import than the first definition to load.
+# ruff: noqa: PTH118, PTH120, PTH123, PTH208
+
 from __future__ import annotations
 
 import os
 import re
 from functools import lru_cache
-from pathlib import Path
+from os.path import dirname, join
 from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.errors import UnsupportedError
@@ -31,7 +34,7 @@ DISTRIBUTIONS: dict[int, tuple[str, ...]] = {
     2: ("jazzy", "kilted", "lyrical", "iron", "humble", "galactic", "foxy", "eloquent", "dashing"),
 }
 
-_HERE = Path(__file__).parent
+_HERE = dirname(__file__)
 _BLOCK = re.compile(r"^=== (\S+)(.*)\n", re.MULTILINE)
 
 
@@ -43,7 +46,8 @@ class _Block(NamedTuple):
 
 @lru_cache(maxsize=2)
 def _bundle(ros: int) -> tuple[str, Mapping[str, tuple[_Block, ...]]]:
-    text = (_HERE / "distributions" / f"ros{ros}.txt").read_text(encoding="utf-8")
+    with open(join(_HERE, "distributions", f"ros{ros}.txt"), encoding="utf-8") as file:
+        text = file.read()
     heads = list(_BLOCK.finditer(text))
     blocks: dict[str, tuple[_Block, ...]] = {}
     for index, head in enumerate(heads):
@@ -84,6 +88,7 @@ class Distributions(Provider):
         return (self._preferred, *(name for name in names if name != self._preferred))
 
     def find(self, name: str, ros: int) -> Sequence[InterfaceDefinition]:
+        """Return the definitions of all distributions, the preferred one's first."""
         text, blocks = _bundle(ros)
         found: list[InterfaceDefinition] = []
         seen: set[int] = set()
@@ -103,24 +108,24 @@ class Distributions(Provider):
                     )
         if found:
             return found
-        package, kind, base = name.split("/")
+        package = name.partition("/")[0]
         extra = find_in_package(
-            _HERE / "definitions" / f"ros{ros}" / package,
-            f"{package}/{kind}/{base}",
-            ros,
-            "rosglass definitions",
+            join(_HERE, "definitions", f"ros{ros}", package), name, ros, "rosglass definitions"
         )
         return () if extra is None else (extra,)
 
     def names(self, ros: int) -> Iterable[str]:
+        """Return the full names of all types of all distributions."""
         yield from _bundle(ros)[1]
-        folder = _HERE / "definitions" / f"ros{ros}"
-        for package in sorted(folder.iterdir()):
-            yield from list_package(package, package.name)
+        folder = join(_HERE, "definitions", f"ros{ros}")
+        for package in sorted(os.listdir(folder)):
+            yield from list_package(join(folder, package), package, ros)
 
     def describe(self, ros: int) -> str:
+        """Name the distributions."""
         return f"{self.name} sets ({', '.join(self.order(ros))})"
 
     def views(self, ros: int) -> Iterator[Provider]:
+        """Yield the sets of one distribution after the other."""
         for distribution in self.order(ros):
             yield Distributions(distribution)

@@ -6,8 +6,6 @@ of the type description as JSON, without default values.
 
 from __future__ import annotations
 
-import hashlib
-import json
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import DefinitionError, UnsupportedError
@@ -49,7 +47,8 @@ _BUILT_IN = {
     (2, "builtin_interfaces/msg/Time"): "int32 sec\nuint32 nanosec",
     (2, "unique_identifier_msgs/msg/UUID"): "uint8[16] uuid",
     (2, "service_msgs/msg/ServiceEventInfo"): (
-        "uint8 event_type\nbuiltin_interfaces/Time stamp\nchar[16] client_gid\nint64 sequence_number"
+        "uint8 event_type\nbuiltin_interfaces/Time stamp\nchar[16] client_gid\n"
+        "int64 sequence_number"
     ),
     (1, "std_msgs/msg/Header"): "uint32 seq\ntime stamp\nstring frame_id",
     (1, "actionlib_msgs/msg/GoalID"): "time stamp\nstring id",
@@ -109,6 +108,8 @@ def _md5_text(
 
 
 def _md5(text: str) -> str:
+    import hashlib  # noqa: PLC0415 - its 3 ms would be spent by all who load a definition
+
     return hashlib.md5(text.encode(), usedforsecurity=False).hexdigest()
 
 
@@ -119,6 +120,9 @@ def rihs01(definition: InterfaceDefinition) -> str:
         UnsupportedError: `definition` is a ROS 1 one.
         DefinitionError: `definition` is not resolved.
     """
+    import hashlib  # noqa: PLC0415 - as above
+    import json  # noqa: PLC0415
+
     description = type_description(definition)
     for part in (description["type_description"], *description["referenced_type_descriptions"]):
         for field in part["fields"]:
@@ -199,7 +203,7 @@ def _describe_message(
         kind = field.type
         capacity = kind.size or 0
         offset = _ARRAY_OFFSETS[kind.array]
-        default = _default_text(field)
+        default = "" if field.default is None else str(field.default)
         if kind.is_compound:
             fields.append(_field(field.name, _NESTED_ID + offset, capacity, nested=kind.name))
             _describe_message(_nested(definition, field, nested), nested, described)
@@ -229,14 +233,6 @@ def _field(
         },
         "default_value": default,
     }
-
-
-def _default_text(field: Field) -> str:
-    if field.default is None:
-        return ""
-    if isinstance(field.default, tuple):
-        return str(field.default)
-    return str(field.default)
 
 
 def _nested(owner: Definition, field: Field, nested: Mapping[str, Definition]) -> Definition:

@@ -1,10 +1,12 @@
 """The library: looks definitions up in a chain of providers and remembers them."""
 
+# pathlib takes longer to import than the first definition to load.
+# ruff: noqa: PTH100, PTH111, PTH112
+
 from __future__ import annotations
 
 import os
 import threading
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rosglass.errors import (
@@ -122,13 +124,13 @@ class Library:
         Raises:
             TypeNotFoundError: There is no such folder.
         """
-        path = Path(folder).expanduser()
-        if not path.is_dir():
+        path = os.path.abspath(os.path.expanduser(folder))
+        if not os.path.isdir(path):
             raise TypeNotFoundError(f"{path} is not a folder; no definitions can be read from it")
         with self._lock:
             if self._folders not in self._chain:
                 self._chain.append(self._folders)
-            self._folders.add(path.resolve())
+            self._folders.add(path)
 
     def add_text(
         self, name: str, text: str, ros: int = 2, source: str = "wire", *, encoding: str = ""

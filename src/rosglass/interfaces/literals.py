@@ -27,14 +27,15 @@ _FLOAT32_LIMIT = (2 - 2**-24) * 2.0**127
 # int() of very long digit strings takes quadratic time; no number needs more characters.
 _MAX_NUMBER = 400
 
-_INTEGER = re.compile(r"[+-]?(?:[0-9]+|(0[xX][0-9a-fA-F]+|0[oO][0-7]+|0[bB][01]+))")
-_QUOTED = re.compile(r"""(["'])((?:\\.|(?!\1)[^\\])*)\1""", re.DOTALL)
-_ESCAPE = re.compile(r"\\(x[0-9A-Fa-f]{2}|u[0-9A-Fa-f]{4}|U[0-9A-Fa-f]{8}|[0-7]{1,3}|.)", re.DOTALL)
+# Compiled on first use by re's own cache: few definitions have quoted strings.
+_INTEGER = r"[+-]?(?:[0-9]+|(0[xX][0-9a-fA-F]+|0[oO][0-7]+|0[bB][01]+))"
+_QUOTED = r"""(?s)(["'])((?:\\.|(?!\1)[^\\])*)\1"""
+_ESCAPE = r"(?s)\\(x[0-9A-Fa-f]{2}|u[0-9A-Fa-f]{4}|U[0-9A-Fa-f]{8}|[0-7]{1,3}|.)"
+_QUOTE_OR_COMMENT = r"""(?s)\\.|["'#]"""
 _ESCAPES = {
     "a": "\a", "b": "\b", "f": "\f", "n": "\n", "r": "\r", "t": "\t", "v": "\v",
     "\\": "\\", '"': '"', "'": "'",
 }  # fmt: skip
-_QUOTE_OR_COMMENT = re.compile(r"""\\.|["'#]""", re.DOTALL)
 
 
 class LiteralError(ValueError):
@@ -49,7 +50,7 @@ def strip_comment(text: str) -> str:
     quote = ""
     # Quotes count only where strings begin with them: an apostrophe in bare text is just that.
     quoting = stripped[0] in "\"'["
-    for match in _QUOTE_OR_COMMENT.finditer(stripped):
+    for match in re.finditer(_QUOTE_OR_COMMENT, stripped):
         sign = match.group()
         if sign == quote:
             quote = ""
@@ -142,7 +143,7 @@ def _number(name: str, text: str, ros: int) -> bool | int | float:
 
 def _int(text: str) -> int | None:
     # "010" is ten, "0x10" sixteen: rosidl tries base 10 first, then Python's prefixes.
-    match = _INTEGER.fullmatch(text)
+    match = re.fullmatch(_INTEGER, text)
     if match is None:
         return None
     return int(text, 10 if match.group(1) is None else 0)
@@ -173,7 +174,7 @@ def _float(name: str, text: str) -> float:
 
 def _string(text: str) -> str:
     if text[:1] in ("'", '"') and len(text) >= 2 and text[-1] == text[0]:
-        match = _QUOTED.fullmatch(text)
+        match = re.fullmatch(_QUOTED, text)
         if match is None:
             raise LiteralError(f"a {text[0]} inside the string {text} must be written \\{text[0]}")
         return _unescape(match.group(2))
@@ -181,7 +182,7 @@ def _string(text: str) -> str:
 
 
 def _unescape(text: str) -> str:
-    return _ESCAPE.sub(_unescape_one, text) if "\\" in text else text
+    return re.sub(_ESCAPE, _unescape_one, text) if "\\" in text else text
 
 
 def _unescape_one(match: re.Match[str]) -> str:
@@ -209,7 +210,7 @@ def _split_strings(text: str) -> Iterator[str]:
         while position < end and text[position] in " \t":
             position += 1
         if position < end and text[position] in "\"'":
-            match = _QUOTED.match(text, position)
+            match = re.compile(_QUOTED).match(text, position)
             if match is None:
                 raise LiteralError(
                     f"the quote before {text[position + 1 : position + 20]!r} is open"

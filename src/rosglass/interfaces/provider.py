@@ -78,13 +78,16 @@ class MemoryProvider(Provider):
         self._known[definition.ros, definition.name] = definition
 
     def find(self, name: str, ros: int) -> Sequence[InterfaceDefinition]:
+        """Return the stored definition."""
         found = self._known.get((ros, name))
         return () if found is None else (found,)
 
     def names(self, ros: int) -> Iterable[str]:
+        """Return the full names of the stored definitions."""
         return [name for world, name in list(self._known) if world == ros]
 
     def describe(self, ros: int) -> str:
+        """Say how many definitions were received."""
         count = len(list(self.names(ros)))
         return f"{self.name} ({count} received)" if count else ""
 
