@@ -1,15 +1,9 @@
 """What a message is: lazy trees over received bytes, and the codecs behind them."""
 
+from rosglass.messages.loading import ActionType, ServiceType, default_library, load
 from rosglass.messages.message import Message, type_of
 from rosglass.messages.sequences import MessageSequence
-from rosglass.messages.types import (
-    ActionType,
-    Constants,
-    MessageType,
-    ServiceType,
-    default_library,
-    load,
-)
+from rosglass.messages.types import Constants, MessageType
 
 __all__ = [
     "ActionType",

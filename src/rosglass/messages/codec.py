@@ -158,8 +158,8 @@ class Codec:
     def element(self, buffer: bytes, offset: int) -> Message:
         """Return the shell of an element."""
         message = self.shell()
-        message._buffer__ = buffer  # type: ignore[attr-defined]
-        message._offset__ = offset  # type: ignore[attr-defined]
+        message._buffer__ = buffer
+        message._offset__ = offset
         return message
 
     def skip(self, buffer: bytes, offset: int) -> int:

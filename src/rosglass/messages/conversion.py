@@ -273,7 +273,7 @@ def convert(schema: Schema, value: Any, path: str = "") -> Message:
         given = dict(zip((m.name for m in schema.members), parts, strict=True))
     else:
         raise ConversionError(path, value, f"a dict or a {schema.name}")
-    made: Message = object.__new__(cls)
+    made = cls()
     for member in schema.members:
         if member.name in given:
             inner = f"{path}.{member.name}" if path else member.name

@@ -222,7 +222,7 @@ class _Walk:
         elif step < 0:
             index = str(int(count) + step)
         if member.number is not None:
-            self._number_at(reader, member, name, count, index)
+            self._number_at(reader, member, name, index)
             return
         if member.kind is Kind.TEXT:
             reader.check_count(4, count)
@@ -234,14 +234,14 @@ class _Walk:
         schema = member.struct
         assert schema is not None
         reader.check_count(layout.min_size(schema, self.wire), count)
-        reader.to_element(schema, count, index)
+        reader.to_element(schema, index)
         if not rest:
             shell = self.source.bind(self.codec.of(schema).element, "element")
             self.source.line(f"{name} = {shell}(b, {reader.cursor.at()})")
         else:
             self.schema(reader, schema, [(name, rest, path)], last=True)
 
-    def _number_at(self, reader: Reader, member: Member, name: str, count: str, index: str) -> None:
+    def _number_at(self, reader: Reader, member: Member, name: str, index: str) -> None:
         number = member.number
         assert number is not None
         reader.cursor.align(self.source, number.size, reader.var)
@@ -275,7 +275,7 @@ class _Walk:
         if stride is not None and inner is not None:
             number = leaf.number
             assert number is not None
-            reader.to_element(schema, count, "0")
+            reader.to_element(schema, "0")
             array = self.source.bind(numpy.ndarray, "array")
             dtype = self.source.bind(number_type(number.dtype, self.wire.order), number.dtype)
             start = reader.cursor.at(inner - self.wire.origin)

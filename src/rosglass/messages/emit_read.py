@@ -185,6 +185,7 @@ class Reader:
         return count
 
     def text(self, member: Member, target: str) -> None:
+        """Decode one string."""
         self.number("n", "I", 4)
         self.flush()
         var, line = self.var, self.source.line
@@ -392,6 +393,7 @@ class Reader:
             self._skip_elements(member.struct, count)
 
     def skip_text(self, member: Member) -> None:
+        """Step over one string."""
         self.number("n", "I", 4)
         self.flush()
         var = self.var
@@ -411,7 +413,7 @@ class Reader:
                 self.skip(schema)
         self.unproved = True
 
-    def to_element(self, schema: Schema, count: str, index: str) -> None:
+    def to_element(self, schema: Schema, index: str) -> None:
         """Move from the start of an array to its element `index`."""
         stride = layout.constant_stride(schema, self.wire)
         if stride is None:

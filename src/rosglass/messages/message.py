@@ -50,6 +50,10 @@ class Message:
 
     __slots__ = ("_buffer__", "_offset__")
     __hash__ = None  # type: ignore[assignment]
+    #: The bytes of a shell; unset in plain objects.
+    _buffer__: bytes
+    #: Where in the bytes the shell of a nested message starts.
+    _offset__: int
     _schema__: ClassVar[Schema]
     #: Decodes a shell; None for plain classes.
     _fill__: ClassVar[Callable[[Message], None] | None] = None
@@ -125,16 +129,16 @@ class Message:
         return text.to_json(self, indent)
 
     def to_yaml(self) -> str:
-        """Return the message as YAML, with numeric arrays in one line as ``ros2 topic echo`` has."""
+        """Return the message as YAML, each numeric array in one line."""
         return text.to_yaml(self)
 
     def copy(self) -> Message:
-        """Return a deep copy that shares nothing with the received bytes; its arrays are writable."""
+        """Return a deep copy, detached from the received bytes; its arrays are writable."""
         return copy_of(self)
 
     def __copy__(self) -> Message:
         touch(self)
-        twin: Message = object.__new__(plain_class(self._schema__))
+        twin = plain_class(self._schema__)()
         for member in self._schema__.members:
             setattr(twin, member.attr, getattr(self, member.attr))
         return twin
@@ -180,7 +184,7 @@ def touch(message: Message) -> None:
 
 def copy_of(message: Message) -> Message:
     """Return a deep copy; a value that is not of its field's kind is copied as it is."""
-    twin: Message = object.__new__(plain_class(message._schema__))
+    twin = plain_class(message._schema__)()
     for member in message._schema__.members:
         value = getattr(message, member.attr)
         if member.is_array:
@@ -211,14 +215,18 @@ def same(one: Message, other: Message) -> bool:
 
 def _same_value(member: Member, one: Any, other: Any) -> bool:
     if not member.is_array:
-        return bool(one == other or (one != one and other != other))
+        # NaN is the only value that differs from itself.
+        return bool(one == other or (one != one and other != other))  # noqa: PLR0124
     if len(one) != len(other):
         return False
     if member.number is None:
         return all(left == right for left, right in zip(one, other, strict=True))
     numpy = import_module("numpy")
     left, right = numpy.asarray(one), numpy.asarray(other)
-    return bool(((left == right) | ((left != left) & (right != right))).all())
+    equal = left == right
+    if left.dtype.kind == "f":
+        equal |= numpy.isnan(left) & numpy.isnan(right)
+    return bool(equal.all())
 
 
 class Stamp:
@@ -253,7 +261,8 @@ def _make_class(schema: Schema) -> type[Message]:
         "__qualname__": schema.name,
         "_schema__": schema,
     }
-    return type(schema.name.rpartition("/")[2], bases, body)
+    made: type[Message] = type(schema.name.rpartition("/")[2], bases, body)
+    return made
 
 
 def shell_class(
@@ -273,14 +282,14 @@ def shell_class(
         "_schema__": codec.schema,
     }
     body["_root__"] = codec if root else None
-    shell = type(cls.__name__, (cls,), body)
+    shell: Any = type(cls.__name__, (cls,), body)
 
     def first(message: Message) -> None:
         install(compile_fill(shell))
         touch(message)
 
     def install(fill: Callable[[Any], None]) -> None:
-        shell._fill__ = staticmethod(fill)  # type: ignore[assignment]
+        shell._fill__ = staticmethod(fill)
         for member in codec.schema.members:
             setattr(shell, member.attr, _field(member.attr, fill))
 

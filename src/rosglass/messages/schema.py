@@ -88,7 +88,6 @@ _NUMBERS = {
 }
 # ROS 1 says byte is int8 (genmsg), ROS 2 says it is an octet (rosidl).
 _NUMBERS_ROS1 = {**_NUMBERS, "byte": _integer("byte", "b", 1, True)}
-_COUNT = FieldType("uint32")
 
 
 def _stamp_definition(name: str, part: str) -> Definition:
@@ -215,7 +214,7 @@ def _resolve(
     if len(above) >= _MAX_DEPTH:
         raise DefinitionError(f"types nest deeper than {_MAX_DEPTH} levels", file)
     numbers = _NUMBERS_ROS1 if definition.ros == 1 else _NUMBERS
-    members = []
+    members: list[Member] = []
     taken: set[str] = set(PRIVATE_SLOTS)
     used: dict[str, Definition] = {}
     for field in definition.fields:

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import threading
-import weakref
 from dataclasses import replace
 from functools import partial
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from rosglass.errors import DecodeError, Error, UnsupportedError
-from rosglass.interfaces.definition import (
-    ActionDefinition,
-    Definition,
-    InterfaceDefinition,
-    ServiceDefinition,
-)
+from rosglass import interfaces
+from rosglass.errors import DecodeError, DefinitionError, Error, UnsupportedError
+from rosglass.interfaces.definition import Definition
+from rosglass.interfaces.resolver import Resolver
 from rosglass.messages.codec import Codec, codec_of
 from rosglass.messages.conversion import convert
 from rosglass.messages.diagnosis import encapsulation_error
@@ -26,11 +20,10 @@ from rosglass.messages.schema import Schema, schema_of
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rosglass.interfaces import Library
     from rosglass.interfaces.definition import Field
     from rosglass.messages.message import Message
 
-__all__ = ["ActionType", "Constants", "MessageType", "ServiceType", "default_library", "load"]
+__all__ = ["Constants", "MessageType"]
 
 _WIRES = {
     (name, big, wide): Wire(name, big, wide)
@@ -85,6 +78,24 @@ class MessageType:
         self._paths: dict[Any, Callable[[Any], Any]] = {}
 
     @classmethod
+    def from_text(cls, name: str, text: str, ros: int = 2) -> MessageType:
+        """Return the type that a text defines, all it needs included after ``===`` lines.
+
+        Raises:
+            DefinitionError: The text breaks a rule, or needs a type it does not contain.
+            InvalidNameError: `name` is not a type name.
+        """
+        parsed = interfaces.parse_message(text, name, ros=ros)
+
+        def find(wanted: str, owner: Definition, field: Field) -> Definition:
+            if wanted not in parsed.nested:
+                problem = f"{owner.name}.{field.name}: the text does not define {wanted}"
+                raise DefinitionError(problem, parsed.source.file)
+            return parsed.nested[wanted]
+
+        return cls(Resolver(find).message(parsed))
+
+    @classmethod
     def _of_schema(cls, schema: Schema) -> MessageType:
         made: MessageType = object.__new__(cls)
         made._set(schema, schema.definition)
@@ -107,12 +118,12 @@ class MessageType:
     @property
     def md5(self) -> str:
         """ROS 1's md5 sum of the definition."""
-        return hashes().md5(self.definition)
+        return interfaces.md5(self.definition)
 
     @property
     def rihs01(self) -> str:
         """ROS 2's type hash (REP 2016), ``RIHS01_`` and 64 hexadecimal digits."""
-        return hashes().rihs01(self.definition)
+        return interfaces.rihs01(self.definition)
 
     @property
     def fields(self) -> tuple[Field, ...]:
@@ -188,7 +199,7 @@ class MessageType:
         if not self._schema.has_wide and not codec.wire.big:
             self._shells[wire] = codec.root, codec.wire.aligned
         message = codec.root()
-        message._buffer__ = data  # type: ignore[attr-defined]
+        message._buffer__ = data
         return message
 
     def _bytes(self, buffer: Any) -> bytes:
@@ -304,7 +315,7 @@ class MessageType:
 
         def failed(buffer: Any, error: Exception) -> Any:
             if type(buffer) is not bytes:
-                return function(self._bytes(buffer))
+                return made(self._bytes(buffer))
             if isinstance(error, Error):
                 raise error
             found = codec
@@ -312,8 +323,9 @@ class MessageType:
                 found = self._codec(name, _encapsulation(self.name, buffer), wide)
             raise found.explain(buffer, error) from None
 
-        function = self._paths[key] = path_function(codec, paths, single, other, failed)
-        return function
+        made = path_function(codec, paths, single, other, failed)
+        self._paths[key] = made
+        return made
 
     def _path_by_bytes(self, name: str, paths: tuple[str, ...], single: bool, buffer: Any) -> Any:
         data = self._bytes(buffer)
@@ -356,8 +368,8 @@ class MessageType:
             untouched = getattr(value, "_buffer__", None)
             if untouched is not None:
                 return untouched  # type: ignore[no-any-return]
-        data = codec.writer(False, True)(value)
-        return data
+        written: bytes = codec.writer(False, True)(value)
+        return written
 
     def encode_parts(
         self,
@@ -427,117 +439,3 @@ def _portable(definition: Definition) -> Definition:
 
 
 Schema.make_type = MessageType._of_schema
-
-
-class ServiceType:
-    """A service type.
-
-    Attributes:
-        definition: The definition it was made from.
-        name: Full name, ``pkg/srv/Type``.
-        ros: 1 or 2.
-        request: Type of the request.
-        response: Type of the response.
-    """
-
-    def __init__(self, definition: ServiceDefinition) -> None:
-        self.definition = definition
-        self.name, self.ros = definition.name, definition.ros
-        self.request = MessageType(definition.request)
-        self.response = MessageType(definition.response)
-
-    @property
-    def md5(self) -> str:
-        """ROS 1's md5 sum of the definition."""
-        return hashes().md5(self.definition)
-
-    @property
-    def rihs01(self) -> str:
-        """ROS 2's type hash (REP 2016)."""
-        return hashes().rihs01(self.definition)
-
-    def __repr__(self) -> str:
-        return f"<ServiceType {self.name} (ROS {self.ros})>"
-
-
-class ActionType:
-    """An action type.
-
-    Attributes:
-        definition: The definition it was made from.
-        name: Full name, ``pkg/action/Type``.
-        ros: 1 or 2.
-        goal: Type of the goal.
-        result: Type of the result.
-        feedback: Type of the feedback.
-    """
-
-    def __init__(self, definition: ActionDefinition) -> None:
-        self.definition = definition
-        self.name, self.ros = definition.name, definition.ros
-        self.goal = MessageType(definition.goal)
-        self.result = MessageType(definition.result)
-        self.feedback = MessageType(definition.feedback)
-
-    @property
-    def md5(self) -> str:
-        """ROS 1's md5 sum of the definition."""
-        return hashes().md5(self.definition)
-
-    @property
-    def rihs01(self) -> str:
-        """ROS 2's type hash (REP 2016)."""
-        return hashes().rihs01(self.definition)
-
-    def __repr__(self) -> str:
-        return f"<ActionType {self.name} (ROS {self.ros})>"
-
-
-def hashes() -> Any:
-    """Return the module that computes type hashes; it is loaded only when one is asked for."""
-    return import_module("rosglass.interfaces")
-
-
-_lock = threading.RLock()
-_libraries: weakref.WeakKeyDictionary[Any, dict[tuple[str, int], Any]]
-_libraries = weakref.WeakKeyDictionary()
-_default: list[Library] = []
-
-
-def default_library() -> Library:
-    """Return the library that :func:`load` uses unless given another; made on first use."""
-    with _lock:
-        if not _default:
-            _default.append(import_module("rosglass.interfaces").Library())
-        return _default[0]
-
-
-def load(
-    name: str, ros: int = 2, library: Library | None = None
-) -> MessageType | ServiceType | ActionType:
-    """Return the type called `name`.
-
-    Args:
-        name: ``pkg/msg/Type`` or ``pkg/Type`` (also ``srv`` and ``action``).
-        ros: 2 for ROS 2's definition, 1 for ROS 1's.
-        library: Where to look it up; None for :func:`default_library`.
-
-    Raises:
-        TypeNotFoundError: No provider has a definition.
-        DefinitionError: The definition has errors, or is cyclic.
-    """
-    source = default_library() if library is None else library
-    with _lock:
-        types = _libraries.setdefault(source, {})
-        found = types.get((name, ros))
-        if found is None:
-            found = types[name, ros] = _make(source.definition(name, ros=ros))
-    return found  # type: ignore[no-any-return]
-
-
-def _make(definition: InterfaceDefinition) -> MessageType | ServiceType | ActionType:
-    if isinstance(definition, ServiceDefinition):
-        return ServiceType(definition)
-    if isinstance(definition, ActionDefinition):
-        return ActionType(definition)
-    return MessageType(definition)

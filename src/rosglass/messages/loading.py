@@ -1,0 +1,127 @@
+"""Finding types by name: services and actions too, each kept once per library."""
+
+from __future__ import annotations
+
+import threading
+import weakref
+from typing import TYPE_CHECKING
+
+from rosglass import interfaces
+from rosglass.interfaces.definition import ActionDefinition, ServiceDefinition
+from rosglass.messages.types import MessageType
+
+if TYPE_CHECKING:
+    from rosglass.interfaces import Library
+    from rosglass.interfaces.definition import InterfaceDefinition
+
+__all__ = ["ActionType", "ServiceType", "default_library", "load"]
+
+
+class ServiceType:
+    """A service type.
+
+    Attributes:
+        definition: The definition it was made from.
+        name: Full name, ``pkg/srv/Type``.
+        ros: 1 or 2.
+        request: Type of the request.
+        response: Type of the response.
+    """
+
+    def __init__(self, definition: ServiceDefinition) -> None:
+        self.definition = definition
+        self.name, self.ros = definition.name, definition.ros
+        self.request = MessageType(definition.request)
+        self.response = MessageType(definition.response)
+
+    @property
+    def md5(self) -> str:
+        """ROS 1's md5 sum of the definition."""
+        return interfaces.md5(self.definition)
+
+    @property
+    def rihs01(self) -> str:
+        """ROS 2's type hash (REP 2016)."""
+        return interfaces.rihs01(self.definition)
+
+    def __repr__(self) -> str:
+        return f"<ServiceType {self.name} (ROS {self.ros})>"
+
+
+class ActionType:
+    """An action type.
+
+    Attributes:
+        definition: The definition it was made from.
+        name: Full name, ``pkg/action/Type``.
+        ros: 1 or 2.
+        goal: Type of the goal.
+        result: Type of the result.
+        feedback: Type of the feedback.
+    """
+
+    def __init__(self, definition: ActionDefinition) -> None:
+        self.definition = definition
+        self.name, self.ros = definition.name, definition.ros
+        self.goal = MessageType(definition.goal)
+        self.result = MessageType(definition.result)
+        self.feedback = MessageType(definition.feedback)
+
+    @property
+    def md5(self) -> str:
+        """ROS 1's md5 sum of the definition."""
+        return interfaces.md5(self.definition)
+
+    @property
+    def rihs01(self) -> str:
+        """ROS 2's type hash (REP 2016)."""
+        return interfaces.rihs01(self.definition)
+
+    def __repr__(self) -> str:
+        return f"<ActionType {self.name} (ROS {self.ros})>"
+
+
+_lock = threading.RLock()
+_libraries: weakref.WeakKeyDictionary[
+    Library, dict[tuple[str, int], MessageType | ServiceType | ActionType]
+] = weakref.WeakKeyDictionary()
+_default: list[Library] = []
+
+
+def default_library() -> Library:
+    """Return the library that :func:`load` uses unless given another; made on first use."""
+    with _lock:
+        if not _default:
+            _default.append(interfaces.Library())
+        return _default[0]
+
+
+def load(
+    name: str, ros: int = 2, library: Library | None = None
+) -> MessageType | ServiceType | ActionType:
+    """Return the type called `name`.
+
+    Args:
+        name: ``pkg/msg/Type`` or ``pkg/Type`` (also ``srv`` and ``action``).
+        ros: 2 for ROS 2's definition, 1 for ROS 1's.
+        library: Where to look it up; None for :func:`default_library`.
+
+    Raises:
+        TypeNotFoundError: No provider has a definition.
+        DefinitionError: The definition has errors, or is cyclic.
+    """
+    source = default_library() if library is None else library
+    with _lock:
+        types = _libraries.setdefault(source, {})
+        found = types.get((name, ros))
+        if found is None:
+            found = types[name, ros] = _make(source.definition(name, ros=ros))
+    return found
+
+
+def _make(definition: InterfaceDefinition) -> MessageType | ServiceType | ActionType:
+    if isinstance(definition, ServiceDefinition):
+        return ServiceType(definition)
+    if isinstance(definition, ActionDefinition):
+        return ActionType(definition)
+    return MessageType(definition)
