@@ -5,6 +5,8 @@ Messages follow one pattern: what happened, where (topic, field path, file and l
 
 from __future__ import annotations
 
+import builtins
+
 __all__ = [
     "ConnectionLostError",
     "ConversionError",
@@ -107,7 +109,7 @@ class ConnectionLostError(Error):
     """The middleware could not be reached, or the connection to it was lost."""
 
 
-class TimeoutError(Error, TimeoutError):  # noqa: A001 - the field's own word; also a builtin TimeoutError
+class TimeoutError(Error, builtins.TimeoutError):  # noqa: A001 - the field's own word
     """What was waited for did not come within the given time."""
 
 
