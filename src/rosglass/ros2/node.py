@@ -226,19 +226,33 @@ class Ros2Node(Node):
         self._status_listeners.clear()
 
     def _find(self, name: str, hash: str = "") -> MessageType:
-        from rosglass.messages import load  # noqa: PLC0415 - brings in numpy
+        """Return the message type `name`, in the version that a peer announced by its hash."""
+        from rosglass.interfaces import Definition  # noqa: PLC0415 - only when a type is needed
+        from rosglass.messages import MessageType, default_library, load  # noqa: PLC0415 - numpy
 
-        return self._check_type(load(name, ros=2, library=self._library, hash=hash))
+        try:
+            found = self._check_type(load(name, ros=2, library=self._library))
+        except Error:
+            if not hash:
+                raise
+        else:
+            if hash in ("", found.rihs01):
+                return found
+        library = default_library() if self._library is None else self._library
+        definition = library.definition(name, ros=2, hash=hash)
+        return self._check_type(
+            MessageType(definition) if isinstance(definition, Definition) else definition
+        )
 
     def _check_type(self, found: object) -> MessageType:
-        from rosglass.messages import MessageType  # noqa: PLC0415 - brings in numpy
+        from rosglass.messages import MessageType  # noqa: PLC0415 - numpy
 
         if not isinstance(found, MessageType):
             raise TypeNotFoundError(
                 f"{found!r} is not a message type; give a name such as std_msgs/msg/String "
                 "or what rosglass.load() returns for a message"
             )
-        if found.definition.ros != 2:
+        if found.ros != 2:
             raise UnsupportedError(
                 f"{found.name} is ROS 1's definition, and {self.url} is a ROS 2 graph; "
                 f"load it with rosglass.load({found.name!r}, ros=2)"

@@ -38,6 +38,7 @@ class Ros2Publisher(Publisher):
         self._writer, self._graph, self._matches_qos = writer, graph, matches_qos
         self._on_close = on_close
         self._closed = False
+        self._hash = type.rihs01
         self._warned: set[EndpointInfo] = set()
 
     def publish(self, message: Message | dict[str, Any] | None = None, /, **fields: Any) -> None:
@@ -84,7 +85,7 @@ class Ros2Publisher(Publisher):
         for endpoint in self._graph.endpoints(EndpointKind.SUBSCRIPTION, self.topic):
             if endpoint.type != self.type.name:
                 continue
-            if endpoint.type_hash not in ("", self.type.rihs01):
+            if endpoint.type_hash not in ("", self._hash):
                 self._warn(endpoint)
             elif not (self._matches_qos and endpoint.qos.incompatibility(self.qos)):
                 found.append(endpoint)
@@ -99,7 +100,7 @@ class Ros2Publisher(Publisher):
                 endpoint.node,
                 self.type.name,
                 endpoint.type_hash,
-                self.type.rihs01,
+                self._hash,
             )
 
     def _check_open(self) -> None:

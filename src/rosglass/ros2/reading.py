@@ -62,6 +62,7 @@ class Reading:
         self._lock = threading.Lock()
         self._reader: Handle | None = None
         self._type: MessageType | None = None
+        self._hash = ""
         self._closed = False
         self._failed: tuple[str, str] | None = None
         self._failure = ""
@@ -70,13 +71,13 @@ class Reading:
     def read(self, message_type: MessageType) -> None:
         """Receive samples of `message_type` from now on, instead of any before."""
         self._strangers.clear()
-        self._type = message_type
+        self._type, self._hash = message_type, message_type.rihs01
         self.subscription.set_type(message_type)
         reader = self._middleware.create_reader(
             self._node,
             self.subscription.topic,
             message_type.name,
-            message_type.rihs01,
+            self._hash,
             self.subscription.qos,
             self._receiver(message_type),
         )
@@ -133,7 +134,7 @@ class Reading:
         """Load and read the version of the type that publishers announce."""
         hashes = {p.type_hash for p in publishers if p.type == name and p.type_hash}
         ours = self._type if self._type is not None and self._type.name == name else None
-        if ours is not None and (len(hashes) != 1 or ours.rihs01 in hashes):
+        if ours is not None and (len(hashes) != 1 or self._hash in hashes):
             return
         wanted = (name, hashes.pop() if len(hashes) == 1 else "")
         if wanted != self._failed or retry:
@@ -164,7 +165,7 @@ class Reading:
         for publisher in publishers:
             if publisher.type != ours.name:
                 continue
-            if publisher.type_hash not in ("", ours.rihs01):
+            if publisher.type_hash not in ("", self._hash):
                 strangers[publisher.type_hash] = f" of {publisher.node}"
             conflict = self.subscription.qos.incompatibility(publisher.qos)
             if conflict:
@@ -179,13 +180,13 @@ class Reading:
                 )
         problems += [
             f"the publisher{who} has another definition of {ours.name} ({type_hash}, ours is "
-            f"{ours.rihs01}): its samples are refused; add the robot's definition to the library"
+            f"{self._hash}): its samples are refused; add the robot's definition to the library"
             for type_hash, who in sorted(strangers.items())
         ]
         return problems
 
     def _receiver(self, message_type: MessageType) -> OnSample:
-        ours, strangers, repeats = message_type.rihs01, self._strangers, Repeats()
+        ours, strangers, repeats = self._hash, self._strangers, Repeats()
         deliver, wire = self.subscription.deliver, "cdr"
 
         def receive(

@@ -1,0 +1,105 @@
+"""Fixtures for tests with real peers: other processes on this machine, loopback only."""
+
+from __future__ import annotations
+
+import json
+import queue
+import subprocess
+import sys
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+
+def wait_for(condition: Callable[[], Any], timeout: float = 10.0, what: str = "") -> Any:
+    """Return the first true value of `condition`, which must come within `timeout` seconds."""
+    deadline = time.monotonic() + timeout
+    while True:
+        value = condition()
+        if value:
+            return value
+        assert time.monotonic() < deadline, f"not within {timeout} s: {what or condition}"
+        time.sleep(0.01)
+
+
+class Process:
+    """A process that prints one JSON object per line; everything else it prints is kept."""
+
+    def __init__(self, command: Sequence[str], env: dict[str, str] | None = None) -> None:
+        self.popen = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=env,
+        )
+        self.pid = self.popen.pid
+        self.output: list[str] = []
+        self.events: queue.Queue[dict[str, Any]] = queue.Queue()
+        self._skipped: list[dict[str, Any]] = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        assert self.popen.stdout is not None
+        for line in self.popen.stdout:
+            if line.startswith("{"):
+                self.events.put(json.loads(line))
+            else:
+                self.output.append(line)
+
+    def event(self, key: str, timeout: float = 20.0) -> Any:
+        """Return the value of the next event that has `key`; other events wait for their turn."""
+        deadline = time.monotonic() + timeout
+        for event in self._skipped:
+            if key in event:
+                self._skipped.remove(event)
+                return event[key]
+        while True:
+            try:
+                event = self.events.get(timeout=max(0.01, deadline - time.monotonic()))
+            except queue.Empty:
+                told = "".join(self.output[-40:])
+                pytest.fail(f"no {key!r} from {self.popen.args} within {timeout} s:\n{told}")
+            if key in event:
+                return event[key]
+            self._skipped.append(event)
+
+    def ask(self, **request: Any) -> None:
+        """Send a JSON object to its standard input."""
+        assert self.popen.stdin is not None
+        self.popen.stdin.write(json.dumps(request) + "\n")
+        self.popen.stdin.flush()
+
+    def end(self) -> None:
+        """Kill it, this process only."""
+        self.popen.kill()
+        self.popen.wait()
+        self._reader.join(5)
+
+
+@pytest.fixture(name="wait_for", scope="session")
+def wait_for_fixture() -> Callable[..., Any]:
+    """See :func:`wait_for`."""
+    return wait_for
+
+
+@pytest.fixture(scope="module")
+def start() -> Iterator[Callable[..., Process]]:
+    """Start Python with the given arguments; killed when the module's tests are done."""
+    started: list[Process] = []
+
+    def start(*arguments: str, env: dict[str, str] | None = None) -> Process:
+        process = Process([sys.executable, "-W", "ignore", *arguments], env)
+        started.append(process)
+        return process
+
+    yield start
+    for process in started:
+        process.end()

@@ -1,0 +1,120 @@
+"""Fixtures for tests with real ROS 2 peers over Zenoh."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import socket
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+import rosglass
+from rosglass.interfaces import Definition, Library, rihs01, type_description
+from rosglass.ros2.router import Router
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from rosglass.comm import Node
+
+PEERS = Path(__file__).parent / "peers"
+MODULES = {"rosglass": "rosglass", "sdk": "zenoh_ros2_sdk", "dora": "dora"}
+
+
+@pytest.fixture
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.fixture(scope="session")
+def peer_values() -> Any:
+    """The module that peers share: ``VALUES`` they publish, ``summary()`` of what they receive."""
+    spec = importlib.util.spec_from_file_location("summary", PEERS / "summary.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def router() -> Iterator[Router]:
+    with Router("tcp/127.0.0.1:0") as running:
+        yield running
+
+
+@pytest.fixture
+def connect(router: Router) -> Iterator[Callable[..., Node]]:
+    """Connect to the router; nodes are closed at the end of the test."""
+    nodes: list[Node] = []
+
+    def connect(name: str, options: str = "", namespace: str = "/", url: str = "") -> Node:
+        node = rosglass.connect((url or router.url) + options, name, namespace)
+        nodes.append(node)
+        return node
+
+    yield connect
+    for node in nodes:
+        node.close()
+
+
+@pytest.fixture(scope="session")
+def interfaces(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A prefix such as ROS installs, with the definitions that peers need."""
+    prefix = tmp_path_factory.mktemp("interfaces")
+    library = Library()
+    waiting = ["std_msgs/msg/String", "geometry_msgs/msg/Twist", "sensor_msgs/msg/Image"]
+    packages = set()
+    while waiting:
+        name = waiting.pop()
+        definition = library.definition(name)
+        assert isinstance(definition, Definition)
+        waiting += definition.nested
+        package, _, base = name.split("/")
+        packages.add(package)
+        folder = prefix / "share" / package / "msg"
+        folder.mkdir(parents=True, exist_ok=True)
+        text = definition.text.partition("\n====")[0]
+        (folder / f"{base}.msg").write_text(text)
+        hashes = [
+            {"type_name": part.name, "hash_string": rihs01(part)}
+            for part in (definition, *definition.nested.values())
+        ]
+        described = {"type_description_msg": type_description(definition), "type_hashes": hashes}
+        (folder / f"{base}.json").write_text(json.dumps(described))
+    for package in packages:
+        for kind in ("srv", "action"):
+            (prefix / "share" / package / kind).mkdir()
+        (prefix / "share" / package / "package.xml").write_text(
+            f'<package format="3"><name>{package}</name><version>1.0.0</version><description/>'
+            '<maintainer email="a@example.org">a</maintainer><license>MIT</license></package>'
+        )
+    return prefix
+
+
+@pytest.fixture(scope="module")
+def start_peer(start: Callable[..., Any], interfaces: Path) -> Callable[..., Any]:
+    """Start a peer's script with a plan, and wait until it is ready."""
+
+    def start_peer(kind: str, router: Router, **plan: Any) -> Any:
+        plan.setdefault("domain", 0)
+        plan |= {"port": int(router.listen.rpartition(":")[2]), "interfaces": str(interfaces)}
+        script, _, plan["profile"] = kind.partition("-")
+        module = MODULES[script]
+        if importlib.util.find_spec(module) is None:
+            pytest.skip(f'{module} is not installed: pip install "rosglass[peers]"')
+        # dora takes the domain of its data keys and its type descriptions from here only.
+        env = os.environ | {
+            "ROS_DOMAIN_ID": str(plan["domain"]),
+            "AMENT_PREFIX_PATH": str(interfaces),
+        }
+        process = start(str(PEERS / f"{script}_peer.py"), json.dumps(plan), env=env)
+        process.event("ready")
+        return process
+
+    return start_peer

@@ -1,0 +1,37 @@
+"""Another rosglass program: `rosglass_peer.py PLAN` with the plan as JSON, see ``plan`` below."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+
+from summary import VALUES, summary, tell
+
+import rosglass
+
+# {"port", "domain", "publish": {topic: type}, "subscribe": {topic: type}, "latched": bool,
+#  "period": seconds, "count": how many messages to publish}
+plan = json.loads(sys.argv[1])
+node = rosglass.connect(f"zenoh://127.0.0.1:{plan['port']}?domain={plan['domain']}", "peer", "/own")
+qos = rosglass.QoS.latched() if plan.get("latched") else rosglass.QoS()
+
+
+def receiver(topic: str):
+    return lambda message: tell(received=topic, value=summary(message.to_dict()))
+
+
+for topic, name in plan.get("subscribe", {}).items():
+    node.create_subscription(topic, name, receiver(topic), qos)
+publishers = {
+    topic: (node.create_publisher(topic, name, qos), VALUES[name])
+    for topic, name in plan.get("publish", {}).items()
+}
+tell(ready=True)
+left = plan.get("count", -1)
+while left:
+    for publisher, value in publishers.values():
+        publisher.publish(value)
+    time.sleep(plan.get("period", 0.1))
+    left -= 1
+time.sleep(600)

@@ -1,0 +1,148 @@
+"""Topics both ways with every peer, each in its own process."""
+
+from __future__ import annotations
+
+import pytest
+
+import rosglass
+from rosglass.comm import NodeName
+
+TYPES = ["std_msgs/msg/String", "geometry_msgs/msg/Twist", "sensor_msgs/msg/Image"]
+NODES = {
+    "rosglass": NodeName("/own", "peer"),
+    "sdk": NodeName("/sdk", "talker0"),
+    "dora-humble": NodeName("/dora", "dora_node"),
+    "dora-rep2016": NodeName("/dora", "dora_node"),
+}
+pytestmark = pytest.mark.peers
+
+
+def topic(direction: str, type_name: str) -> str:
+    return f"/{direction}/{type_name.rpartition('/')[2].lower()}"
+
+
+@pytest.fixture(scope="module", params=list(NODES))
+def kind(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def peer(kind, router, start_peer):
+    plan = {
+        "publish": {topic("from", name): name for name in TYPES},
+        "subscribe": {topic("to", name): name for name in TYPES},
+        # dora's domains differ unless told twice; another domain than 0 shows that all agree.
+        "domain": 7,
+    }
+    process = start_peer(kind, router, **plan)
+    yield process
+    process.end()
+
+
+@pytest.fixture
+def node(peer, connect):
+    return connect("cockpit", "?domain=7")
+
+
+@pytest.mark.parametrize("type_name", TYPES)
+@pytest.mark.parametrize("given", ["type given", "type discovered"])
+def test_we_receive_what_the_peer_publishes(node, type_name, given, peer_values):
+    wanted = type_name if given == "type given" else None
+    subscription = node.create_subscription(topic("from", type_name), wanted)
+    sample = subscription.wait(10)
+    assert sample is not None, subscription.problem or node.status()
+    assert subscription.problem == ""
+    assert sample.type.name == type_name
+    sample.type.validate(sample.data)
+    received = peer_values.summary(sample.message().to_dict())
+    assert received == peer_values.summary(peer_values.VALUES[type_name])
+    assert sample.sent is not None
+    assert 0 <= (sample.received - sample.sent).seconds < 2
+    following = subscription.wait(10)
+    assert following.publisher == sample.publisher
+    assert len(sample.publisher) == 16
+    assert following.sequence == sample.sequence + 1
+
+
+@pytest.mark.parametrize("type_name", TYPES)
+def test_the_peer_receives_what_we_publish(node, peer, type_name, peer_values, wait_for):
+    publisher = node.create_publisher(topic("to", type_name), type_name)
+    wait_for(publisher.subscription_count, what="the peer's subscription in our graph")
+    value = peer_values.VALUES[type_name]
+    received = {}
+
+    def arrived():
+        publisher.publish(value)
+        while not peer.events.empty():
+            event = peer.events.get()
+            received[event["received"]] = event["value"]
+        return publisher.topic in received
+
+    wait_for(arrived, what="our message at the peer")
+    assert received[publisher.topic] == peer_values.summary(value)
+
+
+def test_the_peer_is_in_our_graph(node, kind, wait_for):
+    wait_for(lambda: NODES[kind] in node.nodes(), what="the peer's node")
+    for type_name in TYPES:
+        (publisher,) = wait_for(lambda t=type_name: node.publishers(topic("from", t)))
+        (subscription,) = wait_for(lambda t=type_name: node.subscriptions(topic("to", t)))
+        announced = "" if kind == "dora-humble" else rosglass.load(type_name).rihs01
+        for endpoint in (publisher, subscription):
+            assert endpoint.type == type_name
+            assert endpoint.node.namespace == NODES[kind].namespace
+            assert endpoint.type_hash == announced
+        assert publisher.qos.incompatibility(rosglass.QoS()) == ""
+    assert node.topics()["/from/twist"] == ["geometry_msgs/msg/Twist"]
+    assert node.topics()["/to/image"] == ["sensor_msgs/msg/Image"]
+
+
+@pytest.mark.parametrize("kind", ["sdk"], indirect=True)
+def test_we_are_in_the_peers_graph(node, peer, wait_for):
+    qos = rosglass.QoS.sensor_data()
+    node.create_publisher("ours", "geometry_msgs/msg/Twist", qos)
+    node.create_subscription("ours", "geometry_msgs/msg/Twist")
+
+    def seen():
+        peer.ask(info="/ours")
+        found = peer.event("info")
+        return found if len(found) == 2 else None
+
+    twist_hash = rosglass.load("geometry_msgs/msg/Twist").rihs01
+    publisher, subscription = wait_for(seen, what="both ends in the SDK's graph")
+    assert publisher[1:4] == ["cockpit", "geometry_msgs/msg/Twist", twist_hash]
+    assert publisher[4] == "2:2:1,5:,:,:,,"
+    assert subscription[1:4] == publisher[1:4]
+
+
+@pytest.mark.parametrize("peer_kind", ["rosglass", "dora-humble", "dora-rep2016"])
+def test_the_last_message_of_a_latched_peer_comes_late_but_comes(
+    peer_kind, router, start_peer, connect, wait_for, peer_values
+):
+    name = "geometry_msgs/msg/Twist"
+    plan = {"publish": {"/latched": name}, "latched": True, "count": 1, "domain": 8}
+    process = start_peer(peer_kind, router, **plan)
+    node = connect("late", "?domain=8")
+    wait_for(lambda: node.publishers("/latched"))
+    # So late that the message was sent long before.
+    assert node.create_subscription("/latched", name).wait(1) is None
+    subscription = node.create_subscription("/latched", name, qos=rosglass.QoS.latched())
+    sample = subscription.wait(5)
+    assert sample is not None
+    assert sample.message().to_dict() == peer_values.VALUES[name]
+    assert subscription.wait(0.5) is None
+    process.end()
+
+
+@pytest.mark.parametrize("peer_kind", ["rosglass", "sdk", "dora-humble", "dora-rep2016"])
+def test_our_last_latched_message_reaches_a_late_peer(
+    peer_kind, router, start_peer, connect, wait_for, peer_values
+):
+    name = "geometry_msgs/msg/Twist"
+    node = connect("early", "?domain=9")
+    publisher = node.create_publisher("/latched", name, rosglass.QoS.latched())
+    publisher.publish({"linear": {"x": 1.0}})
+    publisher.publish(peer_values.VALUES[name])
+    process = start_peer(peer_kind, router, subscribe={"/latched": name}, latched=True, domain=9)
+    assert process.event("received") == "/latched"
+    process.end()
