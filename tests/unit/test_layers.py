@@ -25,7 +25,7 @@ RANK = {
     "qt": 5,
     "qml": 6,
     "rviz": 7,
-    "cli": 8,
+    "cli": 9,
     "demo": 8,
 }
 QT = {"PySide6", "PySide2", "PyQt5", "PyQt6", "shiboken6", "shiboken2"}
