@@ -132,12 +132,12 @@ def opencv() -> Any:
         ) from None
 
 
-def _to_rgba(pixels: Array, code: str) -> Array:
+def _to_rgba(pixels: Array, code: str, out: Array | None = None) -> Array:
     if not code:
         return pixels
     cv2 = opencv()
     try:
-        rgba: Array = cv2.cvtColor(pixels, getattr(cv2, f"COLOR_{code}"))
+        rgba: Array = cv2.cvtColor(pixels, getattr(cv2, f"COLOR_{code}"), dst=out)
     except cv2.error as error:
         raise DecodeError(_IMAGE, f"cannot convert a picture of {pixels.shape}: {error}") from None
     return rgba
@@ -195,17 +195,20 @@ _EVEN_WIDTH = {PixelFormat.UYVY, PixelFormat.YUYV, PixelFormat.NV12, PixelFormat
 
 def _rows_of_bytes(pixels: Array) -> NDArray[np.uint8]:
     """View pixels as rows x bytes; copies only when a row's values are not adjacent."""
-    width = pixels[0].nbytes
     if not pixels[0].flags.c_contiguous:
         pixels = np.ascontiguousarray(pixels)
-    rows: NDArray[np.uint8] = np.ndarray(
-        (pixels.shape[0], width), np.uint8, pixels, 0, (pixels.strides[0], 1)
+    width = pixels[0].nbytes
+    values = pixels.reshape(pixels.shape[0], -1) if pixels.flags.c_contiguous else pixels
+    return np.lib.stride_tricks.as_strided(
+        values.view(np.uint8), (pixels.shape[0], width), (pixels.strides[0], 1)
     )
-    return rows
 
 
 def convert(
-    image: RawImage, accept: frozenset[PixelFormat] = ANY_FORMAT, received: Time | None = None
+    image: RawImage,
+    accept: frozenset[PixelFormat] = ANY_FORMAT,
+    received: Time | None = None,
+    allocate: Callable[[int, int], Array] | None = None,
 ) -> Frame:
     """Make a picture showable.
 
@@ -217,6 +220,8 @@ def convert(
         accept: Layouts that all its displays take; RGBX, RGBA, BGRA, GRAY8 and GRAY16 are always
             assumed.
         received: When it arrived.
+        allocate: Gives memory for a picture of a width and height, as rows x columns x RGBX; used
+            when colours must be converted, so that they land where the display wants them.
 
     Raises:
         UnsupportedError: The encoding cannot be shown.
@@ -234,7 +239,8 @@ def convert(
     elif encoding.direct is not None and (not encoding.code or encoding.direct in accept):
         layout, out = encoding.direct, pixels
     else:
-        layout, out = PixelFormat.RGBX, _to_rgba(pixels, encoding.code)
+        memory = None if allocate is None else allocate(image.width, image.height)
+        layout, out = PixelFormat.RGBX, _to_rgba(pixels, encoding.code, memory)
     rows = _rows_of_bytes(out)
     planes: tuple[NDArray[np.uint8], ...] = (rows,)
     if layout in {PixelFormat.NV12, PixelFormat.NV21}:

@@ -12,7 +12,6 @@ from rosglass.comm.executor import IMMEDIATE
 from rosglass.comm.node import Handle
 from rosglass.comm.qos import QoS, Reliability
 from rosglass.errors import Error, NodeClosedError
-from rosglass.images.encodings import ANY_FORMAT, convert
 from rosglass.images.transports import TRANSPORTS, Choice, choose
 
 if TYPE_CHECKING:
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 
     from rosglass.comm.node import Node
     from rosglass.comm.subscription import Sample, Subscription
-    from rosglass.images.frame import Frame, PixelFormat, RawImage
+    from rosglass.images.frame import RawImage
     from rosglass.messages import MessageType
 
 __all__ = ["ImageStream", "StreamStatistics"]
@@ -38,8 +37,8 @@ class StreamStatistics:
 
     Attributes:
         received: Pictures received.
-        shown: Pictures converted and handed on.
-        dropped: Pictures overtaken by a newer one before they were converted.
+        shown: Pictures handed on.
+        dropped: Pictures overtaken by a newer one before they were handed on.
         lost: Pictures that never arrived, by the publisher's running numbers.
         invalid: Pictures that could not be shown; :attr:`ImageStream.problem` says why.
     """
@@ -55,13 +54,15 @@ class ImageStream(Handle):
     """Receives the pictures of one camera.
 
     Subscribes best effort to the preferred transport, or to another one while that is not
-    published. Conversion runs in the stream's own thread, so that neither the middleware nor the
-    user interface waits for it; a picture that is overtaken by a newer one is dropped.
+    published. Decompression and conversion run in the stream's own thread, so that neither the
+    middleware nor the user interface waits for them; a picture that is overtaken by a newer one
+    is dropped.
 
     Args:
         node: Where to subscribe.
         topic: The camera's base topic, or a transport's own topic.
-        deliver: Called in the stream's thread with each picture, ready to be shown.
+        show: Called in the stream's thread with each picture and its sample; converts and shows
+            it. A rosglass.Error that it raises becomes the stream's problem.
         preferred: Name of the transport to prefer.
         changed: Called from any thread when :attr:`problem` or :attr:`transport` changed.
 
@@ -73,15 +74,13 @@ class ImageStream(Handle):
         self,
         node: Node,
         topic: str,
-        deliver: Callable[[Frame], None],
+        show: Callable[[RawImage, Sample], None],
         preferred: str = "compressed",
         changed: Callable[[], None] | None = None,
     ) -> None:
         self.topic = node.resolve(topic)
-        #: Layouts that all displays of this stream take.
-        self.accept: frozenset[PixelFormat] = ANY_FORMAT
         self._node, self._preferred = node, preferred
-        self._deliver, self._changed = deliver, changed
+        self._show_picture, self._changed = show, changed
         self._wake = threading.Condition()
         self._sample: Sample | None = None
         self._look, self._closing = True, False
@@ -212,7 +211,7 @@ class ImageStream(Handle):
                 )
                 reader = transport.reader(sample.type, sample.wire)
                 self._reader = (sample.type, sample.wire, reader)
-            frame = convert(self._reader[2](sample), self.accept, sample.received)
+            self._show_picture(self._reader[2](sample), sample)
         except Error as error:
             with self._wake:
                 self._invalid += 1
@@ -226,7 +225,6 @@ class ImageStream(Handle):
         self._say("")
         with self._wake:
             self._shown += 1
-        self._deliver(frame)
 
     def _say(self, problem: str) -> None:
         """Remember why nothing is shown; log it, but not for every picture of a bad stream."""

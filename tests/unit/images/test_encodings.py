@@ -158,13 +158,27 @@ def test_every_encoding_has_a_test() -> None:
     assert {name for name in ENCODINGS if not name.startswith("bayer")} == tested
 
 
-def test_rows_may_be_padded_but_not_the_last() -> None:
-    padded = np.zeros((H, W * 3 + 5), np.uint8)
-    padded[:, : W * 3] = rgb().reshape(H, -1)
+@pytest.mark.parametrize("encoding", ["rgb8", "rgba8", "mono8", "mono16"])
+def test_rows_may_be_padded_but_not_the_last(encoding: str) -> None:
+    pixels = np.ascontiguousarray(COLOUR_CASES.get(encoding, RGB16[..., 0]))
+    if encoding == "mono8":
+        pixels = rgb()[..., 0].copy()
+    rows = pixels.reshape(H, -1).view(np.uint8)
+    padded = np.zeros((H, rows.shape[1] + 6), np.uint8)
+    padded[:, : rows.shape[1]] = rows
     data = padded.tobytes()
-    for end in (len(data), len(data) - 5):
-        picture = RawImage(W, H, "rgb8", W * 3 + 5, data[:end])
-        np.testing.assert_array_equal(shown(picture), rgb())
+    for end in (len(data), len(data) - 6):
+        frame = convert(RawImage(W, H, encoding, padded.shape[1], data[:end]))
+        out = convert(image(encoding, pixels))
+        assert [p.tobytes() for p in frame.planes] == [p.tobytes() for p in out.planes]
+
+
+def test_colours_are_converted_into_the_display_s_memory() -> None:
+    memory = np.zeros((H, W + 3, 4), np.uint8)[:, :W]
+    frame = convert(image("rgb8", rgb()), allocate=lambda width, height: memory[:height, :width])
+    np.testing.assert_array_equal(memory[..., :3], rgb())
+    assert np.may_share_memory(frame.planes[0], memory)
+    np.testing.assert_array_equal(frame.planes[0].reshape(H, W, 4)[..., :3], rgb())
 
 
 @pytest.mark.parametrize(

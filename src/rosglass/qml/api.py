@@ -1,0 +1,385 @@
+"""The singleton ``Ros2``: the node, the graph, and the makers of everything else."""
+# ruff: noqa: N802, N815 - the names of slots and signals are QML's
+
+from __future__ import annotations
+
+import logging
+import re
+import socket
+from typing import TYPE_CHECKING, Any
+
+from rosglass.comm.qos import QoS
+from rosglass.comm.time import Time
+from rosglass.errors import Error, InvalidNameError
+from rosglass.qml.from_js import qos_from_js
+from rosglass.qml.log import log_from_qml
+from rosglass.qml.logger import Logger
+from rosglass.qml.publisher import Publisher
+from rosglass.qml.runtime import Runtime, runtime_of
+from rosglass.qml.subscription import DEFAULT_QOS, Subscription
+from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
+
+if TYPE_CHECKING:
+    from rosglass.comm.node import Node
+    from rosglass.qml.session import Session
+
+__all__ = ["Ros2"]
+
+_HIDDEN = "/_action/"
+_SHORT = re.compile(r"([A-Za-z]\w*)/([A-Za-z]\w*)\Z")
+
+
+class Ros2(QtCore.QObject):
+    """What QML calls ``Ros2``; one per engine, all of a session sharing its node."""
+
+    initialized = Signal()
+    aboutToShutdown = Signal()
+    connectionChanged = Signal()
+    urlChanged = Signal()
+
+    def __init__(self, parent: QtCore.QObject | None = None) -> None:
+        super().__init__(parent)
+        self._bound: Runtime | None = None
+        self._loggers: dict[str, Logger] = {}
+        # QML may only listen; without this, nothing would ever ask for the runtime.
+        QtCore.QTimer.singleShot(0, self._bind)
+
+    def _bind(self) -> None:
+        if is_alive(self):
+            _ = self._runtime
+
+    @property
+    def _runtime(self) -> Runtime:
+        if self._bound is None:
+            runtime = runtime_of(self)
+            if runtime is None:
+                raise Error("Ros2 belongs to no QML engine")
+            self._bound = runtime
+            session = runtime.session
+            session.initialized.connect(self.initialized)
+            session.about_to_shutdown.connect(self.aboutToShutdown)
+            session.connection_changed.connect(self.connectionChanged)
+            session.url_changed.connect(self.urlChanged)
+        return self._bound
+
+    @property
+    def _session(self) -> Session:
+        return self._runtime.session
+
+    # The node.
+
+    @Slot(str)
+    @Slot(str, QJSValue)
+    @Slot(str, QJSValue, QJSValue)
+    def init(
+        self, name: str, first: QJSValue | None = None, second: QJSValue | None = None
+    ) -> None:
+        """Ask for a node; arguments are name, optional command line, optional init options."""
+        args, options = (first, second) if _is_list(first) else (None, first)
+        try:
+            namespace, domain = _read_options(options)
+            if args is not None:
+                name, namespace = _remap(_strings(args), name, namespace)
+            self._session.init(name, namespace, domain)
+        except Error as error:
+            self._runtime.throw(f"Ros2.init: {error}")
+
+    @Slot()
+    def shutdown(self) -> None:
+        """Close the node."""
+        self._session.shutdown()
+
+    @Slot(result=bool)
+    def isInitialized(self) -> bool:
+        """Return whether a node was asked for and not shut down again."""
+        return self._session.is_initialized
+
+    @Slot(result=bool)
+    def ok(self) -> bool:
+        """Return whether there is a node, or one is being made; false after a failure."""
+        return self._session.state not in {"uninitialized", "failed"}
+
+    @Slot(result=str)
+    def getName(self) -> str:
+        """Return the node's base name; empty before init."""
+        return self._session.name
+
+    @Slot(result=str)
+    def getNamespace(self) -> str:
+        """Return the node's namespace; empty before init."""
+        return self._session.namespace
+
+    @Slot(result=QJSValue)
+    def now(self) -> QJSValue:
+        """Return the time of the node's clock; the system's before there is a node."""
+        node = self._session.node
+        return self._runtime.time(node.now() if node is not None else Time.now())
+
+    @Slot(result=QJSValue)
+    def createInitOptions(self) -> QJSValue:
+        """Return empty init options: setNamespace(), setDomainId()."""
+        return self._runtime.options()
+
+    def _set_url(self, url: str) -> None:
+        self._session.url = url
+
+    url = Property(str, lambda self: self._session.url, _set_url, notify=urlChanged)
+    connectionState = Property(str, lambda self: self._session.state, notify=connectionChanged)
+    connectionDetail = Property(str, lambda self: self._session.detail, notify=connectionChanged)
+    hostname = Property(str, lambda _: socket.gethostname(), constant=True)
+
+    # Profiles.
+
+    @Slot(result=QJSValue)
+    def QoS(self) -> QJSValue:
+        """Return best effort, volatile, only the newest message."""
+        return self._runtime.qos(DEFAULT_QOS)
+
+    @Slot(result=QJSValue)
+    def SensorDataQoS(self) -> QJSValue:
+        """Return best effort, the newest 5."""
+        return self._runtime.qos(QoS.sensor_data())
+
+    @Slot(result=QJSValue)
+    def SystemDefaultsQoS(self) -> QJSValue:
+        """Return reliable, volatile, the newest 10."""
+        return self._runtime.qos(QoS())
+
+    @Slot(result=QJSValue)
+    def ServicesQoS(self) -> QJSValue:
+        """Return reliable, volatile, the newest 10."""
+        return self._runtime.qos(QoS.services())
+
+    @Slot(result=QJSValue)
+    def ClockQoS(self) -> QJSValue:
+        """Return best effort, only the newest message."""
+        return self._runtime.qos(QoS.clock())
+
+    @Slot(result=QJSValue)
+    def BestAvailableQoS(self) -> QJSValue:
+        """Return a profile that matches every publisher: best effort, volatile, the newest 10."""
+        return self._runtime.qos(DEFAULT_QOS.with_depth(10))
+
+    # Topics.
+
+    @Slot(str, str, result=QtCore.QObject)
+    @Slot(str, str, QJSValue, result=QtCore.QObject)
+    def createPublisher(
+        self, topic: str, type_name: str, qos: QJSValue | None = None
+    ) -> QtCore.QObject | None:
+        """Return a publisher; it lives as long as JavaScript holds it.
+
+        Args:
+            topic: Topic name.
+            type_name: Message type, ``pkg/msg/Type`` or ``pkg/Type``.
+            qos: Profile, or the depth of a reliable one; 10 when left out.
+        """
+        try:
+            self._check_topic(topic)
+            if not type_name:
+                raise InvalidNameError(f"the message type of topic {topic!r} is empty")
+            profile = qos_from_js(qos, QoS())
+        except Error as error:
+            self._runtime.throw(f"Ros2.createPublisher: {error}")
+            return None
+        publisher = Publisher(self._runtime, topic, _full_type(type_name), profile)
+        return self._runtime.keep(publisher)
+
+    @Slot(str, result=QtCore.QObject)
+    @Slot(str, QJSValue, result=QtCore.QObject)
+    @Slot(str, QJSValue, QJSValue, result=QtCore.QObject)
+    def createSubscription(
+        self, topic: str, first: QJSValue | None = None, second: QJSValue | None = None
+    ) -> QtCore.QObject | None:
+        """Return a subscription; it lives as long as JavaScript holds it.
+
+        Args:
+            topic: Topic name.
+            first: Message type; or, when the type is left out, profile or queue size.
+            second: Profile or queue size after a type.
+        """
+        type_name, qos = "", first
+        if first is not None and first.isString():
+            type_name, qos = first.toString(), second
+        try:
+            self._check_topic(topic)
+            profile = qos_from_js(qos, DEFAULT_QOS)
+        except Error as error:
+            self._runtime.throw(f"Ros2.createSubscription: {error}")
+            return None
+        subscription = Subscription(None, self._runtime)
+        subscription.configure(topic, _full_type(type_name), profile)
+        return self._runtime.keep(subscription)
+
+    @Slot(str, result=bool)
+    def isValidTopic(self, topic: str) -> bool:
+        """Return whether a topic name follows ROS 2's rules."""
+        try:
+            self._check_topic(topic)
+        except Error:
+            return False
+        return True
+
+    @Slot(str, result=QJSValue)
+    def createEmptyMessage(self, type_name: str) -> QJSValue:
+        """Return a message with every field at its default; undefined for unknown types."""
+        from rosglass.messages import MessageType, load  # noqa: PLC0415 - brings in the definitions
+
+        try:
+            kind = load(_full_type(type_name), ros=2)
+            if not isinstance(kind, MessageType):
+                raise InvalidNameError(f"{type_name} is not a message type")
+            return self._runtime.message(kind.create())
+        except Error as error:
+            self._log(logging.WARNING, f"Ros2.createEmptyMessage: {error}")
+            return QJSValue()
+
+    # The graph.
+
+    @Slot(result="QStringList")
+    @Slot(str, result="QStringList")
+    def queryTopics(self, datatype: str = "") -> list[str]:
+        """Return the topics in the graph, those of one type if given; empty before init."""
+        wanted = _full_type(datatype)
+        return [name for name, types in self._topics().items() if not wanted or wanted in types]
+
+    @Slot(result=QJSValue)
+    def queryTopicInfo(self) -> QJSValue:
+        """Return ``{name, datatypes}`` of every topic."""
+        infos = [{"name": name, "datatypes": types} for name, types in self._topics().items()]
+        return self._runtime.value(infos)
+
+    @Slot(result=QJSValue)
+    def getTopicNamesAndTypes(self) -> QJSValue:
+        """Return an object from topic names to lists of types."""
+        return self._runtime.value(self._topics())
+
+    @Slot(str, result="QStringList")
+    def getTopicTypes(self, topic: str) -> list[str]:
+        """Return the types announced for a topic."""
+        node = self._node("getTopicTypes")
+        try:
+            return self._topics().get(node.resolve(topic), []) if node is not None else []
+        except Error as error:
+            self._runtime.throw(f"Ros2.getTopicTypes: {error}")
+            return []
+
+    @Slot(str, result="QStringList")
+    def queryTopicTypes(self, topic: str) -> list[str]:
+        """Return the types announced for a topic; another name of getTopicTypes."""
+        return self.getTopicTypes(topic)
+
+    def _node(self, what: str) -> Node | None:
+        node = self._session.node
+        if node is None:
+            self._log(logging.DEBUG, f"Ros2.{what}: there is no node yet")
+        return node
+
+    def _topics(self) -> dict[str, list[str]]:
+        node = self._node("topics")
+        if node is None:
+            return {}
+        try:
+            found = node.topics()
+        except Error as error:
+            self._log(logging.WARNING, f"Ros2: the topics cannot be listed: {error}")
+            return {}
+        return {name: types for name, types in sorted(found.items()) if _HIDDEN not in name}
+
+    def _check_topic(self, topic: str) -> None:
+        from rosglass.ros2.names import expand  # noqa: PLC0415 - not needed at start-up
+
+        session = self._session
+        expand(topic, session.name or "node", session.namespace or "/")
+
+    # Logging.
+
+    @Slot(result=QtCore.QObject)
+    @Slot(str, result=QtCore.QObject)
+    def getLogger(self, name: str = "") -> QtCore.QObject:
+        """Return a logger; the node's own without a name."""
+        if name not in self._loggers:
+            self._loggers[name] = Logger(self._runtime, name, self)
+        return self._loggers[name]
+
+    @Slot(QJSValue)
+    def debug(self, message: QJSValue) -> None:
+        """Log a message for developers."""
+        self._log(logging.DEBUG, message.toString())
+
+    @Slot(QJSValue)
+    def info(self, message: QJSValue) -> None:
+        """Log a message."""
+        self._log(logging.INFO, message.toString())
+
+    @Slot(QJSValue)
+    def warn(self, message: QJSValue) -> None:
+        """Log a warning."""
+        self._log(logging.WARNING, message.toString())
+
+    @Slot(QJSValue)
+    def error(self, message: QJSValue) -> None:
+        """Log an error."""
+        self._log(logging.ERROR, message.toString())
+
+    @Slot(QJSValue)
+    def fatal(self, message: QJSValue) -> None:
+        """Log an error after which the program is of no use."""
+        self._log(logging.CRITICAL, message.toString())
+
+    def _log(self, level: int, message: str) -> None:
+        log_from_qml("", level, message, self._runtime.caller())
+
+
+def _is_list(value: QJSValue | None) -> bool:
+    return value is not None and value.isArray()
+
+
+def _strings(value: QJSValue) -> list[str]:
+    count = value.property("length").toInt()
+    return [value.property(index).toString() for index in range(count)]
+
+
+def _full_type(name: str) -> str:
+    """Return ``pkg/msg/Type`` for ``pkg/Type``."""
+    match = _SHORT.match(name)
+    return f"{match[1]}/msg/{match[2]}" if match else name
+
+
+def _read_options(options: QJSValue | None) -> tuple[str, int]:
+    """Return the namespace and domain of init options."""
+    if options is None or options.isUndefined() or options.isNull():
+        return "/", -1
+    if not options.hasProperty("namespace"):
+        raise InvalidNameError("the options must come from Ros2.createInitOptions()")
+    namespace = options.property("namespace").toString() or "/"
+    domain = options.property("domain").toNumber()
+    if not domain.is_integer() or not -1 <= domain <= 232:
+        raise InvalidNameError(f"the domain id must be 0 to 232, got {domain:g}")
+    return namespace, int(domain)
+
+
+def _remap(args: list[str], name: str, namespace: str) -> tuple[str, str]:
+    """Apply ``--ros-args -r __node:=... -r __ns:=...``.
+
+    Syntax: ROS 2's design article "ROS Command Line Arguments".
+
+    Raises:
+        InvalidNameError: Another ROS argument is given, which this version does not know.
+    """
+    inside = False
+    rest: Any = iter(args)
+    for arg in rest:
+        if arg == "--ros-args":
+            inside = True
+        elif arg == "--":
+            inside = False
+        elif inside:
+            rule = next(rest, "") if arg in {"-r", "--remap"} else arg
+            key, separator, value = rule.partition(":=")
+            if not separator or key not in {"__node", "__name", "__ns"}:
+                raise InvalidNameError(
+                    f"ROS argument {rule!r} is not known; __node:= and __ns:= can be remapped"
+                )
+            name, namespace = (name, value) if key == "__ns" else (value, namespace)
+    return name, namespace

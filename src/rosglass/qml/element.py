@@ -1,0 +1,189 @@
+"""What all elements have in common: finding their session, and settling down after changes."""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING
+
+from rosglass.errors import Error
+from rosglass.qml.log import Caller, RateLimit, log_from_qml
+from rosglass.qml.runtime import runtime_of
+from rosglass.qt import QtCore, is_alive
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rosglass.comm.node import Node
+    from rosglass.qml.runtime import Runtime
+    from rosglass.qml.session import Session
+
+__all__ = ["DEFAULT_TIMEOUT", "RETRY", "Element", "TopicElement", "changed_enough"]
+
+_log = logging.getLogger("rosglass.qml")
+#: Milliseconds until something that is missing is looked for again.
+RETRY = 1000
+#: Milliseconds without data after which it counts as stale.
+DEFAULT_TIMEOUT = 3000
+
+
+def changed_enough(before: float, after: float) -> bool:
+    """Return whether a rate changed by more than 1 %, which is when the screen is told."""
+    return abs(after - before) > 0.01 * abs(before) or (after == 0) != (before == 0)
+
+
+class Element(QtCore.QObject):
+    """A QML object that uses the session's node.
+
+    Properties may be set in any order and before there is a node: every change only schedules
+    :meth:`_update`, which runs once the event loop is reached and brings about what is wanted.
+
+    Args:
+        parent: The parent object.
+        runtime: For objects made by a function of QML; elements find their own.
+    """
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._runtime = runtime
+        self._session: Session | None = None
+        self._scheduled = False
+        self._problem = ""
+        self._limit = RateLimit()
+        #: What is left to do when QML destroys the object, by name.
+        self._at_end: dict[str, Callable[[], None]] = {}
+        self._schedule()
+
+    @property
+    def node(self) -> Node | None:
+        """The node; None while there is none."""
+        return self._session.node if self._session is not None else None
+
+    def _schedule(self) -> None:
+        if not self._scheduled:
+            self._scheduled = True
+            QtCore.QTimer.singleShot(0, self._settle)
+
+    def _settle(self) -> None:
+        if not is_alive(self):
+            return
+        self._scheduled = False
+        if self._session is None and not self._find_session():
+            return
+        self._update()
+
+    def _find_session(self) -> bool:
+        runtime = self._find_runtime()
+        if runtime is None:
+            self._say("this object belongs to no QML engine")
+            return False
+        session = self._session = runtime.session
+        session.node_changed.connect(self._schedule)
+        session.connection_changed.connect(self._on_connection)
+        session.graph_changed.connect(self._on_graph)
+        session.tick.connect(self._on_tick)
+        session.use_ticks(True)
+        at_end = self._at_end
+        at_end["ticks"] = lambda: session.use_ticks(False)
+        self.destroyed.connect(lambda: [job() for job in at_end.values()])
+        return True
+
+    def _find_runtime(self) -> Runtime | None:
+        if self._runtime is None:
+            self._runtime = runtime_of(self)
+        return self._runtime
+
+    def _update(self) -> None:
+        """Bring about what the properties ask for."""
+        raise AssertionError("every element has its own")
+
+    def _on_connection(self) -> None:
+        """The session's connection state changed."""
+
+    def _on_graph(self) -> None:
+        """Nodes or endpoints appeared or went."""
+
+    def _on_tick(self) -> None:
+        """A tenth of a second has passed."""
+
+    def _problem_changed(self) -> None:
+        """Tell QML that the problem changed."""
+
+    def _say(self, problem: str) -> None:
+        """Set the problem; a new one is logged, the same one not more often than every 5 s."""
+        if problem == self._problem:
+            return
+        self._problem = problem
+        if problem and self._limit.allows(problem):
+            _log.warning("%s", problem)
+        self._problem_changed()
+
+    def _refuse(self, message: str) -> None:
+        """Log that a property was given an impossible value, with the QML place if there is one."""
+        runtime = self._find_runtime()
+        caller = runtime.caller() if runtime is not None else Caller("<unknown>", 0, "")
+        log_from_qml("", logging.ERROR, message, caller)
+
+
+class TopicElement(Element):
+    """An element that receives a topic and knows whether what it shows is live."""
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        super().__init__(parent, runtime)
+        self._topic, self._resolved = "", ""
+        self._enabled = True
+        self._stale = True
+        self._suspect = False
+        self._publishers = 0
+
+    def _resolve(self, topic: str) -> str:
+        """Return the absolute name of a topic; empty, with a problem said, when it is invalid."""
+        node = self.node
+        if node is None or not topic:
+            return ""
+        try:
+            return node.resolve(topic)
+        except Error as error:
+            self._say(str(error))
+            return ""
+
+    def _count_publishers(self) -> int:
+        node = self.node
+        if node is None or not self._resolved:
+            return 0
+        try:
+            return len(node.publishers(self._resolved))
+        except Error:
+            return 0
+
+    def _on_connection(self) -> None:
+        if self._session is not None and self._session.state != "connected":
+            self._suspect = True
+            self._judge()
+
+    def _on_graph(self) -> None:
+        before, self._publishers = self._publishers, self._count_publishers()
+        if before and not self._publishers:
+            # The robot is gone: what is on the screen is the past, however recent.
+            self._suspect = True
+            self._judge()
+
+    def _on_tick(self) -> None:
+        self._judge()
+
+    def _judge(self) -> None:
+        """Find out whether what is shown is live, and tell when that changed."""
+        stale = self._suspect or self._is_old()
+        if stale != self._stale:
+            self._stale = stale
+            self._stale_changed()
+
+    def _is_old(self) -> bool:
+        """Return whether there is nothing to show, or nothing new for too long."""
+        raise AssertionError("every element has its own")
+
+    def _stale_changed(self) -> None:
+        """Tell QML that :attr:`_stale` changed."""

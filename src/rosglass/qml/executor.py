@@ -1,0 +1,69 @@
+"""Callbacks on the GUI thread."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import deque
+from typing import TYPE_CHECKING
+
+from rosglass.comm.node import Executor
+from rosglass.qt import QtCore, Signal
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+__all__ = ["GuiExecutor"]
+
+_log = logging.getLogger("rosglass.qml")
+
+
+class _Waker(QtCore.QObject):
+    """Lives on the GUI thread; the queued signal carries wake-ups there."""
+
+    wake = Signal()
+
+
+class GuiExecutor(Executor):
+    """Runs jobs on the thread that made it, which must run a Qt event loop.
+
+    Many jobs posted at once cost one event. Jobs posted while jobs run wait for the next event, so
+    that a busy topic cannot keep the user interface from drawing.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._jobs: deque[Callable[[], None]] = deque()
+        self._waker = _Waker()
+        self._waker.wake.connect(self._run, QtCore.Qt.ConnectionType.QueuedConnection)
+        self._closed = False
+
+    def post(self, job: Callable[[], None]) -> None:
+        """Run `job` soon; forgotten when the executor is closed."""
+        with self._lock:
+            if self._closed:
+                return
+            self._jobs.append(job)
+            first = len(self._jobs) == 1
+        if first:
+            self._waker.wake.emit()
+
+    def close(self) -> None:
+        """Forget the waiting jobs and take no more; safe to call twice."""
+        with self._lock:
+            self._closed = True
+            self._jobs.clear()
+
+    def _run(self) -> None:
+        with self._lock:
+            jobs, self._jobs = self._jobs, deque()
+        for job in jobs:
+            _guarded(job)
+
+
+def _guarded(job: Callable[[], None]) -> None:
+    try:
+        job()
+    except Exception:
+        # Nothing may be raised through Qt's event loop.
+        _log.exception("a callback failed")

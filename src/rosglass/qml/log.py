@@ -1,0 +1,149 @@
+"""Logging from QML: through Python's logging, with the QML file and line that it came from."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rosglass.qt import QtCore
+
+if TYPE_CHECKING:
+    from collections.abc import Hashable
+
+
+__all__ = [
+    "LEVELS",
+    "Caller",
+    "LocationFormatter",
+    "RateLimit",
+    "install_message_handler",
+    "log_from_qml",
+]
+
+#: Ros2LoggerLevel -> Python's level.
+LEVELS = {
+    "debug": logging.DEBUG,
+    "info": logging.INFO,
+    "warn": logging.WARNING,
+    "error": logging.ERROR,
+    "fatal": logging.CRITICAL,
+}
+_QML = "rosglass.qml"
+
+
+class Caller(NamedTuple):
+    """Where in the QML files something happened.
+
+    Attributes:
+        file: Local path, or URL.
+        line: 1-based line.
+        function: Name of the JavaScript function; empty for bindings.
+    """
+
+    file: str
+    line: int
+    function: str
+
+    @property
+    def place(self) -> str:
+        """``file:line``, as editors understand it."""
+        return f"{self.file}:{self.line}"
+
+
+def plain_path(url: str) -> str:
+    """Return a file URL's path, and any other URL as it is."""
+    local = QtCore.QUrl(url)
+    return local.toLocalFile() if local.isLocalFile() else url
+
+
+def logger_name(name: str) -> str:
+    """Return the Python logger of a QML logger; empty for the node's own."""
+    return f"{_QML}.{name}" if name else _QML
+
+
+def log_from_qml(name: str, level: int, message: str, caller: Caller) -> None:
+    """Log a message as coming from QML.
+
+    Args:
+        name: Name of the QML logger; empty for the node's own.
+        level: Python's level.
+        message: The text.
+        caller: Where in QML it was logged.
+    """
+    logger = logging.getLogger(logger_name(name))
+    if not logger.isEnabledFor(level):
+        return
+    file, line, function = caller
+    record = logger.makeRecord(
+        logger.name, level, file, line, "%s", (message,), None, function or None
+    )
+    logger.handle(record)
+
+
+class RateLimit:
+    """Lets one log line of each kind through every `seconds`."""
+
+    def __init__(self, seconds: float = 5.0) -> None:
+        self._seconds = seconds
+        self._last: dict[Hashable, float] = {}
+
+    def allows(self, kind: Hashable) -> bool:
+        """Return whether a line of this kind may be logged now."""
+        now = time.monotonic()
+        if now - self._last.get(kind, -self._seconds) < self._seconds:
+            return False
+        if len(self._last) > 100:
+            self._last.clear()
+        self._last[kind] = now
+        return True
+
+
+class LocationFormatter(logging.Formatter):
+    """Puts ``file:line`` in front of what came from QML; the rest as ``LEVEL logger: text``."""
+
+    def __init__(self) -> None:
+        super().__init__("%(levelname)s %(name)s: %(message)s")
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Return the line for a record."""
+        text = super().format(record)
+        from_qml = record.name.startswith(_QML) and not record.pathname.endswith(".py")
+        return f"{record.pathname}:{record.lineno}: {text}" if from_qml else text
+
+
+_TYPES = {
+    "QtDebugMsg": logging.DEBUG,
+    "QtInfoMsg": logging.INFO,
+    "QtWarningMsg": logging.WARNING,
+    "QtCriticalMsg": logging.ERROR,
+    "QtFatalMsg": logging.CRITICAL,
+}
+_handling = threading.local()
+
+
+def _handle(mode: Any, context: Any, message: str) -> None:
+    # A log handler that uses Qt may make Qt log in turn.
+    if getattr(_handling, "busy", False):
+        return
+    _handling.busy = True
+    try:
+        level = _TYPES.get(str(mode).rpartition(".")[2], logging.WARNING)
+        category = context.category or "default"
+        file = context.file or ""
+        if not file:
+            logging.getLogger(f"rosglass.qt.{category}").log(level, "%s", message)
+            return
+        # console.log() is what an author wants to see; Qt calls it a debug message.
+        if category in {"qml", "js"} and level == logging.DEBUG:
+            level = logging.INFO
+        caller = Caller(plain_path(file), max(context.line, 0), context.function or "")
+        log_from_qml("", level, message.removeprefix(f"{file}:{context.line}: "), caller)
+    finally:
+        _handling.busy = False
+
+
+def install_message_handler() -> None:
+    """Send Qt's own messages, QML warnings and ``console.log()`` through Python's logging."""
+    QtCore.qInstallMessageHandler(_handle)

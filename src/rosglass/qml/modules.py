@@ -1,0 +1,64 @@
+"""Making the QML modules known to Qt and to an engine."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rosglass.errors import Error
+from rosglass.qml.api import Ros2
+from rosglass.qml.image_item import ImageItem
+from rosglass.qml.image_subscription import ImageTransportSubscription
+from rosglass.qml.logger import LoggerLevel
+from rosglass.qml.runtime import Runtime, runtime_of
+from rosglass.qml.subscription import Subscription
+from rosglass.qt import QtQml
+
+if TYPE_CHECKING:
+    from rosglass.qml.session import Session
+
+__all__ = ["IMPORT_PATH", "install", "register"]
+
+#: The directory to put on a QML import path; the types also need :func:`register`.
+IMPORT_PATH = Path(__file__).with_name("imports")
+
+
+@cache
+def register() -> None:
+    """Register the types with Qt, once per process."""
+    register_type: Any = QtQml.qmlRegisterType
+    register_type(Ros2, "Ros2.Native", 1, 0, "Ros2Native")
+    for kind, name in (
+        (Subscription, "Subscription"),
+        (ImageTransportSubscription, "ImageTransportSubscription"),
+        (ImageItem, "ImageItem"),
+        (LoggerLevel, "Ros2LoggerLevel"),
+    ):
+        register_type(kind, "Ros2", 1, 0, name)
+
+
+def install(engine: QtQml.QQmlEngine, session: Session | None = None) -> Session:
+    """Make ``import Ros2 1.0`` work in an engine.
+
+    Args:
+        engine: The engine, before it loads anything that imports the module.
+        session: The node it talks through; None for the application's own, which all such engines
+            share.
+
+    Returns:
+        The session.
+
+    Raises:
+        Error: The engine was given another session before.
+    """
+    register()
+    engine.addImportPath(str(IMPORT_PATH))
+    if session is None:
+        found = runtime_of(engine)
+        assert found is not None
+        return found.session
+    if engine.findChild(Runtime) is not None:
+        raise Error("this QML engine has a session already; install() it only once")
+    Runtime(engine, session)
+    return session

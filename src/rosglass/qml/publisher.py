@@ -1,0 +1,157 @@
+"""Publishers made by ``Ros2.createPublisher``."""
+# ruff: noqa: N802, N815 - the names of slots and signals are QML's
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING
+
+from rosglass.errors import ConversionError, Error, TypeNotFoundError
+from rosglass.messages.schema import schema_of
+from rosglass.qml.element import RETRY, Element
+from rosglass.qml.from_js import fields_from_js
+from rosglass.qml.log import log_from_qml
+from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
+
+if TYPE_CHECKING:
+    from rosglass.comm.node import Node
+    from rosglass.comm.node import Publisher as Sender
+    from rosglass.comm.qos import QoS
+    from rosglass.messages.schema import Schema
+    from rosglass.qml.runtime import Runtime
+
+__all__ = ["Publisher"]
+
+
+class Publisher(Element):
+    """Sends messages of one type on one topic; advertises as soon as there is a node.
+
+    Args:
+        runtime: The engine's runtime.
+        topic: Topic name, as in QML.
+        type_name: Message type.
+        qos: Profile offered.
+    """
+
+    #: :attr:`isAdvertised` changed.
+    advertised = Signal()
+    topicChanged = Signal()
+    problemChanged = Signal()
+
+    def __init__(self, runtime: Runtime, topic: str, type_name: str, qos: QoS) -> None:
+        super().__init__(None, runtime)
+        self._topic, self._type, self._qos = topic, type_name, qos
+        self._resolved = ""
+        self._sender: Sender | None = None
+        self._schema: Schema | None = None
+        self._have: Node | None = None
+        self._retry = QtCore.QTimer(self)
+        self._retry.setSingleShot(True)
+        self._retry.timeout.connect(self._advertise)
+
+    topic = Property(str, lambda self: self._resolved or self._topic, notify=topicChanged)
+    type = Property(str, lambda self: self._type, constant=True)
+    queueSize = Property(int, lambda self: self._qos.depth, constant=True)
+    qos = Property(QJSValue, lambda self: self._runtime.qos(self._qos), constant=True)
+    isAdvertised = Property(bool, lambda self: self._sender is not None, notify=advertised)
+    problem = Property(str, lambda self: self._problem, notify=problemChanged)
+
+    @Slot(result=int)
+    def getSubscriptionCount(self) -> int:
+        """Return how many subscriptions match; 0 before the topic is advertised."""
+        sender = self._sender
+        try:
+            return sender.subscription_count() if sender is not None else 0
+        except Error:
+            return 0
+
+    @Slot(QJSValue, result=bool)
+    def publish(self, message: QJSValue) -> bool:
+        """Send a message; fields that are left out get their defaults.
+
+        A value that does not fit throws a JavaScript Error that names the field; nothing is sent.
+
+        Returns:
+            Whether it was handed to a connected node: false before the topic is advertised and
+            while the connection is lost.
+        """
+        sender, schema = self._sender, self._schema
+        if sender is None or schema is None:
+            reason = self._problem or "it is not advertised yet"
+            self._complain(f"nothing was published on {self._topic}: {reason}", logging.WARNING)
+            return False
+        try:
+            sender.publish(fields_from_js(message, schema))
+        except ConversionError as error:
+            text = f"nothing was published on {self._resolved}: {error}"
+            self._complain(text, logging.ERROR)
+            if self._runtime is not None:
+                self._runtime.throw(text)
+            return False
+        except Error as error:
+            self._complain(f"nothing was published on {self._resolved}: {error}", logging.ERROR)
+            return False
+        if self._session is None or self._session.state != "connected":
+            detail = self._session.detail if self._session is not None else ""
+            text = f"published on {self._resolved} while the connection is lost: {detail}"
+            self._complain(text, logging.WARNING)
+            return False
+        return True
+
+    def _complain(self, text: str, level: int) -> None:
+        """Log with the QML place, but not for every message of a stream."""
+        if self._runtime is None:
+            return
+        caller = self._runtime.caller()
+        if self._limit.allows((caller, text)):
+            log_from_qml("", level, text, caller)
+
+    def _update(self) -> None:
+        node = self.node
+        if node is self._have:
+            return
+        self._withdraw()
+        self._have = node
+        if node is not None:
+            self._advertise()
+
+    def _advertise(self) -> None:
+        node, session = self._have, self._session
+        if node is None or session is None or self._sender is not None:
+            return
+
+        def done(result: Sender | Error) -> None:
+            if not is_alive(self) or self._have is not node:
+                if not isinstance(result, Error):
+                    session.background(result.close)
+                return
+            self._advertised(result)
+
+        session.background(lambda: node.create_publisher(self._topic, self._type, self._qos), done)
+
+    def _advertised(self, result: Sender | Error) -> None:
+        if isinstance(result, Error):
+            self._say(f"{self._topic}: {result}")
+            if isinstance(result, TypeNotFoundError):
+                self._retry.start(RETRY)
+            return
+        session = self._session
+        assert session is not None
+        self._sender, self._resolved = result, result.topic
+        self._schema = schema_of(result.type.definition)
+        self._at_end["sender"] = lambda: session.background(result.close)
+        self._say("")
+        self.topicChanged.emit()
+        self.advertised.emit()
+
+    def _withdraw(self) -> None:
+        self._retry.stop()
+        sender, self._sender = self._sender, None
+        if sender is None or self._session is None:
+            return
+        self._at_end.pop("sender", None)
+        self._session.background(sender.close)
+        self.advertised.emit()
+
+    def _problem_changed(self) -> None:
+        self.problemChanged.emit()

@@ -1,0 +1,225 @@
+"""What one QML engine needs from us: its session, its JavaScript helpers, its value conversions."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rosglass.errors import Error
+from rosglass.qml.log import Caller, plain_path
+from rosglass.qml.session import Session
+from rosglass.qml.to_js import describe, exact, reader, to_json
+from rosglass.qt import QJSValue, QtCore, QtQml, Slot, engine_of, is_alive
+
+if TYPE_CHECKING:
+    from rosglass.comm.qos import QoS
+    from rosglass.comm.time import Time
+    from rosglass.messages import Message
+    from rosglass.messages.schema import Schema
+    from rosglass.qml.to_js import LongArray
+
+__all__ = ["Runtime", "runtime_of"]
+
+_log = logging.getLogger("rosglass.qml")
+_HELPERS = Path(__file__).with_name("helpers.js")
+_NAME = "rosglass.runtime"
+#: Bytes of long arrays handed to JavaScript after which it is asked to collect its garbage: it
+#: does not see how much memory its small objects hold on our side.
+_GARBAGE = 64 << 20
+
+
+class _Source(QtCore.QObject):
+    """The long arrays of one message; lives as long as JavaScript holds one of them."""
+
+    def __init__(self, runtime: Runtime, arrays: list[LongArray]) -> None:
+        super().__init__()
+        self._runtime, self.arrays = runtime, arrays
+
+    @Slot(int, int, result=QJSValue)
+    def at(self, index: int, place: int) -> QJSValue:
+        """Return one element of an array."""
+        member, values = self.arrays[index]
+        try:
+            value = values[place]
+            if member.struct is not None:
+                return self._runtime.message(value)
+        except Error as error:
+            self._runtime.throw(str(error))
+            return QJSValue()
+        if member.number is None:
+            return QJSValue(str(value))
+        if member.number.code == "?":
+            return QJSValue(bool(value))
+        whole = exact(int(value)) if member.number.low is not None else float(value)
+        return self._runtime.value(whole)
+
+    @Slot(int, result="QVariant")
+    def buffer(self, index: int) -> QtCore.QByteArray | None:
+        """Return a numeric array's bytes in this machine's byte order, otherwise None."""
+        member, values = self.arrays[index]
+        if member.number is None:
+            return None
+        native = values.astype(values.dtype.newbyteorder("="), copy=False)
+        return QtCore.QByteArray(native.tobytes())
+
+
+class Runtime(QtCore.QObject):
+    """Everything that belongs to one engine; a child of the engine, found by :func:`runtime_of`.
+
+    Args:
+        engine: The engine.
+        session: The session that its QML talks to.
+    """
+
+    def __init__(self, engine: QtQml.QQmlEngine, session: Session) -> None:
+        super().__init__(engine)
+        self.setObjectName(_NAME)
+        self.session = session
+        self._engine = engine
+        self._shapes: dict[Schema, QJSValue] = {}
+        self._kept: set[QtCore.QObject] = set()
+        self._debt = 0
+        helpers = _evaluate(engine, _HELPERS.read_text(encoding="utf-8"), str(_HELPERS))
+        if helpers.isError():
+            raise Error(f"{_HELPERS}: {helpers.toString()}")
+        self._helper = {
+            name: helpers.property(name)
+            for name in ("build", "buildWithNan", "shape", "makeTime", "makeQos", "makeOptions")
+        }
+
+    @property
+    def engine(self) -> QtQml.QQmlEngine | None:
+        """The engine; None when it is gone."""
+        return self._engine if is_alive(self._engine) else None
+
+    def throw(self, message: str) -> None:
+        """Throw a JavaScript Error out of the slot that is running."""
+        engine = self.engine
+        if engine is not None:
+            engine.throwError(message)
+
+    def caller(self) -> Caller:
+        """Return where in QML the slot that is running was called from."""
+        engine = self.engine
+        stack = "" if engine is None else _evaluate(engine, "new Error().stack").toString()
+        for frame in stack.splitlines()[1:]:
+            function, _, place = frame.partition("@")
+            file, _, line = place.rpartition(":")
+            if line.lstrip("-").isdigit():
+                return Caller(plain_path(file), max(int(line), 0), function)
+        return Caller("<python>", 0, "")
+
+    def keep(self, item: QtCore.QObject) -> QtCore.QObject:
+        """Hand an object to JavaScript: it lives until JavaScript has collected it."""
+        QtQml.QQmlEngine.setObjectOwnership(
+            item, QtQml.QQmlEngine.ObjectOwnership.JavaScriptOwnership
+        )
+        self._kept.add(item)
+        kept = self._kept
+        item.destroyed.connect(lambda: kept.discard(item))
+        return item
+
+    def value(self, value: Any) -> QJSValue:
+        """Return a plain value (None, bool, number, text, list, dict) for JavaScript."""
+        engine = self.engine
+        if engine is None or value is None:
+            return QJSValue()
+        if isinstance(value, (bool, int, float, str)):
+            # An int overload would cut integers to 32 bits.
+            number = isinstance(value, int) and not isinstance(value, bool)
+            return QJSValue(float(value) if number else value)
+        if isinstance(value, dict):
+            made = engine.newObject()
+            for key, inner in value.items():
+                made.setProperty(key, self.value(inner))
+            return made
+        made = engine.newArray(len(value))
+        for index, inner in enumerate(value):
+            made.setProperty(index, self.value(inner))
+        return made
+
+    def message(self, message: Message) -> QJSValue:
+        """Return a message as a JavaScript value.
+
+        Raises:
+            DecodeError: The received bytes are malformed.
+        """
+        engine = self.engine
+        if engine is None:
+            return QJSValue()
+        schema = message._schema__
+        arrays: list[LongArray] = []
+        text, marked = to_json(reader(schema)(message, arrays))
+        source = QJSValue()
+        if arrays:
+            source = engine.newQObject(self.keep(_Source(self, arrays)))
+            self._charge(arrays)
+        build = "buildWithNan" if marked else "build"
+        return self._call(build, [QJSValue(text), self._shape(schema), source])
+
+    def time(self, time: Time) -> QJSValue:
+        """Return a time as messages carry it, with seconds(), toJSDate() and so on."""
+        return self._call("makeTime", [self.value(time.sec), self.value(time.nanosec)])
+
+    def options(self) -> QJSValue:
+        """Return an empty set of init options."""
+        return self._call("makeOptions", [])
+
+    def qos(self, qos: QoS) -> QJSValue:
+        """Return a profile that QML can change and give to a publisher or subscription."""
+        parts = (qos.reliability.value, qos.durability.value, qos.history.value, qos.depth)
+        return self._call("makeQos", [self.value(part) for part in parts])
+
+    def _shape(self, schema: Schema) -> QJSValue:
+        shape = self._shapes.get(schema)
+        if shape is None:
+            assert self.engine is not None
+            constants, members = describe(schema)
+            fields = self.engine.newArray(len(members))
+            for index, (name, kind, inner) in enumerate(members):
+                field = self.value([name, kind, 0])
+                if inner is not None:
+                    field.setProperty(2, self._shape(inner))
+                fields.setProperty(index, field)
+            arguments = [QJSValue(schema.name), fields, self.value(constants)]
+            shape = self._shapes[schema] = self._call("shape", arguments)
+        return shape
+
+    def _charge(self, arrays: list[LongArray]) -> None:
+        self._debt += sum(getattr(values, "nbytes", 0) for _, values in arrays)
+        if self._debt > _GARBAGE:
+            self._debt = 0
+            self.session.executor.post(self._collect)
+
+    def _collect(self) -> None:
+        engine = self.engine
+        if engine is not None:
+            engine.collectGarbage()
+
+    def _call(self, name: str, arguments: list[QJSValue]) -> QJSValue:
+        if self.engine is None:
+            return QJSValue()
+        result: QJSValue = self._helper[name].call(arguments)
+        if result.isError():
+            _log.error("internal error: %s: %s", name, result.toString())
+            return QJSValue()
+        return result
+
+
+def runtime_of(item: QtCore.QObject) -> Runtime | None:
+    """Return the runtime of the engine an object lives in; None when it lives in none.
+
+    An engine that was given no session gets the application's own.
+    """
+    engine = item if isinstance(item, QtQml.QQmlEngine) else engine_of(item)
+    if engine is None:
+        return None
+    found = engine.findChild(Runtime, _NAME)
+    return found if isinstance(found, Runtime) else Runtime(engine, Session.default())
+
+
+def _evaluate(engine: QtQml.QQmlEngine, script: str, file: str = "") -> QJSValue:
+    result: Any = engine.evaluate(script, file)
+    value: QJSValue = result
+    return value

@@ -1,0 +1,315 @@
+"""The node that a user interface talks through: made, replaced and closed off the GUI thread."""
+
+from __future__ import annotations
+
+import logging
+import re
+import threading
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+
+from rosglass.comm.executor import Dispatcher
+from rosglass.comm.graph import ConnectionState, Status
+from rosglass.errors import ConnectionLostError, Error, InvalidNameError
+from rosglass.qml.executor import GuiExecutor
+from rosglass.qt import QtCore, Signal
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rosglass.comm.node import Handle, Node
+
+__all__ = ["Session"]
+
+_log = logging.getLogger("rosglass.qml")
+_T = TypeVar("_T")
+#: Milliseconds between two looks at ages and rates.
+TICK = 100
+#: Milliseconds until connecting is tried again when this machine could not open a session.
+_RETRY = 1000
+#: Seconds that the end of the program waits for the node to say goodbye.
+_PATIENCE = 3.0
+
+
+def _connect(url: str | None, name: str, namespace: str) -> Node:
+    from rosglass.connection import connect  # noqa: PLC0415 - not before someone connects
+
+    return connect(url, name, namespace)
+
+
+class Session(QtCore.QObject):
+    """One node, shared by every QML engine that is given this session.
+
+    Lives on the GUI thread. Connecting, creating and closing run on a worker thread, so that no
+    robot that does not answer can freeze the screen.
+
+    Args:
+        url: Address of the robot; empty asks the environment when connecting.
+        name: Node name that overrides the one that QML asks for; empty for none.
+        connect: Makes a node of URL, name and namespace; for tests and embedding.
+    """
+
+    #: The node was asked for; :attr:`is_initialized` is true already.
+    initialized = Signal()
+    #: The node is about to be closed.
+    about_to_shutdown = Signal()
+    #: :attr:`node` exists now, or exists no longer.
+    node_changed = Signal()
+    #: :attr:`state` or :attr:`detail` changed.
+    connection_changed = Signal()
+    url_changed = Signal()
+    #: Nodes or endpoints appeared or went.
+    graph_changed = Signal()
+    #: Ten times per second while anybody holds :meth:`use_ticks`.
+    tick = Signal()
+
+    _default: ClassVar[Session | None] = None
+
+    def __init__(
+        self,
+        url: str = "",
+        name: str = "",
+        connect: Callable[[str | None, str, str], Node] = _connect,
+    ) -> None:
+        super().__init__()
+        self.executor = GuiExecutor()
+        #: The node; None before it is there and after it is closed.
+        self.node: Node | None = None
+        self.name, self.namespace = "", ""
+        self.streams: dict[Any, Any] = {}
+        #: While true, QML's wish to shut down is ignored: its successor needs the node.
+        self.holding = False
+        self._url, self._forced_name, self._connect = url, name, connect
+        self._owns_node = True
+        self._status = Status(ConnectionState.CLOSED)
+        self._failed = False
+        self._generation = 0
+        self._handles: list[Handle] = []
+        self._worker = Dispatcher("rosglass-qml")
+        self._ticking = 0
+        self._ticker = QtCore.QTimer(self)
+        self._ticker.setInterval(TICK)
+        self._ticker.timeout.connect(self.tick)
+        app = QtCore.QCoreApplication.instance()
+        if app is not None:
+            app.aboutToQuit.connect(self.close)
+
+    @classmethod
+    def default(cls) -> Session:
+        """Return the application's own session, shared by all engines that were given no other."""
+        if cls._default is None:
+            cls._default = cls()
+        return cls._default
+
+    @property
+    def is_initialized(self) -> bool:
+        """Whether a node was asked for and not shut down again."""
+        return bool(self.name)
+
+    @property
+    def state(self) -> str:
+        """``uninitialized``, ``connecting``, ``connected``, ``lost`` or ``failed``."""
+        if not self.is_initialized:
+            return "uninitialized"
+        if self._failed:
+            return "failed"
+        if self._status.state is ConnectionState.CLOSED:
+            return "connecting"
+        return str(self._status.state.value)
+
+    @property
+    def detail(self) -> str:
+        """One line about the connection: what was tried, what happens next."""
+        return self._status.detail if self.is_initialized else ""
+
+    @property
+    def url(self) -> str:
+        """Address of the robot."""
+        return self._url
+
+    @url.setter
+    def url(self, url: str) -> None:
+        if url == self._url:
+            return
+        self._url = url
+        self.url_changed.emit()
+        if self.is_initialized and self._owns_node:
+            self._drop_node()
+            self._start()
+
+    def init(self, name: str, namespace: str = "/", domain: int = -1) -> bool:
+        """Ask for a node.
+
+        Args:
+            name: Its base name.
+            namespace: Its absolute namespace.
+            domain: ROS domain, -1 for what the URL or the environment says.
+
+        Returns:
+            False when there is a node already, which stays as it is.
+
+        Raises:
+            InvalidNameError: The name or namespace breaks ROS's rules.
+        """
+        from rosglass.ros2.names import validate_namespace, validate_node_name  # noqa: PLC0415
+
+        name = self._forced_name or name
+        validate_node_name(name)
+        validate_namespace(namespace)
+        if self.is_initialized:
+            if (name, namespace) != (self.name, self.namespace):
+                _log.warning(
+                    "Ros2.init(%r) ignored: the node is already called %r", name, self.name
+                )
+            return False
+        if domain >= 0:
+            self._url = _with_domain(self._url, domain)
+            self.url_changed.emit()
+        self.name, self.namespace = name, namespace
+        self._start()
+        self.initialized.emit()
+        return True
+
+    def adopt(self, node: Node) -> None:
+        """Use a node that Python made, and leave it open at the end.
+
+        Raises:
+            InvalidNameError: The session has a node already.
+        """
+        if self.is_initialized:
+            raise InvalidNameError(f"this session already has the node {self.name!r}")
+        self.name, self.namespace = node.name, node.namespace
+        self._url, self._owns_node = node.url, False
+        self._take_node(node)
+        self.initialized.emit()
+
+    def shutdown(self) -> None:
+        """Close the node; everything made from it stops, and starts again after the next init."""
+        if not self.is_initialized or self.holding:
+            return
+        self.about_to_shutdown.emit()
+        self.name = self.namespace = ""
+        self._drop_node()
+        self._owns_node = True
+        self._set_status(Status(ConnectionState.CLOSED))
+
+    def close(self) -> None:
+        """Shut down and wait, at most 3 s, for the node's goodbye; safe to call twice."""
+        self.holding = False
+        self.shutdown()
+        done = threading.Event()
+        self._worker.post(done.set)
+        if not done.wait(_PATIENCE):
+            _log.warning("the node is still closing after %.0f s", _PATIENCE)
+        self.executor.close()
+        self._worker.close()
+        if Session._default is self:
+            Session._default = None
+
+    def background(
+        self, work: Callable[[], _T], done: Callable[[_T | Error], None] | None = None
+    ) -> None:
+        """Do something that may wait on the worker thread, jobs in the order they were given.
+
+        Args:
+            work: What to do.
+            done: Called on the GUI thread with the result, or with the error it raised.
+        """
+
+        def run() -> None:
+            result: _T | Error
+            try:
+                result = work()
+            except Error as error:
+                result = error
+            except Exception as error:
+                _log.exception("a background job failed")
+                result = Error(f"internal error: {error}")
+            if done is not None:
+                finished = done
+                self.executor.post(lambda: finished(result))
+
+        self._worker.post(run)
+
+    def use_ticks(self, wanted: bool) -> None:
+        """Start or stop taking part in :attr:`tick`; an idle program has none."""
+        self._ticking += 1 if wanted else -1
+        if self._ticking > 0 and not self._ticker.isActive():
+            self._ticker.start()
+        elif self._ticking <= 0:
+            self._ticker.stop()
+
+    def _start(self) -> None:
+        self._generation += 1
+        generation, connect = self._generation, self._connect
+        url, name, namespace = self._url or None, self.name, self.namespace
+        self._failed = False
+        self._set_status(Status(ConnectionState.CONNECTING, f"connecting to {url or 'the robot'}"))
+
+        def work() -> Node:
+            try:
+                return connect(url, name, namespace)
+            except ModuleNotFoundError as error:
+                raise Error(
+                    f'{error.name} is not installed; install it with: pip install "rosglass[zenoh]"'
+                ) from None
+
+        def done(result: Node | Error) -> None:
+            if generation != self._generation:
+                if not isinstance(result, Error):
+                    self.background(result.close)
+                return
+            if isinstance(result, Error):
+                self._connect_failed(result, generation)
+            else:
+                self._take_node(result)
+
+        self.background(work, done)
+
+    def _connect_failed(self, error: Error, generation: int) -> None:
+        retry = isinstance(error, ConnectionLostError)
+        self._failed = not retry
+        _log.error("%s", error)
+        state = ConnectionState.CONNECTING if retry else ConnectionState.LOST
+        self._set_status(Status(state, str(error)))
+        if retry:
+            QtCore.QTimer.singleShot(
+                _RETRY, lambda: self._start() if generation == self._generation else None
+            )
+
+    def _take_node(self, node: Node) -> None:
+        self.node = node
+        self._handles = [
+            node.on_status_change(self._on_status, self.executor),
+            node.on_graph_change(self.graph_changed.emit, self.executor),
+        ]
+        self._set_status(node.status())
+        self.node_changed.emit()
+
+    def _drop_node(self) -> None:
+        self._generation += 1
+        for handle in self._handles:
+            handle.close()
+        self._handles = []
+        node, self.node = self.node, None
+        if node is not None:
+            self.node_changed.emit()
+            if self._owns_node:
+                self.background(node.close)
+
+    def _on_status(self, status: Status) -> None:
+        if self.node is not None:
+            self._set_status(status)
+
+    def _set_status(self, status: Status) -> None:
+        before = (self.state, self.detail)
+        self._status = status
+        if (self.state, self.detail) != before or not self.is_initialized:
+            _log.info("connection: %s %s", self.state, self.detail)
+            self.connection_changed.emit()
+
+
+def _with_domain(url: str, domain: int) -> str:
+    """Return `url` with another ``domain`` option; an empty one becomes the default robot's."""
+    base, _, query = (url or "zenoh://").partition("?")
+    others = [part for part in query.split("&") if part and not re.match(r"domain=", part)]
+    return f"{base}?{'&'.join([*others, f'domain={domain}'])}"

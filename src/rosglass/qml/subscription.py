@@ -1,0 +1,428 @@
+"""The element ``Subscription``: the messages of a topic as QML values."""
+# ruff: noqa: N802, N815 - the names of slots and signals are QML's
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from typing import TYPE_CHECKING
+
+from rosglass.comm.node import Executor
+from rosglass.comm.qos import Durability, QoS, Reliability
+from rosglass.errors import ConversionError, DecodeError, Error, TypeNotFoundError
+from rosglass.qml.element import DEFAULT_TIMEOUT, RETRY, TopicElement, changed_enough
+from rosglass.qml.from_js import qos_from_js
+from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rosglass.comm.node import Node
+    from rosglass.comm.subscription import Sample
+    from rosglass.comm.subscription import Subscription as Received
+    from rosglass.qml.executor import GuiExecutor
+    from rosglass.qml.runtime import Runtime
+    from rosglass.qml.session import Session
+
+__all__ = ["DEFAULT_QOS", "Subscription"]
+
+_log = logging.getLogger("rosglass.qml")
+#: What ``Ros2.QoS()`` gives: matches every publisher, keeps only the newest message.
+DEFAULT_QOS = QoS(depth=1, reliability=Reliability.BEST_EFFORT)
+
+
+class _Feed(Executor):
+    """Carries samples from the middleware's thread to an element on the GUI thread.
+
+    The subscription posts its delivery job here. It does not post another one before that job has
+    run, so a fast topic costs one event per delivery, not per message.
+    """
+
+    def __init__(self, executor: GuiExecutor, arrived: Callable[[_Feed], None]) -> None:
+        self._executor, self._arrived = executor, arrived
+        self._job: Callable[[], None] | None = None
+        self._samples: list[Sample] = []
+        self.subscription: Received | None = None
+        self.closed = False
+
+    def post(self, job: Callable[[], None]) -> None:
+        self._job = job
+        self._executor.post(lambda: self._arrived(self))
+
+    def collect(self, sample: Sample) -> None:
+        """Take one sample; called by the subscription's delivery job."""
+        self._samples.append(sample)
+
+    def take(self) -> list[Sample]:
+        """Return the samples that wait."""
+        job, self._job = self._job, None
+        if job is not None:
+            job()
+        samples, self._samples = self._samples, []
+        return samples
+
+    def close(self, session: Session) -> None:
+        """Stop; the middleware is told on the worker thread."""
+        self.closed = True
+        if self.subscription is not None:
+            session.background(self.subscription.close)
+
+
+class Subscription(TopicElement):
+    """Receives a topic. See ``docs/qml.md`` for every property."""
+
+    topicChanged = Signal()
+    messageTypeChanged = Signal()
+    qosChanged = Signal()
+    queueSizeChanged = Signal()
+    throttleRateChanged = Signal()
+    enabledChanged = Signal()
+    timeoutChanged = Signal()
+    messageChanged = Signal()
+    subscribedChanged = Signal()
+    staleChanged = Signal()
+    ageChanged = Signal()
+    frequencyChanged = Signal()
+    bandwidthChanged = Signal()
+    droppedChanged = Signal()
+    problemChanged = Signal()
+    newMessage = Signal(QJSValue, arguments=["message"])
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        super().__init__(parent, runtime)
+        self._wanted_type, self._found_type = "", ""
+        self._qos = DEFAULT_QOS
+        self._throttle = 20
+        self._timeout: int | None = None
+        self._sample: Sample | None = None
+        self._value: QJSValue | None = None
+        self._shown_at = 0.0
+        self._age, self._frequency, self._bandwidth, self._dropped = -1.0, 0.0, 0.0, 0
+        self._inner_problem = ""
+        self._feed: _Feed | None = None
+        self._have: tuple[Node, str, str, QoS] | None = None
+        self._timer = QtCore.QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.setTimerType(QtCore.Qt.TimerType.PreciseTimer)
+        self._timer.timeout.connect(self._deliver_waiting)
+        self._retry = QtCore.QTimer(self)
+        self._retry.setSingleShot(True)
+        self._retry.timeout.connect(self._attach_again)
+
+    def configure(self, topic: str, type_name: str, qos: QoS) -> None:
+        """Set what ``Ros2.createSubscription`` was given."""
+        self._topic, self._wanted_type, self._qos = topic, type_name, qos
+
+    # Properties that QML sets.
+
+    def _get_topic(self) -> str:
+        return self._resolved or self._topic
+
+    def _set_topic(self, topic: str) -> None:
+        if topic in {self._topic, self._resolved}:
+            return
+        self._topic, self._resolved = topic, ""
+        self._forget()
+        self.topicChanged.emit()
+        self._schedule()
+
+    def _get_type(self) -> str:
+        return self._wanted_type or self._found_type
+
+    def _set_type(self, name: str) -> None:
+        if name == self._wanted_type:
+            return
+        self._wanted_type, self._found_type = name, ""
+        self._forget()
+        self.messageTypeChanged.emit()
+        self._schedule()
+
+    def _get_qos(self) -> QJSValue:
+        runtime = self._find_runtime()
+        return runtime.qos(self._qos) if runtime is not None else QJSValue()
+
+    def _set_qos(self, value: QJSValue | None) -> None:
+        try:
+            self._take_qos(qos_from_js(value, DEFAULT_QOS))
+        except ConversionError as error:
+            self._refuse(f"Subscription {self._topic!r}: {error}")
+
+    def _take_qos(self, qos: QoS) -> None:
+        before, self._qos = self._qos, qos
+        if qos == before:
+            return
+        self.qosChanged.emit()
+        if qos.depth != before.depth:
+            self.queueSizeChanged.emit()
+        self._schedule()
+
+    def _get_queue_size(self) -> int:
+        return self._qos.depth
+
+    def _set_queue_size(self, size: int) -> None:
+        if size < 1:
+            self._refuse(f"Subscription {self._topic!r}: queueSize must be at least 1, got {size}")
+            return
+        self._take_qos(self._qos.with_depth(size))
+
+    def _get_throttle_rate(self) -> int:
+        return self._throttle
+
+    def _set_throttle_rate(self, rate: int) -> None:
+        if rate < 0:
+            self._refuse(f"Subscription {self._topic!r}: throttleRate {rate} is negative")
+        elif rate != self._throttle:
+            self._throttle = rate
+            self.throttleRateChanged.emit()
+            if self._timer.isActive():
+                self._timer.start(0)
+
+    def _get_enabled(self) -> bool:
+        return self._enabled
+
+    def _set_enabled(self, enabled: bool) -> None:
+        if enabled != self._enabled:
+            self._enabled = enabled
+            self.enabledChanged.emit()
+            self._schedule()
+
+    def _get_timeout(self) -> int:
+        if self._timeout is not None:
+            return self._timeout
+        latched = self._qos.durability is Durability.TRANSIENT_LOCAL
+        return 0 if latched else DEFAULT_TIMEOUT
+
+    def _set_timeout(self, timeout: int) -> None:
+        if timeout < 0:
+            self._refuse(f"Subscription {self._topic!r}: timeout {timeout} ms is negative")
+        elif timeout != self._timeout:
+            self._timeout = timeout
+            self.timeoutChanged.emit()
+            self._judge()
+
+    topic = Property(str, _get_topic, _set_topic, notify=topicChanged)
+    messageType = Property(str, _get_type, _set_type, notify=messageTypeChanged)
+    qos = Property(QJSValue, _get_qos, _set_qos, notify=qosChanged)
+    queueSize = Property(int, _get_queue_size, _set_queue_size, notify=queueSizeChanged)
+    throttleRate = Property(int, _get_throttle_rate, _set_throttle_rate, notify=throttleRateChanged)
+    enabled = Property(bool, _get_enabled, _set_enabled, notify=enabledChanged)
+    timeout = Property(int, _get_timeout, _set_timeout, notify=timeoutChanged)
+
+    # Properties that QML reads.
+
+    def _get_message(self) -> QJSValue:
+        if self._value is None:
+            self._value = self._build()
+        return self._value
+
+    def _get_subscribed(self) -> bool:
+        return self._feed is not None and self._feed.subscription is not None
+
+    def _get_problem(self) -> str:
+        return self._problem or self._inner_problem
+
+    message = Property(QJSValue, _get_message, notify=messageChanged)
+    subscribed = Property(bool, _get_subscribed, notify=subscribedChanged)
+    stale = Property(bool, lambda self: self._stale, notify=staleChanged)
+    age = Property(float, lambda self: self._age, notify=ageChanged)
+    frequency = Property(float, lambda self: self._frequency, notify=frequencyChanged)
+    bandwidth = Property(float, lambda self: self._bandwidth, notify=bandwidthChanged)
+    dropped = Property(int, lambda self: self._dropped, notify=droppedChanged)
+    problem = Property(str, _get_problem, notify=problemChanged)
+
+    @Slot(result=int)
+    def getPublisherCount(self) -> int:
+        """Return how many publishers the topic has; 0 while not connected."""
+        return self._count_publishers()
+
+    # Subscribing.
+
+    def _update(self) -> None:
+        node = self.node
+        resolved = self._resolve(self._topic)
+        want = None
+        if node is not None and self._enabled and resolved:
+            want = (node, resolved, self._wanted_type, self._qos)
+        if want == self._have:
+            return
+        self._detach()
+        self._have = want
+        if want is None:
+            self._suspect = True
+            self._judge()
+            return
+        if resolved != self._resolved:
+            self._resolved = resolved
+            self.topicChanged.emit()
+        self._attach()
+
+    def _attach_again(self) -> None:
+        if self._have is not None and self._feed is None:
+            self._attach()
+
+    def _attach(self) -> None:
+        assert self._have is not None
+        assert self._session is not None
+        session = self._session
+        node, topic, type_name, qos = self._have
+        feed = self._feed = _Feed(session.executor, self._on_arrival)
+        self._at_end["feed"] = lambda: feed.close(session)
+        self._publishers = self._count_publishers()
+
+        def done(result: Received | Error) -> None:
+            if not isinstance(result, Error):
+                feed.subscription = result
+            if feed.closed:
+                feed.close(session)
+            elif is_alive(self):
+                self._attached(feed, result)
+
+        session.background(
+            lambda: node.create_subscription(
+                topic, type_name or None, qos=qos, raw_callback=feed.collect, executor=feed
+            ),
+            done,
+        )
+
+    def _attached(self, feed: _Feed, result: Received | Error) -> None:
+        if feed is not self._feed:
+            return
+        if isinstance(result, Error):
+            self._feed = None
+            self._say(f"{self._resolved}: {result}")
+            if isinstance(result, TypeNotFoundError):
+                self._retry.start(RETRY)
+            return
+        self._say("")
+        self.subscribedChanged.emit()
+
+    def _detach(self) -> None:
+        self._timer.stop()
+        self._retry.stop()
+        feed, self._feed = self._feed, None
+        self._at_end.pop("feed", None)
+        if feed is None or self._session is None:
+            return
+        feed.close(self._session)
+        self._inner_problem = ""
+        if feed.subscription is not None:
+            self.subscribedChanged.emit()
+
+    def _forget(self) -> None:
+        """Throw the message away: it belongs to another topic or type."""
+        had = self._sample is not None
+        self._sample, self._value, self._age = None, None, -1.0
+        if had:
+            self.messageChanged.emit()
+            self.ageChanged.emit()
+        self._judge()
+
+    # Receiving.
+
+    def _on_arrival(self, feed: _Feed) -> None:
+        if not is_alive(self) or feed is not self._feed or self._timer.isActive():
+            return
+        wait = 0.0
+        if self._throttle:
+            wait = self._shown_at + 1 / self._throttle - time.monotonic()
+        if wait > 0.0005:
+            self._timer.start(math.ceil(wait * 1000))
+        else:
+            self._deliver_waiting()
+
+    def _deliver_waiting(self) -> None:
+        feed = self._feed
+        if feed is None:
+            return
+        samples = feed.take()
+        for sample in samples if self._throttle == 0 else samples[-1:]:
+            self._deliver(sample)
+            # A handler may have changed the topic, or destroyed this very object.
+            if not is_alive(self) or feed is not self._feed:
+                return
+
+    def _deliver(self, sample: Sample) -> None:
+        try:
+            sample.type.validate(sample.data, wire=sample.wire)
+        except DecodeError as error:
+            self._say(f"{self._resolved}: a malformed message was refused: {error}")
+            return
+        name = sample.type.definition.name
+        new_type = name != self._found_type and not self._wanted_type
+        self._found_type = name
+        self._sample, self._value = sample, None
+        self._shown_at = time.monotonic()
+        self._age = 0.0
+        self._suspect = False
+        # Every getter answers for the new message before the first signal is sent.
+        was_stale, self._stale = self._stale, False
+        if new_type:
+            self.messageTypeChanged.emit()
+        self.messageChanged.emit()
+        if not is_alive(self) or self._sample is not sample:
+            return
+        self._say("")
+        self.ageChanged.emit()
+        if was_stale:
+            self.staleChanged.emit()
+        if is_alive(self) and self._has_listeners():
+            self.newMessage.emit(self._get_message())
+
+    def _has_listeners(self) -> bool:
+        """Return whether anybody listens to newMessage; if not, its value need not be built."""
+        meta = self.metaObject()
+        return self.isSignalConnected(meta.method(meta.indexOfSignal("newMessage(QJSValue)")))
+
+    def _build(self) -> QJSValue:
+        sample = self._sample
+        runtime = self._find_runtime()
+        if sample is None or runtime is None:
+            return QJSValue()
+        try:
+            return runtime.message(sample.message())
+        except Error as error:
+            _log.error("%s: %s", self._resolved, error)
+            return QJSValue()
+
+    # Judging.
+
+    def _is_old(self) -> bool:
+        if self._sample is None:
+            return True
+        timeout = self._get_timeout()
+        return timeout > 0 and time.monotonic() - self._shown_at > timeout / 1000
+
+    def _stale_changed(self) -> None:
+        self.staleChanged.emit()
+
+    def _problem_changed(self) -> None:
+        self.problemChanged.emit()
+
+    def _on_tick(self) -> None:
+        super()._on_tick()
+        if self._sample is not None:
+            self._age = time.monotonic() - self._shown_at
+            self.ageChanged.emit()
+        subscription = self._feed.subscription if self._feed is not None else None
+        frequency = bandwidth = 0.0
+        dropped = self._dropped
+        if subscription is not None:
+            statistics = subscription.statistics()
+            frequency, bandwidth = statistics.frequency, statistics.bandwidth
+            # Thinning out a topic is what throttling is for; only what was wanted can be lost.
+            dropped = statistics.dropped if self._throttle == 0 else 0
+            if self._inner_problem != subscription.problem:
+                self._inner_problem = subscription.problem
+                self.problemChanged.emit()
+        if changed_enough(self._frequency, frequency):
+            self._frequency = frequency
+            self.frequencyChanged.emit()
+        if changed_enough(self._bandwidth, bandwidth):
+            self._bandwidth = bandwidth
+            self.bandwidthChanged.emit()
+        if dropped != self._dropped:
+            self._dropped = dropped
+            self.droppedChanged.emit()

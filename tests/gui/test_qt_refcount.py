@@ -1,0 +1,58 @@
+"""The Qt binding must not eat references: PySide6 6.12.0 on Python 3.11 takes one per call."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+from rosglass.errors import UnsupportedError
+from rosglass.qt import _refuse_broken_binding, choose_binding
+
+
+def test_none_keeps_its_references(app) -> None:
+    app.processEvents()
+    before = sys.getrefcount(None)
+    for _ in range(200):
+        app.processEvents()
+    assert sys.getrefcount(None) - before > -20
+
+
+def test_the_version_that_does_not_is_refused() -> None:
+    if sys.version_info < (3, 12):
+        with pytest.raises(UnsupportedError, match=r"6\.12\.0 corrupts .*PySide6-Essentials<6.12"):
+            _refuse_broken_binding("PySide6", (6, 12, 0))
+    else:
+        _refuse_broken_binding("PySide6", (6, 12, 0))
+    _refuse_broken_binding("PySide6", (6, 11, 3))
+    _refuse_broken_binding("PySide2", (5, 15, 8))
+
+
+@pytest.mark.parametrize(
+    ("loaded", "wanted", "binding"),
+    [
+        (set(), "", "PySide6"),
+        (set(), "pyside2", "PySide2"),
+        (set(), "PySide6", "PySide6"),
+        ({"PyQt5"}, "", "PySide2"),
+        ({"PySide2", "PyQt5"}, "pyside2", "PySide2"),
+        ({"PySide6"}, "", "PySide6"),
+        ({"PyQt6"}, "pyside6", "PySide6"),
+    ],
+)
+def test_choice(loaded: set, wanted: str, binding: str) -> None:
+    assert choose_binding(frozenset(loaded), wanted) == binding
+
+
+@pytest.mark.parametrize(
+    ("loaded", "wanted", "reason"),
+    [
+        ({"PyQt5"}, "pyside6", "already uses PyQt5"),
+        ({"PySide6"}, "pyside2", "already uses PySide6"),
+        ({"PySide6", "PyQt5"}, "", "already uses PySide6"),
+        (set(), "qt7", "must be pyside6 or pyside2"),
+    ],
+)
+def test_a_second_qt_is_refused(loaded: set, wanted: str, reason: str) -> None:
+    with pytest.raises(UnsupportedError, match=reason):
+        choose_binding(frozenset(loaded), wanted)
