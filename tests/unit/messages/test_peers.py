@@ -162,7 +162,7 @@ def leaves(types: Types, name: str, value: dict[str, Any], prefix: str = "") -> 
             else:
                 found.append((path, item))
         elif field.is_compound:
-            for index in sorted({0, len(item) - 1} - {-1}):
+            for index in sorted({0, len(item) - 1}) if item else ():
                 found += leaves(types, field.base, item[index], f"{path}[{index}].")
         elif field.base in corpus.TIMES:
             found += [(f"{path}[{len(item) - 1}].secs", item[-1]["secs"])] if item else []

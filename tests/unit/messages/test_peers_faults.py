@@ -237,7 +237,7 @@ def test_cyclic_types_are_refused_when_loaded(wire: str) -> None:
         from_text("a_msgs/msg/A", text, ros).decode(bytes(8), wire=wire)
 
 
-@pytest.mark.parametrize("count", [0, 1, 3, 65_536])
+@pytest.mark.parametrize("count", [0, 1, 3, 1000])
 def test_ros1_empty_messages_in_a_list_take_no_bytes(count: int) -> None:
     text = f"std_msgs/Empty[] e\nuint8 after\n\n{'=' * 80}\nMSG: std_msgs/Empty\n"
     kind = from_text("a_msgs/msg/A", text, ros=1)
