@@ -1,10 +1,17 @@
-"""``.idl`` definitions of ROS 2, read by rosbags' IDL parser."""
+"""The parser of ``.idl`` definitions: what rosidl takes and writes of OMG IDL 4.2.
+
+Grammar: https://www.omg.org/spec/IDL/4.2 and
+https://design.ros2.org/articles/idl_interface_definition.html. Written here because the parser in
+rosbags 0.11 refuses the ``#include`` lines of every generated file, drops default values, units and
+comments, and takes minutes for a constant in three pairs of parentheses.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.errors import DefinitionError
+from rosglass.interfaces.comments import clean_comment
 from rosglass.interfaces.definition import (
     ActionDefinition,
     ArrayKind,
@@ -15,85 +22,435 @@ from rosglass.interfaces.definition import (
     ServiceDefinition,
     Source,
 )
-from rosglass.interfaces.names import join_name
+from rosglass.interfaces.idl_lexer import Lexer
+from rosglass.interfaces.literals import LiteralError, parse_constant, parse_default, unescape
+from rosglass.interfaces.names import check_package_name, check_type_name, join_name
 
 if TYPE_CHECKING:
-    from rosglass.interfaces.definition import InterfaceDefinition
+    from rosglass.interfaces.definition import InterfaceDefinition, Value
+    from rosglass.interfaces.idl_lexer import Token
 
 __all__ = ["parse_idl"]
 
+_MAX_TEXT = 4 * 1024 * 1024
+_MAX_COUNT = 2**32 - 1
+_MAX_MODULES = 16
 _PLACEHOLDER = "structure_needs_at_least_one_member"
-_ARRAYS = {3: ArrayKind.FIXED, 4: ArrayKind.UNBOUNDED}
+
+_BASIC = {
+    "boolean": "bool",
+    "octet": "byte",
+    "char": "char",
+    "float": "float32",
+    "double": "float64",
+    "short": "int16",
+    "long": "int32",
+    "long long": "int64",
+    "unsigned short": "uint16",
+    "unsigned long": "uint32",
+    "unsigned long long": "uint64",
+    **{name: name for name in ("int8", "uint8", "int16", "uint16", "int32", "uint32")},
+    **{name: name for name in ("int64", "uint64", "string", "wstring")},
+}
+_UNSUPPORTED = frozenset(
+    {"any", "bitmask", "bitset", "component", "exception", "fixed", "import", "interface", "map"}
+    | {"native", "Object", "union", "valuetype", "wchar"}
+)
+#: Annotations that change how a struct is put on the wire, in ways ROS 2 does not use.
+_WIRE_ANNOTATIONS = frozenset(("mutable", "optional"))
+
+_Literal = bool | int | float | str
+
+
+class _Annotations(NamedTuple):
+    comment: str = ""
+    unit: str = ""
+    default: tuple[_Literal, Token] | None = None
+
+
+class _Struct(NamedTuple):
+    fields: list[Field]
+    comment: str
 
 
 def parse_idl(
     text: str, name: str, *, file: str = "", provider: str = "text"
 ) -> InterfaceDefinition:
-    """Parse an IDL file.
+    """Parse an IDL file of ROS 2.
 
     Args:
-        text: The IDL.
+        text: The IDL; what it includes is not read, types are looked up by name.
         name: Full name of the type to take from it; ``pkg/Type`` means a message.
-        file: Label for error messages.
+        file: Label for error messages, by default the name in angle brackets.
         provider: Recorded in the definition's source.
 
+    Returns:
+        The definition, not resolved; ``nested`` holds the other messages in the file.
+
     Raises:
-        DefinitionError: The text is not IDL, or has no such type.
+        DefinitionError: The text is not IDL, uses what ROS 2 does not have, or has no such type.
         InvalidNameError: `name` is not a type name.
     """
-    from rosbags.typesys import TypesysError, get_types_from_idl  # noqa: PLC0415 - 40 ms
-
     full = join_name(name)
     source = Source(provider, file or f"<{full}>")
-    try:
-        types = get_types_from_idl(text)
-    except TypesysError as error:
-        raise DefinitionError(f"the IDL can't be parsed: {error}", source.file) from error
-    messages = {key: _definition(key, types[key], source) for key in types}
-    return _pick(full, messages, text, source)
+    if not isinstance(text, str):
+        raise DefinitionError(
+            f"the definition must be a str, got {type(text).__name__}", source.file
+        )
+    if len(text) > _MAX_TEXT:
+        raise DefinitionError(
+            f"the definition has {len(text)} characters, the limit is {_MAX_TEXT}", source.file
+        )
+    parser = _Parser(Lexer(text.removeprefix("\ufeff"), source.file))
+    messages = parser.messages(text, source)
 
-
-def _pick(
-    full: str, messages: dict[str, Definition], text: str, source: Source
-) -> InterfaceDefinition:
     def part(suffix: str) -> Definition:
         found = messages.get(f"{full}{suffix}")
         if found is None:
-            known = ", ".join(messages) or "nothing"
-            raise DefinitionError(f"the IDL has no {full}{suffix}; it has {known}", source.file)
+            known = ", ".join(messages) or "no struct"
+            raise DefinitionError(f"the IDL has no {full}{suffix}, but {known}", source.file)
         return found
 
     kind = full.split("/")[1]
     if kind == "srv" and full not in messages:
         return ServiceDefinition(full, 2, part("_Request"), part("_Response"), text, source)
     if kind == "action" and full not in messages:
-        return ActionDefinition(
-            full, 2, part("_Goal"), part("_Result"), part("_Feedback"), text, source
-        )
+        goal, result, feedback = part("_Goal"), part("_Result"), part("_Feedback")
+        return ActionDefinition(full, 2, goal, result, feedback, text, source)
     return part("")
 
 
-def _definition(name: str, parsed: Any, source: Source) -> Definition:
-    constants, fields = parsed
-    return Definition(
-        name=name,
-        ros=2,
-        fields=tuple(
-            Field(field, _type(description))
-            for field, description in fields
-            if field != _PLACEHOLDER
-        ),
-        constants=tuple(Constant(key, kind, value, str(value)) for key, kind, value in constants),
-        source=source,
-    )
+class _Parser:
+    """Reads one file; scoped names are tuples of their parts."""
+
+    def __init__(self, lexer: Lexer) -> None:
+        self._lexer = lexer
+        self._scope: tuple[str, ...] = ()
+        self._structs: dict[tuple[str, ...], _Struct] = {}
+        self._typedefs: dict[tuple[str, ...], FieldType] = {}
+        self._constants: dict[tuple[str, ...], Constant] = {}
+
+    def messages(self, text: str, source: Source) -> dict[str, Definition]:
+        """Parse the file; returns its structs by full name, each with all of them as nested."""
+        while self._lexer.token.kind != "end":
+            self._definition()
+        constants: dict[tuple[str, ...], list[Constant]] = {}
+        for scope, constant in self._constants.items():
+            constants.setdefault(scope[:-1], []).append(constant)
+        # One mapping for all, so that many structs don't take quadratic memory.
+        messages: dict[str, Definition] = {}
+        for scope, struct in self._structs.items():
+            name = "/".join(scope)
+            messages[name] = Definition(
+                name=name,
+                ros=2,
+                fields=tuple(field for field in struct.fields if field.name != _PLACEHOLDER),
+                constants=tuple(constants.get((*scope[:-1], f"{scope[-1]}_Constants"), ())),
+                text=text,
+                source=source,
+                nested=messages,
+                comment=struct.comment,
+            )
+        return messages
+
+    def _definition(self) -> None:
+        notes = self._annotations()
+        token = self._lexer.take()
+        if token.text == "module":
+            self._module()
+        elif token.text == "struct":
+            self._struct(notes)
+        elif token.text == "const":
+            self._const(notes)
+        elif token.text == "typedef":
+            self._typedef()
+        elif token.text == "enum":
+            self._enum()
+        else:
+            raise self._lexer.error(self._refusal(token), token)
+        self._lexer.take(";")
+
+    def _refusal(self, token: Token) -> str:
+        if token.text in _UNSUPPORTED:
+            return f"ROS 2 has no {token.text!r}"
+        return f"expected module, struct, const, typedef or enum, got {token.text!r}"
+
+    def _module(self) -> None:
+        name = self._lexer.take(kind="name")
+        if len(self._scope) >= _MAX_MODULES:
+            raise self._lexer.error(f"modules nest deeper than {_MAX_MODULES} levels", name)
+        outer, self._scope = self._scope, (*self._scope, name.text)
+        self._lexer.take("{")
+        while not self._lexer.accept("}"):
+            self._definition()
+        self._scope = outer
+
+    def _struct(self, notes: _Annotations) -> None:
+        name = self._lexer.take(kind="name")
+        if self._lexer.token.text == ";":
+            return  # a forward declaration
+        if self._lexer.token.text == ":":
+            raise self._lexer.error("ROS 2 has no structs that inherit", self._lexer.token)
+        scope = (*self._scope, name.text)
+        if len(scope) != 3 or scope[1] not in ("msg", "srv", "action"):
+            raise self._lexer.error(
+                "a struct lies in the modules of its package and kind, package::msg::Type", name
+            )
+        fault = check_package_name(scope[0], 2) or check_type_name(scope[2], 2)
+        if fault:
+            raise self._lexer.error(fault, name)
+        if scope in self._structs:
+            raise self._lexer.error(f"struct {name.text} is defined twice", name)
+        fields: dict[str, Field] = {}
+        self._lexer.take("{")
+        while not self._lexer.accept("}"):
+            self._members(fields)
+        self._structs[scope] = _Struct(list(fields.values()), notes.comment)
+
+    def _members(self, fields: dict[str, Field]) -> None:
+        notes = self._annotations()
+        base = self._type()
+        while True:
+            name = self._lexer.take(kind="name")
+            if name.text in fields:
+                raise self._lexer.error(f"{name.text!r} is already defined", name)
+            kind = self._declarator(base)
+            default = None if notes.default is None else self._default(kind, notes.default)
+            place = self._lexer.place(name)
+            fields[name.text] = Field(name.text, kind, default, notes.comment, notes.unit, place)
+            if not self._lexer.accept(","):
+                break
+        self._lexer.take(";")
+
+    def _declarator(self, base: FieldType) -> FieldType:
+        """Apply ``[n]`` after a name."""
+        opening = self._lexer.token
+        if not self._lexer.accept("["):
+            return base
+        size = self._count()
+        self._lexer.take("]")
+        if base.array is not ArrayKind.NONE or self._lexer.token.text == "[":
+            raise self._lexer.error(
+                "there are no arrays of arrays; put the inner one into a struct", opening
+            )
+        return FieldType(base.name, ArrayKind.FIXED, size, base.string_bound)
+
+    def _typedef(self) -> None:
+        base = self._type()
+        while True:
+            name = self._lexer.take(kind="name")
+            scope = (*self._scope, name.text)
+            self._typedefs[scope] = self._declarator(base)
+            if not self._lexer.accept(","):
+                break
+
+    def _enum(self) -> None:
+        name = self._lexer.take(kind="name")
+        self._lexer.take("{")
+        while True:
+            self._annotations()
+            self._lexer.take(kind="name")
+            if not self._lexer.accept(","):
+                break
+        self._lexer.take("}")
+        scope = (*self._scope, name.text)
+        self._typedefs[scope] = FieldType("uint32")  # as CDR writes them
+
+    def _const(self, notes: _Annotations) -> None:
+        start = self._lexer.token
+        kind = self._type()
+        if kind.is_compound or kind.array is not ArrayKind.NONE:
+            raise self._lexer.error("a constant has a basic type", start)
+        name = self._lexer.take(kind="name")
+        self._lexer.take("=")
+        at = self._lexer.token
+        value = self._literal()
+        try:
+            checked = _convert(kind, value)
+        except LiteralError as error:
+            raise self._lexer.error(f"constant {name.text}: {error}", at) from None
+        scope = (*self._scope, name.text)
+        if scope in self._constants:
+            raise self._lexer.error(f"{name.text!r} is already defined", name)
+        assert not isinstance(checked, tuple)
+        self._constants[scope] = Constant(
+            name.text, kind.name, checked, str(checked), notes.comment
+        )
+
+    def _default(self, kind: FieldType, default: tuple[_Literal, Token]) -> Value:
+        value, at = default
+        try:
+            return _convert(kind, value)
+        except LiteralError as error:
+            raise self._lexer.error(f"default value: {error}", at) from None
+
+    def _type(self) -> FieldType:
+        token = self._lexer.take(kind="name")
+        if token.text == "sequence":
+            return self._sequence(token)
+        words = token.text
+        if words in ("unsigned", "long"):
+            while self._lexer.token.text in ("short", "long", "double"):
+                words += f" {self._lexer.take().text}"
+        if words in _UNSUPPORTED or words == "long double":
+            raise self._lexer.error(f"ROS 2 has no {words!r}", token)
+        basic = _BASIC.get(words)
+        if basic is None:
+            return self._named(token)
+        if basic in ("string", "wstring") and self._lexer.accept("<"):
+            bound = self._count()
+            self._lexer.take(">")
+            return FieldType(basic, string_bound=bound)
+        return FieldType(basic)
+
+    def _sequence(self, token: Token) -> FieldType:
+        self._lexer.take("<")
+        inner = self._type()
+        if inner.array is not ArrayKind.NONE:
+            raise self._lexer.error(
+                "there are no sequences of sequences or arrays; put the inner one into a struct",
+                token,
+            )
+        kind, size = ArrayKind.UNBOUNDED, None
+        if self._lexer.accept(","):
+            kind, size = ArrayKind.BOUNDED, self._count()
+        self._lexer.take(">")
+        return FieldType(inner.name, kind, size, inner.string_bound)
+
+    def _named(self, token: Token) -> FieldType:
+        path = self._path(token)
+        # IDL's rule: the innermost enclosing module that has the name.
+        for depth in range(len(self._scope), -1, -1):
+            scope = (*self._scope[:depth], *path)
+            if scope in self._typedefs:
+                return self._typedefs[scope]
+            if scope in self._structs:
+                return FieldType("/".join(scope))
+        if len(path) == 1:
+            path = (*self._scope, *path)
+        if len(path) != 3 or path[1] not in ("msg", "srv", "action"):
+            raise self._lexer.error(
+                f"unknown type {'::'.join(path)!r}; a message type is written package::msg::Type",
+                token,
+            )
+        return FieldType("/".join(path))
+
+    def _path(self, token: Token) -> tuple[str, ...]:
+        path = [token.text]
+        while self._lexer.accept("::"):
+            path.append(self._lexer.take(kind="name").text)
+        return tuple(path)
+
+    def _count(self) -> int:
+        token = self._lexer.token
+        value = self._literal()
+        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= _MAX_COUNT:
+            raise self._lexer.error(
+                f"a size must be a whole number from 1 to {_MAX_COUNT}, got {token.text!r}", token
+            )
+        return value
+
+    def _literal(self) -> _Literal:
+        """Take a literal, with a sign if need be, or the name of a constant."""
+        token = self._lexer.token
+        if token.kind == "string":
+            return self._lexer.strings()
+        sign = 1
+        while self._lexer.token.text in ("-", "+") and self._lexer.token.kind == "sign":
+            sign = -sign if self._lexer.take().text == "-" else sign
+        token = self._lexer.take()
+        value: _Literal
+        if token.kind == "number":
+            value = self._number(token)
+        elif token.kind == "char":
+            value = ord(unescape(token.text.removeprefix("L")[1:-1])[0])
+        elif token.text in ("TRUE", "FALSE"):
+            value = token.text == "TRUE"
+        elif token.kind == "name":
+            value = self._constant_value(token)
+        else:
+            raise self._lexer.error(
+                f"expected a value, got {token.text!r}; expressions are not evaluated", token
+            )
+        if sign < 0:
+            if isinstance(value, (str, bool)):
+                raise self._lexer.error(f"{token.text!r} can't have a sign", token)
+            value = -value
+        return value
+
+    def _number(self, token: Token) -> int | float:
+        text = token.text.lower()
+        if len(text) > 400:
+            raise self._lexer.error(f"{text[:20]}... is too long for a number", token)
+        if text.startswith("0x"):
+            return int(text, 16)
+        if text.isdigit():
+            octal = len(text) > 1 and text[0] == "0" and not set(text) & {"8", "9"}
+            return int(text, 8 if octal else 10)
+        return float(text)
+
+    def _constant_value(self, token: Token) -> _Literal:
+        path = self._path(token)
+        for depth in range(len(self._scope), -1, -1):
+            found = self._constants.get((*self._scope[:depth], *path))
+            if found is not None:
+                return found.value
+        raise self._lexer.error(f"unknown constant {'::'.join(path)!r}", token)
+
+    def _annotations(self) -> _Annotations:
+        comments: list[str] = []
+        unit = ""
+        default: tuple[_Literal, Token] | None = None
+        while self._lexer.accept("@"):
+            token = self._lexer.take(kind="name")
+            if token.text in _WIRE_ANNOTATIONS:
+                raise self._lexer.error(
+                    f"@{token.text} is not supported: it changes the wire format", token
+                )
+            values = self._parameters()
+            if token.text == "verbatim" and values.get("language", ("",))[0] == "comment":
+                comments += str(values.get("text", ("",))[0]).split("\n")
+            elif token.text == "unit" and "value" in values:
+                unit = str(values["value"][0])
+            elif token.text == "default" and "value" in values:
+                default = values["value"]
+        return _Annotations(clean_comment(comments), unit, default)
+
+    def _parameters(self) -> dict[str, tuple[_Literal, Token]]:
+        """Take ``(name=value, ...)`` or ``(value)``, if there is one."""
+        values: dict[str, tuple[_Literal, Token]] = {}
+        if not self._lexer.accept("("):
+            return values
+        while not self._lexer.accept(")"):
+            key = "value"
+            token = self._lexer.token
+            if token.kind == "name" and token.text not in ("TRUE", "FALSE"):
+                self._lexer.take()
+                if not self._lexer.accept("="):
+                    values[key] = (token.text, token)
+                    continue
+                key, token = token.text, self._lexer.token
+            enumerator = token.kind == "name" and token.text not in ("TRUE", "FALSE")
+            values[key] = (self._lexer.take().text if enumerator else self._literal(), token)
+            if not self._lexer.accept(",") and self._lexer.token.text != ")":
+                raise self._lexer.error("expected ',' or ')'", self._lexer.token)
+        return values
 
 
-def _type(description: Any) -> FieldType:
-    kind, rest = int(description[0]), description[1]
-    if kind == 1:
-        return FieldType(str(rest[0]), string_bound=rest[1] or None)
-    if kind == 2:
-        return FieldType(str(rest))
-    inner = _type(rest[0])
-    array = ArrayKind.BOUNDED if kind == 4 and rest[1] else _ARRAYS[kind]
-    return FieldType(inner.name, array, rest[1] or None, inner.string_bound)
+def _convert(kind: FieldType, value: _Literal) -> Value:
+    """Check a value against a type; raises LiteralError."""
+    if isinstance(value, str) and kind.array is not ArrayKind.NONE:
+        # rosidl writes array defaults as the text of a Python tuple.
+        inner = value.strip().removeprefix("(").removesuffix(")").strip().removesuffix(",")
+        return parse_default(kind, f"[{inner}]")
+    if kind.is_compound or kind.array is not ArrayKind.NONE:
+        return parse_default(kind, str(value))
+    if kind.name in ("string", "wstring"):
+        if not isinstance(value, str):
+            raise LiteralError(f"{value!r} is not a string")
+        if kind.string_bound is not None and len(value) > kind.string_bound:
+            raise LiteralError(
+                f"the string has {len(value)} characters, its bound is {kind.string_bound}"
+            )
+        return value
+    return parse_constant(kind.name, str(value), 2)

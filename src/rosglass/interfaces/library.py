@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from rosglass.errors import (
     DefinitionConflictError,
     DefinitionError,
+    InvalidNameError,
     TypeNotFoundError,
     UnsupportedError,
 )
@@ -29,10 +30,15 @@ from rosglass.interfaces.resolver import Resolver
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from rosglass.errors import Error
     from rosglass.interfaces.definition import Field, InterfaceDefinition, Source
 
 __all__ = ["Library"]
 
+#: ROS 1's md5 sum of those who take any type.
+ANY_HASH = "*"
+
+#: Environment variable with the names of preferred providers.
 PREFER_VARIABLE = "ROSGLASS_PREFER_DEFINITIONS"
 
 
@@ -79,8 +85,9 @@ class Library:
                 by services and actions have names too, e.g. ``pkg/srv/Type_Request``,
                 ``pkg/action/Type_FeedbackMessage``; in ROS 1 ``pkg/TypeActionGoal``.
             ros: 1 or 2.
-            hash: md5 sum or RIHS01 hash that a peer announced for it. Picks the definition that
-                has it, of any provider and any distribution.
+            hash: md5 sum (ROS 1) or RIHS01 hash (ROS 2) that a peer announced for it. Picks the
+                definition that has it, of any provider and any distribution; ``*``, with which
+                ROS 1 peers say "any", is the same as none.
 
         Raises:
             InvalidNameError: `name` is not a type name.
@@ -89,15 +96,19 @@ class Library:
                 differently, or nobody's definition has `hash`.
             DefinitionError: A definition has an error or needs an unknown type.
         """
+        if not isinstance(name, str):
+            raise InvalidNameError(f"a type name is a str, got {name!r}")
         loaded = self._loaded.get((ros, name, hash))
         if loaded is None:
             if ros not in (1, 2):
                 raise UnsupportedError(f"ros must be 1 or 2, got {ros!r}")
             with self._lock:
-                if hash:
+                if hash not in ("", ANY_HASH):
                     loaded = self._matching(name, ros, hash)
                 else:
                     loaded = self._load(name, ros, self._resolver(ros), self._chain)
+                    # All spellings of a name share one object.
+                    loaded = self._loaded.setdefault((ros, loaded.name, ""), loaded)
                 self._loaded[ros, name, hash] = loaded
         return loaded
 
@@ -204,6 +215,8 @@ class Library:
     def _new_resolver(self, ros: int, chain: list[Provider], *, check: bool = True) -> Resolver:
         def find(name: str, owner: Definition, field: Field) -> Definition:
             found = self._find(name, ros, chain, check=check)
+            if found is None:
+                found = owner.nested.get(name)  # an IDL file may define several types
             if isinstance(found, Definition):
                 return found
             raise DefinitionError(
@@ -278,24 +291,35 @@ class Library:
     def _matching(self, name: str, ros: int, wanted: str) -> InterfaceDefinition:
         """Return the definition with a given hash, of whichever provider or distribution."""
         tried: dict[str, str] = {}
-        for chain in self._views(ros):
-            resolver = self._new_resolver(ros, chain, check=False)
-            found = self._load(name, ros, resolver, chain, check=False)
+        problem: Error | None = None
+        for resolver, chain, check in self._views(ros):
+            try:
+                found = self._load(name, ros, resolver, chain, check=check)
+            except (DefinitionError, DefinitionConflictError) as error:
+                problem = problem or error
+                continue
             actual = md5(found) if ros == 1 else rihs01(found)
             if actual == wanted:
                 return found
             tried.setdefault(actual, _place(None, found))
+        if problem is not None and not tried:
+            raise problem
         known = "; ".join(f"{place} has {actual}" for actual, place in tried.items())
         raise DefinitionConflictError(
             f"no definition of {name} has the hash {wanted} that the peer announces: {known}. Add "
             "the peer's definition with Library.add_path() or source its workspace"
         )
 
-    def _views(self, ros: int) -> Iterator[list[Provider]]:
-        """Yield the chain with each provider, and each distribution, moved to the front."""
+    def _views(self, ros: int) -> Iterator[tuple[Resolver, list[Provider], bool]]:
+        """Yield the chain, then the chain with each provider and distribution moved to the front.
+
+        Each comes with a resolver and whether definitions that differ are an error.
+        """
+        yield self._resolver(ros), self._chain, True
         for provider in self._chain:
             for view in provider.views(ros):
-                yield [view, *(other for other in self._chain if other is not provider)]
+                chain = [view, *(other for other in self._chain if other is not provider)]
+                yield self._new_resolver(ros, chain, check=False), chain, False
 
     def _add_one(self, definition: InterfaceDefinition) -> None:
         key = (definition.ros, definition.name, "")

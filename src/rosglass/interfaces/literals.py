@@ -11,7 +11,14 @@ if TYPE_CHECKING:
 
     from rosglass.interfaces.definition import FieldType, Value
 
-__all__ = ["INTEGER_RANGES", "LiteralError", "parse_constant", "parse_default", "strip_comment"]
+__all__ = [
+    "INTEGER_RANGES",
+    "LiteralError",
+    "parse_constant",
+    "parse_default",
+    "strip_comment",
+    "unescape",
+]
 
 _SIGNED = {f"int{n}": (-(1 << (n - 1)), (1 << (n - 1)) - 1) for n in (8, 16, 32, 64)}
 _UNSIGNED = {f"uint{n}": (0, (1 << n) - 1) for n in (8, 16, 32, 64)}
@@ -177,11 +184,12 @@ def _string(text: str) -> str:
         match = re.fullmatch(_QUOTED, text)
         if match is None:
             raise LiteralError(f"a {text[0]} inside the string {text} must be written \\{text[0]}")
-        return _unescape(match.group(2))
+        return unescape(match.group(2))
     return text
 
 
-def _unescape(text: str) -> str:
+def unescape(text: str) -> str:
+    """Replace backslash escapes; raises LiteralError for code points that do not exist."""
     return re.sub(_ESCAPE, _unescape_one, text) if "\\" in text else text
 
 
