@@ -132,6 +132,8 @@ def measure(sample: Sample, ros: int, settings: Settings, missing: set[str]) -> 
         if metric == "decode":
             contenders["rosbags view"] = libraries["rosbags"].statements["decode view"]
         if metric == "encode":
+            by_hand = libraries["rosbags"].statements["encode by hand"]
+            contenders["rosbags by hand"] = by_hand
             contenders["memcpy"] = ("bytes(view)", {"view": memoryview(data)})
         rows.append(_row(sample, ros, metric, time_in_turns(contenders, settings)))
     first = {

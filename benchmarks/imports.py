@@ -10,9 +10,11 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import statistics
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 #: `import rosglass` has to stay below this, without Qt and numpy.
@@ -44,13 +46,13 @@ TARGETS = {
 _PROBE = """
 import sys
 sys.path.append({debian!r})
-try:
-    import resource
-except ImportError:
-    resource = None
 from time import perf_counter
 def used():
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss if resource else 0
+    try:
+        with open("/proc/self/status") as status:
+            return next(int(line.split()[1]) for line in status if line.startswith("VmRSS"))
+    except OSError:
+        return 0  # not Linux
 before, start = used(), perf_counter()
 {statement}
 spent = perf_counter() - start
@@ -60,10 +62,20 @@ print(spent * 1000, used() - before, ",".join(heavy) or "-")
 DEBIAN_PACKAGES = "/usr/lib/python3/dist-packages"
 
 
-def probe(statement: str) -> tuple[float, float, str] | None:
-    """Milliseconds, kilobytes and heavy modules of a statement in a fresh process."""
+def probe(statement: str, cache: str) -> tuple[float, float, str] | None:
+    """Milliseconds, kilobytes (0 if unknown) and heavy modules of a statement, run afresh.
+
+    `cache` is the folder for byte code.
+    """
     code = _PROBE.format(statement=statement, debian=DEBIAN_PACKAGES)
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    run = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=False,
+        # Compiled once for everybody, wherever byte code may or may not be written otherwise.
+        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": cache},
+    )
     if run.returncode:
         if "ModuleNotFoundError" in run.stderr:
             return None
@@ -78,12 +90,13 @@ def main() -> int:
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures there")
     options = parser.parse_args()
     taken: dict[str, list[tuple[float, float, str]]] = {name: [] for name in CASES}
-    # One run that is not counted writes the byte code; then the cases take turns.
-    for turn in range(options.runs + 1):
-        for name, statement in CASES.items():
-            result = probe(statement)
-            if result is not None and turn:
-                taken[name].append(result)
+    with tempfile.TemporaryDirectory(prefix="rosglass-bytecode-") as cache:
+        # One turn that is not counted writes the byte code; then the cases take turns.
+        for turn in range(options.runs + 1):
+            for name, statement in CASES.items():
+                result = probe(statement, cache)
+                if result is not None and turn:
+                    taken[name].append(result)
     figures = {
         name: (
             statistics.median(r[0] for r in results),

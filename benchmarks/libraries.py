@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import importlib.util
 import itertools
+import re
 import sys
 from dataclasses import dataclass
 from io import BytesIO
@@ -18,7 +19,7 @@ import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from samples import Sample, Value, builder, definition, store, walker
+from samples import Sample, Value, builder, definition, generic_builder, store, walker
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -52,6 +53,7 @@ class Library:
 
 def rosglass(sample: Sample, ros: int, value: Value) -> Library:
     import rosglass
+    from rosglass.interfaces.provider import MemoryProvider
     from rosglass.messages import MessageType
 
     wire = "ros1" if ros == 1 else "cdr"
@@ -60,12 +62,15 @@ def rosglass(sample: Sample, ros: int, value: Value) -> Library:
     if ros == 1:
         value, path = _ros1_times(value), path.replace(".sec", ".secs")
     leaf = compile(f"m.{path}", "<leaf>", "eval")
-    # A new constant each time, so that no cache knows the text.
     fresh = itertools.count()
 
     def first_use(data: bytes) -> Any:
-        changed = f"uint32 FRESH_{next(fresh)}=1\n{text}"
-        unknown = MessageType.from_text(sample.type, changed, ros=ros)
+        # A new constant in every type each time, so that no cache knows the text.
+        constant = f"uint32 FRESH_{next(fresh)}=1\n"
+        changed = constant + re.sub(r"(?m)^(MSG: .*\n)", rf"\1{constant}", text)
+        library = rosglass.Library(MemoryProvider("empty"))
+        library.add_text(sample.type, changed, ros=ros)
+        unknown = MessageType(library.definition(sample.type, ros=ros))
         return eval(leaf, {"m": unknown.decode(data, wire=wire)})
 
     names = {
@@ -100,7 +105,8 @@ def rosglass(sample: Sample, ros: int, value: Value) -> Library:
 
 def rosbags(sample: Sample, ros: int, value: Value) -> Library:
     types, name, text = store(ros), sample.type, definition(sample.type, ros)
-    build = builder(name, ros, types.types.__getitem__)
+    build = generic_builder(name, ros, types.types.__getitem__)
+    by_hand = builder(name, ros, types.types.__getitem__)
     wire = "ros1" if ros == 1 else "cdr"
     read, write = getattr(types, f"deserialize_{wire}"), getattr(types, f"serialize_{wire}")
     base = get_typestore(Stores.EMPTY)
@@ -120,6 +126,7 @@ def rosbags(sample: Sample, ros: int, value: Value) -> Library:
         "read": read,
         "write": write,
         "build": build,
+        "by_hand": by_hand,
         "walk": walker(name, ros),
         "value": value,
         "name": name,
@@ -127,6 +134,7 @@ def rosbags(sample: Sample, ros: int, value: Value) -> Library:
     return Library(
         encodings={
             "dict": lambda _: bytes(write(build(value), name)),
+            "by hand": lambda _: bytes(write(by_hand(value), name)),
             "message": lambda data: bytes(write(read(data, name), name)),
         },
         decode=lambda data: read(data, name),
@@ -136,6 +144,7 @@ def rosbags(sample: Sample, ros: int, value: Value) -> Library:
             "attribute": (f"read(data, name).{sample.leaf}", names),
             "every leaf": ("walk(read(data, name))", names),
             "encode": ("write(build(value), name)", names),
+            "encode by hand": ("write(by_hand(value), name)", names),
         },
         first_use=first_use,
     )

@@ -115,8 +115,44 @@ def walker(type_name: str, ros: int, stamp: tuple[str, str] = ("sec", "nanosec")
     return _define("\n".join(lines), {}, "walk")
 
 
+def generic_builder(type_name: str, ros: int, class_of: Callable[[str], Any]) -> Any:
+    """A function that builds a library's objects from a nested dict of any type.
+
+    It follows the fields at run time, as a program has to that learns its types at run time.
+    """
+    plans: dict[str, tuple[Any, list[tuple[str, str, bool]]]] = {}
+
+    def plan(name: str) -> None:
+        if name in plans:
+            return
+        steps = [
+            (field.name, field.base if "/" in field.base else "", field.array == "messages")
+            for field in fields(name, ros)
+        ]
+        plans[name] = class_of(name), steps
+        for _, base, _ in steps:
+            if base:
+                plan(base)
+
+    def build(name: str, value: Value) -> Any:
+        kind, steps = plans[name]
+        arguments = []
+        for field, base, several in steps:
+            item = value[field]
+            if base:
+                item = [build(base, e) for e in item] if several else build(base, item)
+            arguments.append(item)
+        return kind(*arguments)
+
+    plan(type_name)
+    return lambda value: build(type_name, value)
+
+
 def builder(type_name: str, ros: int, class_of: Callable[[str], Any]) -> Any:
-    """A function that builds a library's objects from a nested dict, as a careful user would."""
+    """A function that builds a library's objects from a nested dict of one known type.
+
+    It is what a user would write by hand for the type, constructor by constructor.
+    """
     lines: list[str] = []
     names: dict[str, Any] = {}
 
