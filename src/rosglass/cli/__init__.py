@@ -46,9 +46,16 @@ def build_parser(command: str | None = None) -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code (0 done, 1 failed, 2 wrong usage, 130 Ctrl-C)."""
     arguments = list(sys.argv[1:] if argv is None else argv)
+    # What follows -- is not ours: argparse would look for options in it.
+    end = arguments.index("--") if "--" in arguments else len(arguments)
+    arguments, rest = arguments[:end], arguments[end + 1 :]
     command = next((a for a in arguments if not a.startswith("-")), None)
     try:
-        args = build_parser(command).parse_args(arguments)
+        parser = build_parser(command)
+        args = parser.parse_args(arguments)
+        if rest and not hasattr(args, "arguments"):
+            parser.error(f"{args.command} takes no arguments after --")
+        args.arguments = rest
         level = {0: logging.WARNING, 1: logging.INFO}.get(args.verbose, logging.DEBUG)
         logging.basicConfig(level=level, format="%(levelname)s %(name)s: %(message)s")
         return int(import_module(COMMANDS[args.command][0]).run(args))

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.qos import Durability, History, QoS, Reliability
 from rosglass.errors import ConversionError
-from rosglass.messages.schema import Kind
 from rosglass.qt import QJSValue, QtGui, QtQml
 
 if TYPE_CHECKING:
@@ -89,7 +88,7 @@ def _field(value: QJSValue, member: Member, path: str) -> Any:
     if value.isArray() or value.property("#index").isNumber():
         return _elements(value, member, path)
     constructor = value.property("constructor").property("name").toString()
-    if constructor in _TYPED and member.kind is Kind.NUMBER:
+    if constructor in _TYPED and member.number is not None:
         return _typed_array(value, constructor)
     if constructor == "ArrayBuffer" and member.number is not None and member.number.size == 1:
         return bytes(value.toVariant().data())
@@ -103,7 +102,7 @@ def _elements(value: QJSValue, member: Member, path: str) -> Any:
         held: Any = source.toQObject()
         return held.arrays[value.property("#index").toInt()][1]
     length = value.property("length").toInt()
-    if length > _BULK and member.kind is not Kind.STRUCT:
+    if length > _BULK and member.struct is None:
         whole = member.number is not None and member.number.low is not None
         return [_integral(v) if whole else v for v in value.toVariant()]
     return [_single(value.property(i), member, f"{path}[{i}]") for i in range(length)]

@@ -101,24 +101,27 @@ class RateLimit:
 
 
 class LocationFormatter(logging.Formatter):
-    """Puts ``file:line`` in front of what came from QML; the rest as ``LEVEL logger: text``."""
+    """Shows what came from QML as ``file:line: LEVEL text``, the rest as ``LEVEL logger: text``."""
 
     def __init__(self) -> None:
         super().__init__("%(levelname)s %(name)s: %(message)s")
 
     def format(self, record: logging.LogRecord) -> str:
         """Return the line for a record."""
-        text = super().format(record)
-        from_qml = record.name.startswith(_QML) and not record.pathname.endswith(".py")
-        return f"{record.pathname}:{record.lineno}: {text}" if from_qml else text
+        if not record.name.startswith(_QML) or record.pathname.endswith(".py"):
+            return super().format(record)
+        name = record.name.removeprefix(_QML).lstrip(".")
+        logger = f" {name}" if name else ""
+        place = f"{record.pathname}:{record.lineno}"
+        return f"{place}: {record.levelname}{logger}: {record.getMessage()}"
 
 
 _TYPES = {
-    "QtDebugMsg": logging.DEBUG,
-    "QtInfoMsg": logging.INFO,
-    "QtWarningMsg": logging.WARNING,
-    "QtCriticalMsg": logging.ERROR,
-    "QtFatalMsg": logging.CRITICAL,
+    QtCore.QtMsgType.QtDebugMsg: logging.DEBUG,
+    QtCore.QtMsgType.QtInfoMsg: logging.INFO,
+    QtCore.QtMsgType.QtWarningMsg: logging.WARNING,
+    QtCore.QtMsgType.QtCriticalMsg: logging.ERROR,
+    QtCore.QtMsgType.QtFatalMsg: logging.CRITICAL,
 }
 _handling = threading.local()
 
@@ -129,7 +132,7 @@ def _handle(mode: Any, context: Any, message: str) -> None:
         return
     _handling.busy = True
     try:
-        level = _TYPES.get(str(mode).rpartition(".")[2], logging.WARNING)
+        level = _TYPES.get(mode, logging.WARNING)
         category = context.category or "default"
         file = context.file or ""
         if not file:

@@ -6,8 +6,8 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING
 
+from rosglass.comm.qos import History
 from rosglass.errors import ConversionError, Error, TypeNotFoundError
-from rosglass.messages.schema import schema_of
 from rosglass.qml.element import RETRY, Element
 from rosglass.qml.from_js import fields_from_js
 from rosglass.qml.log import log_from_qml
@@ -81,7 +81,13 @@ class Publisher(Element):
             self._complain(f"nothing was published on {self._topic}: {reason}", logging.WARNING)
             return False
         try:
-            sender.publish(fields_from_js(message, schema))
+            fields = fields_from_js(message, schema)
+            if self._qos.history is History.KEEP_ALL and self._session is not None:
+                # Who must not lose anything waits for a network that is stuck: not here.
+                data = sender.type.encode(fields)
+                self._session.background(lambda: sender.publish_serialized(data))
+            else:
+                sender.publish(fields)
         except ConversionError as error:
             text = f"nothing was published on {self._resolved}: {error}"
             self._complain(text, logging.ERROR)
@@ -135,6 +141,8 @@ class Publisher(Element):
             if isinstance(result, TypeNotFoundError):
                 self._retry.start(RETRY)
             return
+        from rosglass.messages.schema import schema_of  # noqa: PLC0415 - loaded by now
+
         session = self._session
         assert session is not None
         self._sender, self._resolved = result, result.topic

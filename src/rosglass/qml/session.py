@@ -83,6 +83,7 @@ class Session(QtCore.QObject):
         self._status = Status(ConnectionState.CLOSED)
         self._failed = False
         self._generation = 0
+        self._closed = False
         self._handles: list[Handle] = []
         self._worker = Dispatcher("rosglass-qml")
         self._ticking = 0
@@ -194,6 +195,9 @@ class Session(QtCore.QObject):
 
     def close(self) -> None:
         """Shut down and wait, at most 3 s, for the node's goodbye; safe to call twice."""
+        if self._closed:
+            return
+        self._closed = True
         self.holding = False
         self.shutdown()
         done = threading.Event()
@@ -304,7 +308,7 @@ class Session(QtCore.QObject):
         before = (self.state, self.detail)
         self._status = status
         if (self.state, self.detail) != before or not self.is_initialized:
-            _log.info("connection: %s %s", self.state, self.detail)
+            _log.info("%s: %s", self.state, self.detail or "no node")
             self.connection_changed.emit()
 
 

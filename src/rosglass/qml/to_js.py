@@ -11,8 +11,6 @@ import math
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
-from rosglass.messages.schema import Kind
-
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -21,8 +19,8 @@ if TYPE_CHECKING:
 
 __all__ = ["INLINE", "LongArray", "describe", "exact", "reader", "to_json"]
 
-#: Arrays of more elements than this are fetched element by element or as a buffer.
-INLINE = {Kind.NUMBER: 64, Kind.TEXT: 32, Kind.STRUCT: 16}
+#: Arrays of more numbers, texts or messages than this are fetched when they are asked for.
+INLINE = {"number": 64, "text": 32, "message": 16}
 _EXACT = 1 << 53
 
 #: A long array: its member and its values.
@@ -77,7 +75,7 @@ def _is_wide(member: Member) -> bool:
 
 
 def _array_fix(member: Member) -> Callable[[Any, list[LongArray]], Any]:
-    limit = 0 if _is_wide(member) else INLINE[member.kind]
+    limit = 0 if _is_wide(member) else INLINE[member.kind.value]
     element = reader(member.struct) if member.struct is not None else None
     boolean = member.number is not None and member.number.code == "?"
 

@@ -1,0 +1,186 @@
+"""``rosglass run``: open an interface written in QML."""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rosglass.errors import QmlError, UnsupportedError
+
+if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Sequence
+
+    from rosglass.qml.runner import Runner
+
+__all__ = ["configure", "run", "show"]
+
+#: Qt's messages that say nothing to whoever runs an interface.
+_QUIET = "qt.multimedia.symbolsresolver=false;qt.multimedia.ffmpeg*=false;qt.qpa.theme*=false"
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Describe the options."""
+    parser.add_argument("file", metavar="FILE.qml", type=Path, help="the interface")
+    parser.add_argument(
+        "--url",
+        default="",
+        help="address of the robot, e.g. zenoh://192.168.1.5:7447; default: ROSGLASS_URL",
+    )
+    parser.add_argument("--name", default="", help="node name, instead of the one in the file")
+    parser.add_argument(
+        "--watch",
+        action="store_true",
+        help="show the interface anew whenever a file in its folder is saved",
+    )
+    parser.add_argument(
+        "--no-watch", dest="watch", action="store_false", help="don't; this is the default"
+    )
+    parser.add_argument("--fullscreen", action="store_true", help="fill the screen")
+    parser.add_argument(
+        "--screenshot",
+        metavar="PICTURE",
+        type=Path,
+        help="save a picture of the window (PNG, JPEG) and end",
+    )
+    parser.add_argument(
+        "--after",
+        metavar="SECONDS",
+        type=_seconds,
+        default=2.0,
+        help="when to take the screenshot (default: %(default)s)",
+    )
+    parser.set_defaults(arguments=[])
+    parser.epilog = "Arguments after -- are the interface's own, in Qt.application.arguments."
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not 0 <= value <= 86_400:
+        raise ValueError(text)
+    return value
+
+
+def run(args: argparse.Namespace) -> int:
+    """Show the interface until it is closed; returns the exit code."""
+    if not args.file.is_file():
+        print(f"{args.file}:0:0: there is no such file", file=sys.stderr)
+        return 1
+    _format_log(args.verbose)
+    try:
+        return show(
+            args.file,
+            url=args.url,
+            name=args.name,
+            watch=args.watch,
+            fullscreen=args.fullscreen,
+            screenshot=args.screenshot,
+            after=args.after,
+            arguments=args.arguments,
+        )
+    except QmlError as error:
+        print(error, file=sys.stderr)
+        return 1
+
+
+def show(
+    file: Path,
+    *,
+    url: str = "",
+    name: str = "",
+    watch: bool = False,
+    fullscreen: bool = False,
+    screenshot: Path | None = None,
+    after: float = 2.0,
+    arguments: Sequence[str] = (),
+) -> int:
+    """Show a QML file in a window until it is closed.
+
+    Args:
+        file: The file.
+        url: Address of the robot; empty for ROSGLASS_URL.
+        name: Node name, instead of the one in the file.
+        watch: Show it anew whenever a file in its folder is saved.
+        fullscreen: Fill the screen.
+        screenshot: Where to save a picture of the window, after which the program ends.
+        after: Seconds until the screenshot.
+        arguments: What the interface finds in ``Qt.application.arguments``.
+
+    Returns:
+        The exit code: 0, what QML gave to ``Qt.exit()``, 130 after Ctrl-C.
+
+    Raises:
+        QmlError: The file is missing or has errors.
+        UnsupportedError: There is no display.
+    """
+    os.environ["QT_LOGGING_RULES"] = ";".join(
+        filter(None, [_QUIET, os.environ.get("QT_LOGGING_RULES", "")])
+    )
+    if screenshot is not None:
+        # Grabbing waits for the renderer, which may wait for Python.
+        os.environ["QSG_RENDER_LOOP"] = "basic"
+
+    from rosglass.qml.display import require_display
+    from rosglass.qml.interrupt import QuitOnSignal
+    from rosglass.qml.log import install_message_handler
+    from rosglass.qml.runner import Runner, needs_widgets
+    from rosglass.qml.session import Session
+    from rosglass.qt import QtCore, QtGui, optional
+
+    connected = require_display()
+    install_message_handler()
+    widgets = optional("QtWidgets") if needs_widgets(file) else None
+    kind: Any = QtGui.QGuiApplication if widgets is None else widgets.QApplication
+    app = kind([str(file), *arguments])
+    connected()
+    app.setApplicationName(file.stem)
+    app.setApplicationDisplayName(file.stem)
+    session = Session(url or os.environ.get("ROSGLASS_URL", ""), name)
+    signals: list[int] = []
+
+    def interrupted(number: int) -> None:
+        signals.append(number)
+        session.executor.post(app.quit)
+
+    with QuitOnSignal(interrupted):
+        try:
+            runner = Runner(file, session, watch=watch, fullscreen=fullscreen)
+        except QmlError:
+            session.close()
+            raise
+        if screenshot is not None:
+            target = screenshot
+            QtCore.QTimer.singleShot(round(after * 1000), lambda: app.exit(_save(runner, target)))
+        code = 0 if signals else int(app.exec())
+        runner.close()
+        session.close()
+    return 128 + signals[0] if signals else code
+
+
+def _save(runner: Runner, target: Path) -> int:
+    try:
+        image = runner.grab()
+        if image.isNull():
+            raise UnsupportedError("the interface has no window to take a picture of")
+        if not image.save(str(target)):
+            raise UnsupportedError(
+                f"the picture could not be written to {target}; "
+                "its folder must exist and its name end in .png or .jpg"
+            )
+    except UnsupportedError as error:
+        print(f"rosglass: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _format_log(verbose: int) -> None:
+    """Show what comes from QML with its file and line, and from its author's level on."""
+    from rosglass.qml.log import LocationFormatter
+
+    for handler in logging.getLogger().handlers:
+        handler.setFormatter(LocationFormatter())
+    level = logging.DEBUG if verbose > 1 else logging.INFO
+    logging.getLogger("rosglass.qml").setLevel(level)

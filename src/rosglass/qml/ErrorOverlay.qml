@@ -1,0 +1,22 @@
+import QtQuick
+
+// Shown over the last good interface while a reloaded one has errors.
+Rectangle {
+    id: overlay
+
+    property string text: ""
+
+    z: 1000000
+    anchors.fill: parent
+    color: "#c0301010"
+
+    Text {
+        anchors.fill: parent
+        anchors.margins: 24
+        color: "white"
+        font.family: "monospace"
+        font.pixelSize: 15
+        wrapMode: Text.Wrap
+        text: "The interface below is the last one without errors.\n\n" + overlay.text
+    }
+}

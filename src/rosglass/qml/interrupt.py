@@ -1,0 +1,68 @@
+"""Ctrl-C and SIGTERM while Qt's event loop runs."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import sys
+import threading
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import TracebackType
+
+__all__ = ["QuitOnSignal"]
+
+#: Seconds that the program has to end in good order.
+_PATIENCE = 4.0
+
+
+class QuitOnSignal:
+    """Calls `quit` when the process is told to end, and ends it itself when that does not help.
+
+    Python runs its signal handlers only between two instructions of Python; an event loop in C++,
+    or QML that hangs, would put that off for ever. A thread is told at once.
+
+    Args:
+        quit: Called in that thread with the signal's number.
+    """
+
+    def __init__(self, quit: Callable[[int], None]) -> None:
+        self._quit = quit
+        self._reader, self._writer = socket.socketpair()
+        self._ended = threading.Event()
+        self._before: dict[int, Any] = {}
+        self._wakeup = -1
+
+    def __enter__(self) -> QuitOnSignal:
+        self._writer.setblocking(False)
+        self._wakeup = signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            self._before[number] = signal.signal(number, lambda *_: None)
+        threading.Thread(target=self._watch, name="signals", daemon=True).start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._ended.set()
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+        signal.set_wakeup_fd(self._wakeup)
+        self._writer.close()
+
+    def _watch(self) -> None:
+        ending = {int(number) for number in self._before}
+        while received := self._reader.recv(1):
+            if received[0] in ending:
+                self._quit(received[0])
+                if not self._ended.wait(_PATIENCE):
+                    sys.stderr.write("rosglass: the interface does not react; ending it\n")
+                    sys.stderr.flush()
+                    os._exit(128 + received[0])
+        self._reader.close()
