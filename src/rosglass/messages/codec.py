@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from rosglass.errors import DecodeError
+from rosglass.errors import ConversionError, DecodeError
 from rosglass.messages import diagnosis, layout
 from rosglass.messages.conversion import convert
 from rosglass.messages.emit_read import Reader
 from rosglass.messages.emit_write import write_function
 from rosglass.messages.layout import ANYWHERE, START, Cursor, Wire
 from rosglass.messages.message import await_fill, plain_class, shell_class
+from rosglass.messages.runtime import MAX_EMPTY, OddValueError
 from rosglass.messages.sequences import MessageSequence
 from rosglass.messages.source import Source
 
@@ -224,10 +225,14 @@ class Codec:
         )
 
     def _writer(self, from_dict: bool, joined: bool) -> Any:
-        def slowly(value: Any, error: Exception, again: bool) -> Any:
-            if again:
-                raise error
-            return self.writer(False, joined)(convert(self.schema, value), True)
+        def slowly(value: Any, error: Exception) -> Any:  # noqa: ARG001 - raised again if real
+            message = convert(self.schema, value)
+            last = self.made(("write", joined), lambda: write_function(self, False, joined, None))
+            try:
+                return last(message)
+            except OddValueError:
+                limit = f"no array of more than {MAX_EMPTY} messages that take no bytes"
+                raise ConversionError("", value, limit, self.schema.name) from None
 
         return write_function(self, from_dict, joined, slowly)
 

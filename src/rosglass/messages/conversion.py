@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.errors import ConversionError
 from rosglass.interfaces.definition import ArrayKind
 from rosglass.messages.message import Message, plain_class
-from rosglass.messages.runtime import MAX_EMPTY, number_type
+from rosglass.messages.runtime import number_type
 from rosglass.messages.schema import Kind
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from rosglass.messages.layout import Wire
     from rosglass.messages.schema import Member, Number, Schema
 
-__all__ = ["array_packer", "as_bool", "as_float", "as_int", "convert", "convert_member", "default"]
+__all__ = ["array_packer", "as_bool", "as_float", "as_int", "convert"]
 
 _FLOAT32_MAX = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]
 _NANO = 1_000_000_000
@@ -168,7 +168,7 @@ def _numbers(member: Member, value: Any, path: str) -> np.ndarray:
         plain = [_number(number, item, f"{path}[{index}]") for index, item in enumerate(items)]
         made = numpy.array(plain, dtype)
     _check_length(member, len(made), value, path)
-    return made  # type: ignore[no-any-return]
+    return numpy.ascontiguousarray(made)  # type: ignore[no-any-return]
 
 
 def _from_array(number: Number, dtype: Any, value: np.ndarray, path: str) -> np.ndarray:
@@ -244,8 +244,8 @@ def array_packer(member: Member, wire: Wire) -> Callable[[Any], tuple[Any, int]]
                 value = _numbers(member, value, "")
                 if value.dtype != wanted:
                     value = value.astype(wanted)
-            count = len(value)
-            data = value if value.flags.c_contiguous else value.copy()
+            # Gaps between the elements show when the parts are joined, see Codec.
+            count, data = len(value), value
         if limit is not None and (count > limit or (fixed is not None and count != fixed)):
             _check_length(member, count, value, "")
         return data, count
@@ -256,12 +256,19 @@ def array_packer(member: Member, wire: Wire) -> Callable[[Any], tuple[Any, int]]
 # -- messages ------------------------------------------------------------------------------------
 
 
-def convert(schema: Schema, value: Any, path: str = "") -> Message:
+def convert(schema: Schema, value: Any) -> Message:
     """Return a plain message made from a dict, a message of the type, or something like a time.
 
     Raises:
         ConversionError: A value does not fit; its path is the field's from the root.
     """
+    try:
+        return _message(schema, value, "")
+    except ConversionError as error:
+        raise ConversionError(error.path, error.value, error.expected, schema.name) from None
+
+
+def _message(schema: Schema, value: Any, path: str) -> Message:
     cls = plain_class(schema)
     if isinstance(value, Message):
         if value._schema__ is not schema:
@@ -277,9 +284,9 @@ def convert(schema: Schema, value: Any, path: str = "") -> Message:
     for member in schema.members:
         if member.name in given:
             inner = f"{path}.{member.name}" if path else member.name
-            found = convert_member(member, given[member.name], inner)
+            found = _member(member, given[member.name], inner)
         else:
-            found = default(member)
+            found = _default(member)
         setattr(made, member.attr, found)
     return made
 
@@ -317,7 +324,7 @@ def _time_parts(value: Any) -> tuple[Any, Any] | None:
     return None
 
 
-def convert_member(member: Member, value: Any, path: str) -> Any:
+def _member(member: Member, value: Any, path: str) -> Any:
     """Return the value of a field, checked and in its canonical Python form."""
     if not member.is_array:
         return _element(member, value, path)
@@ -325,8 +332,6 @@ def convert_member(member: Member, value: Any, path: str) -> Any:
         return _numbers(member, value, path)
     items = _sequence(value, path, member.field.type.name)
     _check_length(member, len(items), value, path)
-    if member.struct is not None and not member.struct.members and len(items) > MAX_EMPTY:
-        raise ConversionError(path, value, f"at most {MAX_EMPTY} empty messages")
     return [_element(member, item, f"{path}[{index}]") for index, item in enumerate(items)]
 
 
@@ -336,16 +341,14 @@ def _element(member: Member, value: Any, path: str) -> Any:
     if member.kind is Kind.TEXT:
         return _text(member, value, path)
     assert member.struct is not None
-    return convert(member.struct, value, path)
+    return _message(member.struct, value, path)
 
 
-def default(member: Member) -> Any:
+def _default(member: Member) -> Any:
     """Return a fresh default value of a field: the definition's, or zero and empty."""
     given = member.field.default
     if given is not None:
-        return convert_member(
-            member, list(given) if isinstance(given, tuple) else given, member.name
-        )
+        return _member(member, list(given) if isinstance(given, tuple) else given, member.name)
     count = member.fixed_count or 0
     one: Callable[[], Any]
     if member.number is not None:
@@ -357,5 +360,5 @@ def default(member: Member) -> Any:
         one = str
     else:
         assert member.struct is not None
-        one = partial(convert, member.struct, {})
+        one = partial(_message, member.struct, {}, "")
     return [one() for _ in range(count)] if member.is_array else one()

@@ -149,7 +149,7 @@ class _Walk:
         reader.flush()
         cursor = reader.cursor.copy()
         if cursor.var:
-            name = self.source.fresh("f")
+            name = self.source.fresh("at")
             self.source.line(f"{name} = {cursor.at()}")
             cursor.move(name, cursor.known)
         return Reader(self.codec, self.source, cursor)

@@ -15,7 +15,7 @@ from rosglass.messages import layout
 from rosglass.messages.layout import Cursor, Knowledge
 from rosglass.messages.runtime import MAX_EMPTY, number_type, read_wide, too_short
 from rosglass.messages.schema import Kind
-from rosglass.messages.source import Source, unpacker
+from rosglass.messages.source import Source, iterator, unpacker
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -29,6 +29,8 @@ __all__ = ["Reader"]
 #: Nested messages of up to this many values are filled with their parent, bigger ones on demand.
 INLINE_LEAVES = 16
 
+_DECODE = '.decode("utf-8", "surrogateescape")'
+
 
 class Reader:
     """Emits the reading of a buffer called ``b``.
@@ -41,7 +43,8 @@ class Reader:
     def __init__(self, codec: Codec, source: Source, cursor: Cursor) -> None:
         self.codec, self.wire = codec, codec.wire
         self.source, self.cursor = source, cursor
-        self._run: list[tuple[str, str, int]] = []
+        #: Numbers to be unpacked together: target, format character, size.
+        self.run: list[tuple[str, str, int]] = []
         #: Whether the end was not yet proved to lie within the buffer.
         self.unproved = False
 
@@ -49,15 +52,15 @@ class Reader:
 
     def number(self, target: str, code: str, size: int) -> None:
         """Unpack one number into `target` ('' for none); it joins the current run."""
-        self._run.append((target, code, size))
+        self.run.append((target, code, size))
 
     def flush(self) -> None:
         """Unpack the numbers collected so far."""
-        while self._run:
+        while self.run:
             if self.wire.aligned:
-                self.cursor.align(self.source, self._run[0][2], self.var)
-            taken, layouts = self._plan_run()
-            run, self._run = self._run[:taken], self._run[taken:]
+                self.cursor.align(self.source, self.run[0][2], self.var)
+            taken, layouts = self.plan_run()
+            run, self.run = self.run[:taken], self.run[taken:]
             targets = ", ".join(target for target, _, _ in run if target)
             if len(layouts) == 1:
                 fmt, size = layouts[0]
@@ -85,7 +88,7 @@ class Reader:
         at = "" if offset == "0" else f", {offset}"
         self.source.line(f"{targets}{comma} = {function}(b{at})")
 
-    def _plan_run(self) -> tuple[int, list[tuple[str, int]]]:
+    def plan_run(self) -> tuple[int, list[tuple[str, int]]]:
         """Return how many numbers fit one call, and the layout for each possible residue."""
         known = self.cursor.known
         starts = [known.residue]
@@ -93,18 +96,18 @@ class Reader:
             modulus = 1
         else:
             modulus = known.modulus
-            if modulus == 4 and any(size == 8 for _, _, size in self._run):
+            if modulus == 4 and any(size == 8 for _, _, size in self.run):
                 modulus, starts = 8, [known.residue, known.residue + 4]
-        taken = len(self._run)
+        taken = len(self.run)
         if self.wire.aligned:
-            for index, (_, _, size) in enumerate(self._run):
+            for index, (_, _, size) in enumerate(self.run):
                 if size > modulus:
                     taken = index
                     break
         layouts = []
         for start in starts:
             fmt, position = [self.wire.order], start
-            for target, code, size in self._run[:taken]:
+            for target, code, size in self.run[:taken]:
                 pad = -position % size if self.wire.aligned else 0
                 fmt.append("x" * pad + (code if target else "x" * size))
                 position += pad + size
@@ -190,25 +193,30 @@ class Reader:
         self.flush()
         var, line = self.var, self.source.line
         start = self.cursor.at()
-        if not (start.isdigit() or start == "s"):
-            line(f"s = {start}")
-            start = "s"
+        known = self.cursor.known.many(self.wire.wide if member.wide else 1)
         if member.wide:
-            line(f"{var} = {start} + n * {self.wire.wide}")
+            line(f"s = {start}")
+            line(f"{var} = s + n * {self.wire.wide}")
             wide = self.source.bind(read_wide, "wide")
-            line(f"{target} = {wide}(b, {start}, {var}, {self.wire.wide}, {self.wire.big})")
+            line(f"{target} = {wide}(b, s, {var}, {self.wire.wide}, {self.wire.big})")
+            self.cursor.move(var, known)
         elif self.wire.aligned:
-            line(f"{var} = {start} + n")
+            last = self._other_var(var)
+            line(f"{last} = {self.cursor.at(-1)} + n")
+            line(f"{target} = b[{start}:{last}]{_DECODE}")
             # The look at the last byte is the bounds check, too. Some writers send no NUL.
-            line(
-                f"{target} = (b[{start}:{var}] if b[{var} - 1] else b[{start}:{var} - 1])"
-                '.decode("utf-8", "surrogateescape")'
-            )
+            line(f"if b[{last}]: {target} = b[{start}:{last} + 1]{_DECODE}")
+            self.cursor.move(last, known, 1)
         else:
-            line(f"{var} = {start} + n")
-            line(f'{target} = b[{start}:{var}].decode("utf-8", "surrogateescape")')
-        self.cursor.move(var, self.cursor.known.many(self.wire.wide if member.wide else 1))
+            last = self._other_var(var)
+            line(f"{last} = {start} + n")
+            line(f"{target} = b[{start}:{last}]{_DECODE}")
+            self.cursor.move(last, known)
         self.unproved = not self.wire.aligned
+
+    def _other_var(self, var: str) -> str:
+        """Return the other of the two locals that take turns in holding the offset."""
+        return var[:-1] if var.endswith("_") else f"{var}_"
 
     def _numbers(self, member: Member, target: str, count: str) -> None:
         number = member.number
@@ -335,13 +343,55 @@ class Reader:
     def many(self, schema: Schema, count: str) -> None:
         """Decode elements into a list called ``out``."""
         cls = self.source.bind(self.codec.of(schema).cls, "C")
-        self.source.line("out = []")
-        self.source.line("add = out.append")
+        line = self.source.line
+        if not layout.min_size(schema, self.wire):
+            # Without anything in them, one is as good as another.
+            line(f"m = {cls}()")
+            self.fields(schema, "m")
+            line(f"out = [m] * {count}")
+            return
+        line("out = []")
+        line("add = out.append")
+        stride = layout.constant_stride(schema, self.wire)
+        if stride is not None and stride[0] == stride[1] and layout.all_numbers(schema):
+            self._records(schema, stride[0], count, cls)
+            return
         with self.schema_loop(f"for _ in range({count}):", schema):
-            self.source.line(f"m = {cls}()")
+            line(f"m = {cls}()")
             self.fields(schema, "m")
             self.flush()
-            self.source.line("add(m)")
+            line("add(m)")
+
+    def _records(self, schema: Schema, size: int, count: str, cls: str) -> None:
+        """Decode messages of nothing but numbers, without a gap between them, in one sweep."""
+        start = self._elements_start(self._first_align(schema), count)
+        if start != "o":
+            self.source.line(f"o = {start}")
+        known = layout.after_elements(self.cursor.known, self._first_align(schema), size, size)
+        # Elements start on their largest alignment, so any such position will do to lay them out.
+        self.cursor.move("o", layout.START)
+        body = Source()
+        body.globals = self.source.globals
+        body.names = self.source.names
+        sweep = Reader(self.codec, body, self.cursor.copy())
+        sweep.fields(schema, "m")
+        fields = [(f"v{i}", target) for i, (target, _, _) in enumerate(sweep.run) if target]
+        taken, layouts = sweep.plan_run()
+        assert taken == len(sweep.run)
+        each = self.source.bind(iterator(layouts[0][0]), "each")
+        line = self.source.line
+        line(f"end = o + {count} * {size}")
+        names = ", ".join(name for name, _ in fields)
+        with self.source.block(f"for {names}, in {each}(b[o:end]):"):
+            line(f"m = {cls}()")
+            for text in body.lines:
+                line(text.strip())
+            for name, target in fields:
+                line(f"{target} = {name}")
+            line("add(m)")
+        line("o = end")
+        self.cursor.move("o", known)
+        self.unproved = True
 
     def _first_align(self, schema: Schema) -> int:
         return layout.align_of(schema.members[0], self.wire) if schema.members else 1

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.messages import layout
 from rosglass.messages.conversion import array_packer, as_bool, as_float, as_int
 from rosglass.messages.layout import START, Cursor, Knowledge
-from rosglass.messages.runtime import as_list, odd, own, write_wide
+from rosglass.messages.runtime import MAX_EMPTY, as_list, odd, own, write_wide
 from rosglass.messages.schema import Kind
 from rosglass.messages.source import Source, packer
 
@@ -37,15 +37,20 @@ class Writer:
     Attributes:
         source: Where the code goes.
         from_dict: Whether values come from nested dicts instead of messages.
+        lenient: Whether strings may hold bytes that are not UTF-8, as surrogates.
     """
 
-    def __init__(self, codec: Codec, source: Source, from_dict: bool) -> None:
+    def __init__(
+        self, codec: Codec, source: Source, from_dict: bool = False, lenient: bool = False
+    ) -> None:
         self.codec, self.wire, self.source = codec, codec.wire, source
-        self.from_dict = from_dict
+        self.from_dict, self.lenient = from_dict, lenient
         # Positions in the body; the header goes out with the first run.
         self.cursor = Cursor(self.wire, "", 0, START)
         self.cursor.shift = 0
         self._run: list[tuple[str, str, int]] = []
+        #: Locals in the run whose type was not checked yet, by the type they should have.
+        self._unchecked: dict[type, list[str]] = {bool: [], int: [], float: []}
         #: Zero bytes still to be written before the next run; already counted in the position.
         self._pending = 0
         self._header = bytes((0, 0 if self.wire.big else 1, 0, 0)) if self.wire.aligned else b""
@@ -77,6 +82,7 @@ class Writer:
             return
         largest = max(size for _, _, size in run) if self.wire.aligned else 1
         values = ", ".join(value for value, _, _ in run)
+        self._check_types()
         known = self.cursor.known
         if not self.wire.aligned or known.modulus >= largest:
             fmt, size = self._layout(run, known.residue)
@@ -85,12 +91,31 @@ class Writer:
             return
         layouts = [self._layout(run, start) for start in range(largest)]
         table = self.source.bind(tuple(packer(fmt) for fmt, _ in layouts), "packs")
-        sizes = self.source.bind(tuple(size for _, size in layouts), "sizes")
-        self.source.line(f"k = ({self.cursor.at()}) & {largest - 1}")
-        self._part(f"{table}[k]({values})")
-        self.source.line(f"o = {self.cursor.at()} + {sizes}[k]")
+        place = self.cursor.at()
+        self._part(f"{table}[{place} & {largest - 1}]({values})")
+        if run[0][2] == largest:
+            # Only the first number is padded for, by as much as brings it onto its alignment.
+            end = f"({self.cursor.aligned(largest)}) + {layouts[0][1]}"
+        else:
+            sizes = self.source.bind(tuple(size for _, size in layouts), "sizes")
+            end = f"{place} + {sizes}[{place} & {largest - 1}]"
+        self.source.line(f"o = {end}")
         self.cursor.move("o", Knowledge(largest, layouts[0][1] % largest))
         self._pending = 0
+
+    def _check_types(self) -> None:
+        """Convert the numbers of the run that are not of the very type expected.
+
+        The check itself is one chain of comparisons: conversion is the exception.
+        """
+        for kind, names in self._unchecked.items():
+            if names:
+                chain = " is ".join(f"{name}.__class__" for name in names)
+                convert = self.source.bind(_CHECKS[kind], f"as_{kind.__name__}")
+                with self.source.block(f"if not ({chain} is {kind.__name__}):"):
+                    for name in names:
+                        self.source.line(f"{name} = {convert}({name})")
+                names.clear()
 
     def _packed(self, fmt: str, values: str) -> str:
         if self._header:
@@ -144,6 +169,7 @@ class Writer:
     def finish(self, joined: bool) -> None:
         """Emit the end of the function: the bytes, or the list of parts."""
         self._zeros()
+        self.source.drop_last("o = ")  # nothing follows that would need the position
         if not joined:
             parts = "parts" if self._parts is None else f"[{', '.join(self._parts)}]"
             self.source.line(f"return {parts}")
@@ -169,9 +195,8 @@ class Writer:
         if self.from_dict:
             strange = self.source.bind(odd, "odd")
             count = len(schema.members)
-            self.source.line(
-                f"if type({holder}) is not dict or len({holder}) != {count}: {strange}()"
-            )
+            # Neither an unknown field nor a missing one can hide behind the right number.
+            self.source.line(f"if len({holder}) != {count}: {strange}()")
         else:
             cls = self.source.bind(self.codec.of(schema).cls, "C")
             mine = self.source.bind(own, "own")
@@ -190,8 +215,7 @@ class Writer:
         if member.number is not None:
             name, number = self.source.fresh("v"), member.number
             line(f"{name} = {value}")
-            check = self.source.bind(_CHECKS[number.python], f"as_{number.python.__name__}")
-            line(f"if type({name}) is not {number.python.__name__}: {name} = {check}({name})")
+            self._unchecked[number.python].append(name)
             self._run.append((name, number.code, number.size))
         elif member.kind is Kind.TEXT:
             self._text(member, value)
@@ -212,7 +236,9 @@ class Writer:
             wide = self.source.bind(write_wide, "wide")
             line(f"{text}, {count} = {wide}({value}, {width}, {self.wire.big})")
         else:
-            line(f'{text} = {value}.encode("utf-8", "surrogateescape")')
+            # Strict is quicker; what it refuses comes back by way of the conversion.
+            how = '"utf-8", "surrogateescape"' if self.lenient else ""
+            line(f"{text} = {value}.encode({how})")
             line(f"{count} = len({text})" + (" + 1" if self.wire.aligned else ""))
             limit = None if limit is None else limit + (1 if self.wire.aligned else 0)
         if limit is not None:
@@ -262,8 +288,11 @@ class Writer:
         else:
             count = self.source.fresh("n")
             line(f"{count} = len({items})")
-            if member.size is not None:
-                line(f"if {count} > {member.size}: {strange}()")
+            limit = member.size
+            if member.struct is not None and not layout.min_size(member.struct, self.wire):
+                limit = min(limit or MAX_EMPTY, MAX_EMPTY)
+            if limit is not None:
+                line(f"if {count} > {limit}: {strange}()")
             self._run.append((count, "I", 4))
         head = f"for {item} in {items}:"
         schema = member.struct
@@ -321,24 +350,29 @@ class Writer:
         self.cursor.move("o", known)
 
 
-def write_function(codec: Codec, from_dict: bool, joined: bool, convert: Any) -> Any:
-    """Return ``write(value, again=False)``: the bytes of a message or dict, or their parts.
+def write_function(
+    codec: Codec, from_dict: bool, joined: bool, convert: Callable[[Any, Exception], Any] | None
+) -> Any:
+    """Return ``write(value)``: the bytes of a message or dict, or their parts.
 
     Args:
         codec: The codec.
         from_dict: Whether it takes dicts, otherwise messages.
         joined: Whether it returns bytes, otherwise a list of buffers.
         convert: Called with the value and the error when the generated code does not do; returns
-            what the function returns.
+            what the function returns. None for values that are converted already.
     """
     source = Source()
-    writer = Writer(codec, source, from_dict)
-    with source.block("try:"):
-        writer.check_holder(codec.schema, "m")
+    writer = Writer(codec, source, from_dict, lenient=convert is None)
+    if convert is None:
         writer.fields(codec.schema, "m")
         writer.finish(joined)
-    with source.block("except Exception as error:"):
-        source.line(f"return {source.bind(convert, 'convert')}(m, error, again)")
+    else:
+        with source.block("try:"):
+            writer.check_holder(codec.schema, "m")
+            writer.fields(codec.schema, "m")
+            writer.finish(joined)
+        with source.block("except Exception as error:"):
+            source.line(f"return {source.bind(convert, 'convert')}(m, error)")
     what = f"encode {'dict' if from_dict else 'message'}{'' if joined else ' parts'}"
-    title = f"{what} {codec.schema.name} {codec.wire.title}"
-    return source.compile("write(m, again=False)", title)
+    return source.compile("write(m)", f"{what} {codec.schema.name} {codec.wire.title}")

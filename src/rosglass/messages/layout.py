@@ -182,6 +182,17 @@ def leaves(schema: Schema) -> int:
     return total
 
 
+def all_numbers(schema: Schema) -> bool:
+    """Return whether a message holds at least one number, no string and no array at any depth."""
+    return bool(schema.members) and all(
+        not member.is_array
+        and (
+            member.number is not None or (member.struct is not None and all_numbers(member.struct))
+        )
+        for member in schema.members
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class Knowledge:
     """What is known of a position when code is generated: it is `residue` modulo `modulus`."""
@@ -284,16 +295,16 @@ class Cursor:
         delta = self.delta + extra
         if not self.var:
             return str(delta)
-        return f"{self.var} + {delta}" if delta > 0 else self.var
+        return f"{self.var} {'+' if delta > 0 else '-'} {abs(delta)}" if delta else self.var
 
     def advance(self, size: int) -> None:
         """Move on by a known number of bytes."""
         self.delta += size
         self.known = self.known.after(size)
 
-    def move(self, var: str, known: Knowledge) -> None:
-        """Stand where `var` says."""
-        self.var, self.delta, self.known = var, 0, known
+    def move(self, var: str, known: Knowledge, delta: int = 0) -> None:
+        """Stand `delta` bytes behind where `var` says, of which `known` is known."""
+        self.var, self.delta, self.known = var, delta, known
 
     def padding(self, align: int) -> int | None:
         """Return the number of padding bytes before `align`, None if only known at run time."""

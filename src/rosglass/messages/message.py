@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import time
 from difflib import get_close_matches
+from functools import lru_cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.errors import DecodeError, FieldPathError
 from rosglass.messages import access, text
 from rosglass.messages.schema import Kind
+from rosglass.messages.source import Source
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -177,7 +179,7 @@ def type_of(message: Message) -> MessageType:
 
 def touch(message: Message) -> None:
     """Decode a shell's own level, if it is one."""
-    fill = message._fill__
+    fill = type(message)._fill__
     if fill is not None:
         fill(message)
 
@@ -294,19 +296,26 @@ def shell_class(
             setattr(shell, member.attr, _field(member.attr, fill))
 
     install(first)
-    return shell
+    made: type[Message] = shell
+    return made
+
+
+@lru_cache(maxsize=4096)
+def _accessors(attr: str) -> Any:
+    """Return a function from a shell's `fill` to the getter and setter of one attribute."""
+    source = Source()
+    with source.block("def get(m):"):
+        source.line("fill(m)")
+        source.line(f"return m.{attr}")
+    with source.block("def put(m, value):"):
+        source.line("fill(m)")
+        source.line(f"m.{attr} = value")
+    source.line("return get, put")
+    return source.compile("accessors(fill)", f"access {attr}")
 
 
 def _field(attr: str, fill: Callable[[Any], None]) -> property:
-    def get(message: Message) -> Any:
-        fill(message)
-        return getattr(message, attr)
-
-    def put(message: Message, value: Any) -> None:
-        fill(message)
-        setattr(message, attr, value)
-
-    return property(get, put)
+    return property(*_accessors(attr)(fill))
 
 
 def await_fill(message: Message, shell: type[Message]) -> None:

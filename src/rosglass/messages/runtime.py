@@ -12,8 +12,9 @@ if TYPE_CHECKING:
 
 __all__ = ["MAX_EMPTY", "TooShortError", "number_type", "read_wide", "too_short", "write_wide"]
 
-#: Elements allowed in an array of messages that take no bytes: nothing else limits the count.
-MAX_EMPTY = 65536
+#: Elements allowed in an array of messages that take no bytes (ROS 1's ``std_msgs/Empty[]``):
+#: nothing in the buffer limits their count.
+MAX_EMPTY = 1024
 
 
 class TooShortError(Exception):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-__all__ = ["Source", "packer", "unpacker"]
+__all__ = ["Source", "iterator", "packer", "unpacker"]
 
 _numbers = itertools.count(1)
 
@@ -29,19 +29,31 @@ def packer(fmt: str) -> Callable[..., bytes]:
     return struct.Struct(fmt).pack
 
 
+@lru_cache(maxsize=4096)
+def iterator(fmt: str) -> Callable[..., Iterator[tuple[Any, ...]]]:
+    """Return ``struct.Struct(fmt).iter_unpack``, shared between all generated functions."""
+    return struct.Struct(fmt).iter_unpack
+
+
 class Source:
     """The text of one function and the objects its names stand for."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
         self.globals: dict[str, Any] = {}
-        self._names: dict[int, str] = {}
+        #: The names of the objects, by their id.
+        self.names: dict[int, str] = {}
         self._depth = 1
         self._fresh = itertools.count(1)
 
     def line(self, text: str) -> None:
         """Add a line at the current indentation."""
         self.lines.append("    " * self._depth + text)
+
+    def drop_last(self, start: str) -> None:
+        """Take back the last line if it is of the current block and starts with `start`."""
+        if self.lines and self.lines[-1].startswith("    " * self._depth + start):
+            self.lines.pop()
 
     @contextmanager
     def block(self, head: str) -> Iterator[None]:
@@ -53,10 +65,10 @@ class Source:
 
     def bind(self, value: Any, hint: str) -> str:
         """Return the name that stands for `value` in the text, made from `hint`."""
-        name = self._names.get(id(value))
+        name = self.names.get(id(value))
         if name is None:
             name = hint if hint not in self.globals else f"{hint}_{len(self.globals)}"
-            self._names[id(value)] = name
+            self.names[id(value)] = name
             self.globals[name] = value
         return name
 

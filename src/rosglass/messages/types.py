@@ -73,8 +73,8 @@ class MessageType:
         self.definition = definition
         self.name, self.ros = schema.name, schema.ros
         self.wire = "cdr" if schema.ros == 2 else "ros1"
-        self._codecs: dict[Any, Codec] = {}
-        self._shells: dict[str | None, tuple[type[Any], bool]] = {}
+        self._writers: dict[Any, tuple[Codec, Any, Any]] = {}
+        self._shells: dict[str, type[Any]] = {}
         self._paths: dict[Any, Callable[[Any], Any]] = {}
 
     @classmethod
@@ -184,20 +184,22 @@ class MessageType:
             DecodeError: The buffer is no bytes, or its header announces another representation.
                 Other damage shows when fields are read; :meth:`validate` finds it at once.
         """
-        fast = self._shells.get(wire)
-        if fast is not None and type(buffer) is bytes:
-            shell, aligned = fast
-            if not aligned or (len(buffer) > 3 and buffer[1] == 1 and not buffer[0]):
-                message: Message = shell()
+        if wire is None:
+            wire = self.wire
+        try:
+            message: Message = self._shells[wire]()
+            if buffer.__class__ is bytes and (wire == "ros1" or (buffer[1] == 1 and not buffer[0])):
                 message._buffer__ = buffer
                 return message
+        except LookupError:
+            pass  # the first of its kind, or too short for a header
         return self._decode(buffer, wire, wstring_width)
 
     def _decode(self, buffer: Any, wire: str | None, wide: int | None) -> Message:
         data = self._bytes(buffer)
         codec = self._codec_for(data, wire, wide)
         if not self._schema.has_wide and not codec.wire.big:
-            self._shells[wire] = codec.root, codec.wire.aligned
+            self._shells[codec.wire.name] = codec.root
         message = codec.root()
         message._buffer__ = data
         return message
@@ -360,16 +362,14 @@ class MessageType:
             value = fields
         elif fields:
             value = self._merged(value, fields)
-        codec = self._writing_codec(wire, byteorder, wstring_width)
-        if type(value) is dict:
-            data: bytes = codec.writer(True, True)(value)
-            return data
-        if getattr(value, "_root__", None) is codec:
-            untouched = getattr(value, "_buffer__", None)
-            if untouched is not None:
-                return untouched  # type: ignore[no-any-return]
-        written: bytes = codec.writer(False, True)(value)
-        return written
+        try:
+            codec, from_dict, from_message = self._writers[wire, byteorder, wstring_width]
+        except (KeyError, TypeError):
+            codec, from_dict, from_message = self._writer(wire, byteorder, wstring_width)
+        if value.__class__ is dict:
+            return from_dict(value)  # type: ignore[no-any-return]
+        untouched = _untouched(value, codec)
+        return from_message(value) if untouched is None else untouched
 
     def encode_parts(
         self,
@@ -390,32 +390,39 @@ class MessageType:
             value = fields
         elif fields:
             value = self._merged(value, fields)
-        codec = self._writing_codec(wire, byteorder, wstring_width)
-        if getattr(value, "_root__", None) is codec:
-            untouched = getattr(value, "_buffer__", None)
-            if untouched is not None:
-                return [untouched]
-        parts = codec.writer(type(value) is dict, False)(value)
+        codec = self._writer(wire, byteorder, wstring_width)[0]
+        untouched = _untouched(value, codec)
+        if untouched is not None:
+            return [untouched]
+        parts = codec.writer(value.__class__ is dict, False)(value)
         return [part if type(part) is bytes else _flat(part) for part in parts]
 
-    def _writing_codec(self, wire: str | None, byteorder: str, wide: int | None) -> Codec:
-        try:
-            return self._codecs[wire, byteorder, wide]
-        except KeyError:
-            name = self._wire_name(wire)
-        except TypeError:
-            name = self._wire_name(str(wire))
+    def _writer(self, wire: str | None, byteorder: str, wide: int | None) -> tuple[Any, Any, Any]:
+        """Return the codec, its writer of dicts and its writer of messages."""
+        key = (wire, byteorder, wide)
+        name = self._wire_name(wire)
         if byteorder not in _ORDERS:
             raise UnsupportedError(f"byteorder is 'little' or 'big', not {byteorder!r}")
         big = _ORDERS[byteorder]
         if big and name == "ros1":
             raise UnsupportedError("ROS 1 messages are little endian; byteorder='big' is for CDR")
-        codec = self._codecs[wire, byteorder, wide] = self._codec(name, big, _width(wide))
-        return codec
+        codec = self._codec(name, big, _width(wide))
+        found = codec, codec.writer(True, True), codec.writer(False, True)
+        self._writers[key] = found
+        return found
+
+
+def _untouched(value: Any, codec: Codec) -> bytes | None:
+    """Return the bytes of a shell that was received through `codec` and never looked into."""
+    if getattr(value, "_root__", None) is not codec:
+        return None
+    return getattr(value, "_buffer__", None)
 
 
 def _flat(part: Any) -> memoryview:
     view = memoryview(part)
+    if not view.c_contiguous:
+        view = memoryview(view.tobytes())
     return view.cast("B") if view.nbytes else memoryview(b"")
 
 
