@@ -14,6 +14,11 @@ _UNIT = re.compile(
     r"(?: ?[*/\u00b7] ?[A-Za-z0-9^\u00b2\u00b3]+)*"
 )
 
+# What people also put in brackets.
+_NO_UNITS = frozenset(
+    {"default", "deprecated", "enum", "internal", "optional", "required", "todo", "unused"}
+)
+
 
 def clean_comment(lines: list[str]) -> str:
     """Join comment lines (without their ``#``) to one text.
@@ -39,5 +44,5 @@ def find_unit(comment: str) -> str:
     if "[" not in comment:
         return ""
     units = {text.strip() for text in _BRACKETS.findall(comment)}
-    units = {text for text in units if _UNIT.fullmatch(text)}
+    units = {text for text in units if _UNIT.fullmatch(text) and text.lower() not in _NO_UNITS}
     return units.pop() if len(units) == 1 else ""

@@ -35,7 +35,7 @@ _FLOAT32_LIMIT = (2 - 2**-24) * 2.0**127
 _MAX_NUMBER = 400
 
 # Compiled on first use by re's own cache: few definitions have quoted strings.
-_INTEGER = r"[+-]?(?:[0-9]+|(0[xX][0-9a-fA-F]+|0[oO][0-7]+|0[bB][01]+))"
+_INTEGER = r"[+-]?(?:[0-9]+(?:_[0-9]+)*|(0[xX][0-9a-fA-F]+|0[oO][0-7]+|0[bB][01]+))"
 _QUOTED = r"""(?s)(["'])((?:\\.|(?!\1)[^\\])*)\1"""
 _ESCAPE = r"(?s)\\(x[0-9A-Fa-f]{2}|u[0-9A-Fa-f]{4}|U[0-9A-Fa-f]{8}|[0-7]{1,3}|.)"
 _QUOTE_OR_COMMENT = r"""(?s)\\.|["'#]"""
@@ -220,9 +220,7 @@ def _split_strings(text: str) -> Iterator[str]:
         if position < end and text[position] in "\"'":
             match = re.compile(_QUOTED).match(text, position)
             if match is None:
-                raise LiteralError(
-                    f"the quote before {text[position + 1 : position + 20]!r} is open"
-                )
+                raise LiteralError(f"no closing quote after {text[position : position + 20]!r}")
             yield match.group()
             position = match.end()
             while position < end and text[position] in " \t":

@@ -301,7 +301,9 @@ def _field_type(text: str, package: str, ros: int) -> FieldType:
         if bounded or size:
             array = ArrayKind.BOUNDED if bounded else ArrayKind.FIXED
             count = _count(size, "size of an array", match.start(5))
-    if base not in PRIMITIVES[ros]:
+    if text == "Header" and ros == 1:
+        base = "std_msgs/msg/Header"  # but Header[] is a message of the package, as in genmsg
+    elif base not in PRIMITIVES[ros]:
         base = _compound(base, package, ros)
     return FieldType(base, array, count, bound)
 
@@ -325,8 +327,6 @@ def _compound(base: str, package: str, ros: int) -> str:
         )
     if ros == 1 and base == "wstring":
         raise _FaultError("'wstring' exists in ROS 2 only")
-    if ros == 1 and base == "Header":
-        return "std_msgs/msg/Header"
     parts = base.split("/")
     if len(parts) == 1:
         parts = [package, "msg", base]
