@@ -72,7 +72,10 @@ class Bench:
         from PySide6.QtQml import QQmlComponent
 
         self._count += 1
-        file = self.folder / f"test{self._count}.qml"
+        # The engine remembers what is in a folder.
+        folder = self.folder / str(self._count)
+        folder.mkdir(parents=True)
+        file = folder / f"Test{self._count}.qml"
         file.write_text(f"import QtQml\nimport Ros2 1.0\n{imports}\n{body}")
         component = QQmlComponent(self.engine, QUrl.fromLocalFile(str(file)))
         root = component.create()

@@ -137,8 +137,9 @@ class MemoryNode(Node):
             lambda s: self.world.subscriptions.remove(s),
         )
         self.world.subscriptions.append(subscription)
+        latched = subscription.qos.durability is Durability.TRANSIENT_LOCAL
         for publisher in self.world.publishers:
-            if publisher.topic == subscription.topic:
+            if latched and publisher.topic == subscription.topic:
                 for data in publisher.kept[-subscription.qos.depth :]:
                     publisher.send(subscription, data, 0)
         return subscription

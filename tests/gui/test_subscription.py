@@ -1,26 +1,369 @@
-"""The element Subscription."""
+"""The element Subscription: what it shows, when it says that it is not live, what it refuses."""
 
 from __future__ import annotations
 
+import gc
+import threading
+import time
+from typing import Any
 
-def test_message(running, wait):
-    pub = running.robot.create_publisher("/chat", "std_msgs/msg/String")
-    root = running.load("""QtObject {
-        property string text: sub.message ? sub.message.data : "none"
-        property list<string> log
-        property QtObject sub: Subscription { id: sub; topic: "chat"; onNewMessage: (m) => root.log.push(m.data) }
-        id: root
-    }""")
-    assert root.property("text") == "none"
+import pytest
+
+from rosglass.comm import ConnectionState, QoS
+from rosglass.comm.qos import Durability, Reliability
+
+TEXT = "std_msgs/msg/String"
+
+
+def load(bench: Any, properties: str = 'topic: "/chat"', more: str = "") -> Any:
+    """Return the root of an interface with one subscription called `sub`."""
+    return bench.load(
+        """QtObject {
+            id: root
+            property var log: []
+            property var texts: []
+            property string shown: sub.message ? sub.message.data : "none"
+            property QtObject sub: Subscription { id: sub; %s
+                onMessageTypeChanged: root.log.push("type " + messageType)
+                onMessageChanged: root.log.push("message " + (message ? message.data : message))
+                onStaleChanged: root.log.push("stale " + stale)
+                onNewMessage: (m) => { root.log.push("new " + m.data); root.texts.push(m.data) }
+            }
+            %s
+        }"""
+        % (properties, more)
+    )
+
+
+def texts(root: Any, name: str = "texts") -> list:
+    return root.property(name).toVariant()
+
+
+@pytest.fixture
+def chat(running: Any) -> Any:
+    """The robot's publisher."""
+    return running.robot.create_publisher("/chat", TEXT, QoS(depth=10))
+
+
+def test_type_is_discovered_and_signals_come_in_order(running: Any, chat: Any, wait: Any) -> None:
+    root = load(running)
+    sub = root.property("sub")
+    assert (root.property("shown"), sub.property("stale"), sub.property("age")) == (
+        "none",
+        True,
+        -1,
+    )
+    wait(lambda: sub.property("subscribed"))
+    chat.publish(data="hello")
+    wait(lambda: root.property("shown") == "hello")
+    assert texts(root, "log") == [
+        f"type {TEXT}",
+        "message hello",
+        "stale false",
+        "new hello",
+    ]
+    assert sub.property("messageType") == TEXT
+    assert sub.property("problem") == ""
+
+
+def test_elements_made_before_init_work_after_it(bench: Any, wait: Any) -> None:
+    publisher = bench.robot.create_publisher("/ui/chat", TEXT)
+    root = load(bench, 'topic: "chat"; throttleRate: 0')
+    wait(50)
+    assert not root.property("sub").property("subscribed")
+    bench.session.init("node", "/ui")
+    wait(lambda: root.property("sub").property("subscribed"))
+    assert root.property("sub").property("topic") == "/ui/chat"
+    publisher.publish(data="x")
+    wait(lambda: root.property("shown") == "x")
+
+
+@pytest.mark.parametrize(
+    ("properties", "expected"),
+    [
+        ("qos: Ros2.QoS().transient_local().reliable().keep_last(9)", ["0", "1", "2"]),
+        ("qos: Ros2.QoS().transient_local().keep_last(2)", ["1", "2"]),
+        ("qos: Ros2.QoS().transient_local(); queueSize: 3", ["0", "1", "2"]),
+    ],
+)
+def test_throttle_rate_zero_delivers_every_message(
+    running: Any, wait: Any, properties: str, expected: list
+) -> None:
+    qos = QoS(depth=5, durability=Durability.TRANSIENT_LOCAL)
+    publisher = running.robot.create_publisher("/chat", TEXT, qos)
+    for i in range(3):
+        publisher.publish(data=str(i))
+    root = load(running, f'topic: "/chat"; throttleRate: 0; {properties}')
+    wait(lambda: len(texts(root)) == len(expected))
+    wait(50)
+    assert texts(root) == expected
+
+
+def test_throttling_shows_the_first_at_once_and_then_the_newest(
+    running: Any, chat: Any, wait: Any
+) -> None:
+    root = load(running, 'topic: "/chat"; throttleRate: 5')
+    wait(lambda: root.property("sub").property("subscribed"))
+    started = time.monotonic()
+    for i in range(20):
+        chat.publish(data=str(i))
+        wait(10)
+    assert texts(root)[0] == "0"
+    wait(lambda: texts(root)[-1] == "19")
+    assert len(texts(root)) <= (time.monotonic() - started) * 5 + 2
+    assert root.property("sub").property("dropped") == 0
+
+
+def test_what_a_full_queue_drops_is_counted(running: Any, chat: Any, wait: Any) -> None:
+    root = load(running, 'topic: "/chat"; throttleRate: 0; queueSize: 2')
     sub = root.property("sub")
     wait(lambda: sub.property("subscribed"))
-    pub.publish(data="hello")
-    wait(lambda: root.property("text") == "hello")
-    print(
-        sub.property("messageType"),
-        root.property("log"),
-        sub.property("stale"),
-        sub.property("problem"),
+    for i in range(10):
+        chat.publish(data=str(i))
+    wait(lambda: sub.property("dropped") == 8)
+    assert texts(root) == ["8", "9"]
+
+
+def test_disabled_drops_what_arrives_and_says_stale(running: Any, chat: Any, wait: Any) -> None:
+    root = load(running, 'topic: "/chat"; throttleRate: 0')
+    sub = root.property("sub")
+    wait(lambda: sub.property("subscribed"))
+    chat.publish(data="a")
+    wait(lambda: root.property("shown") == "a")
+    sub.setProperty("enabled", False)
+    wait(lambda: not sub.property("subscribed"))
+    assert sub.property("stale")
+    chat.publish(data="b")
+    sub.setProperty("qos", None)
+    sub.setProperty("queueSize", 4)
+    wait(100)
+    assert root.property("shown") == "a"
+    assert not sub.property("subscribed")
+    sub.setProperty("enabled", True)
+    wait(lambda: sub.property("subscribed"))
+    chat.publish(data="c")
+    wait(lambda: root.property("shown") == "c")
+    assert texts(root) == ["a", "c"]
+    assert not sub.property("stale")
+
+
+def test_changing_the_topic_in_the_handler(running: Any, chat: Any, wait: Any) -> None:
+    other = running.robot.create_publisher("/other", TEXT)
+    root = load(
+        running,
+        'topic: "/chat"; throttleRate: 0',
+        'property var c: Connections { target: sub; function onNewMessage(m) { sub.topic = "/other" } }',
     )
-    wait(300)
-    print(sub.property("age"), sub.property("frequency"))
+    sub = root.property("sub")
+    wait(lambda: sub.property("subscribed"))
+    for text in ("a", "b", "c"):
+        chat.publish(data=text)
+    wait(lambda: sub.property("topic") == "/other" and sub.property("subscribed"))
+    assert root.property("shown") == "none"
+    assert "message undefined" in texts(root, "log")
+    chat.publish(data="d")
+    other.publish(data="z")
+    wait(lambda: root.property("shown") == "z")
+    assert texts(root)[-1] == "z"
+    assert "d" not in texts(root)
+
+
+def test_an_element_may_destroy_itself_in_its_handler(running: Any, chat: Any, wait: Any) -> None:
+    root = running.load(
+        """QtObject {
+            property int count: 0
+            property Component maker: Component { Subscription { topic: "/chat"; throttleRate: 0 } }
+            property var sub
+            Component.onCompleted: {
+                sub = maker.createObject(this)
+                sub.newMessage.connect(() => { ++count; sub.destroy() })
+            }
+        }"""
+    )
+    wait(lambda: len(running.world.subscriptions) == 1)
+    for _ in range(3):
+        chat.publish(data="x")
+    wait(lambda: not running.world.subscriptions)
+    assert root.property("count") >= 1
+
+
+def test_subscriptions_made_by_a_function_end_with_their_owner(
+    running: Any, chat: Any, wait: Any
+) -> None:
+    root = running.load(
+        """QtObject {
+            id: root
+            property var sub
+            property string shown: sub && sub.message ? sub.message.data : "none"
+            Component.onCompleted: sub = Ros2.createSubscription("/chat", "std_msgs/String", Ros2.QoS())
+            function drop() { sub = null; gc() }
+        }"""
+    )
+    wait(lambda: len(running.world.subscriptions) == 1)
+    gc.collect()
+    running.engine.collectGarbage()
+    chat.publish(data="x")
+    wait(lambda: root.property("shown") == "x")
+    from PySide6.QtCore import QMetaObject
+
+    QMetaObject.invokeMethod(root, "drop")
+    wait(lambda: not running.world.subscriptions)
+
+
+class TestStale:
+    """The operator never sees old data dressed as live."""
+
+    @pytest.fixture
+    def live(self, running: Any, chat: Any, wait: Any) -> Any:
+        root = load(running, 'topic: "/chat"; timeout: 300')
+        wait(lambda: root.property("sub").property("subscribed"))
+        chat.publish(data="x")
+        wait(lambda: not root.property("sub").property("stale"))
+        return root
+
+    def test_after_the_timeout(self, live: Any, chat: Any, wait: Any) -> None:
+        sub = live.property("sub")
+        started = time.monotonic()
+        wait(lambda: sub.property("stale"))
+        assert 0.2 < time.monotonic() - started < 1.0
+        assert 0.2 < sub.property("age") < 1.0
+        assert live.property("shown") == "x"
+        chat.publish(data="y")
+        wait(lambda: not sub.property("stale"))
+        assert live.property("shown") == "y"
+
+    def test_when_the_publisher_goes(self, live: Any, chat: Any, wait: Any) -> None:
+        live.property("sub").setProperty("timeout", 0)
+        chat.close()
+        wait(lambda: live.property("sub").property("stale"), timeout=1.0)
+
+    def test_when_the_connection_is_lost(self, live: Any, running: Any, wait: Any) -> None:
+        live.property("sub").setProperty("timeout", 0)
+        running.session.node.set_status(ConnectionState.LOST, "gone")
+        wait(lambda: live.property("sub").property("stale"), timeout=1.0)
+
+    def test_when_ros_is_shut_down(self, live: Any, running: Any, chat: Any, wait: Any) -> None:
+        running.session.shutdown()
+        wait(lambda: live.property("sub").property("stale"), timeout=1.0)
+        assert live.property("shown") == "x"
+        running.session.init("again")
+        wait(lambda: live.property("sub").property("subscribed"))
+        chat.publish(data="back")
+        wait(lambda: live.property("shown") == "back")
+
+    def test_latched_topics_do_not_age(self, running: Any, wait: Any) -> None:
+        root = load(running, 'topic: "/chat"; qos: Ros2.QoS().transient_local()')
+        assert root.property("sub").property("timeout") == 0
+        root.property("sub").setProperty("timeout", 100)
+        assert root.property("sub").property("timeout") == 100
+
+    def test_default(self, running: Any) -> None:
+        assert load(running).property("sub").property("timeout") == 3000
+
+
+def test_frequency_and_bandwidth_follow_the_topic(running: Any, wait: Any) -> None:
+    publisher = running.robot.create_publisher("/n", "std_msgs/msg/Int32")
+    root = running.load('QtObject { property QtObject sub: Subscription { topic: "/n" } }')
+    sub = root.property("sub")
+    wait(lambda: sub.property("subscribed"))
+    stop = threading.Event()
+
+    def publish() -> None:
+        while not stop.wait(0.01):
+            publisher.publish(data=5)
+
+    thread = threading.Thread(target=publish)
+    thread.start()
+    try:
+        wait(lambda: sub.property("frequency") > 60)
+        assert sub.property("bandwidth") == pytest.approx(8 * sub.property("frequency"), rel=0.3)
+    finally:
+        stop.set()
+        thread.join()
+    wait(lambda: sub.property("frequency") < 10, timeout=6)
+
+
+def test_malformed_messages_are_refused_and_the_good_one_stays(
+    running: Any, chat: Any, wait: Any, caplog: Any
+) -> None:
+    root = load(running, 'topic: "/chat"; throttleRate: 0')
+    sub = root.property("sub")
+    wait(lambda: sub.property("subscribed"))
+    chat.publish(data="good")
+    wait(lambda: root.property("shown") == "good")
+    for _ in range(5):
+        chat.publish_serialized(b"\0\1\0\0\xff\xff\0\0ab")
+        wait(10)
+    wait(lambda: "malformed" in sub.property("problem"))
+    assert root.property("shown") == "good"
+    assert sum("malformed" in r.getMessage() for r in caplog.records) == 1
+    chat.publish(data="better")
+    wait(lambda: root.property("shown") == "better")
+    assert sub.property("problem") == ""
+
+
+@pytest.mark.parametrize(
+    ("properties", "reason"),
+    [
+        ('topic: "/a//b"', "//"),
+        ('topic: "has space"', "has space"),
+        ('topic: "/chat"; messageType: "no_pkg/msg/Nothing"', "no_pkg/msg/Nothing"),
+    ],
+)
+def test_what_cannot_be_subscribed_is_said(
+    running: Any, chat: Any, wait: Any, properties: str, reason: str
+) -> None:
+    running.world.missing.add("no_pkg/msg/Nothing")
+    sub = load(running, properties).property("sub")
+    wait(lambda: reason in sub.property("problem"))
+    assert not sub.property("subscribed")
+
+
+def test_a_type_that_appears_later_is_found(running: Any, wait: Any) -> None:
+    running.world.missing.add(TEXT)
+    sub = load(running, f'topic: "/chat"; messageType: "{TEXT}"').property("sub")
+    wait(lambda: sub.property("problem"))
+    running.world.missing.clear()
+    wait(lambda: sub.property("subscribed"), timeout=3)
+    assert sub.property("problem") == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "kept"),
+    [("throttleRate", -1, 20), ("timeout", -5, 3000), ("queueSize", 0, 1)],
+)
+def test_impossible_values_are_refused(
+    running: Any, caplog: Any, name: str, value: Any, kept: Any
+) -> None:
+    sub = load(running).property("sub")
+    sub.setProperty(name, value)
+    assert caplog.records
+    assert sub.property(name) == kept
+
+
+def test_an_impossible_profile_is_refused_with_its_place(running: Any, caplog: Any) -> None:
+    script = """const s = Ros2.createSubscription("/t"); s.qos = "fast"; return s.qos.reliability"""
+    assert running.run(script) == "best_effort"
+    assert "a queue size or Ros2.QoS()" in caplog.text
+    assert caplog.records[0].pathname.endswith(".qml")
+
+
+def test_every_property_reads_back(running: Any) -> None:
+    shown = running.run(
+        """const s = Ros2.createSubscription("/t", "std_msgs/msg/Int32", Ros2.QoS().reliable().keep_last(3));
+        s.throttleRate = 7; s.enabled = false; s.timeout = 9; const before = s.queueSize; s.queueSize = 4;
+        return [s.topic, s.messageType, s.qos.reliability, before, s.qos.depth(), s.throttleRate,
+                s.enabled, s.timeout, s.message === undefined, s.getPublisherCount()]"""
+    )
+    assert shown == [
+        "/t",
+        "std_msgs/msg/Int32",
+        Reliability.RELIABLE.value,
+        3,
+        4,
+        7,
+        False,
+        9,
+        True,
+        0,
+    ]

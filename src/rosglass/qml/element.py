@@ -79,14 +79,20 @@ class Element(QtCore.QObject):
             self._say("this object belongs to no QML engine")
             return False
         session = self._session = runtime.session
-        session.node_changed.connect(self._schedule)
+        session.node_changed.connect(self._on_node)
         session.connection_changed.connect(self._on_connection)
         session.graph_changed.connect(self._on_graph)
         session.tick.connect(self._on_tick)
         session.use_ticks(True)
         at_end = self._at_end
         at_end["ticks"] = lambda: session.use_ticks(False)
-        self.destroyed.connect(lambda: [job() for job in at_end.values()])
+
+        def end() -> None:
+            # At the end of the program the session may be gone before the last element.
+            for job in at_end.values() if is_alive(session) else ():
+                job()
+
+        self.destroyed.connect(end)
         return True
 
     def _find_runtime(self) -> Runtime | None:
@@ -97,6 +103,13 @@ class Element(QtCore.QObject):
     def _update(self) -> None:
         """Bring about what the properties ask for."""
         raise AssertionError("every element has its own")
+
+    def _on_node(self) -> None:
+        """There is a node now, or none any more, which must not be used a moment longer."""
+        if self.node is None:
+            self._settle()
+        else:
+            self._schedule()
 
     def _on_connection(self) -> None:
         """The session's connection state changed."""

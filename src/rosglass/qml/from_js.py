@@ -185,6 +185,8 @@ def qos_from_js(value: QJSValue | None, default: QoS) -> QoS:
     if value.isNumber():
         return default.with_depth(_depth(value.toNumber()))
     try:
+        if not value.hasProperty("reliability"):
+            raise ValueError
         return QoS(
             depth=_depth(value.property("size").toNumber()),
             reliability=Reliability(value.property("reliability").toString()),

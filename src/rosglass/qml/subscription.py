@@ -95,6 +95,7 @@ class Subscription(TopicElement):
         super().__init__(parent, runtime)
         self._wanted_type, self._found_type = "", ""
         self._qos = DEFAULT_QOS
+        self._queue_size: int | None = None
         self._throttle = 20
         self._timeout: int | None = None
         self._sample: Sample | None = None
@@ -151,7 +152,10 @@ class Subscription(TopicElement):
             self._refuse(f"Subscription {self._topic!r}: {error}")
 
     def _take_qos(self, qos: QoS) -> None:
-        before, self._qos = self._qos, qos
+        # A queue size that was set wins, whichever of the two QML happens to set last.
+        size = self._queue_size
+        before, self._qos = self._qos, qos if size is None else qos.with_depth(size)
+        qos = self._qos
         if qos == before:
             return
         self.qosChanged.emit()
@@ -166,7 +170,8 @@ class Subscription(TopicElement):
         if size < 1:
             self._refuse(f"Subscription {self._topic!r}: queueSize must be at least 1, got {size}")
             return
-        self._take_qos(self._qos.with_depth(size))
+        self._queue_size = size
+        self._take_qos(self._qos)
 
     def _get_throttle_rate(self) -> int:
         return self._throttle

@@ -1,0 +1,190 @@
+"""Publishers made in QML."""
+
+from __future__ import annotations
+
+import gc
+import logging
+from typing import Any
+
+import pytest
+
+from rosglass.comm import ConnectionState
+from rosglass.comm.qos import Durability, Reliability
+
+TWIST = "geometry_msgs/msg/Twist"
+
+
+@pytest.fixture
+def received(running: Any) -> list:
+    messages: list = []
+    running.robot.create_subscription("/cmd_vel", TWIST, messages.append)
+    return messages
+
+
+def load(bench: Any, more: str = "") -> Any:
+    return bench.load(
+        """QtObject {
+            id: root
+            property var pub: Ros2.createPublisher("cmd_vel", "geometry_msgs/Twist", 3)
+            property string error: ""
+            property var sent
+            property int advertised: 0
+            property var c: Connections { target: pub; function onAdvertised() { ++advertised } }
+            function send(x) { try { sent = pub.publish({linear: {x: x}}) } catch (e) { error = String(e) } }
+            %s
+        }"""
+        % more
+    )
+
+
+def send(root: Any, value: Any) -> None:
+    from PySide6.QtCore import Q_ARG, QMetaObject
+
+    QMetaObject.invokeMethod(root, "send", Q_ARG("QVariant", value))
+
+
+def test_partial_messages_get_defaults(running: Any, received: list, wait: Any) -> None:
+    root = load(running)
+    wait(lambda: root.property("advertised") == 1)
+    send(root, 0.5)
+    assert root.property("sent") is True
+    wait(lambda: received)
+    assert received[0].to_dict() == {
+        "linear": {"x": 0.5, "y": 0.0, "z": 0.0},
+        "angular": {"x": 0.0, "y": 0.0, "z": 0.0},
+    }
+
+
+def test_what_does_not_fit_throws_and_is_logged_with_its_place(
+    running: Any, received: list, wait: Any, caplog: Any
+) -> None:
+    root = load(running)
+    wait(lambda: root.property("advertised") == 1)
+    for _ in range(5):
+        send(root, "fast")
+    assert "linear.x" in root.property("error")
+    assert "'fast'" in root.property("error")
+    records = [r for r in caplog.records if "linear.x" in r.getMessage()]
+    assert len(records) == 1
+    assert records[0].pathname.endswith(".qml")
+    assert records[0].lineno == 11
+    assert records[0].funcName == "send"
+    wait(50)
+    assert not received
+
+
+def test_nothing_is_lost_silently_before_and_after(
+    running: Any, received: list, wait: Any, caplog: Any
+) -> None:
+    root = load(running)
+    send(root, 1.0)
+    assert root.property("sent") is False
+    assert "not advertised yet" in caplog.text
+    wait(lambda: root.property("advertised") == 1)
+    running.session.node.set_status(ConnectionState.LOST, "no router")
+    wait(lambda: running.session.state == "lost")
+    send(root, 1.0)
+    assert root.property("sent") is False
+    assert "connection is lost: no router" in caplog.text
+
+
+def test_shutdown_withdraws_and_init_advertises_again(
+    running: Any, received: list, wait: Any
+) -> None:
+    root = load(running)
+    wait(lambda: root.property("advertised") == 1)
+    running.session.shutdown()
+    wait(lambda: root.property("advertised") == 2)
+    wait(lambda: not running.world.publishers)
+    send(root, 1.0)
+    assert root.property("sent") is False
+    running.session.init("again")
+    wait(lambda: root.property("advertised") == 3)
+    send(root, 2.0)
+    wait(lambda: received)
+    assert received[0].linear.x == 2.0
+
+
+def test_a_publisher_lives_as_long_as_javascript_holds_it(running: Any, wait: Any) -> None:
+    root = load(running, "function drop() { pub = null; gc() }")
+    wait(lambda: len(running.world.publishers) == 1)
+    gc.collect()
+    running.engine.collectGarbage()
+    wait(100)
+    assert len(running.world.publishers) == 1
+    from PySide6.QtCore import QMetaObject
+
+    QMetaObject.invokeMethod(root, "drop")
+    wait(lambda: not running.world.publishers)
+
+
+def test_properties(running: Any, wait: Any, received: list) -> None:
+    root = running.load(
+        """QtObject {
+            property var pub: Ros2.createPublisher("~/state", "std_msgs/msg/Bool",
+                                                   Ros2.QoS().reliable().transient_local().keep_last(2))
+            property var facts: [pub.topic, pub.type, pub.queueSize, pub.isAdvertised, pub.qos.durability]
+        }"""
+    )
+    assert root.property("facts").toVariant()[1:] == [
+        "std_msgs/msg/Bool",
+        2,
+        False,
+        "transient_local",
+    ]
+    wait(lambda: root.property("facts").toVariant()[3])
+    assert root.property("facts").toVariant()[0] == "/ui/state"
+    publisher = running.world.publishers[-1]
+    assert publisher.qos.durability is Durability.TRANSIENT_LOCAL
+    assert publisher.qos.reliability is Reliability.RELIABLE
+    assert running.run('return Ros2.createPublisher("/x", "std_msgs/msg/Bool").queueSize') == 10
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        ('"bad topic", "std_msgs/msg/Bool"', "bad topic"),
+        ('"", "std_msgs/msg/Bool"', "non-empty"),
+        ('"/x", ""', "type of topic '/x' is empty"),
+        ('"/x", "std_msgs/msg/Bool", 0', "an integer of 1 to"),
+        ('"/x", "std_msgs/msg/Bool", 1.5', "an integer of 1 to"),
+        ('"/x", "std_msgs/msg/Bool", "reliable"', "a queue size or Ros2.QoS"),
+    ],
+)
+def test_bad_arguments_throw(running: Any, arguments: str, reason: str) -> None:
+    script = "try { Ros2.createPublisher(%s); return 'made' } catch (e) { return String(e) }"
+    assert reason in running.run(script % arguments)
+
+
+def test_unknown_types_are_said_and_looked_for_again(running: Any, wait: Any, caplog: Any) -> None:
+    running.world.missing.add("std_msgs/msg/Bool")
+    root = running.load(
+        'QtObject { property var pub: Ros2.createPublisher("/x", "std_msgs/msg/Bool"); property string problem: pub.problem }'
+    )
+    wait(lambda: "std_msgs/msg/Bool" in root.property("problem"))
+    assert any(r.levelno == logging.WARNING for r in caplog.records)
+    running.world.missing.clear()
+    wait(lambda: root.property("problem") == "", timeout=3)
+    assert len(running.world.publishers) == 1
+
+
+def test_keep_all_never_waits_on_the_gui_thread(running: Any, wait: Any) -> None:
+    import threading
+
+    root = running.load(
+        """QtObject {
+            property var pub: Ros2.createPublisher("/x", "std_msgs/msg/Bool", Ros2.QoS().reliable().keep_all())
+            function send() { return pub.publish({data: true}) }
+        }"""
+    )
+    wait(lambda: running.world.publishers)
+    threads: list = []
+    running.world.publishers[0].publish_serialized = lambda data: threads.append(
+        threading.current_thread()
+    )
+    from PySide6.QtCore import QMetaObject
+
+    wait(50)
+    QMetaObject.invokeMethod(root, "send")
+    wait(lambda: threads)
+    assert threads[0] is not threading.main_thread()

@@ -1,0 +1,249 @@
+"""The singleton Ros2: the node's life, what it says about the connection, the graph."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import Any
+
+import pytest
+from PySide6.QtQml import QQmlEngine
+
+from rosglass.comm import ConnectionState
+from rosglass.errors import ConnectionLostError, Error, UnsupportedError
+from rosglass.qml import Session, install
+
+LOG = """QtObject {
+    id: root
+    property var log: []
+    property string state: Ros2.connectionState + "|" + Ros2.connectionDetail
+    property var c: Connections {
+        target: Ros2
+        function onInitialized() { log.push("initialized " + Ros2.isInitialized() + Ros2.getName()) }
+        function onAboutToShutdown() { log.push("aboutToShutdown " + Ros2.isInitialized()) }
+        function onConnectionChanged() { log.push(Ros2.connectionState) }
+    }
+}"""
+
+
+def log(root: Any) -> list:
+    return root.property("log").toVariant()
+
+
+def test_before_init(bench: Any) -> None:
+    script = """return [Ros2.isInitialized(), Ros2.ok(), Ros2.getName(), Ros2.getNamespace(),
+        Ros2.connectionState, Ros2.queryTopics(), Ros2.hostname.length > 0]"""
+    assert bench.run(script) == [False, False, "", "", "uninitialized", [], True]
+
+
+def test_life(bench: Any, wait: Any) -> None:
+    root = bench.load(LOG)
+    wait(20)
+    script = "Ros2.init('ui'); return [Ros2.isInitialized(), Ros2.ok(), Ros2.getName(), Ros2.getNamespace()]"
+    assert bench.run(script) == [True, True, "ui", "/"]
+    wait(lambda: bench.session.state == "connected")
+    bench.run("Ros2.init('ui')")
+    assert [n.name for n in bench.world.nodes] == ["robot", "ui"]
+    bench.run("Ros2.shutdown(); Ros2.shutdown()")
+    wait(lambda: len(bench.world.nodes) == 1)
+    assert bench.run("return [Ros2.isInitialized(), Ros2.getName()]") == [False, ""]
+    assert log(root) == [
+        "connecting",
+        "initialized trueui",
+        "connected",
+        "aboutToShutdown true",
+        "uninitialized",
+    ]
+    bench.run("Ros2.init('ui2', Ros2.createInitOptions().setNamespace('/space'))")
+    wait(lambda: bench.session.node is not None)
+    assert bench.session.node.namespace == "/space"
+
+
+def test_a_second_name_is_ignored_with_a_warning(running: Any, caplog: Any) -> None:
+    running.run("Ros2.init('other')")
+    assert running.session.name == "ui"
+    assert "'other'" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name", "namespace"),
+    [
+        ("'a', ['--ros-args', '-r', '__node:=b', '-r', '__ns:=/n']", "b", "/n"),
+        ("'a', ['x', '--ros-args', '--remap', '__ns:=/n', '--', '-r']", "a", "/n"),
+        ("'a', [], Ros2.createInitOptions().setNamespace('/o')", "a", "/o"),
+    ],
+)
+def test_command_lines(bench: Any, wait: Any, arguments: str, name: str, namespace: str) -> None:
+    bench.run(f"Ros2.init({arguments})")
+    wait(lambda: bench.session.node is not None)
+    assert (bench.session.node.name, bench.session.node.namespace) == (name, namespace)
+
+
+def test_domain_goes_into_the_address(bench: Any, wait: Any) -> None:
+    bench.session.url = "zenoh://robot?mode=client&domain=3"
+    bench.run("Ros2.init('a', Ros2.createInitOptions().setDomainId(7))")
+    wait(lambda: bench.session.node is not None)
+    assert bench.session.node.url == "zenoh://robot?mode=client&domain=7"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        ("'bad name'", "bad name"),
+        ("''", "must not be empty"),
+        ("'a', {namespace: 'x', domain: -1}", "not absolute"),
+        ("'a', {}", "createInitOptions"),
+        ("'a', Ros2.createInitOptions().setDomainId(999)", "0 to 232"),
+        ("'a', ['--ros-args', '-p', 'x:=1']", "'-p' is not known"),
+    ],
+)
+def test_bad_init_throws(bench: Any, arguments: str, reason: str) -> None:
+    script = "try { Ros2.init(%s); return 'made' } catch (e) { return String(e) }"
+    assert reason in bench.run(script.replace("%s", arguments))
+    assert not bench.session.is_initialized
+
+
+def test_the_state_of_the_connection_is_shown(running: Any, wait: Any) -> None:
+    root = running.load(LOG)
+    assert root.property("state") == "connected|connected to memory://"
+    running.session.node.set_status(ConnectionState.LOST, "no router at x, retrying")
+    wait(lambda: root.property("state") == "lost|no router at x, retrying")
+    running.session.node.set_status(ConnectionState.CONNECTED)
+    wait(lambda: root.property("state") == "connected|")
+
+
+def test_the_address_can_be_changed_while_running(running: Any, wait: Any) -> None:
+    root = running.load('QtObject { property QtObject s: Subscription { topic: "/t" } }')
+    wait(lambda: root.property("s").property("subscribed"))
+    running.run("Ros2.url = 'memory://other'")
+    wait(lambda: running.session.node is not None and running.session.node.url == "memory://other")
+    wait(lambda: root.property("s").property("subscribed"))
+    assert len(running.world.nodes) == 2
+    assert running.run("return Ros2.url") == "memory://other"
+
+
+def engine_with(session: Session, tmp_path: Any) -> Any:
+    from conftest import Bench
+    from memory_world import MemoryWorld
+
+    engine = QQmlEngine()
+    install(engine, session)
+    return Bench(session, engine, MemoryWorld(), tmp_path)
+
+
+def test_connecting_never_blocks(app: Any, tmp_path: Any, wait: Any) -> None:
+    release = threading.Event()
+
+    def connect(url: Any, name: str, namespace: str) -> Any:
+        release.wait(10)
+        raise UnsupportedError("no such world")
+
+    made = engine_with(Session(connect=connect), tmp_path)
+    started = time.monotonic()
+    made.run("Ros2.init('a')")
+    assert time.monotonic() - started < 1.0
+    assert made.session.state == "connecting"
+    release.set()
+    wait(lambda: made.session.state == "failed")
+    assert made.run("return [Ros2.connectionDetail, Ros2.ok()]") == ["no such world", False]
+    made.close()
+
+
+def test_an_address_that_cannot_be_used_yet_is_tried_again(
+    app: Any, tmp_path: Any, wait: Any
+) -> None:
+    from memory_world import MemoryWorld
+
+    world, tries = MemoryWorld(), []
+
+    def connect(url: Any, name: str, namespace: str) -> Any:
+        tries.append(name)
+        if len(tries) == 1:
+            raise ConnectionLostError("no network")
+        return world.connect(url, name, namespace)
+
+    made = engine_with(Session(connect=connect), tmp_path)
+    made.run("Ros2.init('a')")
+    wait(lambda: made.session.detail == "no network")
+    assert made.session.state == "connecting"
+    wait(lambda: made.session.state == "connected", timeout=3)
+    made.close()
+
+
+def test_engines_share_a_session_and_may_go_first(running: Any, wait: Any, tmp_path: Any) -> None:
+    engine = QQmlEngine()
+    install(engine, running.session)
+    with pytest.raises(Error, match="only once"):
+        install(engine, running.session)
+    from conftest import Bench
+
+    other = Bench(running.session, engine, running.world, tmp_path / "other")
+    script = "return [Ros2.getName(), Ros2.createPublisher('/x', 'std_msgs/msg/Bool').topic]"
+    assert other.run(script) == ["ui", "/x"]
+    other.load('QtObject { property QtObject s: Subscription { topic: "/t" } }')
+    engine.deleteLater()
+    del engine, other
+    wait(200)
+    assert running.run("return Ros2.getName()") == "ui"
+
+
+def test_a_node_made_in_python_can_be_used(bench: Any, wait: Any) -> None:
+    node = bench.world.connect("memory://mine", "mine")
+    bench.session.adopt(node)
+    assert bench.run("return [Ros2.getName(), Ros2.connectionState]") == ["mine", "connected"]
+    bench.session.shutdown()
+    wait(50)
+    assert not node.closed
+
+
+def test_the_graph_can_be_asked(running: Any, wait: Any) -> None:
+    running.robot.create_publisher("/a", "std_msgs/msg/String")
+    running.robot.create_publisher("/a", "std_msgs/msg/Int32")
+    running.robot.create_publisher("/b", "std_msgs/msg/String")
+    running.robot.create_publisher("/x/_action/feedback", "std_msgs/msg/String")
+    shown = running.run(
+        """return [Ros2.queryTopics(), Ros2.queryTopics("std_msgs/Int32"),
+            Ros2.queryTopics("std_msgs/msg/Nothing"), Ros2.queryTopicInfo()[1],
+            Ros2.getTopicTypes("a"), Ros2.queryTopicTypes("/b"), Ros2.getTopicNamesAndTypes()["/b"],
+            Ros2.getTopicTypes("/none"), Ros2.isValidTopic("/a/b"), Ros2.isValidTopic("a b"),
+            Ros2.isValidTopic("")]"""
+    )
+    text, number = "std_msgs/msg/String", "std_msgs/msg/Int32"
+    assert shown == [
+        ["/a", "/b"],
+        ["/a"],
+        [],
+        {"name": "/b", "datatypes": [text]},
+        [text, number],
+        [text],
+        [text],
+        [],
+        True,
+        False,
+        False,
+    ]
+
+
+def test_empty_messages(bench: Any, caplog: Any) -> None:
+    script = """const m = Ros2.createEmptyMessage("geometry_msgs/PoseStamped");
+        return [m.pose.orientation.w, m.header.frame_id, m["#messageType"], m.header.stamp.isZero()]"""
+    assert bench.run(script) == [1, "", "geometry_msgs/msg/PoseStamped", True]
+    assert bench.run("return Ros2.createEmptyMessage('no/msg/Type') === undefined") is True
+    assert "no/msg/Type" in caplog.text
+    assert caplog.records[-1].pathname.endswith(".qml")
+
+
+@pytest.mark.parametrize(
+    ("call", "expected"),
+    [
+        ("SensorDataQoS", ["best_effort", "volatile", 5]),
+        ("SystemDefaultsQoS", ["reliable", "volatile", 10]),
+        ("ServicesQoS", ["reliable", "volatile", 10]),
+        ("ClockQoS", ["best_effort", "volatile", 1]),
+        ("BestAvailableQoS", ["best_effort", "volatile", 10]),
+        ("QoS", ["best_effort", "volatile", 1]),
+    ],
+)
+def test_presets(bench: Any, call: str, expected: list) -> None:
+    script = f"const q = Ros2.{call}(); return [q.reliability, q.durability, q.depth()]"
+    assert bench.run(script) == expected
