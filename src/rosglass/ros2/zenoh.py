@@ -5,42 +5,34 @@ from __future__ import annotations
 import itertools
 import logging
 import threading
-import time
-from abc import abstractmethod
-from collections import deque
-from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import zenoh
-import zenoh.ext
 
 from rosglass.comm import (
     ConnectionState,
-    Durability,
     EndpointInfo,
     EndpointKind,
     Handle,
-    History,
     NodeName,
     QoS,
-    Reliability,
     Status,
 )
 from rosglass.errors import ConnectionLostError, NodeClosedError
 from rosglass.ros2.middleware import Middleware, OnSample, Writer
 from rosglass.ros2.zenoh_config import close_session, session_config
-from rosglass.ros2.zenoh_keys import (
-    HUMBLE_HASH,
-    NO_ATTACHMENT,
-    Attachment,
-    Token,
-    gid_of,
-    graph_key,
-    topic_key,
+from rosglass.ros2.zenoh_endpoints import (
+    Announcement,
+    Declaration,
+    ZenohReader,
+    ZenohWriter,
+    queued,
 )
+from rosglass.ros2.zenoh_keys import Token, graph_key, topic_key
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from rosglass.ros2.graph import Graph
     from rosglass.ros2.zenoh_options import ZenohOptions
@@ -48,8 +40,6 @@ if TYPE_CHECKING:
 __all__ = ["ZenohMiddleware"]
 
 _log = logging.getLogger("rosglass.ros2")
-#: Seconds between the heartbeats that let subscriptions notice a lost last sample (rmw_zenoh's).
-_HEARTBEAT = 0.5
 
 
 class ZenohMiddleware(Middleware):
@@ -68,7 +58,7 @@ class ZenohMiddleware(Middleware):
         self._id = str(self._config.get_json("id")).strip('"')
         self._numbers = itertools.count(1)
         self._lock = threading.Lock()
-        self._declared: dict[int, _Declaration] = {}
+        self._declared: dict[int, Declaration] = {}
         self._links: dict[str, bool] = {}
         self._was_connected = self._closed = False
         self._changed: Callable[[], None] = lambda: None
@@ -100,7 +90,7 @@ class ZenohMiddleware(Middleware):
     def announce(self, node: NodeName) -> Handle:
         """Declare the node's token."""
         key = Token(self._options.domain, self._id, "0", "0", node).key()
-        return self._add(_TokenOnly(self, key))
+        return self._add(Announcement(self, key))
 
     def create_writer(
         self, node: NodeName, topic: str, type_name: str, type_hash: str, qos: QoS
@@ -108,7 +98,7 @@ class ZenohMiddleware(Middleware):
         """Declare a publisher and its token."""
         kind = EndpointKind.PUBLISHER
         token = self._token(node, EndpointInfo(kind, topic, type_name, node, qos, type_hash))
-        writer = _ZenohWriter(self, self._options, token, topic, type_name, type_hash, qos)
+        writer = ZenohWriter(self, self._options, token, topic, type_name, type_hash, qos)
         self._add(writer)
         return writer
 
@@ -125,7 +115,7 @@ class ZenohMiddleware(Middleware):
         kind = EndpointKind.SUBSCRIPTION
         token = self._token(node, EndpointInfo(kind, topic, type_name, node, qos, type_hash))
         key = topic_key(self._options.domain, topic, type_name, "*")
-        return self._add(_Reader(self, token, key, qos, on_sample))
+        return self._add(ZenohReader(self, token, key, qos, on_sample))
 
     def poll(self) -> None:
         """Try again to open a client's session."""
@@ -145,25 +135,25 @@ class ZenohMiddleware(Middleware):
             close_session(session)
         self._changed()
 
-    def forget(self, declaration: _Declaration) -> None:
+    def forget(self, declaration: Declaration) -> None:
         """Drop a declaration that was closed; for declarations."""
         with self._lock:
             self._declared.pop(id(declaration), None)
+        self._hide(declaration.token)
 
     def _token(self, node: NodeName, endpoint: EndpointInfo) -> str:
         number = str(next(self._numbers))
         if self._options.humble:
-            endpoint = EndpointInfo(
-                endpoint.kind, endpoint.name, endpoint.type, node, endpoint.qos, HUMBLE_HASH
-            )
+            endpoint = replace(endpoint, type_hash="")
         return Token(self._options.domain, self._id, "0", number, node, endpoint).key()
 
-    def _add(self, declaration: _Declaration) -> _Declaration:
+    def _add(self, declaration: Declaration) -> Declaration:
         with self._lock:
             if self._closed:
                 raise NodeClosedError("the node is closed; connect again")
             self._declared[id(declaration)] = declaration
             session = self._session
+        self._show(declaration.token)
         if session is not None:
             declaration.attach(session)
         return declaration
@@ -175,9 +165,9 @@ class ZenohMiddleware(Middleware):
             if "Unable to connect" in str(error):
                 return  # a client without router; status() says so and poll() tries again
             raise ConnectionLostError(f"cannot open a Zenoh session: {error}") from error
-        session.info.declare_transport_events_listener(_direct(self._on_transport), history=True)
+        session.info.declare_transport_events_listener(queued(self._on_transport), history=True)
         session.liveliness().declare_subscriber(
-            graph_key(self._options.domain), _direct(self._on_token), history=True
+            graph_key(self._options.domain), queued(self._on_token), history=True
         )
         with self._lock:
             if not self._closed:
@@ -200,10 +190,15 @@ class ZenohMiddleware(Middleware):
 
     def _on_token(self, sample: zenoh.Sample) -> None:
         key = str(sample.key_expr)
-        if self._graph is None or self._closed:
-            return
+        if f"/{self._id}/" in key or self._closed:
+            return  # our own show as long as they are declared, whatever happens to links
         if sample.kind == zenoh.SampleKind.DELETE:
-            self._graph.remove(key)
+            self._hide(key)
+        else:
+            self._show(key)
+
+    def _show(self, key: str) -> None:
+        if self._graph is None:
             return
         try:
             token = Token.parse(key)
@@ -217,204 +212,6 @@ class ZenohMiddleware(Middleware):
         else:
             self._graph.put_endpoint(key, token.endpoint)
 
-
-class _Declaration(Handle):
-    """Something declared on the session, or to be declared when it opens."""
-
-    def __init__(self, owner: ZenohMiddleware) -> None:
-        self._owner = owner
-        self._lock = threading.Lock()
-        self._closed = self._attached = False
-        self._handles: list[Any] = []
-
-    def attach(self, session: zenoh.Session) -> None:
-        """Declare it on the session that just opened."""
-        with self._lock:
-            if self._closed or self._attached:
-                return
-            self._attached = True
-        # Declaring may call back at once, into code that closes this very declaration.
-        self._keep(self.declare(session))
-
-    @abstractmethod
-    def declare(self, session: zenoh.Session) -> list[Any]:
-        """Declare it and return what has to be undeclared, in that order."""
-
-    def close(self) -> None:
-        """Undeclare it."""
-        with self._lock:
-            if self._closed:
-                return
-            self._closed = True
-            handles, self._handles = self._handles, []
-        self._owner.forget(self)
-        _undeclare(handles)
-
-    def _keep(self, handles: list[Any]) -> None:
-        with self._lock:
-            if not self._closed:
-                self._handles += handles
-                return
-        _undeclare(handles)
-
-
-class _TokenOnly(_Declaration):
-    def __init__(self, owner: ZenohMiddleware, token: str) -> None:
-        super().__init__(owner)
-        self._token = token
-
-    def declare(self, session: zenoh.Session) -> list[Any]:
-        return [session.liveliness().declare_token(self._token)]
-
-
-class _Reader(_Declaration):
-    def __init__(
-        self, owner: ZenohMiddleware, token: str, key: str, qos: QoS, on_sample: OnSample
-    ) -> None:
-        super().__init__(owner)
-        self._token, self._key, self._qos, self._on_sample = token, key, qos, on_sample
-
-    def declare(self, session: zenoh.Session) -> list[Any]:
-        subscriber: Any
-        if self._qos.durability is Durability.TRANSIENT_LOCAL:
-            reliable = self._qos.reliability is Reliability.RELIABLE
-            subscriber = zenoh.ext.declare_advanced_subscriber(
-                session,
-                self._key,
-                _direct(self._on_data),
-                history=zenoh.ext.HistoryConfig(
-                    detect_late_publishers=True, max_samples=self._qos.depth
-                ),
-                recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True)
-                if reliable
-                else None,
-                subscriber_detection=True,
-            )
-        else:
-            subscriber = session.declare_subscriber(self._key, _direct(self._on_data))
-        return [session.liveliness().declare_token(self._token), subscriber]
-
-    def _on_data(self, sample: zenoh.Sample) -> None:
-        received = time.time_ns()
-        if self._closed or sample.kind == zenoh.SampleKind.DELETE:
-            return
-        attached = sample.attachment
-        note = NO_ATTACHMENT if attached is None else Attachment.decode(attached.to_bytes())
-        type_hash = str(sample.key_expr).rpartition("/")[2]
-        self._on_sample(
-            sample.payload.to_bytes(),
-            received,
-            note.sent,
-            note.gid,
-            note.sequence,
-            "" if type_hash == HUMBLE_HASH else type_hash,
-        )
-
-
-class _ZenohWriter(_Declaration, Writer):
-    def __init__(
-        self,
-        owner: ZenohMiddleware,
-        options: ZenohOptions,
-        token: str,
-        topic: str,
-        type_name: str,
-        type_hash: str,
-        qos: QoS,
-    ) -> None:
-        super().__init__(owner)
-        self._options, self._token, self._topic, self._qos = options, token, topic, qos
-        self._type_name, self._type_hash = type_name, type_hash
-        self._gid = gid_of(token)
-        self._numbers = itertools.count(1)
-        self._session: zenoh.Session | None = None
-        self._hashes = {HUMBLE_HASH if options.humble else type_hash or HUMBLE_HASH}
-        self._publishers: tuple[Any, ...] = ()
-        # Kept for keys that are declared later: late subscriptions are owed the last samples.
-        latched = qos.durability is Durability.TRANSIENT_LOCAL
-        self._history: deque[tuple[bytes | bytearray, bytes]] = deque(maxlen=qos.depth * latched)
-
-    def declare(self, session: zenoh.Session) -> list[Any]:
-        self._session = session
-        token = session.liveliness().declare_token(self._token)
-        return [token, *self._declare_publishers(session, self._hashes)]
-
-    def write(self, data: bytes | bytearray) -> None:
-        """Send a payload; while nothing is linked, only a transient local cache keeps it."""
-        if self._closed:
-            raise NodeClosedError(f"the publisher of {self._topic} is closed")
-        note = Attachment(next(self._numbers), time.time_ns(), self._gid).encode()
-        self._history.append((data, note))
-        try:
-            for publisher in self._publishers:
-                publisher.put(data, attachment=note)
-        except zenoh.ZError as error:
-            if self._closed or self._owner.status().state is ConnectionState.CLOSED:
-                raise NodeClosedError(f"the publisher of {self._topic} is closed") from error
-            raise ConnectionLostError(f"cannot publish on {self._topic}: {error}") from error
-
-    def match(self, subscriptions: Sequence[EndpointInfo]) -> None:
-        """Send under a further key for subscriptions that name the type's definition otherwise.
-
-        A Humble robot subscribes without hash; the same definition is meant.
-        """
-        ours = {self._type_hash or HUMBLE_HASH, HUMBLE_HASH}
-        wanted = {endpoint.type_hash or HUMBLE_HASH for endpoint in subscriptions}
-        new = (wanted & ours) - self._hashes
-        if new and not self._closed:
-            self._hashes = self._hashes | new
-            if self._session is not None:
-                self._keep(self._declare_publishers(self._session, new))
-
-    def _declare_publishers(self, session: zenoh.Session, hashes: set[str]) -> list[Any]:
-        publishers = [self._declare_publisher(session, name) for name in sorted(hashes)]
-        # First: whatever is written from here on reaches them; some of it twice, under one number.
-        self._publishers += tuple(publishers)
-        for data, note in tuple(self._history):
-            for publisher in publishers:
-                publisher.put(data, attachment=note)
-        return publishers
-
-    def _declare_publisher(self, session: zenoh.Session, type_hash: str) -> Any:
-        key = topic_key(self._options.domain, self._topic, self._type_name, type_hash)
-        reliable = self._qos.reliability is Reliability.RELIABLE
-        keep_all = self._qos.history is History.KEEP_ALL
-        # rmw_zenoh's choice: only who keeps everything waits for a full queue.
-        block = reliable and keep_all
-        congestion = zenoh.CongestionControl.BLOCK if block else zenoh.CongestionControl.DROP
-        # Each priority has its own queue: a stop command must not be thrown away because camera
-        # pictures, sent best effort by the same program, fill theirs while the network is stuck.
-        priority = zenoh.Priority.INTERACTIVE_LOW if reliable else zenoh.Priority.DATA
-        if self._qos.durability is Durability.VOLATILE:
-            return session.declare_publisher(key, congestion_control=congestion, priority=priority)
-        return zenoh.ext.declare_advanced_publisher(
-            session,
-            key,
-            congestion_control=congestion,
-            priority=priority,
-            cache=zenoh.ext.CacheConfig(max_samples=self._qos.depth),
-            publisher_detection=True,
-            sample_miss_detection=zenoh.ext.MissDetectionConfig(
-                heartbeat=None, sporadic_heartbeat=_HEARTBEAT
-            )
-            if reliable
-            else None,
-        )
-
-
-def _undeclare(handles: list[Any]) -> None:
-    for handle in handles:
-        with suppress(zenoh.ZError):  # the session went first
-            handle.undeclare()
-
-
-def _direct(callback: Callable[[Any], None]) -> Any:
-    """Run `callback` on Zenoh's own thread, and log what it raises: Zenoh would only print it."""
-
-    def guarded(item: Any) -> None:
-        try:
-            callback(item)
-        except Exception:
-            _log.exception("handling something received over Zenoh failed")
-
-    return zenoh.handlers.Callback(guarded, indirect=False)
+    def _hide(self, key: str) -> None:
+        if self._graph is not None:
+            self._graph.remove(key)

@@ -11,10 +11,11 @@ from summary import VALUES, summary, tell
 import rosglass
 
 # {"port", "domain", "publish": {topic: type}, "subscribe": {topic: type}, "latched": bool,
-#  "period": seconds, "count": how many messages to publish}
+#  "quiet": topics not to report, "depth": of the queues, "period": seconds,
+#  "count": how many messages to publish}
 plan = json.loads(sys.argv[1])
 node = rosglass.connect(f"zenoh://127.0.0.1:{plan['port']}?domain={plan['domain']}", "peer", "/own")
-qos = rosglass.QoS.latched() if plan.get("latched") else rosglass.QoS()
+qos = rosglass.QoS.latched() if plan.get("latched") else rosglass.QoS(plan.get("depth", 10))
 
 
 def receiver(topic: str):
@@ -22,7 +23,8 @@ def receiver(topic: str):
 
 
 for topic, name in plan.get("subscribe", {}).items():
-    node.create_subscription(topic, name, receiver(topic), qos)
+    quiet = topic in plan.get("quiet", [])
+    node.create_subscription(topic, name, None if quiet else receiver(topic), qos)
 publishers = {
     topic: (node.create_publisher(topic, name, qos), VALUES[name])
     for topic, name in plan.get("publish", {}).items()

@@ -1,0 +1,264 @@
+"""What a node declares on a Zenoh session: its token, its readers and writers."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import threading
+import time
+from abc import abstractmethod
+from collections import deque
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, Protocol
+
+import zenoh
+import zenoh.ext
+
+from rosglass.comm import ConnectionState, Durability, Handle, History, Reliability
+from rosglass.errors import ConnectionLostError, NodeClosedError
+from rosglass.ros2.middleware import OnSample, Writer
+from rosglass.ros2.zenoh_keys import HUMBLE_HASH, NO_ATTACHMENT, Attachment, gid_of, topic_key
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from rosglass.comm import EndpointInfo, QoS, Status
+    from rosglass.ros2.zenoh_options import ZenohOptions
+
+__all__ = ["Announcement", "Declaration", "ZenohReader", "ZenohWriter", "direct", "queued"]
+
+_log = logging.getLogger("rosglass.ros2")
+#: Seconds between the heartbeats that let subscriptions notice a lost last sample (rmw_zenoh's).
+_HEARTBEAT = 0.5
+
+
+class Owner(Protocol):
+    """Who keeps declarations."""
+
+    def forget(self, declaration: Declaration) -> None:
+        """Drop a declaration that was closed."""
+
+    def status(self) -> Status:
+        """Return the state of the connection."""
+
+
+class Declaration(Handle):
+    """Something declared on the session, or to be declared when it opens."""
+
+    def __init__(self, owner: Owner, token: str) -> None:
+        self.token = token
+        self._owner = owner
+        self._lock = threading.Lock()
+        self._closed = self._attached = False
+        self._handles: list[Any] = []
+
+    def attach(self, session: zenoh.Session) -> None:
+        """Declare it on the session that just opened."""
+        with self._lock:
+            if self._closed or self._attached:
+                return
+            self._attached = True
+        # Declaring may call back at once, into code that closes this very declaration.
+        handles = self.declare(session)
+        # The token comes last and goes first: who sees it can count on the rest.
+        self._keep([session.liveliness().declare_token(self.token), *handles])
+
+    @abstractmethod
+    def declare(self, session: zenoh.Session) -> list[Any]:
+        """Declare what comes with the token, and return what has to be undeclared."""
+
+    def close(self) -> None:
+        """Undeclare it."""
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+            handles, self._handles = self._handles, []
+        self._owner.forget(self)
+        _undeclare(handles)
+
+    def _keep(self, handles: list[Any]) -> None:
+        with self._lock:
+            if not self._closed:
+                self._handles += handles
+                return
+        _undeclare(handles)
+
+
+class Announcement(Declaration):
+    """A token alone: a node."""
+
+    def declare(self, session: zenoh.Session) -> list[Any]:  # noqa: ARG002 - nothing but the token
+        """Declare nothing more."""
+        return []
+
+
+class ZenohReader(Declaration):
+    """A subscriber and its token."""
+
+    def __init__(self, owner: Owner, token: str, key: str, qos: QoS, on_sample: OnSample) -> None:
+        super().__init__(owner, token)
+        self._key, self._qos, self._on_sample = key, qos, on_sample
+
+    def declare(self, session: zenoh.Session) -> list[Any]:
+        """Declare the subscriber; a transient local one asks publishers for their last samples."""
+        subscriber: Any
+        if self._qos.durability is Durability.TRANSIENT_LOCAL:
+            reliable = self._qos.reliability is Reliability.RELIABLE
+            subscriber = zenoh.ext.declare_advanced_subscriber(
+                session,
+                self._key,
+                queued(self._on_data),
+                history=zenoh.ext.HistoryConfig(
+                    detect_late_publishers=True, max_samples=self._qos.depth
+                ),
+                recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True)
+                if reliable
+                else None,
+                subscriber_detection=True,
+            )
+        else:
+            subscriber = session.declare_subscriber(self._key, direct(self._on_data))
+        return [subscriber]
+
+    def _on_data(self, sample: zenoh.Sample) -> None:
+        received = time.time_ns()
+        if self._closed or sample.kind == zenoh.SampleKind.DELETE:
+            return
+        attached = sample.attachment
+        note = NO_ATTACHMENT if attached is None else Attachment.decode(attached.to_bytes())
+        type_hash = str(sample.key_expr).rpartition("/")[2]
+        self._on_sample(
+            sample.payload.to_bytes(),
+            received,
+            note.sent,
+            note.gid,
+            note.sequence,
+            "" if type_hash == HUMBLE_HASH else type_hash,
+        )
+
+
+class ZenohWriter(Declaration, Writer):
+    """A publisher and its token; one publisher for each key that is listened to."""
+
+    def __init__(
+        self,
+        owner: Owner,
+        options: ZenohOptions,
+        token: str,
+        topic: str,
+        type_name: str,
+        type_hash: str,
+        qos: QoS,
+    ) -> None:
+        super().__init__(owner, token)
+        self._options, self._topic, self._qos = options, topic, qos
+        self._type_name, self._type_hash = type_name, type_hash
+        self._gid = gid_of(token)
+        self._numbers = itertools.count(1)
+        self._session: zenoh.Session | None = None
+        self._hashes = {HUMBLE_HASH if options.humble else type_hash or HUMBLE_HASH}
+        self._publishers: tuple[Any, ...] = ()
+        # Kept for keys that are declared later: late subscriptions are owed the last samples.
+        latched = qos.durability is Durability.TRANSIENT_LOCAL
+        self._history: deque[tuple[bytes | bytearray, bytes]] = deque(maxlen=qos.depth * latched)
+
+    def declare(self, session: zenoh.Session) -> list[Any]:
+        """Declare the publishers of the keys known so far."""
+        self._session = session
+        return self._declare_publishers(session, self._hashes)
+
+    def write(self, data: bytes | bytearray) -> None:
+        """Send a payload; while nothing is linked, only a transient local cache keeps it."""
+        if self._closed:
+            raise NodeClosedError(f"the publisher of {self._topic} is closed")
+        note = Attachment(next(self._numbers), time.time_ns(), self._gid).encode()
+        self._history.append((data, note))
+        try:
+            for publisher in self._publishers:
+                publisher.put(data, attachment=note)
+        except zenoh.ZError as error:
+            if self._closed or self._owner.status().state is ConnectionState.CLOSED:
+                raise NodeClosedError(f"the publisher of {self._topic} is closed") from error
+            raise ConnectionLostError(f"cannot publish on {self._topic}: {error}") from error
+
+    def match(self, subscriptions: Sequence[EndpointInfo]) -> None:
+        """Send under a further key for subscriptions that name the type's definition otherwise.
+
+        A Humble robot subscribes without hash; the same definition is meant.
+        """
+        ours = {self._type_hash or HUMBLE_HASH, HUMBLE_HASH}
+        wanted = {endpoint.type_hash or HUMBLE_HASH for endpoint in subscriptions}
+        new = (wanted & ours) - self._hashes
+        if new and not self._closed:
+            self._hashes = self._hashes | new
+            if self._session is not None:
+                self._keep(self._declare_publishers(self._session, new))
+
+    def _declare_publishers(self, session: zenoh.Session, hashes: set[str]) -> list[Any]:
+        publishers = [self._declare_publisher(session, name) for name in sorted(hashes)]
+        # First: whatever is written from here on reaches them; some of it twice, under one number.
+        self._publishers += tuple(publishers)
+        for data, note in tuple(self._history):
+            for publisher in publishers:
+                publisher.put(data, attachment=note)
+        return publishers
+
+    def _declare_publisher(self, session: zenoh.Session, type_hash: str) -> Any:
+        key = topic_key(self._options.domain, self._topic, self._type_name, type_hash)
+        reliable = self._qos.reliability is Reliability.RELIABLE
+        keep_all = self._qos.history is History.KEEP_ALL
+        # rmw_zenoh's choice: only who keeps everything waits for a full queue.
+        block = reliable and keep_all
+        congestion = zenoh.CongestionControl.BLOCK if block else zenoh.CongestionControl.DROP
+        # Each priority has its own queue: a stop command must not be thrown away because camera
+        # pictures, sent best effort by the same program, fill theirs while the network is stuck.
+        priority = zenoh.Priority.INTERACTIVE_LOW if reliable else zenoh.Priority.DATA
+        if self._qos.durability is Durability.VOLATILE:
+            return session.declare_publisher(key, congestion_control=congestion, priority=priority)
+        return zenoh.ext.declare_advanced_publisher(
+            session,
+            key,
+            congestion_control=congestion,
+            priority=priority,
+            cache=zenoh.ext.CacheConfig(max_samples=self._qos.depth),
+            publisher_detection=True,
+            sample_miss_detection=zenoh.ext.MissDetectionConfig(
+                heartbeat=None, sporadic_heartbeat=_HEARTBEAT
+            )
+            if reliable
+            else None,
+        )
+
+
+def _undeclare(handles: list[Any]) -> None:
+    for handle in handles:
+        with suppress(zenoh.ZError):  # the session went first
+            handle.undeclare()
+
+
+def _guarded(callback: Callable[[Any], None]) -> Callable[[Any], None]:
+    """Log what `callback` raises: Zenoh would only print it."""
+
+    def guarded(item: Any) -> None:
+        try:
+            callback(item)
+        except Exception:
+            _log.exception("handling something received over Zenoh failed")
+
+    return guarded
+
+
+def direct(callback: Callable[[Any], None]) -> Any:
+    """Run `callback` on the thread that receives; only for the samples of plain subscribers."""
+    return zenoh.handlers.Callback(_guarded(callback), indirect=False)
+
+
+def queued(callback: Callable[[Any], None]) -> Any:
+    """Run `callback` on a thread of its own.
+
+    Zenoh's "net" threads must never wait for Python's global lock: undeclaring an advanced
+    publisher holds that lock while it waits for a task of theirs (measured with eclipse-zenoh
+    1.10.2: the whole program stands still for 10 s).
+    """
+    return zenoh.handlers.Callback(_guarded(callback), indirect=True)
