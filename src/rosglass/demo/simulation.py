@@ -122,7 +122,7 @@ class RobotState:
     current: float = 0.0
     charging: bool = False
     odometer: float = 0.0
-    carrier_phase: float = 3.0
+    carrier_phase: float = 10.5
 
     @property
     def voltage(self) -> float:

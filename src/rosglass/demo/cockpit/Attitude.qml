@@ -12,13 +12,13 @@ Panel {
     property real roll: 0
     property real pitch: 0
     readonly property bool steep: Math.max(Math.abs(roll), Math.abs(pitch)) > 12
-    note: (-pitch).toFixed(0) + "° / " + roll.toFixed(0) + "°"
+    // Adding zero turns minus zero into zero.
+    note: (Math.round(-pitch) + 0) + "° / " + (Math.round(roll) + 0) + "°"
 
     property Feed imu: Feed {
         topic: "/imu"
         messageType: "sensor_msgs/msg/Imu"
-        throttleRate: 30
-        onNewMessage: function (message) {
+        onArrived: function (message) {
             const q = message.orientation
             const degrees = 180 / Math.PI
             panel.roll = degrees * Math.atan2(2 * (q.w * q.x + q.y * q.z), 1 - 2 * (q.x * q.x + q.y * q.y))
@@ -32,7 +32,7 @@ Panel {
         anchors.centerIn: parent
         width: Math.min(parent.width, parent.height)
         height: width
-        radius: 8
+        radius: 3
         clip: true
         color: "#123"
         readonly property real perDegree: height / 56

@@ -11,26 +11,45 @@ Item {
     property alias transport: camera.defaultTransport
     // Why there may be no picture at all, from the connection.
     property string reason
-    readonly property bool received: camera.age >= 0
-    readonly property real age: camera.age
+    // Seconds that a picture may be shown as live after it came: at 30 pictures a second, the
+    // loss of fifteen is no hiccup any more.
+    property real limit: 0.5
+    property bool received: false
+    property double stamp: 0
+    property real age: -1
     // Milliseconds from the robot's stamp to here; means something while the clocks agree.
     readonly property real latency: camera.latency
     readonly property bool late: received && !camera.stale && latency > 1000
-    readonly property bool live: received && !camera.stale && !late
+    readonly property bool live: received && age <= limit && !camera.stale && !late
     readonly property real framerate: camera.framerate
+    // Where the picture is, in this item's coordinates.
+    readonly property rect pictureRect: output.contentRect
 
     ImageTransportSubscription {
         id: camera
+        objectName: "cameraStream"
         topic: "/camera/image_raw"
         defaultTransport: "raw"
-        // Half a second: at 30 pictures a second the loss of fifteen is no hiccup any more.
-        timeout: 500
+        // The last picture stays, so that the operator can see where the robot was; that it is
+        // old is said below.
+        timeout: 0
+    }
+    Connections {
+        target: output.videoSink
+        function onVideoFrameChanged() {
+            view.stamp = Date.now()
+            view.age = 0
+            view.received = true
+            Beat.picture()
+        }
+    }
+    Timer {
+        interval: 100
+        running: view.received
+        repeat: true
+        onTriggered: view.age = (Date.now() - view.stamp) / 1000
     }
 
-    Rectangle {
-        anchors.fill: parent
-        color: "black"
-    }
     VideoOutput {
         id: output
         objectName: "picture"

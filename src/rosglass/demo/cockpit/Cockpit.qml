@@ -2,7 +2,7 @@
 import QtQuick
 import Ros2 1.0
 
-Rectangle {
+Item {
     id: cockpit
     objectName: "cockpit"
 
@@ -18,11 +18,11 @@ Rectangle {
     property alias diagnostics: diagnostics
     // Whether the window is the one that gets the keys.
     property bool inFront: true
-    // What the middleware says about its connection.
-    property string connection
     readonly property bool wide: width > 1.15 * height
+    // How far the controls stay above the picture's lower edge, where its clock is.
+    readonly property real rim: camera.height - camera.pictureRect.y - camera.pictureRect.height
+        + camera.pictureRect.height * 26 / 480 + 12
 
-    color: Theme.background
     focus: true
 
     onInFrontChanged: if (!inFront) letGo()
@@ -59,7 +59,7 @@ Rectangle {
         id: link
         objectName: "link"
         pulse: map.odom
-        detail: cockpit.connection
+        detail: Ros2.connectionDetail
     }
     Drive {
         id: drive
@@ -96,7 +96,9 @@ Rectangle {
             : cockpit.height - camera.y - camera.height - 2 * Theme.gap
         x: cockpit.wide ? parent.width - width - Theme.gap : Theme.gap
         y: cockpit.wide ? bar.height + Theme.gap : camera.y + camera.height + Theme.gap
-        width: cockpit.wide ? Math.max(240, Math.min(400, cockpit.width * 0.265)) : cockpit.width - 2 * Theme.gap
+        // What a picture of 4:3 in full height leaves over.
+        width: !cockpit.wide ? cockpit.width - 2 * Theme.gap
+            : Math.max(280, Math.min(420, cockpit.width - 3 * Theme.gap - camera.height * 4 / 3))
         height: tall
         readonly property real half: (width - Theme.gap) / 2
         readonly property real mapTall: cockpit.wide ? Math.min(width * 0.86, tall * 0.42) : tall
@@ -147,7 +149,7 @@ Rectangle {
     Speed {
         id: speed
         objectName: "speed"
-        anchors { horizontalCenter: camera.horizontalCenter; bottom: camera.bottom; bottomMargin: 44 }
+        anchors { horizontalCenter: camera.horizontalCenter; bottom: camera.bottom; bottomMargin: cockpit.rim }
         odom: map.odom
         drive: drive
     }
@@ -157,12 +159,12 @@ Rectangle {
         drive: drive
         width: Math.max(110, Math.min(180, camera.height * 0.25))
         height: width
-        anchors { left: camera.left; bottom: camera.bottom; leftMargin: 22; bottomMargin: 44 }
+        anchors { left: camera.left; bottom: camera.bottom; leftMargin: 22; bottomMargin: cockpit.rim }
     }
     Lamp {
         id: lamp
         objectName: "lamp"
-        anchors { right: stop.left; bottom: stop.bottom; rightMargin: 18 }
+        anchors { right: stop.left; bottom: stop.bottom; rightMargin: 14 }
     }
     EmergencyStop {
         id: stop
@@ -170,6 +172,6 @@ Rectangle {
         z: 1000
         width: Math.max(110, Math.min(170, camera.height * 0.24))
         height: width
-        anchors { right: camera.right; bottom: camera.bottom; rightMargin: 22; bottomMargin: 44 }
+        anchors { right: camera.right; bottom: camera.bottom; rightMargin: 22; bottomMargin: cockpit.rim }
     }
 }

@@ -20,11 +20,11 @@ Panel {
         topic: "/diagnostics"
         messageType: "diagnostic_msgs/msg/DiagnosticArray"
         limit: 1.5
-        onNewMessage: function (message) {
+        onArrived: function (message) {
             const list = []
             for (let i = 0; i < message.status.length; ++i) {
-                const status = message.status.at(i)
-                const value = status.values.length ? status.values.at(0).value : ""
+                const status = message.status[i]
+                const value = status.values.length ? status.values[0].value : ""
                 list.push({ level: status.level, name: status.name, text: status.message, value: value })
             }
             // Assigned only when it differs: the rows would be rebuilt each time.

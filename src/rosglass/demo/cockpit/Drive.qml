@@ -23,6 +23,7 @@ QtObject {
     property string problem
 
     property var publisher: null
+    Component.onCompleted: publisher = Ros2.createPublisher(topic, "geometry_msgs/msg/Twist", 1)
     property int zeros: 0
 
     // Take or change what is wanted; the stick and the keys call this.
@@ -55,14 +56,12 @@ QtObject {
     }
 
     function send() {
-        if (publisher === null)
-            publisher = Ros2.createPublisher(topic, "geometry_msgs/msg/Twist", 1)
         try {
-            publisher.publish({
+            const sent = publisher.publish({
                 linear: { x: active ? maxSpeed * forward : 0 },
                 angular: { z: active ? maxTurn * left : 0 }
             })
-            problem = ""
+            problem = sent ? "" : publisher.problem || "command not sent: no connection"
         } catch (error) {
             problem = String(error.message || error)
         }

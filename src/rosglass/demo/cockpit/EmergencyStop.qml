@@ -20,6 +20,7 @@ Item {
     readonly property bool blocks: wanted === true || stopped
 
     property var publisher: null
+    Component.onCompleted: publisher = Ros2.createPublisher(topic, "std_msgs/msg/Bool", 10)
 
     implicitWidth: 168
     implicitHeight: 168
@@ -42,12 +43,13 @@ Item {
     }
 
     function send() {
-        if (publisher === null)
-            publisher = Ros2.createPublisher(topic, "std_msgs/msg/Bool", 10)
         try {
-            publisher.publish({ data: wanted })
-            sent += 1
-            problem = ""
+            if (publisher.publish({ data: wanted })) {
+                sent += 1
+                problem = ""
+            } else {
+                problem = publisher.problem || "no connection"
+            }
         } catch (error) {
             problem = String(error.message || error)
         }
@@ -69,7 +71,7 @@ Item {
     property Feed state_: Feed {
         topic: "/emergency_stop/state"
         messageType: "std_msgs/msg/Bool"
-        throttleRate: 0
+        urgent: true
     }
     Timer {
         interval: 100
@@ -126,7 +128,7 @@ Item {
                 objectName: "confirmation"
                 anchors.horizontalCenter: parent.horizontalCenter
                 horizontalAlignment: Text.AlignHCenter
-                text: stop.overdue ? "NOT CONFIRMED\nsending…"
+                text: stop.overdue ? "NOT CONFIRMED\n" + (stop.problem ? "not sent" : "sending…")
                     : stop.pending ? "sending…"
                     : stop.stopped ? (stop.wanted ? "confirmed" : "by someone else")
                     : stop.known ? "space bar" : "state unknown"

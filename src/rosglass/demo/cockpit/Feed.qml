@@ -2,13 +2,46 @@
 import QtQuick
 import Ros2 1.0
 
-Subscription {
+QtObject {
     id: feed
 
+    property alias topic: subscription.topic
+    property alias messageType: subscription.messageType
+    property alias age: subscription.age
     // Seconds without a message after which the one received last is no longer true.
     property real limit: 1.0
+    // Whether to show a message at once instead of together with the next camera picture.
+    property bool urgent: false
+    property var message: undefined
     readonly property bool received: message !== undefined
-    readonly property bool fresh: received && !stale
+    readonly property bool fresh: received && !subscription.stale
 
-    timeout: limit * 1000
+    signal arrived(var message)
+
+    property bool waiting: false
+
+    function take() {
+        if (!waiting)
+            return
+        waiting = false
+        message = subscription.message
+        if (received)
+            arrived(message)
+    }
+
+    readonly property Subscription subscription: Subscription {
+        id: subscription
+        throttleRate: 30
+        timeout: feed.limit * 1000
+        onMessageChanged: {
+            feed.waiting = true
+            if (feed.urgent)
+                feed.take()
+        }
+    }
+    readonly property Connections beat: Connections {
+        target: Beat
+        enabled: !feed.urgent
+        function onTick() { feed.take() }
+    }
 }

@@ -17,7 +17,8 @@ Panel {
     property real wantedFront: NaN
     property real wantedRear: NaN
     property var publisher: null
-    property string problem
+    Component.onCompleted: publisher = Ros2.createPublisher("/flipper_controller/commands",
+                                                            "std_msgs/msg/Float64MultiArray", 1)
 
     function degrees(angle) { return (angle * 180 / Math.PI).toFixed(0) + "°" }
 
@@ -36,10 +37,10 @@ Panel {
     property Feed joints: Feed {
         topic: "/joint_states"
         messageType: "sensor_msgs/msg/JointState"
-        onNewMessage: function (message) {
+        onArrived: function (message) {
             const angles = {}
             for (let i = 0; i < message.name.length; ++i)
-                angles[message.name.at(i)] = message.position.at(i)
+                angles[message.name[i]] = message.position[i]
             panel.front = (angles.flipper_front_left + angles.flipper_front_right) / 2
             panel.rear = (angles.flipper_rear_left + angles.flipper_rear_right) / 2
         }
@@ -48,38 +49,34 @@ Panel {
     property Timer sender: Timer {
         interval: 100
         onTriggered: {
-            if (panel.publisher === null)
-                panel.publisher = Ros2.createPublisher("/flipper_controller/commands",
-                                                       "std_msgs/msg/Float64MultiArray", 1)
-            try {
-                panel.publisher.publish({ data: [panel.wantedFront, panel.wantedFront,
-                                                 panel.wantedRear, panel.wantedRear] })
-                panel.problem = ""
-            } catch (error) {
-                panel.problem = String(error.message || error)
-            }
+            panel.publisher.publish({ data: [panel.wantedFront, panel.wantedFront,
+                                             panel.wantedRear, panel.wantedRear] })
         }
     }
 
+    component Outline: Rectangle {
+        id: outline
+        property real angle
+        x: -7; y: -7
+        width: 56; height: 14; radius: 7
+        transform: Rotation { origin.x: 7; origin.y: 7; angle: -outline.angle * 180 / Math.PI }
+    }
     component Flipper: Item {
+        id: flipper
         property real angle
         property real wanted: NaN
-        property int side
         width: 0
         height: 0
-        Rectangle {
-            visible: !isNaN(parent.wanted)
-            y: -7; width: 52; height: 14; radius: 7
+        Outline {
+            visible: !isNaN(flipper.wanted)
+            angle: isNaN(flipper.wanted) ? 0 : flipper.wanted
             color: "transparent"
             border { color: Theme.accent; width: 1 }
-            opacity: 0.7
-            transform: Rotation { origin.y: 7; angle: -parent.wanted * 180 / Math.PI }
         }
-        Rectangle {
-            y: -7; width: 52; height: 14; radius: 7
+        Outline {
+            angle: flipper.angle
             color: "#9fb2c2"
             border { color: "#dbe7f0"; width: 1 }
-            transform: Rotation { origin.y: 7; angle: -parent.angle * 180 / Math.PI }
         }
     }
     component Slider: Item {

@@ -7,17 +7,16 @@ Rectangle {
 
     readonly property bool on: state_.fresh && state_.message.data
     property var publisher: null
+    Component.onCompleted: publisher = Ros2.createPublisher("/flashlight", "std_msgs/msg/Bool", 1)
 
     function toggle() {
-        if (publisher === null)
-            publisher = Ros2.createPublisher("/flashlight", "std_msgs/msg/Bool", 1)
         publisher.publish({ data: !on })
     }
 
     property Feed state_: Feed {
         topic: "/flashlight/state"
         messageType: "std_msgs/msg/Bool"
-        throttleRate: 0
+        urgent: true
     }
 
     width: 54

@@ -17,6 +17,11 @@ Panel {
     property real robotX: 0
     property real robotY: 0
     property real robotYaw: 0
+    // Where the robot was when it looked around; it moves on until the next scan.
+    property url scanSource
+    property real scanX: 0
+    property real scanY: 0
+    property real scanYaw: 0
     property real driven: 0
     property var track: []
 
@@ -24,9 +29,8 @@ Panel {
         id: odom
         topic: "/odom"
         messageType: "nav_msgs/msg/Odometry"
-        throttleRate: 30
         limit: 0.7
-        onNewMessage: function (message) {
+        onArrived: function (message) {
             const pose = message.pose.pose
             const q = pose.orientation
             panel.place(pose.position.x, pose.position.y,
@@ -41,6 +45,17 @@ Panel {
         id: scan
         topic: "/scan"
         limit: 0.7
+    }
+    Connections {
+        target: Beat
+        function onTick() {
+            if (panel.scanSource === scan.source)
+                return
+            panel.scanSource = scan.source
+            panel.scanX = panel.robotX
+            panel.scanY = panel.robotY
+            panel.scanYaw = panel.robotYaw
+        }
     }
 
     function place(x, y, yaw) {
@@ -79,13 +94,13 @@ Panel {
             smooth: true
         }
         Image {
-            source: scan.source
+            source: panel.scanSource
             readonly property real size: scan.metres * plane.scale_
-            x: plane.originX + panel.robotX * plane.scale_ - size / 2
-            y: plane.originY - panel.robotY * plane.scale_ - size / 2
+            x: plane.originX + panel.scanX * plane.scale_ - size / 2
+            y: plane.originY - panel.scanY * plane.scale_ - size / 2
             width: size
             height: size
-            rotation: -panel.robotYaw * 180 / Math.PI
+            rotation: -panel.scanYaw * 180 / Math.PI
             cache: false
             opacity: panel.fresh ? 1 : 0
         }

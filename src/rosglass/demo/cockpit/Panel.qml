@@ -18,12 +18,15 @@ Rectangle {
 
     Text {
         id: heading
-        anchors { left: parent.left; top: parent.top; leftMargin: 12; topMargin: 9 }
+        anchors { left: parent.left; right: aside.left; top: parent.top }
+        anchors { leftMargin: 12; rightMargin: 6; topMargin: 9 }
+        elide: Text.ElideRight
         text: panel.title.toUpperCase()
         color: Theme.dim
         font { pixelSize: Theme.small; letterSpacing: 1.2; weight: Font.DemiBold }
     }
     Text {
+        id: aside
         anchors { right: parent.right; baseline: heading.baseline; rightMargin: 12 }
         text: panel.fresh ? panel.note
             : panel.age < 0 ? "NO DATA YET" : "OLD: " + panel.age.toFixed(0) + " s"

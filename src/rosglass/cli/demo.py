@@ -1,0 +1,175 @@
+"""``rosglass demo``: router, robot and cockpit, with one command."""
+
+from __future__ import annotations
+
+import os
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rosglass.errors import Error
+
+if TYPE_CHECKING:
+    import argparse
+
+    from rosglass.demo.app import Cockpit
+    from rosglass.demo.processes import Child
+
+__all__ = ["configure", "run"]
+
+_HEADLESS_SECONDS = 20.0
+_SIZE = (1340, 800)
+_QUIET = "qt.multimedia.symbolsresolver=false;qt.multimedia.ffmpeg*=false;qt.qpa.theme*=false"
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's options."""
+    parser.add_argument(
+        "--url",
+        default="zenoh://127.0.0.1:7447",
+        help="Zenoh router to meet at; one is started when none answers (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--no-robot", action="store_true", help="open the cockpit on a robot that runs already"
+    )
+    parser.add_argument(
+        "--seconds",
+        type=float,
+        metavar="N",
+        help="end after N seconds (default: when the window is closed; without display 20)",
+    )
+    parser.add_argument(
+        "--screenshot",
+        type=Path,
+        metavar="FILE.png",
+        help="save a picture of the cockpit before it ends (without display: demo.png)",
+    )
+    parser.add_argument(
+        "--headless",
+        action="store_true",
+        help="use a virtual screen and drive by itself, as on a machine without display",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the demo; returns 1 when camera or odometry never arrived."""
+    if args.seconds is not None and not 1 <= args.seconds <= 86400:
+        raise Error(f"--seconds {args.seconds:g}: expected 1 to 86400")
+    headless = args.headless or not _has_display()
+    seconds = args.seconds
+    screenshot = args.screenshot
+    if headless:
+        seconds = _HEADLESS_SECONDS if seconds is None else seconds
+        screenshot = screenshot or Path("demo.png")
+    if screenshot is not None and not screenshot.resolve().parent.is_dir():
+        raise Error(f"--screenshot {screenshot}: there is no such directory")
+    with ExitStack() as stack:
+        if headless:
+            _use_virtual_screen(stack, seconds)
+        url = _find_router(stack, args.url)
+        robot = None if args.no_robot else _start_robot(stack, url)
+        # Qt reads this when it is loaded; its media backends report every library they miss.
+        rules = [_QUIET, os.environ.get("QT_LOGGING_RULES", "")]
+        os.environ["QT_LOGGING_RULES"] = ";".join(filter(None, rules))
+        from rosglass.demo.app import Cockpit
+
+        cockpit = Cockpit(url, _SIZE if headless else None)
+        stack.callback(cockpit.close)
+        return _show(cockpit, robot, seconds, screenshot, headless)
+
+
+def _show(
+    cockpit: Cockpit,
+    robot: Child | None,
+    seconds: float | None,
+    screenshot: Path | None,
+    headless: bool,
+) -> int:
+    failures: list[Error] = []
+
+    def shoot() -> None:
+        assert screenshot is not None
+        try:
+            cockpit.screenshot(screenshot)
+        except Error as error:
+            failures.append(error)
+
+    if headless:
+        cockpit.fly()
+    if screenshot is not None and seconds is not None:
+        cockpit.at(max(0.5, seconds - 1.5), shoot)
+    code = cockpit.run(seconds)
+    if screenshot is not None and seconds is None:
+        shoot()
+    cockpit.call("stick", "letGo")
+    print(f"\n{cockpit.report()}", flush=True)
+    if screenshot is not None and not failures:
+        print(f"picture of the cockpit: {screenshot.resolve()}")
+    if robot is not None and robot.poll() is not None:
+        print(f"the robot (process {robot.pid}) had ended with code {robot.poll()}")
+    for error in failures:
+        print(f"rosglass: {error}", file=sys.stderr)
+    missing = [
+        what
+        for what, came in (
+            ("camera picture", cockpit.camera.frames > 0),
+            ("odometry", cockpit.received("/odom")),
+        )
+        if not came
+    ]
+    if missing:
+        print(
+            f"rosglass: no {' and no '.join(missing)} ever arrived; {cockpit.session.detail}",
+            file=sys.stderr,
+        )
+    return code or int(bool(missing or failures))
+
+
+def _has_display() -> bool:
+    if not sys.platform.startswith("linux"):
+        return True
+    return any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"))
+
+
+def _use_virtual_screen(stack: ExitStack, seconds: float | None) -> None:
+    from rosglass.demo.processes import VirtualScreen
+
+    screen = VirtualScreen(*_SIZE)
+    stack.callback(screen.close)
+    os.environ["DISPLAY"] = screen.display
+    os.environ["QT_QPA_PLATFORM"] = "xcb"
+    print(
+        f"no display: the cockpit runs {seconds:g} s on a virtual screen (Xvfb {screen.display}) "
+        "and drives by itself",
+        flush=True,
+    )
+
+
+def _find_router(stack: ExitStack, url: str) -> str:
+    """Return the URL to use, after starting a router there when nobody answers."""
+    from rosglass.ros2.router import Router, is_router_reachable
+
+    if is_router_reachable(url):
+        print(f"using the Zenoh router at {url}", flush=True)
+        return url
+    listen = "tcp/" + url.removeprefix("zenoh://").partition("?")[0].rstrip("/")
+    router = Router(listen)
+    stack.callback(router.close)
+    print(f"no Zenoh router at {url}: started one, on {router.listen}", flush=True)
+    # Port 0 takes a free one.
+    query = url.partition("?")[2]
+    return f"{router.url}?{query}" if query else router.url
+
+
+def _start_robot(stack: ExitStack, url: str) -> Child:
+    from rosglass.demo.processes import start_robot
+
+    robot = start_robot(url)
+    stack.callback(robot.close)
+    print(
+        f"started the robot, process {robot.pid}; to see how the cockpit takes its loss: "
+        f"kill -9 {robot.pid}, and then: rosglass robot --url '{url}'",
+        flush=True,
+    )
+    return robot

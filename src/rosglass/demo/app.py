@@ -1,0 +1,192 @@
+"""The cockpit as a program: window, node, and the figures it prints when it ends."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rosglass.demo import pictures
+from rosglass.demo.figures import CameraFigures, Latency, ProcessFigures, table
+from rosglass.errors import Error, QmlError
+from rosglass.qml import Session
+from rosglass.qml.display import require_display
+from rosglass.qml.interrupt import QuitOnSignal
+from rosglass.qml.log import install_message_handler
+from rosglass.qml.runner import Runner
+from rosglass.qml.subscription import Subscription
+from rosglass.qt import QtCore, QtGui, QtQuick
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+__all__ = ["AUTOPILOT", "Cockpit"]
+
+_QML = Path(__file__).with_name("cockpit") / "main.qml"
+#: What the stick does when nobody is there to hold it: from which second on, right, down.
+AUTOPILOT = (
+    (2.5, -0.32, -0.45),
+    (5.0, 0.0, -0.62),
+    (10.6, 0.3, -0.5),
+    (12.6, 0.42, -0.14),
+    (14.6, 0.0, -0.15),
+    (16.2, 0.1, -0.18),
+    (17.2, -0.09, -0.2),
+)
+
+
+class Cockpit:
+    """The cockpit's window in this process.
+
+    Args:
+        url: Where the robot is.
+        size: Of the window in pixels; None for its own.
+
+    Raises:
+        UnsupportedError: There is no display.
+        QmlError: The interface cannot be loaded; the message lists why.
+    """
+
+    def __init__(self, url: str, size: tuple[int, int] | None = None) -> None:
+        connected = require_display()
+        install_message_handler()
+        self.app = QtGui.QGuiApplication.instance() or QtGui.QGuiApplication(sys.argv[:1])
+        connected()
+        # Half the cost of distance fields without a graphics card, and sharper.
+        QtQuick.QQuickWindow.setTextRenderType(
+            QtQuick.QQuickWindow.TextRenderType.NativeTextRendering
+        )
+        pictures.register()
+        self.session = Session(url)
+        self._closed = False
+        try:
+            self._runner = Runner(_QML, self.session)
+        except QmlError:
+            self.session.close()
+            raise
+        assert self._runner.window is not None
+        self.window = self._runner.window
+        if size is not None:
+            self.window.resize(*size)
+        self.window.requestActivate()
+        self.process = ProcessFigures()
+        self.camera = CameraFigures(self.item("picture").property("videoSink"), self.window)
+
+    def call(self, name: str, method: str, *arguments: float) -> None:
+        """Call a JavaScript function of a part of the interface."""
+        wrapped = [QtCore.Q_ARG("QVariant", argument) for argument in arguments]
+        QtCore.QMetaObject.invokeMethod(
+            self.item(name), method, QtCore.Qt.ConnectionType.DirectConnection, *wrapped
+        )
+
+    def at(self, seconds: float, job: Callable[[], None]) -> None:
+        """Do something some seconds from now."""
+        QtCore.QTimer.singleShot(round(seconds * 1000), job)
+
+    def fly(self, plan: Sequence[tuple[float, float, float]] = AUTOPILOT) -> None:
+        """Let the stick be pulled by itself, the way a hand would."""
+        for begin, x, y in plan:
+            self.at(begin, lambda x=x, y=y: self.call("stick", "pull", x, y))  # type: ignore[misc]
+
+    def screenshot(self, path: Path) -> None:
+        """Save what the window shows.
+
+        Raises:
+            Error: The file cannot be written.
+        """
+        if not self.window.grabWindow().save(str(path)):
+            raise Error(f"the screenshot cannot be written to {path.resolve()}")
+
+    def run(self, seconds: float | None = None) -> int:
+        """Show the window until it is closed, Ctrl-C is pressed, or the time is up.
+
+        Returns:
+            0, or 128 and the number of the signal that ended it.
+        """
+        loop = QtCore.QEventLoop()
+        # Not the application's own loop, which would close the node before the figures are read.
+        self.window.visibleChanged.connect(lambda shown: None if shown else loop.quit())
+        signals: list[int] = []
+
+        def interrupted(number: int) -> None:
+            signals.append(number)
+            self.session.executor.post(loop.quit)
+
+        if seconds is not None:
+            QtCore.QTimer.singleShot(round(seconds * 1000), loop.quit)
+        with QuitOnSignal(interrupted):
+            loop.exec()
+        return 128 + signals[0] if signals else 0
+
+    def close(self) -> None:
+        """Take the window down and leave the graph; safe to call twice."""
+        if self._closed:
+            return
+        self._closed = True
+        # Elements say goodbye to the session, so they have to go first.
+        self._runner.close()
+        self.session.close()
+
+    def topics(self) -> list[Any]:
+        """Return the interface's subscriptions and pictures, one for each topic, by topic."""
+        kinds = (Subscription, pictures.MapPicture, pictures.ScanPicture)
+        found = {item.property("topic"): item for kind in kinds for item in self._all(kind)}
+        return [found[topic] for topic in sorted(found)]
+
+    def received(self, topic: str) -> bool:
+        """Return whether a message of the topic ever came."""
+        return any(
+            item.property("topic") == topic and item.property("age") >= 0 for item in self.topics()
+        )
+
+    def report(self) -> str:
+        """Return the figures as text."""
+        rows = [["topic", "type", "Hz", "newest"]]
+        for item in self.topics():
+            age = item.property("age")
+            rate = item.property("frequency")
+            kind = item.property("messageType") or getattr(item, "kind", "")
+            rows.append(
+                [
+                    item.property("topic"),
+                    kind,
+                    "" if rate is None else f"{rate:.1f}",
+                    "never" if age < 0 else f"{age * 1000:.0f} ms ago",
+                ]
+            )
+        stream = self.item("cameraStream")
+        latency = Latency.of(self.camera.latencies)
+        rows.append(
+            [
+                "/camera/image_raw",
+                f"sensor_msgs/msg/Image {stream.property('encoding')}",
+                f"{stream.property('framerate'):.1f}",
+                f"{self.camera.frames} shown",
+            ]
+        )
+        driven = self.item("map").property("driven")
+        shown = (
+            f"camera, from the robot's stamp to the screen: median {latency.median:.1f} ms, "
+            f"95 % within {latency.p95:.1f} ms, worst {latency.worst:.1f} ms "
+            f"({latency.count} pictures)"
+        )
+        cost = (
+            f"cockpit: {100 * self.process.cpu():.0f} % of a core, "
+            f"{self.process.memory():.0f} MiB; robot: {driven:.1f} m driven"
+        )
+        lines = (table(rows), "", shown, f"dropped pictures: {self.camera.missing}", cost)
+        return "\n".join(lines)
+
+    def item(self, name: str) -> Any:
+        """Return a part of the interface by its objectName.
+
+        Raises:
+            Error: There is none of that name.
+        """
+        found = self.window.findChild(QtCore.QObject, name)
+        if found is None:
+            raise Error(f"the cockpit has no part called {name!r}")
+        return found
+
+    def _all(self, kind: type) -> list[Any]:
+        return list(self.window.findChildren(kind))

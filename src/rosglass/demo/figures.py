@@ -1,0 +1,151 @@
+"""What the demo measures while it runs, and the table it prints."""
+
+from __future__ import annotations
+
+import math
+import os
+import resource
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rosglass.demo import framecode
+from rosglass.demo.camera import CODE_POSITION
+from rosglass.qt import QtCore, optional
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rosglass.qt import QtQuick
+
+# Imported before QML makes a video sink: PySide knows only types whose module it has seen.
+_MULTIMEDIA: Any = optional("QtMultimedia")
+
+__all__ = ["CameraFigures", "Latency", "ProcessFigures", "table"]
+
+
+@dataclass(frozen=True)
+class Latency:
+    """Milliseconds from a picture's stamp until it was on the screen.
+
+    Attributes:
+        count: Pictures measured.
+        median: Half of them were quicker.
+        p95: 95 % were quicker.
+        worst: The slowest.
+    """
+
+    count: int
+    median: float
+    p95: float
+    worst: float
+
+    @classmethod
+    def of(cls, seconds: Sequence[float]) -> Latency:
+        """Return the figures of some latencies."""
+        if not seconds:
+            return cls(0, math.nan, math.nan, math.nan)
+        milliseconds = 1000 * np.asarray(seconds)
+        median, p95 = np.percentile(milliseconds, [50, 95])
+        return cls(len(seconds), float(median), float(p95), float(milliseconds.max()))
+
+
+class CameraFigures(QtCore.QObject):
+    """Follows the pictures of the simulated camera onto the screen.
+
+    Reads the frame code out of each picture that reaches the video sink; the picture counts as
+    shown when the window has swapped its buffers next.
+
+    Args:
+        sink: The ``QVideoSink`` that shows the camera.
+        window: The window it is in.
+    """
+
+    def __init__(self, sink: Any, window: QtQuick.QQuickWindow) -> None:
+        super().__init__()
+        self._sink = sink
+        self._waiting: framecode.FrameCode | None = None
+        self._last = -1
+        #: Seconds from stamp to screen, picture by picture.
+        self.latencies: list[float] = []
+        #: Pictures that reached the screen's video sink.
+        self.frames = 0
+        #: Pictures missing between the first and the last, by their running numbers.
+        self.missing = 0
+        self._sink.videoFrameChanged.connect(self._on_frame)
+        # Queued: nothing of Python's may run on the render thread.
+        window.frameSwapped.connect(self._on_swap, QtCore.Qt.ConnectionType.QueuedConnection)
+
+    def forget(self) -> None:
+        """Start counting anew."""
+        self.latencies.clear()
+        self.frames = self.missing = 0
+        self._last = -1
+
+    def _on_frame(self, frame: Any) -> None:
+        if not frame.isValid():
+            return
+        self.frames += 1
+        code = self._code(frame)
+        if code is None:
+            return
+        if self._last >= 0:
+            gap = (code.number - self._last) % 65536
+            # A robot that was restarted begins to count anew.
+            self.missing += gap - 1 if 0 < gap < 1000 else 0
+        self._last, self._waiting = code.number, code
+
+    def _on_swap(self) -> None:
+        if self._waiting is not None:
+            self.latencies.append(self._waiting.age(time.time_ns()))
+            self._waiting = None
+
+    def _code(self, frame: Any) -> framecode.FrameCode | None:
+        if not frame.map(_MULTIMEDIA.QVideoFrame.MapMode.ReadOnly):
+            return None
+        try:
+            pixels = frame.bytesPerLine(0) // max(1, frame.width())
+            x, y = CODE_POSITION
+            start = (y + framecode.SQUARE // 2) * frame.bytesPerLine(0) + x * pixels
+            length = framecode.BITS * framecode.SQUARE * pixels
+            row = np.frombuffer(frame.bits(0), np.uint8)[start : start + length]
+            return framecode.read(row[1 if pixels > 1 else 0 :: pixels].copy())
+        except framecode.FrameCodeError:
+            return None  # another camera than the simulated one
+        finally:
+            frame.unmap()
+
+
+class ProcessFigures:
+    """What this process costs, from creation on."""
+
+    def __init__(self) -> None:
+        self._wall, self._cpu = time.monotonic(), time.process_time()
+
+    def cpu(self) -> float:
+        """Return the share of one core used since creation, 1.0 for all of it."""
+        wall = time.monotonic() - self._wall
+        return (time.process_time() - self._cpu) / wall if wall > 0 else 0.0
+
+    @staticmethod
+    def memory() -> float:
+        """Return the resident memory in MiB; the peak where the system tells no more."""
+        try:
+            with open("/proc/self/statm", encoding="ascii") as file:  # noqa: PTH123 - not a file
+                pages = int(file.read().split()[1])
+            return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
+        except OSError:
+            return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+def table(rows: Sequence[Sequence[str]]) -> str:
+    """Return rows as text in columns; the first row is the heading."""
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    lines = [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+    lines.insert(1, "  ".join("-" * width for width in widths))
+    return "\n".join(lines)
