@@ -305,7 +305,8 @@ class _Parser:
 
     def _sequence(self, token: Token) -> FieldType:
         self._lexer.take("<")
-        inner = self._type()
+        nested = self._lexer.token.text == "sequence"
+        inner = FieldType("", ArrayKind.UNBOUNDED) if nested else self._type()
         if inner.array is not ArrayKind.NONE:
             raise self._lexer.error(
                 "there are no sequences of sequences or arrays; put the inner one into a struct",

@@ -10,9 +10,12 @@ from rosglass.errors import DefinitionError
 from rosglass.interfaces.literals import LiteralError, unescape
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterator
 
 __all__ = ["Lexer", "Token"]
+
+# A generated file has a few hundred.
+_MAX_TOKENS = 250_000
 
 _TOKEN = re.compile(
     r"""
@@ -21,7 +24,7 @@ _TOKEN = re.compile(
     |(?P<char>L?'(?:\\(?:x[0-9A-Fa-f]{1,2}|u[0-9A-Fa-f]{1,4}|[0-7]{1,3}|.)|[^'\\\n])')
     |(?P<number>0[xX][0-9a-fA-F]+|(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)
     |(?P<name>[A-Za-z_][A-Za-z0-9_]*)
-    |(?P<sign>::|[{}()\[\]<>;:,=@+\-*/%&|^~])
+    |(?P<sign>::|[{}()\[\]<>;:,=@+\-*%&|^~]|/(?!\*))
     """,
     re.VERBOSE | re.MULTILINE | re.DOTALL,
 )
@@ -55,10 +58,14 @@ class Lexer:
     def __init__(self, text: str, file: str) -> None:
         self.file = file
         self._lines = [0, *(match.end() for match in re.finditer("\n", text))]
-        self._tokens = list(self._scan(text))
+        self._tokens: list[Token] = []
         self._next = 0
+        for token in self._scan(text):
+            self._tokens.append(token)
+            if len(self._tokens) > _MAX_TOKENS:
+                raise self.error(f"the text has more than {_MAX_TOKENS} words and signs", token)
 
-    def _scan(self, text: str) -> Iterable[Token]:
+    def _scan(self, text: str) -> Iterator[Token]:
         position, end = 0, len(text)
         while position < end:
             match = _TOKEN.match(text, position)

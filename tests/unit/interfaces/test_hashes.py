@@ -139,7 +139,9 @@ ODD_ROS1 = {
     "Spaces.msg": "\n  int32   x   \n\nint32 y# glued\n   # c\nint32  A =  1 ## c\nbyte B=-1\r\n",
     "Strings.msg": "string A=  a # b  'c' \nstring B=\"x=y\"\nstring   C   =\nstring d\n",
     "Floats.msg": "float32 A=1.50\nfloat64 B=1e-9 # c\nbool C=True\nbool D=0\nchar E=200\n",
-    "Arrays.msg": "time[42] t\nduration[] d\nchar[3] c\nSpaces[2] s\nHeader[] h\nodd_msgs/Strings x\n",
+    "Arrays.msg": (
+        "time[42] t\nduration[] d\nchar[3] c\nSpaces[2] s\nHeader[] h\nodd_msgs/Strings x\n"
+    ),
     "Header.msg": "Header header\nstd_msgs/Header other\nint8 FIRST=1\nint8 last\n",
     "Empty.msg": "# nothing\n",
     "Service.srv": "# c\nint32 X=5\nSpaces s\n---\nHeader h # c\nstring A=b\n",
