@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 MEGABYTE = 1024 * 1024
-SECONDS = 10.0  # far more than needed even on a busy machine; what hangs takes minutes
+SECONDS = 60.0  # far more than needed, even traced on a busy machine; what hangs takes hours
 
 
 @pytest.fixture(autouse=True)

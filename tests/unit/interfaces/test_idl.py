@@ -239,6 +239,29 @@ def test_constants_as_sizes_and_names_in_scopes() -> None:
     ]
 
 
+def test_annotations_and_literals_of_every_form() -> None:
+    text = """
+    module a { module msg {
+      module B_Constants {
+        const char LETTER = 'a'; const long NEG = - +2; const long COPY = NEG;
+        const long PLUS = -COPY; const double TENTH = .1e0; const string JOINED = "a" L"b";
+      };
+      @extensibility(FINAL) @nested @topic(name="x", platform=ANY)
+      struct B { @key @id(5) @range(min=-1, max=1.5) long x; };
+    }; };
+    """
+    odd = message(text, "a/B")
+    assert [field.name for field in odd.fields] == ["x"]
+    assert {constant.name: constant.value for constant in odd.constants} == {
+        "LETTER": 97,
+        "NEG": -2,
+        "COPY": -2,
+        "PLUS": 2,
+        "TENTH": 0.1,
+        "JOINED": "ab",
+    }
+
+
 def wrapped(members: str) -> str:
     return f"module a {{ module msg {{ struct B {{\n{members}\n}}; }}; }};"
 

@@ -20,9 +20,12 @@ from rosglass.interfaces import (
     Distributions,
     Library,
     MemoryProvider,
+    join_name,
     md5,
     parse_message,
     rihs01,
+    ros1_name,
+    split_name,
 )
 
 if TYPE_CHECKING:
@@ -64,6 +67,14 @@ def test_one_object_per_type(library: Library) -> None:
 def test_bad_names(library: Library, name: object) -> None:
     with pytest.raises(InvalidNameError):
         library.definition(name)  # type: ignore[arg-type]
+
+
+def test_spellings_of_names() -> None:
+    assert split_name("a/msg/B") == ("a", "msg", "B")
+    assert split_name("a/B") == ("a", "", "B")
+    assert join_name("a/B") == "a/msg/B"
+    assert join_name("a/B", "srv") == "a/srv/B"
+    assert ros1_name("a/msg/B") == ros1_name("a/B") == "a/B"
 
 
 def test_bad_world(library: Library) -> None:
