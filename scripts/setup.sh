@@ -59,7 +59,7 @@ make_venv() {
         "on Debian and Ubuntu: sudo apt-get install python3-venv, then run this again."; }
   say "installing Python packages into $dir (rosglass[$extras]; a few minutes the first time)"
   "$dir/bin/python" -m pip install --disable-pip-version-check --progress-bar off -e ".[$extras]" \
-    2>&1 | tee .stamps/pip.log | sed -un 's/^Downloading \(.*\)/    \1/p'
+    2>&1 | tee .stamps/pip.log | sed -un 's/^ *Downloading \([^ ]*\)\(.*\)/    \1\2/p'
   [ "${PIPESTATUS[0]}" -eq 0 ] || {
     grep -E '^ *(ERROR|error)' .stamps/pip.log | tail -5 >&2
     if grep -q 'Python\.h' .stamps/pip.log; then
