@@ -17,17 +17,15 @@ __all__ = ["Lexer", "Token"]
 # A generated file has a few hundred.
 _MAX_TOKENS = 250_000
 
-_TOKEN = re.compile(
-    r"""
+# Compiled on first use: it takes longer than the rest of this package takes to import.
+_TOKEN = r"""
     (?P<skip>\s+|//[^\n]*|/\*(?:[^*]|\*(?!/))*\*/|^[ \t]*\#[^\n]*)
     |(?P<string>L?"(?:\\.|[^"\\\n])*")
     |(?P<char>L?'(?:\\(?:x[0-9A-Fa-f]{1,2}|u[0-9A-Fa-f]{1,4}|[0-7]{1,3}|.)|[^'\\\n])')
     |(?P<number>0[xX][0-9a-fA-F]+|(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)
     |(?P<name>[A-Za-z_][A-Za-z0-9_]*)
     |(?P<sign>::|[{}()\[\]<>;:,=@+\-*%&|^~]|/(?!\*))
-    """,
-    re.VERBOSE | re.MULTILINE | re.DOTALL,
-)
+"""
 
 
 class Token(NamedTuple):
@@ -66,9 +64,10 @@ class Lexer:
                 raise self.error(f"the text has more than {_MAX_TOKENS} words and signs", token)
 
     def _scan(self, text: str) -> Iterator[Token]:
+        token = re.compile(_TOKEN, re.VERBOSE | re.MULTILINE | re.DOTALL)
         position, end = 0, len(text)
         while position < end:
-            match = _TOKEN.match(text, position)
+            match = token.match(text, position)
             if match is None:
                 shown = text[position : position + 20].partition("\n")[0]
                 raise self.error(f"{shown!r} is not IDL", Token("", "", position))
