@@ -46,6 +46,7 @@ class Codec:
         self.cls = plain_class(schema)
         self.stride = layout.constant_stride(schema, wire)
         self._made: dict[object, Any] = {}
+        self._read_many: Callable[[bytes, int, int], tuple[Any, int]] | None = None
 
     def of(self, schema: Schema) -> Codec:
         """Return the codec of another schema on the same wire."""
@@ -143,8 +144,11 @@ class Codec:
 
     def read_many(self, buffer: bytes, offset: int, count: int) -> list[Message]:
         """Decode `count` elements from `offset` on."""
+        read = self._read_many
+        if read is None:
+            read = self._read_many = self.reader_of_many(ANYWHERE)
         try:
-            items, end = self.reader_of_many(ANYWHERE)(buffer, offset, count)
+            items, end = read(buffer, offset, count)
             if end > len(buffer):
                 raise DecodeError(self.schema.name, "the buffer ends early", "", len(buffer))
         except Exception as error:

@@ -37,14 +37,15 @@ class Writer:
     Attributes:
         source: Where the code goes.
         from_dict: Whether values come from nested dicts instead of messages.
+        joined: Whether the parts are joined in the end.
         lenient: Whether strings may hold bytes that are not UTF-8, as surrogates.
     """
 
     def __init__(
-        self, codec: Codec, source: Source, from_dict: bool = False, lenient: bool = False
+        self, codec: Codec, source: Source, from_dict: bool, joined: bool, lenient: bool
     ) -> None:
         self.codec, self.wire, self.source = codec, codec.wire, source
-        self.from_dict, self.lenient = from_dict, lenient
+        self.from_dict, self.joined, self.lenient = from_dict, joined, lenient
         # Positions in the body; the header goes out with the first run.
         self.cursor = Cursor(self.wire, "", 0, START)
         self.cursor.shift = 0
@@ -166,11 +167,11 @@ class Writer:
             known = self.cursor.known.meet(known)
         self.cursor.move("o", known)
 
-    def finish(self, joined: bool) -> None:
+    def finish(self) -> None:
         """Emit the end of the function: the bytes, or the list of parts."""
         self._zeros()
-        self.source.drop_last("o = ")  # nothing follows that would need the position
-        if not joined:
+        self.source.take_last("o = ")  # nothing follows that would need the position
+        if not self.joined:
             parts = "parts" if self._parts is None else f"[{', '.join(self._parts)}]"
             self.source.line(f"return {parts}")
         elif self._parts is None:
@@ -268,7 +269,12 @@ class Writer:
         before = self.cursor.known
         self._pad(number.size, count)
         self._zeros()
-        self._part(data)
+        if self.joined:
+            self._part(data)
+        else:
+            # Memory views of foreign byte order cannot be cast.
+            view = f"bytes({data})" if self.wire.big else f'memoryview({data}).cast("B")'
+            self._part(f'{view} if {count} else b""')
         if count.isdigit():
             self.cursor.advance(number.size * int(count))
         else:
@@ -363,15 +369,15 @@ def write_function(
             what the function returns. None for values that are converted already.
     """
     source = Source()
-    writer = Writer(codec, source, from_dict, lenient=convert is None)
+    writer = Writer(codec, source, from_dict, joined, lenient=convert is None)
     if convert is None:
         writer.fields(codec.schema, "m")
-        writer.finish(joined)
+        writer.finish()
     else:
         with source.block("try:"):
             writer.check_holder(codec.schema, "m")
             writer.fields(codec.schema, "m")
-            writer.finish(joined)
+            writer.finish()
         with source.block("except Exception as error:"):
             source.line(f"return {source.bind(convert, 'convert')}(m, error)")
     what = f"encode {'dict' if from_dict else 'message'}{'' if joined else ' parts'}"

@@ -327,7 +327,15 @@ class Cursor:
         """Move to the next multiple of `align`, with a line of code if it takes one."""
         pad = self.padding(align)
         if pad is None:
-            source.line(f"{var} = {self.aligned(align)}")
+            before = source.take_last(f"{self.var} = ") if self.var == var else None
+            # One step with the sum that led here, if nobody else needs to see that.
+            at = self.copy()
+            if before is not None:
+                at.var, _, constant = before.rpartition(" + ")
+                if not (at.var and constant.isdigit()):
+                    at.var, constant = before, "0"
+                at.delta += int(constant)
+            source.line(f"{var} = {at.aligned(align)}")
             self.move(var, Knowledge(align, 0))
         elif pad:
             self.advance(pad)

@@ -30,49 +30,49 @@ class MessageSequence(MutableSequence["Message"]):
     iterating and changing the sequence decodes them all.
     """
 
-    __slots__ = ("_buffer", "_count", "_items", "_known", "_offsets", "_start")
+    __slots__ = ("_buffer", "_count", "_items", "_offsets", "_start")
     _codec: ClassVar[Codec]
-    _items: list[Message] | None
+    #: The elements; before that, those asked for by their index, or None.
+    _items: list[Message] | dict[int, Message] | None
     _buffer: bytes
     _start: int
     _count: int
 
     def _all(self) -> list[Message]:
-        items = self._items
-        if items is None:
-            with _lock:
-                items = self._items
-                if items is None:
-                    items = self._codec.read_many(self._buffer, self._start, self._count)
-                    for index, element in getattr(self, "_known", {}).items():
-                        items[index] = element
-                    self._items = items
-                    self._buffer = b""
-        return items
+        with _lock:
+            items = self._items
+            if items.__class__ is list:
+                return items
+            found = self._codec.read_many(self._buffer, self._start, self._count)
+            if items:
+                for index, element in items.items():  # type: ignore[union-attr]
+                    found[index] = element
+            self._items = found
+            self._buffer = b""
+            return found
 
     def _one(self, index: int) -> Message:
         with _lock:
-            if self._items is not None:
-                return self._items[index]
-            known: dict[int, Message] = getattr(self, "_known", None) or {}
-            self._known = known
-            if index not in known:
-                known[index] = self._codec.element(self._buffer, self._offset(index))
-            return known[index]
+            items = self._items
+            if items is None:
+                items = self._items = {}
+                self._offsets = [self._start]
+            elif index in items or items.__class__ is list:
+                return items[index]
+            element = items[index] = self._codec.element(self._buffer, self._offset(index))
+            return element
 
     def _offset(self, index: int) -> int:
-        codec = self._codec
+        codec, offsets = self._codec, self._offsets
         if codec.stride is not None:
             return self._start + index * codec.stride[0]
-        offsets: list[int] = getattr(self, "_offsets", None) or [self._start]
-        self._offsets = offsets
         while len(offsets) <= index:
             offsets.append(codec.skip(self._buffer, offsets[-1]))
         return offsets[index]
 
     def __len__(self) -> int:
         items = self._items
-        return self._count if items is None else len(items)
+        return len(items) if items.__class__ is list else self._count
 
     @overload
     def __getitem__(self, index: int) -> Message: ...
@@ -80,7 +80,7 @@ class MessageSequence(MutableSequence["Message"]):
     def __getitem__(self, index: slice) -> list[Message]: ...
     def __getitem__(self, index: int | slice) -> Message | list[Message]:
         items = self._items
-        if items is not None:
+        if items.__class__ is list:
             return items[index]
         if isinstance(index, slice):
             return self._all()[index]
@@ -100,7 +100,8 @@ class MessageSequence(MutableSequence["Message"]):
         self._all().insert(index, value)
 
     def __iter__(self) -> Iterator[Message]:
-        return iter(self._all())
+        items = self._items
+        return iter(items if items.__class__ is list else self._all())
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, (MessageSequence, list, tuple)):
@@ -136,7 +137,7 @@ class MessageSequence(MutableSequence["Message"]):
                     (self._count,), dtype, self._buffer, self._start, codec.stride[:1]
                 )
             else:
-                made = numpy.array([_row(item) for item in self._items], dtype)
+                made = numpy.array([_row(item) for item in self._all()], dtype)
         return made  # type: ignore[no-any-return]
 
 

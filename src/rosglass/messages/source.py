@@ -50,10 +50,16 @@ class Source:
         """Add a line at the current indentation."""
         self.lines.append("    " * self._depth + text)
 
-    def drop_last(self, start: str) -> None:
-        """Take back the last line if it is of the current block and starts with `start`."""
-        if self.lines and self.lines[-1].startswith("    " * self._depth + start):
-            self.lines.pop()
+    def take_last(self, start: str) -> str | None:
+        """Take back the last line if it is of the current block and starts with `start`.
+
+        Returns:
+            The rest of the line, None if there is no such line.
+        """
+        head = "    " * self._depth + start
+        if self.lines and self.lines[-1].startswith(head):
+            return self.lines.pop()[len(head) :]
+        return None
 
     @contextmanager
     def block(self, head: str) -> Iterator[None]:

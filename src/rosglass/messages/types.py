@@ -73,7 +73,8 @@ class MessageType:
         self.definition = definition
         self.name, self.ros = schema.name, schema.ros
         self.wire = "cdr" if schema.ros == 2 else "ros1"
-        self._writers: dict[Any, tuple[Codec, Any, Any]] = {}
+        self._codecs: dict[Any, Codec] = {}
+        self._dict_writers: dict[str | None, Any] = {}
         self._shells: dict[str, type[Any]] = {}
         self._paths: dict[Any, Callable[[Any], Any]] = {}
 
@@ -362,14 +363,18 @@ class MessageType:
             value = fields
         elif fields:
             value = self._merged(value, fields)
-        try:
-            codec, from_dict, from_message = self._writers[wire, byteorder, wstring_width]
-        except (KeyError, TypeError):
-            codec, from_dict, from_message = self._writer(wire, byteorder, wstring_width)
+        if byteorder == "little" and wstring_width is None and value.__class__ is dict:
+            try:
+                write = self._dict_writers[wire]
+            except (KeyError, TypeError):
+                pass  # the first of its kind, or nonsense
+            else:
+                return write(value)  # type: ignore[no-any-return]
+        codec = self._writing_codec(wire, byteorder, wstring_width)
         if value.__class__ is dict:
-            return from_dict(value)  # type: ignore[no-any-return]
+            return codec.writer(True, True)(value)  # type: ignore[no-any-return]
         untouched = _untouched(value, codec)
-        return from_message(value) if untouched is None else untouched
+        return codec.writer(False, True)(value) if untouched is None else untouched
 
     def encode_parts(
         self,
@@ -390,26 +395,26 @@ class MessageType:
             value = fields
         elif fields:
             value = self._merged(value, fields)
-        codec = self._writer(wire, byteorder, wstring_width)[0]
+        codec = self._writing_codec(wire, byteorder, wstring_width)
         untouched = _untouched(value, codec)
         if untouched is not None:
             return [untouched]
-        parts = codec.writer(value.__class__ is dict, False)(value)
-        return [part if type(part) is bytes else _flat(part) for part in parts]
+        return codec.writer(value.__class__ is dict, False)(value)  # type: ignore[no-any-return]
 
-    def _writer(self, wire: str | None, byteorder: str, wide: int | None) -> tuple[Any, Any, Any]:
-        """Return the codec, its writer of dicts and its writer of messages."""
-        key = (wire, byteorder, wide)
-        name = self._wire_name(wire)
+    def _writing_codec(self, wire: str | None, byteorder: str, wide: int | None) -> Codec:
+        try:
+            return self._codecs[wire, byteorder, wide]
+        except (KeyError, TypeError):
+            name = self._wire_name(wire)
         if byteorder not in _ORDERS:
             raise UnsupportedError(f"byteorder is 'little' or 'big', not {byteorder!r}")
         big = _ORDERS[byteorder]
         if big and name == "ros1":
             raise UnsupportedError("ROS 1 messages are little endian; byteorder='big' is for CDR")
-        codec = self._codec(name, big, _width(wide))
-        found = codec, codec.writer(True, True), codec.writer(False, True)
-        self._writers[key] = found
-        return found
+        codec = self._codecs[wire, byteorder, wide] = self._codec(name, big, _width(wide))
+        if not big and wide is None:
+            self._dict_writers[wire] = codec.writer(True, True)
+        return codec
 
 
 def _untouched(value: Any, codec: Codec) -> bytes | None:
@@ -417,13 +422,6 @@ def _untouched(value: Any, codec: Codec) -> bytes | None:
     if getattr(value, "_root__", None) is not codec:
         return None
     return getattr(value, "_buffer__", None)
-
-
-def _flat(part: Any) -> memoryview:
-    view = memoryview(part)
-    if not view.c_contiguous:
-        view = memoryview(view.tobytes())
-    return view.cast("B") if view.nbytes else memoryview(b"")
 
 
 def _encapsulation(type_name: str, data: bytes) -> bool:
