@@ -66,15 +66,23 @@ class Library:
         self._wire = MemoryProvider()
         self._folders = Folders()
         standard = [workspace(os.environ), self._folders, Distributions(distribution)]
+        known = [self._wire.name, *(provider.name for provider in standard)]
         self._chain: list[Provider] = [self._wire, *(providers or standard)]
         self._lock = threading.RLock()
         self._loaded: dict[tuple[int, str, str], InterfaceDefinition] = {}
         self._resolvers: dict[int, Resolver] = {}
         self._preferred: list[str] = []
-        chosen = (prefer,) if isinstance(prefer, str) else prefer
-        if not chosen:
-            chosen = tuple(os.environ.get(PREFER_VARIABLE, "").replace(",", " ").split())
-        self.prefer(*chosen)
+        if prefer:
+            self.prefer(*((prefer,) if isinstance(prefer, str) else prefer))
+            return
+        for name in reversed(os.environ.get(PREFER_VARIABLE, "").replace(",", " ").split()):
+            if name not in known:
+                raise UnsupportedError(
+                    f"the environment's {PREFER_VARIABLE} has {name!r}; it takes: "
+                    f"{', '.join(known)}"
+                )
+            if any(provider.name == name for provider in self._chain):
+                self.prefer(name)
 
     def definition(self, name: str, ros: int = 2, *, hash: str = "") -> InterfaceDefinition:
         """Return the definition of a type, with everything that it needs.
@@ -100,8 +108,7 @@ class Library:
             raise InvalidNameError(f"a type name is a str, got {name!r}")
         loaded = self._loaded.get((ros, name, hash))
         if loaded is None:
-            if ros not in (1, 2):
-                raise UnsupportedError(f"ros must be 1 or 2, got {ros!r}")
+            _check_world(ros)
             with self._lock:
                 if hash not in ("", ANY_HASH):
                     loaded = self._matching(name, ros, hash)
@@ -122,7 +129,13 @@ class Library:
         Args:
             ros: 1 or 2.
             kind: ``msg``, ``srv`` or ``action``; None for all.
+
+        Raises:
+            UnsupportedError: There is no such kind or version of ROS.
         """
+        _check_world(ros)
+        if kind is not None and kind not in KINDS:
+            raise UnsupportedError(f"kind must be one of {', '.join(KINDS)}, got {kind!r}")
         with self._lock:
             names = {name for provider in self._chain for name in provider.names(ros)}
         return sorted(name for name in names if kind is None or name.split("/")[1] == kind)
@@ -354,6 +367,11 @@ class Library:
         if any(n.split("/")[0] + "/" + n.split("/")[2] == wanted for n in other):
             text += f" ROS {3 - ros} has it."
         return f"{text} Source its workspace, or add its folder with Library.add_path()"
+
+
+def _check_world(ros: int) -> None:
+    if ros not in (1, 2):
+        raise UnsupportedError(f"ros must be 1 or 2, got {ros!r}")
 
 
 def _place(provider: Provider | None, definition: InterfaceDefinition) -> str:

@@ -198,6 +198,10 @@ def test_names(library: Library) -> None:
     assert {name.split("/")[1] for name in names} == {"msg", "srv", "action"}
     assert {name.split("/")[1] for name in library.names(kind="srv")} == {"srv"}
     assert "bond/msg/Status" in library.names(ros=1)
+    with pytest.raises(UnsupportedError, match="kind must be one of msg, srv, action, got 'foo'"):
+        library.names(kind="foo")
+    with pytest.raises(UnsupportedError, match="ros must be 1 or 2"):
+        library.names(ros=3)
 
 
 # Definitions that differ.
@@ -271,6 +275,14 @@ def test_prefer_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     library = Library()
     library.add_text("sensor_msgs/Temperature", TEMPERATURE)
     assert message(library, "sensor_msgs/Temperature").fields[1].type.name == "float32"
+
+
+def test_prefer_from_the_environment_is_checked(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROSGLASS_PREFER_DEFINITIONS", "workspace")
+    Library(MemoryProvider("mine"))  # for the standard chain only
+    monkeypatch.setenv("ROSGLASS_PREFER_DEFINITIONS", "robot")
+    with pytest.raises(UnsupportedError, match="ROSGLASS_PREFER_DEFINITIONS has 'robot'; it takes"):
+        Library()
 
 
 def test_prefer_received_definitions_over_the_one_in_use(library: Library) -> None:
