@@ -19,7 +19,7 @@ import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from samples import Sample, Value, builder, definition, generic_builder, store, walker
+from samples import Sample, Value, build_any, builder, definition, store, walker
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -105,7 +105,6 @@ def rosglass(sample: Sample, ros: int, value: Value) -> Library:
 
 def rosbags(sample: Sample, ros: int, value: Value) -> Library:
     types, name, text = store(ros), sample.type, definition(sample.type, ros)
-    build = generic_builder(name, ros, types.types.__getitem__)
     by_hand = builder(name, ros, types.types.__getitem__)
     wire = "ros1" if ros == 1 else "cdr"
     read, write = getattr(types, f"deserialize_{wire}"), getattr(types, f"serialize_{wire}")
@@ -125,15 +124,16 @@ def rosbags(sample: Sample, ros: int, value: Value) -> Library:
     names = {
         "read": read,
         "write": write,
-        "build": build,
+        "build": build_any,
         "by_hand": by_hand,
+        "types": types,
         "walk": walker(name, ros),
         "value": value,
         "name": name,
     }
     return Library(
         encodings={
-            "dict": lambda _: bytes(write(build(value), name)),
+            "dict": lambda _: bytes(write(build_any(types, name, value), name)),
             "by hand": lambda _: bytes(write(by_hand(value), name)),
             "message": lambda data: bytes(write(read(data, name), name)),
         },
@@ -143,7 +143,7 @@ def rosbags(sample: Sample, ros: int, value: Value) -> Library:
             "decode view": ("read(view, name)", names),
             "attribute": (f"read(data, name).{sample.leaf}", names),
             "every leaf": ("walk(read(data, name))", names),
-            "encode": ("write(build(value), name)", names),
+            "encode": ("write(build(types, name, value), name)", names),
             "encode by hand": ("write(by_hand(value), name)", names),
         },
         first_use=first_use,

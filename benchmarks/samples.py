@@ -115,37 +115,20 @@ def walker(type_name: str, ros: int, stamp: tuple[str, str] = ("sec", "nanosec")
     return _define("\n".join(lines), {}, "walk")
 
 
-def generic_builder(type_name: str, ros: int, class_of: Callable[[str], Any]) -> Any:
-    """A function that builds a library's objects from a nested dict of any type.
+def build_any(types: Any, type_name: str, value: Value) -> Any:
+    """Build a rosbags message of any type from a nested dict, by its table of fields.
 
-    It follows the fields at run time, as a program has to that learns its types at run time.
+    rosbags has no such function; this is what a program writes that learns its types at run time.
     """
-    plans: dict[str, tuple[Any, list[tuple[str, str, bool]]]] = {}
-
-    def plan(name: str) -> None:
-        if name in plans:
-            return
-        steps = [
-            (field.name, field.base if "/" in field.base else "", field.array == "messages")
-            for field in fields(name, ros)
-        ]
-        plans[name] = class_of(name), steps
-        for _, base, _ in steps:
-            if base:
-                plan(base)
-
-    def build(name: str, value: Value) -> Any:
-        kind, steps = plans[name]
-        arguments = []
-        for field, base, several in steps:
-            item = value[field]
-            if base:
-                item = [build(base, e) for e in item] if several else build(base, item)
-            arguments.append(item)
-        return kind(*arguments)
-
-    plan(type_name)
-    return lambda value: build(type_name, value)
+    arguments = {}
+    for name, (node, detail) in types.fielddefs[type_name][1]:
+        item = value[name]
+        if node == Nodetype.NAME:
+            item = build_any(types, detail, item)
+        elif node in {Nodetype.ARRAY, Nodetype.SEQUENCE} and detail[0][0] == Nodetype.NAME:
+            item = [build_any(types, detail[0][1], element) for element in item]
+        arguments[name] = item
+    return types.types[type_name](**arguments)
 
 
 def builder(type_name: str, ros: int, class_of: Callable[[str], Any]) -> Any:
