@@ -1,0 +1,189 @@
+"""The demo's cockpit in a process of its own, asked and operated through its standard streams.
+
+As a program: ``demo_driver.py URL`` shows the cockpit and answers one JSON request per line.
+As a module: :class:`CockpitProcess` starts it and wraps the requests.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+SIZE = (1000, 640)
+
+
+class CockpitProcess:
+    """A cockpit on a display; every method waits for the answer."""
+
+    def __init__(self, url: str, display: str) -> None:
+        environment = {
+            **os.environ,
+            "DISPLAY": display,
+            "QT_QPA_PLATFORM": "xcb",
+            # The tests read the picture that the operator would see, from the same renderer.
+            "QSG_RENDER_LOOP": "threaded",
+            "QT_LOGGING_RULES": "qt.multimedia.*=false",
+        }
+        self._process = subprocess.Popen(
+            [sys.executable, __file__, url],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=environment,
+            text=True,
+        )
+        self._ask("ready")
+
+    def get(self, item: str, name: str) -> Any:
+        """Return a property of a part of the cockpit."""
+        return self._ask("get", item, name)
+
+    def call(self, item: str, method: str, *arguments: float) -> None:
+        """Call one of its JavaScript functions."""
+        self._ask("call", item, method, *arguments)
+
+    def key(self, action: str, key: str) -> None:
+        """Press or release a key: ``Key_W``."""
+        self._ask("key", action, key)
+
+    def mouse(self, action: str, item: str, x: float, y: float) -> None:
+        """Press, move or release the left button, at shares of the item's size."""
+        self._ask("mouse", action, item, x, y)
+
+    def touch(self, *fingers: tuple[str, int, str, float, float]) -> None:
+        """Move fingers at once: (action, finger, item, x, y)."""
+        self._ask("touch", *fingers)
+
+    def cover(self, covered: bool) -> None:
+        """Let another window take the keyboard, or give it back."""
+        self._ask("cover", covered)
+
+    def grab(self, path: Path) -> None:
+        """Save what the window shows."""
+        self._ask("grab", str(path))
+
+    def until(self, item: str, name: str, wanted: Any = True, timeout: float = 5.0) -> float:
+        """Wait until a property has a value; returns how long it took, seconds."""
+        begin = time.monotonic()
+        while (value := self.get(item, name)) != wanted:
+            waited = time.monotonic() - begin
+            assert waited < timeout, (
+                f"{item}.{name} is {value!r}, not {wanted!r}, after {waited:.1f} s"
+            )
+            time.sleep(0.02)
+        return time.monotonic() - begin
+
+    def close(self) -> int:
+        """End it; returns its exit code."""
+        if self._process.poll() is None:
+            assert self._process.stdin is not None
+            self._process.stdin.close()
+            try:
+                self._process.wait(10)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+        return self._process.wait()
+
+    def _ask(self, *request: Any) -> Any:
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.write(json.dumps(request) + "\n")
+        self._process.stdin.flush()
+        line = self._process.stdout.readline()
+        assert line, f"the cockpit ended with code {self._process.wait()} during {request}"
+        answer = json.loads(line)
+        assert "error" not in answer, answer.get("error")
+        return answer["value"]
+
+
+class _Driver:
+    def __init__(self, url: str) -> None:
+        from PySide6 import QtCore, QtGui, QtTest
+
+        from rosglass.demo.app import Cockpit
+
+        self._core, self._gui, self._test = QtCore, QtGui, QtTest.QTest
+        self.cockpit = Cockpit(url, SIZE)
+        self._finger = self._test.createTouchDevice()
+        self._other = QtGui.QWindow()
+        self._other.resize(50, 50)
+
+    def handle(self, request: list[Any]) -> Any:
+        return getattr(self, request[0])(*request[1:])
+
+    def ready(self) -> bool:
+        return True
+
+    def get(self, item: str, name: str) -> Any:
+        value = self.cockpit.item(item).property(name)
+        if hasattr(value, "toVariant"):
+            value = value.toVariant()
+        if isinstance(value, (self._core.QRectF, self._core.QRect)):
+            return [value.x(), value.y(), value.width(), value.height()]
+        return value
+
+    def call(self, item: str, method: str, *arguments: float) -> None:
+        self.cockpit.call(item, method, *arguments)
+
+    def key(self, action: str, key: str) -> None:
+        act = self._test.keyPress if action == "press" else self._test.keyRelease
+        act(self.cockpit.window, getattr(self._core.Qt.Key, key))
+
+    def mouse(self, action: str, item: str, x: float, y: float) -> None:
+        point = self._point(item, x, y)
+        left = self._core.Qt.MouseButton.LeftButton
+        window, modifiers = self.cockpit.window, self._core.Qt.KeyboardModifier.NoModifier
+        if action == "move":
+            self._test.mouseMove(window, point)
+        else:
+            act = self._test.mousePress if action == "press" else self._test.mouseRelease
+            act(window, left, modifiers, point)
+
+    def touch(self, *fingers: tuple[str, int, str, float, float]) -> None:
+        event = self._test.touchEvent(self.cockpit.window, self._finger)
+        for action, finger, item, x, y in fingers:
+            getattr(event, action)(finger, self._point(item, x, y), self.cockpit.window)
+        event.commit()
+
+    def cover(self, covered: bool) -> None:
+        self._other.setVisible(covered)
+        (self._other if covered else self.cockpit.window).requestActivate()
+
+    def grab(self, path: str) -> None:
+        self.cockpit.screenshot(Path(path))
+
+    def _point(self, item: str, x: float, y: float) -> Any:
+        found = self.cockpit.item(item)
+        width, height = found.property("width"), found.property("height")
+        return found.mapToScene(self._core.QPointF(x * width, y * height)).toPoint()
+
+
+def main() -> int:
+    driver = _Driver(sys.argv[1])
+    executor = driver.cockpit.session.executor
+
+    def answer(line: str) -> None:
+        try:
+            result = {"value": driver.handle(json.loads(line))}
+        except Exception as error:
+            result = {"error": f"{type(error).__name__}: {error}"}
+        print(json.dumps(result), flush=True)
+
+    def listen() -> None:
+        for line in sys.stdin:
+            executor.post(lambda line=line: answer(line))
+        executor.post(driver.cockpit.window.close)
+
+    threading.Thread(target=listen, daemon=True).start()
+    code = driver.cockpit.run()
+    driver.cockpit.close()
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,334 @@
+"""The cockpit on a robot in another process: what the operator sees, and what the robot obeys."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+pytest.importorskip("PySide6.QtMultimedia", reason="the cockpit needs the extra `camera`")
+zenoh = pytest.importorskip("zenoh", reason="the cockpit needs the extra `zenoh`")
+
+from demo_driver import CockpitProcess  # noqa: E402
+
+from rosglass.demo import framecode  # noqa: E402
+from rosglass.demo.camera import CODE_POSITION, HEIGHT, WIDTH  # noqa: E402
+from rosglass.demo.processes import Child, VirtualScreen, start_robot  # noqa: E402
+
+pytestmark = pytest.mark.xvfb
+
+
+class RobotSide:
+    """The robot's process, and what an independent node hears of it."""
+
+    def __init__(self, url: str) -> None:
+        import rosglass
+
+        self.url = url
+        self.process: Child = start_robot(url)
+        self.node = rosglass.connect(url, name="observer")
+        self.commands: list[tuple[float, float, float]] = []
+        self.speed = self.x = self.y = 0.0
+        self.stopped: bool | None = None
+        self._changed = threading.Condition()
+        self.node.create_subscription("/cmd_vel", "geometry_msgs/msg/Twist", self._on_command)
+        self.node.create_subscription("/odom", "nav_msgs/msg/Odometry", self._on_odometry)
+        self.node.create_subscription("/emergency_stop/state", "std_msgs/msg/Bool", self._on_stop)
+
+    def kill(self) -> None:
+        os.kill(self.process.pid, signal.SIGKILL)
+
+    def restart(self) -> None:
+        self.process.close()
+        self.process = start_robot(self.url)
+
+    def until(self, condition: Callable[[], Any], timeout: float = 5.0) -> None:
+        with self._changed:
+            assert self._changed.wait_for(condition, timeout), "did not happen in time"
+
+    def close(self) -> None:
+        self.process.close()
+        self.node.close()
+
+    def _on_command(self, message: Any) -> None:
+        with self._changed:
+            self.commands.append((time.monotonic(), message.linear.x, message.angular.z))
+            self._changed.notify_all()
+
+    def _on_odometry(self, message: Any) -> None:
+        with self._changed:
+            self.speed = message.twist.twist.linear.x
+            self.x, self.y = message.pose.pose.position.x, message.pose.pose.position.y
+            self._changed.notify_all()
+
+    def _on_stop(self, message: Any) -> None:
+        with self._changed:
+            self.stopped = message.data
+            self._changed.notify_all()
+
+
+@pytest.fixture(scope="module")
+def robot() -> Iterator[RobotSide]:
+    from rosglass.ros2.router import Router
+
+    with Router("tcp/127.0.0.1:0") as router:
+        side = RobotSide(router.url)
+        yield side
+        side.close()
+
+
+@pytest.fixture(scope="module")
+def window(robot: RobotSide) -> Iterator[CockpitProcess]:
+    with VirtualScreen(1024, 700) as screen:
+        process = CockpitProcess(robot.url, screen.display)
+        yield process
+        assert process.close() == 0
+
+
+@pytest.fixture
+def cockpit(window: CockpitProcess, robot: RobotSide) -> Iterator[CockpitProcess]:
+    """The cockpit, connected, with everything let go and nothing stopped."""
+    if robot.process.poll() is not None:
+        robot.restart()
+    window.until("camera", "live", timeout=15)
+    window.until("link", "alive")
+    window.until("cockpit", "inFront")
+    window.until("stop", "known")
+    window.until("drive", "obstacle", "")
+    robot.commands.clear()
+    yield window
+    for key in ("Key_W", "Key_A", "Key_S", "Key_D"):
+        window.key("release", key)
+    window.cover(False)
+    if robot.process.poll() is None and window.get("stop", "blocks"):
+        window.call("stop", "release")
+        window.until("stop", "blocks", False)
+
+
+def grab(cockpit: CockpitProcess, path: Path, part: str) -> np.ndarray:
+    """Return what the window shows of the camera, or only of its picture, rows of RGB."""
+    from PySide6.QtGui import QImage
+
+    cockpit.grab(path)
+    image = QImage(str(path)).convertToFormat(QImage.Format.Format_RGB888)
+    rows = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), -1)
+    pixels = rows[:, : 3 * image.width()].reshape(image.height(), image.width(), 3)
+    x, y, width, height = (round(cockpit.get("camera", n)) for n in ("x", "y", "width", "height"))
+    if part == "picture":
+        left, top, width, height = (round(v) for v in cockpit.get("camera", "pictureRect"))
+        x, y = x + left, y + top
+    return pixels[y : y + height, x : x + width].copy()
+
+
+def picture_of(cockpit: CockpitProcess, path: Path) -> np.ndarray:
+    return grab(cockpit, path, "picture")
+
+
+def code_in(picture: np.ndarray) -> framecode.FrameCode:
+    scale = picture.shape[1] / WIDTH
+    row = round((CODE_POSITION[1] + framecode.SQUARE / 2) * scale)
+    left = round(CODE_POSITION[0] * scale)
+    right = round((CODE_POSITION[0] + framecode.BITS * framecode.SQUARE) * scale)
+    return framecode.read(picture[row, left:right, 1])
+
+
+def test_the_window_shows_a_picture_that_is_not_older_than_it_claims(
+    cockpit: CockpitProcess, tmp_path: Path
+) -> None:
+    picture = picture_of(cockpit, tmp_path / "live.png")
+    assert picture.shape[0] / picture.shape[1] == pytest.approx(HEIGHT / WIDTH, abs=0.02)
+    assert code_in(picture).age(time.time_ns()) < 1.0
+    later = picture_of(cockpit, tmp_path / "later.png")
+    assert code_in(later).number != code_in(picture).number
+    colours = picture[:100].astype(int)
+    assert (colours[..., 2] - colours[..., 0]).mean() > 10, "the sky is blue"
+
+
+def test_everything_else_arrives(cockpit: CockpitProcess) -> None:
+    for panel in ("map", "attitude", "battery", "flippers", "diagnostics"):
+        cockpit.until(panel, "fresh")
+    assert 0.5 < cockpit.get("battery", "share") <= 1.0
+    assert len(cockpit.get("diagnostics", "states")) == 5
+    assert cockpit.get("map", "robotX") == pytest.approx(-5.4, abs=2.5)
+
+
+def test_a_key_drives_and_letting_go_stops(cockpit: CockpitProcess, robot: RobotSide) -> None:
+    start = robot.x
+    cockpit.key("press", "Key_W")
+    robot.until(lambda: robot.speed > 0.3)
+    time.sleep(0.3)
+    cockpit.key("release", "Key_W")
+    released = time.monotonic()
+    robot.until(lambda: robot.speed == 0.0, 1.0)
+    assert robot.x > start + 0.1
+    time.sleep(0.6)
+    moving = [c for c in robot.commands if c[1] > 0]
+    zeros = [c for c in robot.commands if c[1] == c[2] == 0]
+    assert len(moving) > 5, robot.commands
+    gaps = np.diff([c[0] for c in moving])
+    assert np.median(gaps) == pytest.approx(0.05, abs=0.02), "20 commands a second"
+    assert len(zeros) >= 3, "one lost message must not keep the robot going"
+    assert zeros[0][0] - released < 0.15
+    assert time.monotonic() - robot.commands[-1][0] > 0.15, "then others may drive"
+
+
+def test_opposite_keys_and_a_lost_release(cockpit: CockpitProcess, robot: RobotSide) -> None:
+    cockpit.key("press", "Key_Left")
+    robot.until(lambda: robot.commands and robot.commands[-1][2] > 0)
+    cockpit.key("press", "Key_Right")
+    robot.until(lambda: robot.commands[-1][1:] == (0.0, 0.0))
+    cockpit.key("release", "Key_Left")
+    robot.until(lambda: robot.commands[-1][2] < 0)
+    cockpit.key("release", "Key_Right")
+    robot.until(lambda: robot.commands[-1][1:] == (0.0, 0.0))
+
+
+def test_the_mouse_pulls_the_stick(cockpit: CockpitProcess, robot: RobotSide) -> None:
+    cockpit.mouse("press", "stick", 0.5, 0.5)
+    cockpit.mouse("move", "stick", 0.5, 0.85)
+    robot.until(lambda: robot.commands and robot.commands[-1][1] < -0.3)
+    assert robot.commands[-1][2] == 0.0
+    cockpit.mouse("release", "stick", 0.5, 0.85)
+    robot.until(lambda: robot.commands[-1][1:] == (0.0, 0.0))
+    assert not cockpit.get("drive", "held")
+
+
+def test_another_window_in_front_stops_the_robot(cockpit: CockpitProcess, robot: RobotSide) -> None:
+    cockpit.key("press", "Key_W")
+    robot.until(lambda: robot.speed > 0.2)
+    cockpit.cover(True)
+    robot.until(lambda: robot.commands[-1][1:] == (0.0, 0.0), 1.0)
+    robot.until(lambda: robot.speed == 0.0, 1.0)
+    cockpit.cover(False)
+    cockpit.until("cockpit", "inFront")
+    time.sleep(0.3)
+    assert robot.commands[-1][1:] == (0.0, 0.0), "a key pressed before does not count any more"
+
+
+@pytest.mark.parametrize("key", ["Key_Space", "Key_Escape"])
+def test_the_emergency_stop_stops_and_stays(
+    cockpit: CockpitProcess, robot: RobotSide, key: str
+) -> None:
+    cockpit.key("press", "Key_W")
+    robot.until(lambda: robot.speed > 0.3)
+    cockpit.key("press", key)
+    robot.until(lambda: robot.stopped is True, 0.5)
+    robot.until(lambda: robot.speed == 0.0, 0.5)
+    cockpit.until("stop", "stopped", timeout=0.5)
+    assert cockpit.get("confirmation", "text") == "confirmed"
+    cockpit.key("release", key)
+    # Pressing harder does not help.
+    cockpit.key("release", "Key_W")
+    cockpit.key("press", "Key_W")
+    time.sleep(0.4)
+    assert robot.speed == 0.0
+    assert cockpit.get("speed", "refused")
+    cockpit.key("release", "Key_W")
+    cockpit.mouse("press", "unlock", 0.5, 0.5)
+    time.sleep(0.2)
+    cockpit.mouse("release", "unlock", 0.5, 0.5)
+    time.sleep(0.3)
+    assert robot.stopped, "a short click does not release"
+    cockpit.mouse("press", "unlock", 0.5, 0.5)
+    robot.until(lambda: robot.stopped is False, 2.0)
+    cockpit.mouse("release", "unlock", 0.5, 0.5)
+    assert robot.speed == 0.0
+
+
+def test_a_second_finger_stops_while_the_first_one_drives(
+    cockpit: CockpitProcess, robot: RobotSide
+) -> None:
+    cockpit.touch(("press", 1, "stick", 0.5, 0.5))
+    cockpit.touch(("move", 1, "stick", 0.5, 0.15))
+    robot.until(lambda: robot.speed > 0.2)
+    cockpit.touch(("move", 1, "stick", 0.5, 0.14), ("press", 2, "mushroom", 0.5, 0.5))
+    robot.until(lambda: robot.stopped is True, 0.5)
+    robot.until(lambda: robot.speed == 0.0, 0.5)
+    cockpit.touch(("release", 1, "stick", 0.5, 0.15), ("release", 2, "mushroom", 0.5, 0.5))
+
+
+def test_a_stop_by_somebody_else_is_shown_and_not_undone(
+    cockpit: CockpitProcess, robot: RobotSide
+) -> None:
+    other = robot.node.create_publisher("/emergency_stop", "std_msgs/msg/Bool")
+    deadline = time.monotonic() + 3
+    while not other.subscription_count() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    other.publish(data=True)
+    cockpit.until("stop", "stopped", timeout=1.0)
+    assert cockpit.get("confirmation", "text") == "by someone else"
+    time.sleep(0.5)
+    assert robot.stopped
+
+
+def test_a_killed_robot_is_seen_within_a_second_and_recovers_by_itself(
+    cockpit: CockpitProcess, robot: RobotSide, tmp_path: Path
+) -> None:
+    alive = picture_of(cockpit, tmp_path / "alive.png")
+    robot.kill()
+    begin = time.monotonic()
+    cockpit.until("camera", "live", False, timeout=1.0)
+    cockpit.until("link", "alive", False, timeout=1.0)
+    for panel in ("map", "attitude", "flippers"):
+        cockpit.until(panel, "fresh", False, timeout=1.0)
+    assert time.monotonic() - begin < 1.0
+    assert cockpit.get("noSignal", "visible")
+    assert "ROBOT LOST" in cockpit.get("linkText", "text")
+
+    dead = picture_of(cockpit, tmp_path / "dead.png").astype(int)
+    spread = dead.max(axis=2) - dead.min(axis=2)
+    was = alive.astype(int).max(axis=2) - alive.astype(int).min(axis=2)
+    top = slice(10, 90)
+    assert spread[top].mean() < 0.6 * was[top].mean(), "the old picture has lost its colours"
+    edge = grab(cockpit, tmp_path / "edge.png", "frame")[1:5, 50:-50].astype(int)
+    assert edge[..., 0].mean() > edge[..., 2].mean() + 80, "a red frame"
+    time.sleep(1.2)
+    assert float(cockpit.get("noSignalText", "text").split()[2]) > 1.0, "its age is told"
+
+    robot.restart()
+    cockpit.until("camera", "live", timeout=15)
+    cockpit.until("link", "alive", timeout=2)
+    assert not cockpit.get("noSignal", "visible")
+    back = picture_of(cockpit, tmp_path / "back.png")
+    assert code_in(back).age(time.time_ns()) < 1.0
+
+
+def test_a_robot_that_comes_back_does_not_drive_by_itself(
+    cockpit: CockpitProcess, robot: RobotSide
+) -> None:
+    cockpit.key("press", "Key_W")
+    robot.until(lambda: robot.speed > 0.2)
+    robot.kill()
+    cockpit.until("drive", "active", False, timeout=1.0)
+    robot.restart()
+    cockpit.until("camera", "live", timeout=15)
+    cockpit.until("drive", "obstacle", "")
+    time.sleep(0.3)
+    assert cockpit.get("drive", "held")
+    assert not cockpit.get("drive", "active")
+    assert robot.speed == 0.0
+
+
+def test_a_stop_that_the_robot_does_not_hear_is_said_and_kept(
+    cockpit: CockpitProcess, robot: RobotSide
+) -> None:
+    robot.kill()
+    cockpit.until("camera", "live", False, timeout=1.0)
+    cockpit.key("press", "Key_Space")
+    cockpit.key("release", "Key_Space")
+    cockpit.until("stop", "overdue", timeout=0.9)
+    assert cockpit.get("confirmation", "text").startswith("NOT CONFIRMED")
+    robot.stopped = None
+    robot.restart()
+    robot.until(lambda: robot.stopped is True, 15)
+    cockpit.until("stop", "stopped", timeout=2)
+    assert not cockpit.get("stop", "overdue")
