@@ -76,4 +76,4 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 130
 
 
-_EXTRA_OF = {"PySide6": "qml", "zenoh": "zenoh", "cv2": "camera", "xxhash": "zenoh"}
+_EXTRA_OF = {"PySide6": "qml", "zenoh": "zenoh", "cv2": "images", "xxhash": "zenoh"}
