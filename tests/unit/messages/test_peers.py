@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 WIRE = {1: "ros1", 2: "cdr"}
 SEED = 20_26
-INVENTED = {ros: corpus.invented(SEED, 60, ros) for ros in (1, 2)}
+INVENTED = {ros: corpus.invented(SEED, 40, ros) for ros in (1, 2)}
 PEERS = {1: ("rosbags", "genpy"), 2: ("rosbags", "mcap-ros2", "cyclone")}
 ALL_TYPES = [
     pytest.param(ros, name, id=f"ros{ros}-{name}")
