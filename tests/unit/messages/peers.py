@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
 GENPY_MISSING = "python3-genpy is not installed: apt install python3-genpy"
+MCAP_MISSING = "mcap-ros2-support is not installed: pip install 'rosglass[peers]'"
+CYCLONE_MISSING = "cyclonedds is not installed: pip install 'rosglass[peers]'"
 DEBIAN_PACKAGES = "/usr/lib/python3/dist-packages"
 _NUMPY = {"float32": np.float32, "float64": np.float64, "bool": np.bool_}
 
@@ -39,6 +41,11 @@ def need_genpy() -> Any:
     import genpy.dynamic
 
     return genpy.dynamic
+
+
+def need_mcap() -> Any:
+    """mcap-ros2-support's module of run-time types; skips without it."""
+    return pytest.importorskip("mcap_ros2._dynamic", reason=MCAP_MISSING)
 
 
 class Rosbags:
@@ -199,9 +206,7 @@ class Mcap:
     """mcap-ros2-support, CDR little endian."""
 
     def __init__(self, types: Types, ros: int = 2) -> None:
-        from mcap_ros2 import _dynamic
-
-        self.types, self.dynamic = types, _dynamic
+        self.types, self.dynamic = types, need_mcap()
         self.readers: dict[str, Callable[[bytes], Any]] = {}
         self.writers: dict[str, Callable[[Any], bytes]] = {}
 
@@ -252,11 +257,9 @@ class Cyclone:
     """Eclipse Cyclone DDS' Python serialiser with types made at run time: XCDR1."""
 
     def __init__(self, types: Types, ros: int = 2) -> None:
-        import cyclonedds.idl
-        from cyclonedds.idl import types as idl
-
-        self.types, self.idl = types, idl
-        self.make, self.orders = cyclonedds.idl.make_idl_struct, cyclonedds.idl.Endianness
+        cyclone = pytest.importorskip("cyclonedds.idl", reason=CYCLONE_MISSING)
+        self.types, self.idl = types, cyclone.types
+        self.make, self.orders = cyclone.make_idl_struct, cyclone.Endianness
         self.classes: dict[str, Any] = {}
 
     def encode(self, name: str, value: dict[str, Any], byteorder: str = "little") -> bytes:

@@ -7,10 +7,12 @@ Each test pins the peer's behaviour too, so that a fixed peer shows up here and 
 from __future__ import annotations
 
 import struct
+from io import BytesIO
 from typing import Any
 
 import numpy as np
 import pytest
+from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import rosglass
@@ -23,11 +25,10 @@ LITTLE = b"\x00\x01\x00\x00"
 
 
 def mcap_functions(name: str, text: str) -> tuple[Any, Any]:
-    from mcap_ros2 import _dynamic
-
+    dynamic = peers.need_mcap()
     return (
-        _dynamic.generate_dynamic(name, text)[name],
-        _dynamic.serialize_dynamic(name, text)[name],
+        dynamic.generate_dynamic(name, text)[name],
+        dynamic.serialize_dynamic(name, text)[name],
     )
 
 
@@ -61,6 +62,7 @@ def test_ros2_byte_is_unsigned(value: int) -> None:
     assert kind.decode(data, wire="cdr").data == value
 
 
+@pytest.mark.peers
 @pytest.mark.parametrize("value", [128, 200, 255])
 def test_ros2_char_is_unsigned(value: int) -> None:
     # mcap-ros2 takes ROS 2's char for an int8; rosidl maps it to uint8.
@@ -106,6 +108,7 @@ def test_ros1_time_goes_on_after_2038(seconds: int) -> None:
     assert kind.encode({"data": {"secs": seconds, "nsecs": 1}}, wire="ros1") == data
 
 
+@pytest.mark.peers
 def test_ros2_duration_is_signed_without_its_definition_at_hand() -> None:
     # mcap-ros2 falls back to uint32 seconds when the schema does not spell Duration out.
     data = LITTLE + struct.pack("<iI", -2, 5)
@@ -116,13 +119,23 @@ def test_ros2_duration_is_signed_without_its_definition_at_hand() -> None:
     assert (message.sec, message.nanosec) == (-2, 5)
 
 
-def test_truncated_bytes_are_an_error() -> None:
-    # genpy and mcap-ros2 take one byte for a complete array of four thousand million.
-    data = struct.pack("<I", 0xFFFFFFFF) + b"\x07"
-    read, _ = mcap_functions("a_msgs/msg/A", "uint8[] data")
-    assert read(LITTLE + data).data == b"\x07"
-    assert genpy_class("a_msgs/A", "uint8[] data\n")().deserialize(data).data == b"\x07"
+TRUNCATED = struct.pack("<I", 0xFFFFFFFF) + b"\x07"
 
+
+@pytest.mark.genpy
+def test_genpy_takes_one_byte_for_four_thousand_million() -> None:
+    kind = genpy_class("a_msgs/A", "uint8[] data\n")
+    assert kind().deserialize(TRUNCATED).data == b"\x07"
+
+
+@pytest.mark.peers
+def test_mcap_takes_one_byte_for_four_thousand_million() -> None:
+    read, _ = mcap_functions("a_msgs/msg/A", "uint8[] data")
+    assert read(LITTLE + TRUNCATED).data == b"\x07"
+
+
+def test_truncated_bytes_are_an_error() -> None:
+    data = TRUNCATED
     for ros, wire, buffer in ((1, "ros1", data), (2, "cdr", LITTLE + data)):
         kind = from_text("a_msgs/msg/A", "uint8[] data", ros)
         with pytest.raises(DecodeError, match="data"):
@@ -133,6 +146,7 @@ def test_truncated_bytes_are_an_error() -> None:
             kind.validate(buffer, wire=wire)
 
 
+@pytest.mark.peers
 @pytest.mark.parametrize(
     ("identifier", "name"),
     [
@@ -161,28 +175,41 @@ def test_other_encapsulations_are_rejected_by_name(identifier: int, name: str) -
         kind.path("data", wire="cdr")(data)
 
 
-def test_ros1_duration_keeps_its_bytes() -> None:
-    # genpy rewrites -1 s, -0.5e9 ns to -2 s, +0.5e9 ns.
-    from io import BytesIO
-
+@pytest.mark.genpy
+def test_genpy_rewrites_durations() -> None:
     data = struct.pack("<ii", -1, -500_000_000)
     theirs = BytesIO()
     genpy_class("std_msgs/Duration", "duration data\n")().deserialize(data).serialize(theirs)
     assert struct.unpack("<ii", theirs.getvalue()) == (-2, 500_000_000)
 
+
+def test_ros1_duration_keeps_its_bytes() -> None:
+    data = struct.pack("<ii", -1, -500_000_000)
     kind = rosglass.load("std_msgs/Duration", ros=1)
     for message in (kind.decode(data, wire="ros1"), kind.decode_all(data, wire="ros1")):
         assert kind.encode(message, wire="ros1") == data
         assert kind.encode(message.to_dict(), wire="ros1") == data
 
 
+LATIN1 = b"caf\xe9"
+
+
+@pytest.mark.genpy
+def test_genpy_replaces_invalid_utf8() -> None:
+    data = struct.pack("<I", len(LATIN1)) + LATIN1
+    assert genpy_class("std_msgs/String", "string data\n")().deserialize(data).data == "caf\ufffd"
+
+
+def test_rosbags_gives_the_message_up_for_invalid_utf8() -> None:
+    data = struct.pack("<I", len(LATIN1)) + LATIN1
+    with pytest.raises(SerdeError):
+        corpus.store(1).deserialize_ros1(data, "std_msgs/msg/String")
+
+
 @pytest.mark.parametrize("wire", ["ros1", "cdr"])
 def test_invalid_utf8_survives(wire: str) -> None:
-    # genpy replaces what is not UTF-8, rosbags and mcap-ros2 give the whole message up.
-    raw = b"caf\xe9"
+    raw = LATIN1
     ros1 = struct.pack("<I", len(raw)) + raw
-    assert genpy_class("std_msgs/String", "string data\n")().deserialize(ros1).data == "caf\ufffd"
-
     cdr = LITTLE + struct.pack("<I", len(raw) + 1) + raw + b"\0"
     data = ros1 if wire == "ros1" else cdr
     kind = rosglass.load("std_msgs/msg/String", ros=1 if wire == "ros1" else 2)
@@ -216,6 +243,7 @@ def test_wstring_in_both_widths(text: str, width: int, byteorder: str) -> None:
         assert message.to_dict() == value
 
 
+@pytest.mark.peers
 def test_peers_do_not_know_wstring() -> None:
     store = get_typestore(Stores.EMPTY)
     store.register(get_types_from_msg("wstring data", "a_msgs/msg/A"))
