@@ -1,0 +1,275 @@
+"""The simulated robot as a node: what it says, what it obeys, what it refuses."""
+
+from __future__ import annotations
+
+import logging
+import math
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+pytest.importorskip("cv2", reason="the simulated camera needs the extra `camera`")
+
+import rosglass
+from rosglass.comm import Durability, QoS
+from rosglass.demo.robot import Robot, RobotOptions
+from rosglass.demo.simulation import FLIPPERS
+from rosglass.errors import Error
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+
+class Recorder:
+    """A publisher that encodes, as a real one does, and keeps what it was given."""
+
+    def __init__(self, type_name: str, qos: QoS | int) -> None:
+        self.type, self.qos = rosglass.load(type_name), qos
+        self.sent: list[Any] = []
+        self.listeners = 1
+        self.blocked = threading.Event()
+        self.blocked.set()
+
+    def publish(self, message: Any = None, /, **fields: Any) -> None:
+        data = self.type.encode(fields if message is None else message, wire="cdr")
+        self.sent.append(self.type.decode(bytes(data), wire="cdr"))
+        self.blocked.wait(10)
+
+    def subscription_count(self) -> int:
+        return self.listeners
+
+
+class Listener:
+    def close(self) -> None:
+        pass
+
+
+class StubNode:
+    """As much of a node as the robot uses."""
+
+    def __init__(self) -> None:
+        self.publishers: dict[str, Recorder] = {}
+        self.commands: dict[str, tuple[Any, Callable[[Any], None]]] = {}
+
+    def create_publisher(self, topic: str, type: str, qos: QoS | int = 10) -> Recorder:
+        self.publishers[topic] = Recorder(type, qos)
+        return self.publishers[topic]
+
+    def create_subscription(
+        self, topic: str, type: str, callback: Callable[[Any], None], qos: QoS | int = 10
+    ) -> Listener:
+        self.commands[topic] = (rosglass.load(type), callback)
+        return Listener()
+
+    def command(self, topic: str, **fields: Any) -> None:
+        type_, callback = self.commands[topic]
+        callback(type_.decode(bytes(type_.encode(fields, wire="cdr")), wire="cdr"))
+
+    def last(self, topic: str, timeout: float = 3.0) -> Any:
+        """Return the next message sent on a topic."""
+        sent = self.publishers[topic].sent
+        count, end = len(sent), time.monotonic() + timeout
+        while len(sent) == count:
+            assert time.monotonic() < end, f"nothing was sent on {topic}"
+            time.sleep(0.005)
+        return sent[-1]
+
+
+@pytest.fixture(scope="module")
+def alive() -> Iterator[tuple[StubNode, Robot]]:
+    node = StubNode()
+    robot = Robot(node)  # type: ignore[arg-type]
+    robot.start()
+    yield node, robot
+    robot.close()
+
+
+@pytest.fixture
+def node(alive: tuple[StubNode, Robot]) -> Iterator[StubNode]:
+    yield alive[0]
+    alive[0].command("/emergency_stop", data=False)
+
+
+@pytest.fixture
+def robot(alive: tuple[StubNode, Robot]) -> Robot:
+    return alive[1]
+
+
+def until(condition: Callable[[], Any], timeout: float = 3.0) -> None:
+    end = time.monotonic() + timeout
+    while not condition():
+        assert time.monotonic() < end, "did not happen in time"
+        time.sleep(0.005)
+
+
+def test_every_topic_is_sent_in_ros_messages(node: StubNode) -> None:
+    for topic, recorder in node.publishers.items():
+        until(lambda recorder=recorder: recorder.sent)
+        assert recorder.sent[0] is not None, topic
+
+
+def test_latched_topics_are_transient_local(node: StubNode) -> None:
+    for topic in ("/map", "/tf_static", "/emergency_stop/state"):
+        qos = node.publishers[topic].qos
+        assert isinstance(qos, QoS)
+        assert qos.durability is Durability.TRANSIENT_LOCAL, topic
+
+
+def test_stamps_are_now(node: StubNode) -> None:
+    for topic in ("/odom", "/scan", "/camera/image_raw", "/imu"):
+        stamp = node.last(topic).header.stamp
+        assert abs(stamp.sec + stamp.nanosec * 1e-9 - time.time()) < 0.5, topic
+
+
+def test_raw_and_compressed_pictures_are_the_same(node: StubNode) -> None:
+    import cv2
+    import numpy as np
+
+    raw = node.last("/camera/image_raw")
+    assert (raw.width, raw.height, raw.encoding, raw.step) == (640, 480, "rgb8", 1920)
+    packed = node.last("/camera/image_raw/compressed")
+    assert packed.format == "rgb8; jpeg compressed bgr8"
+    picture = cv2.cvtColor(
+        cv2.imdecode(np.asarray(packed.data), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB
+    )
+    same = next(
+        m
+        for m in reversed(node.publishers["/camera/image_raw"].sent)
+        if m.header.stamp == packed.header.stamp
+    )
+    plain = np.asarray(same.data).reshape(480, 640, 3)
+    assert np.abs(plain.astype(int) - picture).mean() < 6
+
+
+def test_nothing_is_compressed_while_nobody_listens(node: StubNode) -> None:
+    recorder = node.publishers["/camera/image_raw/compressed"]
+    recorder.listeners = 0
+    time.sleep(0.1)
+    count = len(recorder.sent)
+    node.last("/camera/image_raw")
+    node.last("/camera/image_raw")
+    recorder.listeners = 1
+    assert len(recorder.sent) == count
+
+
+def test_frames_join_map_and_every_part(node: StubNode) -> None:
+    parents = {
+        transform.child_frame_id: transform.header.frame_id
+        for message in (node.last("/tf"), node.publishers["/tf_static"].sent[0])
+        for transform in message.transforms
+    }
+    for frame in ("camera_optical_frame", "laser", "imu_link", *FLIPPERS):
+        while frame != "map":
+            frame = parents[frame]  # noqa: PLW2901 - climbing up
+
+
+def test_it_drives_and_stops_when_commands_cease(node: StubNode, robot: Robot) -> None:
+    for _ in range(12):
+        node.command("/cmd_vel", linear={"x": 0.3})
+        time.sleep(0.03)
+    assert robot.state.speed > 0.2
+    assert node.last("/odom").twist.twist.linear.x > 0.1
+    until(lambda: robot.state.speed == 0.0, 1.2)
+
+
+def test_a_stop_is_confirmed_at_once_and_holds(node: StubNode, robot: Robot) -> None:
+    confirmations = node.publishers["/emergency_stop/state"].sent
+    count = len(confirmations)
+    node.command("/emergency_stop", data=True)
+    assert len(confirmations) > count
+    assert confirmations[-1].data is True
+    for _ in range(8):
+        node.command("/cmd_vel", linear={"x": 0.3})
+        time.sleep(0.03)
+    assert robot.state.speed == 0.0
+    assert node.last("/diagnostics").status[0].message == "emergency stop latched"
+
+
+@pytest.mark.parametrize(
+    ("fields", "named"),
+    [
+        ({"linear": {"x": math.nan}}, "linear.x"),
+        ({"angular": {"z": math.inf}}, "angular.z"),
+        ({"linear": {"x": 1e9}}, "linear.x"),
+        ({"linear": {"y": 0.5}}, "another component"),
+        ({"angular": {"x": math.nan}}, "another component"),
+    ],
+)
+def test_garbage_is_logged_and_does_not_move_it(
+    node: StubNode,
+    robot: Robot,
+    caplog: pytest.LogCaptureFixture,
+    fields: dict[str, Any],
+    named: str,
+) -> None:
+    robot._logged_at = -math.inf
+    until(lambda: robot.state.speed == 0.0)
+    with caplog.at_level(logging.WARNING, "rosglass.demo"):
+        node.command("/cmd_vel", **fields)
+        node.command("/cmd_vel", **fields)
+    assert len(caplog.records) == 1, "one line, not one for each message"
+    assert "/cmd_vel" in caplog.text
+    assert named in caplog.text
+    time.sleep(0.1)
+    assert robot.state.speed == 0.0
+
+
+def test_malformed_bytes_are_refused(
+    node: StubNode, robot: Robot, caplog: pytest.LogCaptureFixture
+) -> None:
+    robot._logged_at = -math.inf
+    type_, callback = node.commands["/cmd_vel"]
+    with caplog.at_level(logging.WARNING, "rosglass.demo"):
+        callback(type_.decode(b"\x00\x01\x00\x00\x01", wire="cdr"))
+    assert "/cmd_vel" in caplog.text
+
+
+def test_flippers_and_lamp(node: StubNode, robot: Robot) -> None:
+    node.command("/flashlight", data=True)
+    assert node.publishers["/flashlight/state"].sent[-1].data is True
+    node.command("/flashlight", data=False)
+    node.command("/flipper_controller/commands", data=[0.5, 0.5, 0.3, 0.3])
+    until(lambda: robot.state.flippers == (0.5, 0.5, 0.3, 0.3))
+    message = node.last("/joint_states")
+    assert tuple(message.name) == FLIPPERS
+    node.command("/flipper_controller/commands", data=[9.0] * 4)
+    time.sleep(0.1)
+    assert robot.state.flippers == (0.5, 0.5, 0.3, 0.3)
+
+
+def test_a_network_that_blocks_does_not_stop_the_body(node: StubNode, robot: Robot) -> None:
+    stuck = [node.publishers["/camera/image_raw"], node.publishers["/odom"]]
+    for recorder in stuck:
+        recorder.blocked.clear()
+    try:
+        time.sleep(0.1)
+        before = robot.state.time
+        time.sleep(0.5)
+        assert robot.state.time - before == pytest.approx(0.5, abs=0.15)
+        for _ in range(6):
+            node.command("/cmd_vel", linear={"x": 0.2})
+            time.sleep(0.03)
+        assert robot.state.speed > 0.05
+    finally:
+        for recorder in stuck:
+            recorder.blocked.set()
+    until(lambda: robot.state.speed == 0.0, 1.2)
+
+
+def test_a_robot_that_fails_ends_instead_of_driving_on() -> None:
+    node = StubNode()
+    robot = Robot(node, RobotOptions(raw=False, compressed=False))  # type: ignore[arg-type]
+    node.publishers["/odom"].publish = None  # type: ignore[assignment]
+    robot.start()
+    try:
+        assert robot.wait(3.0)
+    finally:
+        robot.close()
+
+
+@pytest.mark.parametrize("options", [{"fps": 0.0}, {"fps": math.nan}, {"jpeg_quality": 0}])
+def test_impossible_options_are_refused(options: dict[str, Any]) -> None:
+    with pytest.raises(Error, match="expected"):
+        RobotOptions(**options)
