@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 from difflib import get_close_matches
 from functools import lru_cache
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import FieldPathError
+from rosglass.messages.runtime import number_type
 from rosglass.messages.schema import Kind
 
 if TYPE_CHECKING:
@@ -16,7 +18,7 @@ if TYPE_CHECKING:
     from rosglass.messages.message import Message
     from rosglass.messages.schema import Member, Schema
 
-__all__ = ["Step", "find", "get", "parse", "put", "resolve", "writable"]
+__all__ = ["Step", "column_type", "find", "get", "parse", "put", "resolve", "writable"]
 
 #: One step of a path: a field name, an index, or a slice (``[*]`` is ``slice(None)``).
 Step = str | int | slice
@@ -112,6 +114,16 @@ def resolve(schema: Schema, path: str) -> list[tuple[Member, Step | None]]:
     return found
 
 
+def column_type(rest: list[tuple[Member, Step | None]]) -> Any:
+    """Return the numpy type of a column whose elements a route leads to, None for other values."""
+    number, step = rest[-1][0].number, rest[-1][1]
+    if number is None or (rest[-1][0].is_array and not isinstance(step, int)):
+        return None
+    if any(isinstance(step, slice) for _, step in rest):
+        return None  # a column of columns, each as long as it likes
+    return bool if number.python is bool else number_type(number.dtype, "<")
+
+
 def _check_index(index: int, count: int, path: str) -> None:
     if not -count <= index < count:
         raise FieldPathError(
@@ -135,8 +147,11 @@ def _follow(message: Any, route: list[tuple[Member, Step | None]], path: str) ->
                 value = value.item() if hasattr(value, "item") else value
         elif isinstance(step, slice):
             value = value[step]
-            if member.kind is Kind.STRUCT and place + 1 < len(route):
-                return [_follow(element, route[place + 1 :], path) for element in value]
+            rest = route[place + 1 :]
+            if rest and member.kind is Kind.STRUCT:
+                found = [_follow(element, rest, path) for element in value]
+                leaf = column_type(rest)
+                return found if leaf is None else import_module("numpy").array(found, leaf)
     return value
 
 

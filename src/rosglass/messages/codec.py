@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from rosglass.errors import ConversionError, DecodeError
 from rosglass.messages import diagnosis, layout
-from rosglass.messages.conversion import convert
+from rosglass.messages.conversion import complete, convert
 from rosglass.messages.emit_read import Reader
 from rosglass.messages.emit_write import write_function
 from rosglass.messages.layout import ANYWHERE, START, Cursor, Wire
@@ -230,15 +230,26 @@ class Codec:
 
     def _writer(self, from_dict: bool, joined: bool) -> Any:
         def slowly(value: Any, error: Exception) -> Any:  # noqa: ARG001 - raised again if real
+            if from_dict:
+                try:
+                    return self._converted_writer(True, joined)(complete(self.schema, value))
+                except Exception:
+                    pass  # the careful way finds out what it was
             message = convert(self.schema, value)
-            last = self.made(("write", joined), lambda: write_function(self, False, joined, None))
             try:
-                return last(message)
+                return self._converted_writer(False, joined)(message)
             except OddValueError:
                 limit = f"no array of more than {MAX_EMPTY} messages that take no bytes"
                 raise ConversionError("", value, limit, self.schema.name) from None
 
         return write_function(self, from_dict, joined, slowly)
+
+    def _converted_writer(self, from_dict: bool, joined: bool) -> Callable[[Any], Any]:
+        """Return the writer for values that were converted already."""
+        return self.made(  # type: ignore[no-any-return]
+            ("write converted", from_dict, joined),
+            lambda: write_function(self, from_dict, joined, None),
+        )
 
     def explain(self, buffer: bytes, error: Exception) -> DecodeError:
         """Return the error to raise for a whole message that generated code failed on."""

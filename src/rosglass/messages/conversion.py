@@ -21,6 +21,7 @@ from rosglass.interfaces.definition import ArrayKind
 from rosglass.messages.message import Message, plain_class
 from rosglass.messages.runtime import number_type
 from rosglass.messages.schema import Kind
+from rosglass.messages.text import to_dict
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from rosglass.messages.layout import Wire
     from rosglass.messages.schema import Member, Number, Schema
 
-__all__ = ["array_packer", "as_bool", "as_float", "as_int", "convert"]
+__all__ = ["array_packer", "as_bool", "as_float", "as_int", "complete", "convert"]
 
 _FLOAT32_MAX = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]
 _NANO = 1_000_000_000
@@ -45,7 +46,7 @@ def as_bool(value: Any) -> bool:
         return bool(value)
     if _numpy_kind(value) == "b":
         return bool(value)
-    raise ConversionError("", value, "a bool")
+    raise ConversionError("", value, "a bool, True or False")
 
 
 def as_int(value: Any) -> int:
@@ -86,15 +87,11 @@ def _number(number: Number, value: Any, path: str) -> Any:
             assert number.low is not None
             assert number.high is not None
             if not number.low <= found <= number.high:
-                expected = f"an integer from {number.low} to {number.high} ({number.name})"
-                raise ConversionError(path, value, expected)
+                raise ConversionError("", value, f"an integer from {number.low} to {number.high}")
             return found
         made = as_float(value)
     except ConversionError as error:
-        expected = {bool: "a bool (True or False)", int: f"an integer ({number.name})"}.get(
-            number.python, f"a number ({number.name})"
-        )
-        raise ConversionError(path, value, error.expected if error.path else expected) from None
+        raise ConversionError(path, value, f"{error.expected} ({number.name})") from None
     if number.code == "f" and math.isfinite(made):
         _check_float32(made, value, path)
     return made
@@ -273,7 +270,7 @@ def _message(schema: Schema, value: Any, path: str) -> Message:
     if isinstance(value, Message):
         if value._schema__ is not schema:
             raise ConversionError(path, value, _expected(schema, value._schema__))
-        given = {m.name: getattr(value, m.attr) for m in schema.members}
+        given = _attributes(value)
     elif isinstance(value, Mapping):
         given = _known_fields(schema, value, path)
     elif schema.is_time and (parts := _time_parts(value)) is not None:
@@ -288,6 +285,36 @@ def _message(schema: Schema, value: Any, path: str) -> Message:
         else:
             found = _default(member)
         setattr(made, member.attr, found)
+    return made
+
+
+def _attributes(message: Message) -> dict[str, Any]:
+    return {m.name: getattr(message, m.attr) for m in message._schema__.members}
+
+
+def complete(schema: Schema, value: Any) -> dict[str, Any]:
+    """Return a dict with every field, the missing ones with their defaults; checks no values.
+
+    Raises:
+        LookupError, TypeError, AttributeError: There is more amiss than missing fields.
+    """
+    if isinstance(value, Message):
+        if value._schema__ is not schema:
+            raise TypeError
+        value = _attributes(value)
+    defaults: dict[str, Any] = schema.cached("defaults", lambda: to_dict(_message(schema, {}, "")))
+    made = dict(defaults)
+    for name, given in value.items():
+        member = schema.by_name[name]
+        if name != member.name and member.name in value:
+            raise LookupError
+        struct = member.struct
+        if struct is None:
+            made[member.name] = given
+        elif member.is_array:
+            made[member.name] = [complete(struct, item) for item in given]
+        else:
+            made[member.name] = complete(struct, given)
     return made
 
 
@@ -307,7 +334,7 @@ def _known_fields(schema: Schema, value: Mapping[Any, Any], path: str) -> dict[s
             near = get_close_matches(key, names, 1) if isinstance(key, str) else []
             hint = f"did you mean {near[0]!r}?" if near else f"it has: {', '.join(names) or 'none'}"
             where = f"{path}.{key}" if path else str(key)
-            raise ConversionError(where, item, f"no such field in {schema.name} ({hint})")
+            raise ConversionError(where, item, f"a field of {schema.name} ({hint})")
         if member.name in given:
             raise ConversionError(f"{path}.{key}" if path else str(key), item, "each field once")
         given[member.name] = item

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import FieldPathError
 from rosglass.messages import layout
-from rosglass.messages.access import resolve
+from rosglass.messages.access import column_type, resolve
 from rosglass.messages.emit_read import Reader
 from rosglass.messages.layout import START, Cursor
 from rosglass.messages.runtime import number_type
@@ -266,14 +266,13 @@ class _Walk:
             return
         schema = member.struct
         assert schema is not None
-        leaf = rest[-1][0]
         stride = layout.constant_stride(schema, self.wire)
         inner = _constant_offset(schema, rest, self.wire)
         count = reader.count(member)
         reader.check_count(layout.min_size(schema, self.wire), count)
         numpy = import_module("numpy")
         if stride is not None and inner is not None:
-            number = leaf.number
+            number = rest[-1][0].number
             assert number is not None
             reader.to_element(schema, "0")
             array = self.source.bind(numpy.ndarray, "array")
@@ -290,14 +289,10 @@ class _Walk:
             self.source.line(f"{items}.append({value})")
         reader.prove()
         result = f"{items}{brackets}"
-        single = all(not part.is_array for part, _ in rest)
-        if leaf.number is not None and (single or isinstance(rest[-1][1], int)):
-            several = any(isinstance(step, slice) for _, step in rest)
-            if not several:
-                number = leaf.number
-                kind = bool if number.code == "?" else number_type(number.dtype, "<")
-                make = self.source.bind(numpy.array, "make")
-                result = f"{make}({result}, {self.source.bind(kind, number.name)})"
+        kind = column_type(rest)
+        if kind is not None:
+            make = self.source.bind(numpy.array, "make")
+            result = f"{make}({result}, {self.source.bind(kind, 'kind')})"
         self.source.line(f"{name} = {result}")
 
 

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 __all__ = ["Kind", "Member", "Number", "Schema", "schema_of"]
 
 _MAX_DEPTH = 64
-#: Slots of :class:`~rosglass.messages.message.Message` that no field may take.
-PRIVATE_SLOTS = ("_buffer__", "_offset__")
+#: Names of :class:`~rosglass.messages.message.Message` that no field may take.
+_PRIVATE = ("_buffer__", "_fill__", "_offset__", "_root__", "_schema__")
 
 
 class Kind(Enum):
@@ -215,11 +215,14 @@ def _resolve(
         raise DefinitionError(f"types nest deeper than {_MAX_DEPTH} levels", file)
     numbers = _NUMBERS_ROS1 if definition.ros == 1 else _NUMBERS
     members: list[Member] = []
-    taken: set[str] = set(PRIVATE_SLOTS)
+    taken: set[str] = set(_PRIVATE)
     used: dict[str, Definition] = {}
     for field in definition.fields:
         if any(field.name == member.name for member in members):
             raise DefinitionError(f"field {field.name!r} appears twice in {definition.name}", file)
+        # Names end up in generated code; definitions made by hand were seen by no parser.
+        if not (field.name.isascii() and field.name.isidentifier()):
+            raise DefinitionError(f"{definition.name}: {field.name!r} is no field name", file)
         attr = _attribute(field.name, taken)
         taken.add(attr)
         ftype = field.type
@@ -271,7 +274,7 @@ def _attribute(name: str, taken: set[str]) -> str:
     attr = name
     if attr.startswith("__"):
         attr = attr.strip("_") + "_"
-    if keyword.iskeyword(attr) or not attr.isidentifier():
+    if keyword.iskeyword(attr) or not attr:
         attr += "_"
     while attr in taken:
         attr += "_"
