@@ -12,18 +12,24 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from pathlib import Path
 
 TARGET = 1.5
 INTERFACE = """import QtQuick
 Rectangle {
+    id: root
     width: 640; height: 480; color: "steelblue"
     property bool seen: false
-    Connections {
-        target: Window.window
-        function onFrameSwapped() { if (!seen) { seen = true; console.log("FIRST FRAME"); Qt.quit() } }
+    function shown() {
+        if (seen)
+            return
+        seen = true
+        console.log("FIRST FRAME")
+        Qt.quit()
     }
+    Window.onWindowChanged: if (Window.window) Window.window.frameSwapped.connect(shown)
 }
 """
 PLAIN = """
@@ -48,10 +54,13 @@ def milliseconds(command: list[str], environment: dict[str, str]) -> float:
     )
     assert process.stdout is not None
     taken, output = 0.0, ""
+    timer = threading.Timer(30, process.kill)
+    timer.start()
     for line in process.stdout:
         output += line
         if "FIRST FRAME" in line and not taken:
             taken = 1000 * (time.perf_counter() - started)
+    timer.cancel()
     if process.wait(30) or not taken:
         sys.exit(f"{command} showed nothing:\n{output}")
     return taken

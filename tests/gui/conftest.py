@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -131,3 +133,97 @@ def running(bench: Bench, wait: Callable[..., None]) -> Bench:
     bench.session.init("ui")
     wait(lambda: bench.session.node is not None)
     return bench
+
+
+@pytest.fixture(scope="session")
+def screen() -> Iterator[str]:
+    """A virtual screen of our own; gives the value of DISPLAY."""
+    reader, writer = os.pipe()
+    command = ["Xvfb", "-displayfd", str(writer), "-screen", "0", "1280x800x24", "-nolisten", "tcp"]
+    server = subprocess.Popen(
+        command, pass_fds=[writer], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    os.close(writer)
+    with os.fdopen(reader) as told:
+        number = told.readline().strip()
+    assert number, "Xvfb did not start"
+    yield f":{number}"
+    server.terminate()
+    server.wait(10)
+
+
+class Program:
+    """A program with a user interface in its own process."""
+
+    def __init__(self, command: list[str], environment: dict[str, str]) -> None:
+        self._process = subprocess.Popen(
+            command,
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            bufsize=1,
+        )
+        self.pid = self._process.pid
+        self.lines: list[str] = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            self.lines.append(line.rstrip("\n"))
+
+    @property
+    def text(self) -> str:
+        """Everything it has written."""
+        return "\n".join(self.lines)
+
+    def until(self, text: str, timeout: float = 15.0) -> str:
+        """Wait until a line with `text` is written and return it; later calls want later lines."""
+        until = time.monotonic() + timeout
+        while True:
+            for at, line in enumerate(self.lines):
+                if text in line:
+                    del self.lines[: at + 1]
+                    return line
+            assert time.monotonic() < until, f"no {text!r} in:\n{self.text}"
+            assert self._process.poll() is None or self._reader.is_alive(), self.text
+            time.sleep(0.01)
+
+    def end(self, timeout: float = 15.0) -> int:
+        """Wait for its end and return the exit code."""
+        code = self._process.wait(timeout)
+        self._reader.join(5)
+        return code
+
+    def kill(self, number: int) -> None:
+        """Send it a signal."""
+        self._process.send_signal(number)
+
+    def close(self) -> None:
+        """End it in any case."""
+        if self._process.poll() is None:
+            self._process.kill()
+        self._process.wait(10)
+
+
+@pytest.fixture
+def start(request: Any) -> Iterator[Callable[..., Program]]:
+    """Start ``rosglass`` with arguments; `display` empty is offscreen, None none at all."""
+    programs = []
+
+    def start(*arguments: Any, display: str | None = "", **extra: str) -> Program:
+        gone = {"DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM", "QSG_RENDER_LOOP", "ROSGLASS_URL"}
+        environment = {k: v for k, v in os.environ.items() if k not in gone} | extra
+        if display == "":
+            environment["QT_QPA_PLATFORM"] = "offscreen"
+        elif display is not None:
+            environment["DISPLAY"] = display
+        command = [sys.executable, "-m", "rosglass.cli", *map(str, arguments)]
+        programs.append(Program(command, environment))
+        return programs[-1]
+
+    yield start
+    for program in programs:
+        program.close()

@@ -69,7 +69,6 @@ def run(args: argparse.Namespace) -> int:
     if not args.file.is_file():
         print(f"{args.file}:0:0: there is no such file", file=sys.stderr)
         return 1
-    _format_log(args.verbose)
     try:
         return show(
             args.file,
@@ -80,6 +79,7 @@ def run(args: argparse.Namespace) -> int:
             screenshot=args.screenshot,
             after=args.after,
             arguments=args.arguments,
+            verbose=args.verbose > 1,
         )
     except QmlError as error:
         print(error, file=sys.stderr)
@@ -96,6 +96,7 @@ def show(
     screenshot: Path | None = None,
     after: float = 2.0,
     arguments: Sequence[str] = (),
+    verbose: bool = False,
 ) -> int:
     """Show a QML file in a window until it is closed.
 
@@ -108,6 +109,7 @@ def show(
         screenshot: Where to save a picture of the window, after which the program ends.
         after: Seconds until the screenshot.
         arguments: What the interface finds in ``Qt.application.arguments``.
+        verbose: Show what is logged for developers, too.
 
     Returns:
         The exit code: 0, what QML gave to ``Qt.exit()``, 130 after Ctrl-C.
@@ -116,6 +118,7 @@ def show(
         QmlError: The file is missing or has errors.
         UnsupportedError: There is no display.
     """
+    # Qt reads these when it is loaded.
     os.environ["QT_LOGGING_RULES"] = ";".join(
         filter(None, [_QUIET, os.environ.get("QT_LOGGING_RULES", "")])
     )
@@ -130,6 +133,7 @@ def show(
     from rosglass.qml.session import Session
     from rosglass.qt import QtCore, QtGui, optional
 
+    _format_log(verbose)
     connected = require_display()
     install_message_handler()
     widgets = optional("QtWidgets") if needs_widgets(file) else None
@@ -176,11 +180,10 @@ def _save(runner: Runner, target: Path) -> int:
     return 0
 
 
-def _format_log(verbose: int) -> None:
+def _format_log(verbose: bool) -> None:
     """Show what comes from QML with its file and line, and from its author's level on."""
     from rosglass.qml.log import LocationFormatter
 
     for handler in logging.getLogger().handlers:
         handler.setFormatter(LocationFormatter())
-    level = logging.DEBUG if verbose > 1 else logging.INFO
-    logging.getLogger("rosglass.qml").setLevel(level)
+    logging.getLogger("rosglass.qml").setLevel(logging.DEBUG if verbose else logging.INFO)

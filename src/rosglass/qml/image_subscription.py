@@ -56,6 +56,8 @@ class ImageTransportSubscription(TopicElement):
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         super().__init__(parent, runtime)
+        # Loaded before QML hands over its sink: what Qt gave Python as a plain QObject stays one.
+        self._multimedia = optional("QtMultimedia")
         self._preferred = "compressed"
         self._timeout = DEFAULT_TIMEOUT
         self._sink: Any = None
@@ -107,8 +109,7 @@ class ImageTransportSubscription(TopicElement):
     def _set_sink(self, sink: QtCore.QObject | None) -> None:
         if sink is self._sink:
             return
-        multimedia = optional("QtMultimedia") if sink is not None else None
-        video = multimedia is not None and isinstance(sink, multimedia.QVideoSink)
+        video = self._multimedia is not None and isinstance(sink, self._multimedia.QVideoSink)
         if sink is not None and not video and not isinstance(sink, ImageItem):
             name = sink.metaObject().className()
             self._refuse(
@@ -246,8 +247,7 @@ class ImageTransportSubscription(TopicElement):
         if not is_alive(self._sink):
             return
         if self.wants_video:
-            multimedia = optional("QtMultimedia")
-            self._sink.setVideoFrame(multimedia.QVideoFrame())
+            self._sink.setVideoFrame(self._multimedia.QVideoFrame())
         else:
             self._sink.present(None)
 

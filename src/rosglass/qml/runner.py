@@ -65,14 +65,14 @@ class Runner(QtCore.QObject):
         # Must live as long as its root: dropping it destroys the root.
         self._component: QtQml.QQmlComponent | None = None
         self._overlay: tuple[Any, Any] | None = None
+        # Before anything is read, so that no change in between goes unnoticed.
+        self._watcher = Watcher(self.file.parent) if watch else None
         try:
             self._show(*self._create())
         except QmlError:
             self.close()
             raise
-        self._watcher: Watcher | None = None
-        if watch:
-            self._watcher = Watcher(self.file.parent)
+        if self._watcher is not None:
             self._watcher.changed.connect(self.reload)
 
     def reload(self) -> bool:
@@ -93,8 +93,11 @@ class Runner(QtCore.QObject):
         if isinstance(old_root, QtQuick.QQuickWindow):
             old_root.close()
         if is_alive(old_root) and old_root is not None:
+            # Component.onDestruction runs a little after this signal.
+            old_root.destroyed.connect(
+                lambda: QtCore.QTimer.singleShot(0, lambda: self._reloaded(old_component))
+            )
             old_root.deleteLater()
-        QtCore.QTimer.singleShot(0, lambda: self._reloaded(old_component))
         _log.info("%s reloaded in %.0f ms", self.file, (time.perf_counter() - started) * 1000)
         return True
 
@@ -169,8 +172,9 @@ class Runner(QtCore.QObject):
         self.session.holding = False
         if is_alive(old_component) and old_component is not None:
             old_component.deleteLater()
-        # Publishers of the old interface live until they are collected.
-        self.engine.collectGarbage()
+        if is_alive(self.engine):
+            # Publishers of the old interface live until they are collected.
+            self.engine.collectGarbage()
 
     def _show_errors(self, text: str) -> None:
         window = self.window

@@ -1,0 +1,35 @@
+import QtQuick
+import QtQuick.Controls
+import Ros2 1.0
+
+Item {
+    Component.onCompleted: Ros2.init("remote_control")
+    ImageTransportSubscription { id: camera; topic: "/camera/image_raw" }
+    VideoOutput { anchors.fill: parent; source: camera }
+    Rectangle {
+        anchors.horizontalCenter: parent.horizontalCenter
+        anchors.bottom: parent.bottom
+        width: 120; height: 120; radius: 60
+        color: "#aaaaaa"
+        MouseArea {
+            id: stick
+            anchors.fill: parent
+            property var pub: Ros2.createPublisher("/cmd_vel", "geometry_msgs/msg/Twist", 1)
+            function axis(at, size) { return Math.max(-1, Math.min(1, 1 - 2 * at / size)) }
+            onPressedChanged: if (!pressed) pub.publish({})
+            Timer {
+                interval: 50; repeat: true; triggeredOnStart: true; running: stick.pressed
+                onTriggered: stick.pub.publish({linear: {x: stick.axis(stick.mouseY, stick.height)},
+                                                angular: {z: stick.axis(stick.mouseX, stick.width)}})
+            }
+        }
+    }
+    Button {
+        anchors.bottom: parent.bottom
+        property var pub: Ros2.createPublisher("/flashlight", "std_msgs/msg/Bool", 1)
+        property bool isOn: false
+        text: "Flashlight: " + (isOn ? "On" : "Off")
+        onClicked: pub.publish({data: (isOn = !isOn)})
+    }
+    Label { text: camera.stale ? "NO PICTURE: " + Ros2.connectionDetail : ""; color: "red" }
+}

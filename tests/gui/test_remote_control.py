@@ -1,0 +1,174 @@
+"""The example remote_control.qml on real middleware: a Zenoh router and a robot's node."""
+
+from __future__ import annotations
+
+import threading
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import rosglass
+from rosglass.comm import QoS, Time
+from rosglass.qml import Session, install
+from rosglass.ros2.router import Router
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "remote_control.qml"
+
+
+class Robot:
+    """Films a plain colour at 30 Hz and remembers what it was told."""
+
+    def __init__(self, url: str) -> None:
+        self.node = rosglass.connect(url, "robot")
+        self.commands: list[tuple[float, float]] = []
+        self.lamp: list[bool] = []
+        self.node.create_subscription("/cmd_vel", "geometry_msgs/msg/Twist", self._on_command)
+        self.node.create_subscription(
+            "/flashlight", "std_msgs/msg/Bool", lambda m: self.lamp.append(m.data)
+        )
+        self._camera = self.node.create_publisher(
+            "/camera/image_raw", "sensor_msgs/msg/Image", QoS.sensor_data()
+        )
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._film)
+        self._thread.start()
+
+    def _on_command(self, message: Any) -> None:
+        self.commands.append((message.linear.x, message.angular.z))
+
+    def _film(self) -> None:
+        data = np.full((480, 640, 3), (200, 40, 20), np.uint8).reshape(-1)
+        while not self._ended.wait(1 / 30):
+            self._camera.publish(
+                header={"stamp": Time.now().to_dict()},
+                width=640,
+                height=480,
+                encoding="rgb8",
+                step=1920,
+                data=data,
+            )
+
+    def close(self) -> None:
+        self._ended.set()
+        self._thread.join()
+        self.node.close()
+
+
+@pytest.fixture
+def router() -> Iterator[Router]:
+    with Router("tcp/127.0.0.1:0") as running:
+        yield running
+
+
+@pytest.fixture
+def robot(router: Router) -> Iterator[Robot]:
+    made = Robot(router.url)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def view(app: Any, router: Router, wait: Any) -> Iterator[Any]:
+    from PySide6.QtCore import QUrl
+    from PySide6.QtQuick import QQuickView
+
+    session = Session(router.url)
+    made = QQuickView()
+    made.setResizeMode(QQuickView.ResizeMode.SizeRootObjectToView)
+    install(made.engine(), session)
+    made.setSource(QUrl.fromLocalFile(str(EXAMPLE)))
+    assert made.status() is QQuickView.Status.Ready, [e.toString() for e in made.errors()]
+    made.resize(400, 300)
+    made.show()
+    wait(lambda: session.state == "connected")
+    yield made
+    made.close()
+    made.deleteLater()
+    wait(20)
+    session.close()
+
+
+def test_dragging_drives_and_letting_go_stops(robot: Robot, view: Any, wait: Any) -> None:
+    from PySide6.QtCore import QPoint, Qt
+    from PySide6.QtTest import QTest
+
+    wait(lambda: robot.node.publishers("/cmd_vel"))
+    wait(100)
+    QTest.mousePress(view, Qt.MouseButton.LeftButton, pos=QPoint(200, 240))
+    wait(lambda: robot.commands)
+    QTest.mouseMove(view, QPoint(200, 195))
+    wait(lambda: robot.commands[-1] == (0.75, 0.0))
+    # Held still, it goes on telling the robot, which would otherwise stop by itself.
+    count = len(robot.commands)
+    wait(lambda: len(robot.commands) > count + 3)
+    QTest.mouseMove(view, QPoint(20, 290))
+    wait(lambda: robot.commands[-1][1] == 1.0)
+    assert -1.0 <= robot.commands[-1][0] < 0
+    QTest.mouseRelease(view, Qt.MouseButton.LeftButton, pos=QPoint(20, 290))
+    wait(lambda: robot.commands[-1] == (0.0, 0.0))
+    count = len(robot.commands)
+    wait(200)
+    assert len(robot.commands) == count
+
+
+def test_the_button_switches_the_lamp(robot: Robot, view: Any, wait: Any) -> None:
+    from PySide6.QtCore import QPoint, Qt
+    from PySide6.QtTest import QTest
+
+    wait(lambda: robot.node.publishers("/flashlight"))
+    wait(100)
+    for expected in (True, False):
+        QTest.mouseClick(view, Qt.MouseButton.LeftButton, pos=QPoint(20, 290))
+        wait(lambda expected=expected: robot.lamp[-1:] == [expected])
+
+
+@pytest.mark.xvfb
+def test_the_camera_is_on_the_screen(
+    robot: Robot, router: Router, start: Any, screen: str, tmp_path: Path
+) -> None:
+    import cv2
+
+    shot = tmp_path / "shot.png"
+    program = start(
+        "run", EXAMPLE, "--url", router.url, "--screenshot", shot, "--after", 2.5, display=screen
+    )
+    assert program.end(30) == 0, program.text
+    picture = cv2.imread(str(shot))
+    assert picture[200, 512].tolist() == [20, 40, 200]
+    assert "WARNING" not in program.text
+
+
+def test_a_robot_that_dies_shows_within_a_second_and_comes_back(
+    router: Router, view: Any, wait: Any
+) -> None:
+    from PySide6.QtCore import QObject
+
+    robot = Robot(router.url)
+    camera = view.rootObject().findChild(QObject, "camera") or next(
+        child
+        for child in view.rootObject().children()
+        if child.metaObject().className().startswith("ImageTransport")
+    )
+    try:
+        wait(lambda: not camera.property("stale"))
+        assert camera.property("transport") == "raw"
+    finally:
+        robot.close()
+    started = time.monotonic()
+    wait(lambda: camera.property("stale"))
+    assert time.monotonic() - started < 1.0
+    robot = Robot(router.url)
+    try:
+        wait(lambda: not camera.property("stale"))
+    finally:
+        robot.close()
+
+
+def test_the_example_is_short() -> None:
+    assert len(EXAMPLE.read_text().splitlines()) <= 36

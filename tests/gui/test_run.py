@@ -1,0 +1,199 @@
+"""``rosglass run``: what it shows, what it says when something is wrong, how it ends."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+GOOD = """import QtQuick
+Rectangle {
+    width: 200; height: 100; color: "#204060"
+    Component.onCompleted: console.log("up", width, Qt.application.arguments.slice(1))
+}
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "Main.qml"
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "message"),
+    [
+        ("import QtQuick\nItem {\n  widht: 5\n}", "3:3", 'non-existent property "widht"'),
+        ("import QtQuick\nItem {\n  width: 5 5\n}", "3:12", "Expected token"),
+        ("import QtQuick\nimport No.Such.Module 1.0\nItem {}", "2:1", "No.Such.Module"),
+        ("import QtQuick\nMissing {}", "2:1", "Missing is not a type"),
+        ("", "0:0", "File is empty"),
+    ],
+)
+def test_errors_are_listed_with_file_line_and_column(
+    start: Any, file: Path, text: str, place: str, message: str
+) -> None:
+    file.write_text(text)
+    program = start("run", file)
+    assert program.end() == 1
+    assert f"{file}:{place}: " in program.text
+    assert message in program.text
+
+
+def test_errors_in_other_files_name_them(start: Any, file: Path) -> None:
+    file.write_text("import QtQuick\nItem { Part {} }")
+    file.with_name("Part.qml").write_text("import QtQuick\nItem {\n  oops: 1\n}")
+    program = start("run", file)
+    assert program.end() == 1
+    assert f"{file.with_name('Part.qml')}:3:3: " in program.text
+
+
+def test_a_missing_file(start: Any, tmp_path: Path) -> None:
+    program = start("run", tmp_path / "none.qml")
+    assert program.end() == 1
+    assert program.text == f"{tmp_path / 'none.qml'}:0:0: there is no such file"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signals_end_it(start: Any, file: Path, number: int) -> None:
+    file.write_text(GOOD)
+    program = start("run", file)
+    program.until("up 200")
+    started = time.monotonic()
+    program.kill(number)
+    assert program.end() == 128 + number
+    assert time.monotonic() - started < 3
+    assert "Traceback" not in program.text
+
+
+def test_ctrl_c_ends_an_interface_that_hangs(start: Any, file: Path) -> None:
+    file.write_text(
+        """import QtQuick
+        Item {
+            Timer { running: true; interval: 1; onTriggered: { console.log("hanging"); while (true) ; } }
+        }"""
+    )
+    program = start("run", file)
+    program.until("hanging")
+    program.kill(signal.SIGINT)
+    assert program.end() == 130
+    assert "does not react" in program.text
+
+
+def test_arguments_exit_codes_and_runtime_warnings(start: Any, file: Path) -> None:
+    file.write_text(
+        GOOD.replace(
+            "width: 200",
+            "Timer { running: true; interval: 50; onTriggered: { nothing.here(); } }\n"
+            "Timer { running: true; interval: 90; onTriggered: Qt.exit(7) }\nwidth: 200",
+        )
+    )
+    program = start("run", file, "--", "--speed", "3")
+    program.until("up 200 [--speed,3]")
+    line = program.until("nothing is not defined")
+    assert line.startswith(f"{file}:3: WARNING")
+    assert program.end() == 7
+
+
+def test_no_display_is_said_before_qt_aborts(start: Any, file: Path) -> None:
+    file.write_text(GOOD)
+    program = start("run", file, display=None)
+    assert program.end() == 1
+    assert "there is no display" in program.text
+    assert "xvfb-run" in program.text
+    program = start("run", file, display=":3999")
+    assert program.end() == 1
+    assert "the display :3999 does not answer" in program.text
+
+
+@pytest.mark.xvfb
+@pytest.mark.parametrize("root", ["item", "window"])
+def test_screenshot(start: Any, file: Path, tmp_path: Path, screen: str, root: str) -> None:
+    import cv2
+
+    text = GOOD
+    if root == "window":
+        text = GOOD.replace("Rectangle", "Window").replace("200", "210")
+    file.write_text(text)
+    target = tmp_path / "shot.png"
+    program = start("run", file, "--screenshot", target, "--after", "0.6", display=screen)
+    assert program.end() == 0, program.text
+    picture = cv2.imread(str(target))
+    assert picture.shape[:2] == (100, 210 if root == "window" else 200)
+    assert picture[50, 50].tolist() == [0x60, 0x40, 0x20]
+
+
+def test_a_screenshot_that_cannot_be_written(start: Any, file: Path, tmp_path: Path) -> None:
+    file.write_text(GOOD)
+    program = start("run", file, "--screenshot", tmp_path / "no" / "x.png", "--after", "0.1")
+    assert program.end() == 1
+    assert "could not be written" in program.text
+
+
+def test_live_reload_keeps_the_last_good_interface(start: Any, file: Path) -> None:
+    part = file.with_name("Part.qml")
+    file.write_text(GOOD.replace("width: 200", "Part {}\nwidth: 200"))
+    part.write_text('import QtQuick\nItem { Component.onCompleted: console.log("part 1") }')
+    program = start("run", file, "--watch")
+    program.until("part 1")
+    part.write_text('import QtQuick\nItem { Component.onCompleted: console.log("part 2") }')
+    program.until("part 2")
+    program.until("reloaded")
+    part.write_text("import QtQuick\nItem {\n  oops: 1\n}")
+    assert f"{part}:3:3: " in program.until("oops")
+    # Editors save by renaming a new file over the old one.
+    new = part.with_suffix(".tmp")
+    new.write_text('import QtQuick\nItem { Component.onCompleted: console.log("part 3") }')
+    os.replace(new, part)
+    program.until("part 3")
+    program.until("reloaded")
+    file.with_name("New.qml").write_text("import QtQuick\nItem { }")
+    file.write_text(GOOD.replace("width: 200", "New {}\nwidth: 333"))
+    program.until("up 333")
+    program.kill(signal.SIGINT)
+    assert program.end() == 130
+
+
+def test_without_watch_nothing_is_reloaded(start: Any, file: Path) -> None:
+    file.write_text(GOOD)
+    program = start("run", file)
+    program.until("up 200")
+    file.write_text(GOOD.replace("200", "201"))
+    time.sleep(0.5)
+    assert "201" not in program.text
+
+
+def test_an_address_that_nobody_listens_on_is_shown(start: Any, file: Path) -> None:
+    file.write_text(
+        """import QtQuick
+        import Ros2 1.0
+        Item {
+            Component.onCompleted: Ros2.init("ui")
+            Connections { target: Ros2; function onConnectionChanged() {
+                console.log("state", Ros2.connectionState, Ros2.connectionDetail, Ros2.getName())
+            } }
+        }"""
+    )
+    program = start("run", file, "--url", "zenoh://127.0.0.1:9", "--name", "mine")
+    line = program.until("state connecting no answer from tcp/127.0.0.1:9, trying again")
+    assert line.endswith("mine")
+    program.kill(signal.SIGINT)
+    assert program.end() == 130
+
+
+def test_bad_urls_are_shown(start: Any, file: Path) -> None:
+    file.write_text(
+        """import QtQuick
+        import Ros2 1.0
+        Item {
+            Component.onCompleted: Ros2.init("ui")
+            property string s: Ros2.connectionState
+            onSChanged: if (s == "failed") { console.log("failed:", Ros2.connectionDetail); Qt.exit(5) }
+        }"""
+    )
+    program = start("run", file, "--url", "carrier-pigeon://loft")
+    assert "unknown scheme" in program.until("failed:")
+    assert program.end() == 5

@@ -1,0 +1,92 @@
+"""Pictures reach the pixels of a VideoOutput, on a virtual screen with software OpenGL."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.xvfb
+
+QUARTERS = [(220, 30, 30), (30, 200, 40), (40, 50, 230), (230, 220, 60)]
+COLOURS = ["rgb8", "bgr8", "rgba8", "bgra8", "yuv422", "yuv422_yuy2", "nv12", "nv21"]
+GREYS = ["mono8", "mono16"]
+FORMS = {
+    "native": """import QtQuick
+        import QtMultimedia
+        import Ros2 1.0
+        Rectangle { color: "black";
+            Component.onCompleted: Ros2.init("ui")
+            ImageTransportSubscription { id: sub; objectName: "camera"; topic: "/cam"; timeout: 600; videoSink: out.videoSink }
+            VideoOutput { id: out; anchors.fill: parent } }""",
+    "source": """import QtQuick
+        import Ros2 1.0
+        Rectangle { color: "black";
+            Component.onCompleted: Ros2.init("ui")
+            ImageTransportSubscription { id: sub; objectName: "camera"; topic: "/cam"; timeout: 600 }
+            VideoOutput { anchors.fill: parent; source: sub; fillMode: VideoOutput.PreserveAspectCrop } }""",
+    "painted": """import QtQuick
+        import Ros2 1.0
+        Rectangle { color: "black";
+            Component.onCompleted: Ros2.init("ui")
+            ImageTransportSubscription { id: sub; objectName: "camera"; topic: "/cam"; timeout: 600 }
+            ImageItem { anchors.fill: parent; source: sub } }""",
+    "both": """import QtQuick
+        import Ros2 1.0
+        Rectangle { color: "black";
+            Component.onCompleted: Ros2.init("ui")
+            ImageTransportSubscription { id: sub; objectName: "camera"; topic: "/cam"; timeout: 600 }
+            VideoOutput { width: 160; height: parent.height; source: sub
+                          fillMode: VideoOutput.Stretch; Component.onCompleted: {} }
+            ImageTransportSubscription { id: other; topic: "/cam"; timeout: 600 }
+            ImageItem { x: 160; width: 160; height: parent.height; source: other; fillMode: ImageItem.Stretch } }""",
+}
+
+
+def show(file: Path, screen: str, encodings: list[str]) -> dict[str, list]:
+    gone = {"QT_QPA_PLATFORM", "WAYLAND_DISPLAY", "QT_QUICK_BACKEND"}
+    environment = {k: v for k, v in os.environ.items() if k not in gone} | {"DISPLAY": screen}
+    done = subprocess.run(
+        [sys.executable, str(Path(__file__).with_name("video_app.py")), str(file), *encodings],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=90,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    found = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
+    return {entry["encoding"]: entry["seen"] for entry in found}
+
+
+@pytest.mark.parametrize("form", ["native", "source", "painted"])
+def test_every_encoding_shows_the_right_colours(tmp_path: Path, screen: str, form: str) -> None:
+    file = tmp_path / "View.qml"
+    file.write_text(FORMS[form])
+    seen = show(file, screen, COLOURS + GREYS)
+    for encoding in COLOURS:
+        exact = encoding in {"rgb8", "bgr8", "rgba8", "bgra8"}
+        np.testing.assert_allclose(
+            seen[encoding], QUARTERS, atol=1 if exact else 9, err_msg=encoding
+        )
+    for encoding in GREYS:
+        greys = [[colour[0]] * 3 for colour in QUARTERS]
+        np.testing.assert_allclose(seen[encoding], greys, atol=1, err_msg=encoding)
+    assert seen["timeout"] == [[0, 0, 0]] * 4
+
+
+def test_a_stream_shown_in_both_ways_at_once(tmp_path: Path, screen: str) -> None:
+    file = tmp_path / "View.qml"
+    file.write_text(FORMS["both"])
+    seen = show(file, screen, ["rgb8", "yuv422", "mono8"])
+    # Each half shows the whole picture: left column of each is its middle.
+    for encoding in ("rgb8", "yuv422", "mono8"):
+        left, right, below_left, below_right = seen[encoding]
+        np.testing.assert_allclose(left, right, atol=12)
+        np.testing.assert_allclose(below_left, below_right, atol=12)
+        assert sum(left) > 0

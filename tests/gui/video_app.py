@@ -1,0 +1,109 @@
+"""Run by test_video_output.py on a virtual screen: shows pictures and prints what pixels became.
+
+Arguments: a QML file with an object called "camera", and names of encodings. Prints a JSON object per
+encoding: the colours in the middle of the picture's four quarters.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+os.environ["QSG_RENDER_LOOP"] = "basic"
+os.environ["QT_LOGGING_RULES"] = "qt.multimedia.*=false"
+
+import cv2
+import numpy as np
+from memory_world import MemoryWorld
+from PySide6.QtCore import QObject, QUrl
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtQuick import QQuickView
+
+from rosglass.comm import Time
+from rosglass.qml import Session, install
+
+QUARTERS = [(220, 30, 30), (30, 200, 40), (40, 50, 230), (230, 220, 60)]
+
+
+def scene() -> np.ndarray:
+    picture = np.empty((48, 64, 3), np.uint8)
+    for index, colour in enumerate(QUARTERS):
+        row, column = divmod(index, 2)
+        picture[24 * row : 24 * row + 24, 32 * column : 32 * column + 32] = colour
+    return picture
+
+
+def message(encoding: str) -> dict[str, Any]:
+    rgb = scene()
+    grey = rgb[..., 0].copy()
+    yuv = cv2.cvtColor(rgb, cv2.COLOR_RGB2YUV_I420).reshape(-1)
+    luma, chroma = yuv[: 48 * 64].reshape(48, 64), yuv[48 * 64 :].reshape(2, 24, 32)
+    packed = np.repeat(chroma, 2, axis=1)
+    uyvy = np.empty((48, 32, 4), np.uint8)
+    uyvy[..., 0], uyvy[..., 2] = packed[0], packed[1]
+    uyvy[..., 1], uyvy[..., 3] = luma[:, ::2], luma[:, 1::2]
+    pixels = {
+        "rgb8": rgb,
+        "bgr8": rgb[..., ::-1],
+        "rgba8": np.dstack([rgb, np.full((48, 64), 255, np.uint8)]),
+        "bgra8": np.dstack([rgb[..., ::-1], np.full((48, 64), 255, np.uint8)]),
+        "mono8": grey,
+        "mono16": grey.astype(np.uint16) * 257,
+        "yuv422": uyvy,
+        "yuv422_yuy2": uyvy[..., [1, 0, 3, 2]],
+        "nv12": np.vstack([luma, np.dstack([chroma[0], chroma[1]]).reshape(24, 64)]),
+        "nv21": np.vstack([luma, np.dstack([chroma[1], chroma[0]]).reshape(24, 64)]),
+    }[encoding]
+    data = np.ascontiguousarray(pixels)
+    return {
+        "header": {"stamp": Time.now().to_dict()},
+        "width": 64,
+        "height": 48,
+        "encoding": encoding,
+        "step": data.nbytes // data.shape[0],
+        "data": data.reshape(-1).view(np.uint8),
+    }
+
+
+def main() -> None:
+    file, encodings = Path(sys.argv[1]), sys.argv[2:]
+    app = QGuiApplication([])
+    world = MemoryWorld()
+    camera = world.connect(None, "robot").create_publisher("/cam", "sensor_msgs/msg/Image")
+    session = Session(connect=world.connect)
+    view = QQuickView()
+    view.setResizeMode(QQuickView.ResizeMode.SizeRootObjectToView)
+    install(view.engine(), session)
+    view.setSource(QUrl.fromLocalFile(str(file)))
+    assert view.status() is QQuickView.Status.Ready, [e.toString() for e in view.errors()]
+    view.resize(320, 240)
+    view.show()
+    sub = view.rootObject().findChild(QObject, "camera")
+
+    def turn(seconds: float) -> None:
+        until = time.monotonic() + seconds
+        while time.monotonic() < until:
+            app.processEvents()
+            time.sleep(0.002)
+
+    while not sub.property("subscribed"):
+        turn(0.05)
+    for encoding in encodings:
+        camera.publish(message(encoding))
+        turn(0.2)
+        shot = view.grabWindow()
+        places = [(80, 60), (240, 60), (80, 180), (240, 180)]
+        seen = [shot.pixelColor(x, y).getRgb()[:3] for x, y in places]
+        print(json.dumps({"encoding": encoding, "seen": seen}), flush=True)
+    turn(0.8)
+    blank = view.grabWindow().pixelColor(80, 60).getRgb()[:3]
+    print(json.dumps({"encoding": "timeout", "seen": [blank] * 4}), flush=True)
+    view.close()
+    session.close()
+
+
+main()
