@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-from difflib import get_close_matches
 from functools import lru_cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import FieldPathError
-from rosglass.messages.runtime import number_type
+from rosglass.messages.runtime import hint, number_type
 from rosglass.messages.schema import Kind
 
 if TYPE_CHECKING:
@@ -72,9 +71,9 @@ def find(schema: Schema, name: str, path: str) -> Member:
     member = schema.by_name.get(name)
     if member is None:
         names = [known.name for known in schema.members]
-        near = get_close_matches(name, names, 1)
-        hint = f"did you mean {near[0]!r}?" if near else f"it has: {', '.join(names) or 'nothing'}"
-        raise FieldPathError(f"field path {path!r}: {schema.name} has no field {name!r}; {hint}")
+        raise FieldPathError(
+            f"field path {path!r}: {schema.name} has no field {name!r}; {hint(name, names)}"
+        )
     return member
 
 

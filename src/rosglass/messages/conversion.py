@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -19,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.errors import ConversionError
 from rosglass.interfaces.definition import ArrayKind
 from rosglass.messages.message import Message, plain_class
-from rosglass.messages.runtime import number_type
+from rosglass.messages.runtime import hint, number_type
 from rosglass.messages.schema import Kind
 from rosglass.messages.text import to_dict
 
@@ -331,10 +330,8 @@ def _known_fields(schema: Schema, value: Mapping[Any, Any], path: str) -> dict[s
         member = schema.by_name.get(key) if isinstance(key, str) else None
         if member is None:
             names = [known.name for known in schema.members]
-            near = get_close_matches(key, names, 1) if isinstance(key, str) else []
-            hint = f"did you mean {near[0]!r}?" if near else f"it has: {', '.join(names) or 'none'}"
             where = f"{path}.{key}" if path else str(key)
-            raise ConversionError(where, item, f"a field of {schema.name} ({hint})")
+            raise ConversionError(where, item, f"a field of {schema.name} ({hint(key, names)})")
         if member.name in given:
             raise ConversionError(f"{path}.{key}" if path else str(key), item, "each field once")
         given[member.name] = item

@@ -8,13 +8,13 @@ costs. Nested messages of some size and arrays of messages stay shells of their 
 from __future__ import annotations
 
 import time
-from difflib import get_close_matches
 from functools import lru_cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.errors import DecodeError, FieldPathError
 from rosglass.messages import access, text
+from rosglass.messages.runtime import hint
 from rosglass.messages.schema import Kind
 from rosglass.messages.source import Source
 
@@ -167,9 +167,7 @@ def _restore(kind: MessageType, data: bytes) -> Message:
 
 def _no_field(schema: Schema, name: str) -> str:
     known = [member.name for member in schema.members]
-    near = get_close_matches(name, known, 1)
-    hint = f"did you mean {near[0]!r}?" if near else f"it has: {', '.join(known) or 'no fields'}"
-    return f"{schema.name} has no field {name!r}; {hint}"
+    return f"{schema.name} has no field {name!r}; {hint(name, known)}"
 
 
 def type_of(message: Message) -> MessageType:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import MutableSequence
+from collections.abc import MutableSequence, Sequence
 from functools import lru_cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -53,6 +53,14 @@ def number_type(dtype: str, order: str) -> np.dtype:
     """Return the numpy type with its byte order; the machine's own is numpy's singleton."""
     found: np.dtype = import_module("numpy").dtype(order + dtype)
     return found
+
+
+def hint(name: Any, known: Sequence[str]) -> str:
+    """Return what to tell somebody who used an unknown field name."""
+    near = (
+        import_module("difflib").get_close_matches(name, known, 1) if isinstance(name, str) else []
+    )
+    return f"did you mean {near[0]!r}?" if near else f"it has: {', '.join(known) or 'no fields'}"
 
 
 def read_wide(buffer: bytes, start: int, end: int, width: int, big: bool) -> str:

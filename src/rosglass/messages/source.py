@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import linecache
 import struct
 from contextlib import contextmanager
 from functools import lru_cache
@@ -85,7 +84,19 @@ class Source:
     def compile(self, head: str, title: str) -> Any:
         """Return the function ``def head: lines``; `title` names it in tracebacks."""
         text = "\n".join((f"def {head}:", *self.lines, ""))
-        filename = f"<rosglass {title} #{next(_numbers)}>"
+        # Not in angle brackets: for such names nobody would ask the loader.
+        filename = f"rosglass generated: {title}, {next(_numbers)}"
+        self.globals.update(__name__="rosglass.messages.generated", __loader__=_Loader(text))
         exec(compile(text, filename, "exec"), self.globals)
-        linecache.cache[filename] = (len(text), None, text.splitlines(True), filename)
         return self.globals[head[: head.index("(")]]
+
+
+class _Loader:
+    """Hands the text of generated code to tracebacks and debuggers (PEP 302's ``get_source``)."""
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+
+    def get_source(self, _name: str) -> str:
+        """Return the text."""
+        return self._text

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -56,9 +55,10 @@ def plain(value: Any) -> Any:
 
 def to_json(message: Message, indent: int | None = None) -> str:
     """Return the message as strict JSON."""
-    return json.dumps(
+    dumped: str = import_module("json").dumps(
         _finite(plain(to_dict(message))), indent=indent, ensure_ascii=False, allow_nan=False
     )
+    return dumped
 
 
 def _finite(value: Any) -> Any:

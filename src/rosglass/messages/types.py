@@ -34,6 +34,7 @@ _WIRES = {
 }
 _ORDERS = {"little": False, "big": True}
 _PADDING = 3
+_MOST_PATHS = 1000
 
 
 class Constants(dict[str, Any]):
@@ -327,6 +328,8 @@ class MessageType:
             raise found.explain(buffer, error) from None
 
         made = path_function(codec, paths, single, other, failed)
+        if len(self._paths) >= _MOST_PATHS:
+            self._paths.clear()  # paths made in a loop must not pile up
         self._paths[key] = made
         return made
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 import threading
+import traceback
 
 import pytest
 
@@ -147,6 +148,16 @@ def test_text_has_to_bring_what_it_needs() -> None:
     assert MessageType.from_text("t/msg/A", text, ros=1).create(part={"x": 3}).part.x == 3
     with pytest.raises(DefinitionError, match="does not define other_msgs/msg/Part"):
         MessageType.from_text("t/msg/A", "other_msgs/Part part", ros=1)
+
+
+def test_generated_code_shows_in_tracebacks() -> None:
+    kind = MessageType.from_text("t/msg/Traced", "string a\nfloat64 b")
+    try:
+        kind.path("b")(kind.encode()[:9])
+    except rosglass.DecodeError as error:
+        text = "".join(traceback.format_exception(error))
+    assert "rosglass generated: path b t/msg/Traced cdr" in text
+    assert "return failed(b, error)" in text
 
 
 def test_types_can_be_first_used_by_many_threads() -> None:
