@@ -79,6 +79,8 @@ class Message:
                 except AttributeError:
                     continue
             raise NoSuchFieldError(f"{schema.name}: field {name!r} was deleted")
+        if name.endswith("__"):
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         raise NoSuchFieldError(_no_field(schema, name))
 
     def __getitem__(self, path: str) -> Any:

@@ -6,6 +6,7 @@ import math
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from rosglass.errors import DecodeError
 from rosglass.messages.schema import Kind
 
 if TYPE_CHECKING:
@@ -96,7 +97,10 @@ def to_yaml(message: Message) -> str:
 
 def short(message: Message) -> str:
     """Return one line: the type and the fields, long arrays and strings cut."""
-    return message._schema__.name + _fields(message)
+    try:
+        return message._schema__.name + _fields(message)
+    except DecodeError as error:
+        return f"{message._schema__.name}(<{error}>)"
 
 
 def _fields(message: Message) -> str:

@@ -252,6 +252,7 @@ def test_failing_shell_stays_a_shell() -> None:
         assert caught.value.type_name == "sensor_msgs/msg/Imu"
         assert caught.value.path == "orientation_covariance"
         assert caught.value.offset == 4 + 48
+    assert "orientation_covariance at byte 52" in repr(message)
 
 
 def test_deleted_fields_are_errors() -> None:
