@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import os
 import sys
@@ -126,6 +127,27 @@ def show(
         # Grabbing waits for the renderer, which may wait for Python.
         os.environ["QSG_RENDER_LOOP"] = "basic"
 
+    # Nothing of what is made until the window is there becomes garbage.
+    gc.disable()
+    try:
+        return _show(file, url, name, watch, fullscreen, screenshot, after, arguments, verbose)
+    finally:
+        gc.enable()
+        # PySide takes down what is left in any order at the end of the program, and may crash.
+        gc.collect()
+
+
+def _show(
+    file: Path,
+    url: str,
+    name: str,
+    watch: bool,
+    fullscreen: bool,
+    screenshot: Path | None,
+    after: float,
+    arguments: Sequence[str],
+    verbose: bool,
+) -> int:
     from rosglass.qml.display import require_display
     from rosglass.qml.interrupt import QuitOnSignal
     from rosglass.qml.log import install_message_handler
@@ -155,9 +177,11 @@ def show(
         except QmlError:
             session.close()
             raise
+        gc.enable()
         if screenshot is not None:
-            target = screenshot
-            QtCore.QTimer.singleShot(round(after * 1000), lambda: app.exit(_save(runner, target)))
+            QtCore.QTimer.singleShot(
+                round(after * 1000), lambda: app.exit(_save(runner, screenshot))
+            )
         code = 0 if signals else int(app.exec())
         runner.close()
         session.close()

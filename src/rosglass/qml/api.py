@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import logging
+import platform
 import re
-import socket
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.qos import QoS
@@ -126,7 +126,7 @@ class Ros2(QtCore.QObject):
     url = Property(str, lambda self: self._session.url, _set_url, notify=urlChanged)
     connectionState = Property(str, lambda self: self._session.state, notify=connectionChanged)
     connectionDetail = Property(str, lambda self: self._session.detail, notify=connectionChanged)
-    hostname = Property(str, lambda _: socket.gethostname(), constant=True)
+    hostname = Property(str, lambda _: platform.node(), constant=True)
 
     # Profiles.
 

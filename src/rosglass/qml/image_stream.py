@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from rosglass.comm.time import Time
 from rosglass.images import ImageStream, convert
 from rosglass.qml.frames import IMAGE_FORMATS, VIDEO_FORMATS, VideoFrame, to_image
-from rosglass.qt import QtCore
+from rosglass.qt import QtCore, is_alive
 
 if TYPE_CHECKING:
     from rosglass.comm.node import Node
@@ -116,10 +116,12 @@ class SharedStream(QtCore.QObject):
 
     def close(self) -> None:
         """End the stream; safe to call twice."""
+        self.stream.close()
+        if not is_alive(self):
+            return
         self._linger.stop()
         self._viewers.clear()
         self._session.streams.pop(self._key, None)
-        self.stream.close()
         self.deleteLater()
 
     @property

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import sys
 import threading
 from typing import TYPE_CHECKING, Any
@@ -31,17 +30,18 @@ class QuitOnSignal:
 
     def __init__(self, quit: Callable[[int], None]) -> None:
         self._quit = quit
-        self._reader, self._writer = socket.socketpair()
+        self._reader, self._writer = os.pipe()
         self._ended = threading.Event()
         self._before: dict[int, Any] = {}
         self._wakeup = -1
+        self._thread = threading.Thread(target=self._watch, name="signals", daemon=True)
 
     def __enter__(self) -> QuitOnSignal:
-        self._writer.setblocking(False)
-        self._wakeup = signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)
+        os.set_blocking(self._writer, False)
+        self._wakeup = signal.set_wakeup_fd(self._writer, warn_on_full_buffer=False)
         for number in (signal.SIGINT, signal.SIGTERM):
             self._before[number] = signal.signal(number, lambda *_: None)
-        threading.Thread(target=self._watch, name="signals", daemon=True).start()
+        self._thread.start()
         return self
 
     def __exit__(
@@ -54,15 +54,17 @@ class QuitOnSignal:
         for number, handler in self._before.items():
             signal.signal(number, handler)
         signal.set_wakeup_fd(self._wakeup)
-        self._writer.close()
+        os.close(self._writer)
+        # What `quit` refers to must not outlive this in a thread.
+        self._thread.join()
 
     def _watch(self) -> None:
         ending = {int(number) for number in self._before}
-        while received := self._reader.recv(1):
+        while received := os.read(self._reader, 1):
             if received[0] in ending:
                 self._quit(received[0])
                 if not self._ended.wait(_PATIENCE):
                     sys.stderr.write("rosglass: the interface does not react; ending it\n")
                     sys.stderr.flush()
                     os._exit(128 + received[0])
-        self._reader.close()
+        os.close(self._reader)

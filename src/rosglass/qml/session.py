@@ -194,12 +194,16 @@ class Session(QtCore.QObject):
         self._set_status(Status(ConnectionState.CLOSED))
 
     def close(self) -> None:
-        """Shut down and wait, at most 3 s, for the node's goodbye; safe to call twice."""
+        """Shut down and wait, at most some seconds, for the threads; safe to call twice."""
         if self._closed:
             return
         self._closed = True
         self.holding = False
+        streams = list(self.streams.values())
         self.shutdown()
+        for stream in streams:
+            stream.close()
+            stream.stream.join(_PATIENCE)
         done = threading.Event()
         self._worker.post(done.set)
         if not done.wait(_PATIENCE):
