@@ -11,7 +11,7 @@ say "lint and format (ruff)"
 say "types (mypy --strict)"
 .venv/bin/mypy
 say "documentation (mkdocs --strict)"
-.venv/bin/mkdocs build --strict --quiet
+NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict --quiet
 say "wheel"
 scripts/check_wheel.sh
 say "tests on Debian's own Python ($(.venv-system/bin/python -V))"
