@@ -81,10 +81,14 @@ class Reader(Skipper):
             if not last:
                 self.skip(schema)
             return
-        name = self.source.fresh("t")
         cls = self.source.bind(self.codec.of(schema).cls, "C")
-        self.source.line(f"{target} = {name} = {cls}()")
-        self.fields(schema, name)
+        if target.isidentifier():
+            self.source.line(f"{target} = {cls}()")
+            self.fields(schema, target)
+        else:
+            name = self.source.fresh("t")
+            self.source.line(f"{target} = {name} = {cls}()")
+            self.fields(schema, name)
 
     def text(self, member: Member, target: str) -> None:
         """Decode one string."""

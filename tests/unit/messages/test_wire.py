@@ -258,6 +258,7 @@ def test_hostile_counts_name_the_field() -> None:
 
 def test_nonsense_arguments_are_errors() -> None:
     kind = load("std_msgs/msg/Int32")
+    kind.decode(kind.encode(data=1))  # later calls take a shorter way
     for call in (
         lambda: kind.decode(b"", wire="xcdr"),
         lambda: kind.encode(data=1, wire="json"),
