@@ -54,8 +54,11 @@ class Process:
             else:
                 self.output.append(line)
 
-    def event(self, key: str, timeout: float = 20.0) -> Any:
-        """Return the value of the next event that has `key`; other events wait for their turn."""
+    def event(self, key: str, timeout: float = 20.0, **otherwise: Any) -> Any:
+        """Return the value of the next event that has `key`; other events wait for their turn.
+
+        Without such an event the test fails, unless it says what to return `otherwise`.
+        """
         deadline = time.monotonic() + timeout
         for event in self._skipped:
             if key in event:
@@ -65,6 +68,8 @@ class Process:
             try:
                 event = self.events.get(timeout=max(0.01, deadline - time.monotonic()))
             except queue.Empty:
+                if otherwise:
+                    return otherwise["otherwise"]
                 told = "".join(self.output[-40:])
                 pytest.fail(f"no {key!r} from {self.popen.args} within {timeout} s:\n{told}")
             if key in event:

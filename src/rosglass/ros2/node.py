@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import logging
 import threading
 from typing import TYPE_CHECKING
@@ -92,6 +93,8 @@ class Ros2Node(Node):
             self._worker.close()
             middleware.close()
             raise
+        # Threads that hand on samples must not meet an interpreter that is being taken down.
+        atexit.register(self.close)
 
     def create_publisher(
         self, topic: str, type: str | MessageType, qos: QoS | int = 10
@@ -214,6 +217,7 @@ class Ros2Node(Node):
             if self._closed:
                 return
             self._closed = True
+            atexit.unregister(self.close)
             readings, publishers = list(self._readings), list(self._publishers)
         for item in (*readings, *publishers):
             item.close()

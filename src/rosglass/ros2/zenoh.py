@@ -23,11 +23,12 @@ from rosglass.errors import ConnectionLostError, NodeClosedError
 from rosglass.ros2.middleware import Middleware, OnSample, Writer
 from rosglass.ros2.zenoh_config import close_session, session_config
 from rosglass.ros2.zenoh_endpoints import (
+    CHANNEL,
     Announcement,
     Declaration,
+    Pump,
     ZenohReader,
     ZenohWriter,
-    queued,
 )
 from rosglass.ros2.zenoh_keys import Token, graph_key, topic_key
 
@@ -61,6 +62,8 @@ class ZenohMiddleware(Middleware):
         self._declared: dict[int, Declaration] = {}
         self._links: dict[str, bool] = {}
         self._was_connected = self._closed = False
+        self._refused = False
+        self._pumps: list[Pump] = []
         self._changed: Callable[[], None] = lambda: None
         self._graph: Graph | None = None
         self._strange: set[str] = set()
@@ -119,7 +122,7 @@ class ZenohMiddleware(Middleware):
 
     def poll(self) -> None:
         """Try again to open a client's session."""
-        if self._session is None and not self._closed:
+        if self._refused and not self._closed:
             self._open()
 
     def close(self) -> None:
@@ -131,6 +134,8 @@ class ZenohMiddleware(Middleware):
             session, self._session = self._session, None
             self._declared.clear()
             self._links.clear()
+        for pump in self._pumps:
+            pump.undeclare()
         if session is not None:
             close_session(session)
         self._changed()
@@ -163,12 +168,18 @@ class ZenohMiddleware(Middleware):
             session = zenoh.open(self._config)
         except zenoh.ZError as error:
             if "Unable to connect" in str(error):
-                return  # a client without router; status() says so and poll() tries again
+                self._refused = True  # a client without router; poll() tries again
+                return
             raise ConnectionLostError(f"cannot open a Zenoh session: {error}") from error
-        session.info.declare_transport_events_listener(queued(self._on_transport), history=True)
-        session.liveliness().declare_subscriber(
-            graph_key(self._options.domain), queued(self._on_token), history=True
+        self._refused = False
+        events = session.info.declare_transport_events_listener(CHANNEL, history=True)
+        tokens = session.liveliness().declare_subscriber(
+            graph_key(self._options.domain), CHANNEL, history=True
         )
+        self._pumps = [
+            Pump(events, self._on_transport, f"{self._address} links"),
+            Pump(tokens, self._on_token, f"{self._address} tokens"),
+        ]
         with self._lock:
             if not self._closed:
                 self._session = session

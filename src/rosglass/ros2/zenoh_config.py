@@ -21,6 +21,8 @@ __all__ = ["close_session", "router_config", "session_config"]
 
 #: Pause between two attempts to connect, in milliseconds: first, and at most.
 _RETRY = {"period_init_ms": 250, "period_max_ms": 1000, "period_increase_factor": 2}
+#: Of two peers only one opens the link, so that their attempts do not cross (rmw_zenoh's choice).
+_STRATEGY = {"peer": {"to_router": "always", "to_peer": "greater-zid"}}
 
 
 def session_config(options: ZenohOptions) -> tuple[zenoh.Config, str]:
@@ -45,6 +47,7 @@ def session_config(options: ZenohOptions) -> tuple[zenoh.Config, str]:
         settings["listen/endpoints"] = ["tcp/127.0.0.1:0"] if settings["mode"] == "peer" else []
         settings["scouting/multicast/enabled"] = False
         settings["scouting/gossip/enabled"] = True
+        settings["scouting/gossip/autoconnect_strategy"] = _STRATEGY
         settings["connect/retry"] = _RETRY
         settings["transport/shared_memory/enabled"] = bool(options.shared_memory)
         host = options.host or "127.0.0.1"

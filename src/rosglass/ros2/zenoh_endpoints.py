@@ -25,11 +25,13 @@ if TYPE_CHECKING:
     from rosglass.comm import EndpointInfo, QoS, Status
     from rosglass.ros2.zenoh_options import ZenohOptions
 
-__all__ = ["Announcement", "Declaration", "ZenohReader", "ZenohWriter", "direct", "queued"]
+__all__ = ["CHANNEL", "Announcement", "Declaration", "Pump", "ZenohReader", "ZenohWriter"]
 
 _log = logging.getLogger("rosglass.ros2")
 #: Seconds between the heartbeats that let subscriptions notice a lost last sample (rmw_zenoh's).
 _HEARTBEAT = 0.5
+#: Seconds that closing a publisher waits for another thread's write.
+_PATIENCE = 1.0
 
 
 class Owner(Protocol):
@@ -73,16 +75,22 @@ class Declaration(Handle):
             if self._closed:
                 return
             self._closed = True
-            handles, self._handles = self._handles, []
         self._owner.forget(self)
-        _undeclare(handles)
+        self._release()
 
     def _keep(self, handles: list[Any]) -> None:
         with self._lock:
-            if not self._closed:
-                self._handles += handles
-                return
-        _undeclare(handles)
+            self._handles += handles
+            closed = self._closed
+        if closed:
+            self._release()
+
+    def _release(self) -> None:
+        with self._lock:
+            handles, self._handles = self._handles, []
+        for handle in handles:
+            with suppress(zenoh.ZError):  # the session went first
+                handle.undeclare()
 
 
 class Announcement(Declaration):
@@ -102,13 +110,12 @@ class ZenohReader(Declaration):
 
     def declare(self, session: zenoh.Session) -> list[Any]:
         """Declare the subscriber; a transient local one asks publishers for their last samples."""
-        subscriber: Any
         if self._qos.durability is Durability.TRANSIENT_LOCAL:
             reliable = self._qos.reliability is Reliability.RELIABLE
             subscriber = zenoh.ext.declare_advanced_subscriber(
                 session,
                 self._key,
-                queued(self._on_data),
+                CHANNEL,
                 history=zenoh.ext.HistoryConfig(
                     detect_late_publishers=True, max_samples=self._qos.depth
                 ),
@@ -117,9 +124,8 @@ class ZenohReader(Declaration):
                 else None,
                 subscriber_detection=True,
             )
-        else:
-            subscriber = session.declare_subscriber(self._key, direct(self._on_data))
-        return [subscriber]
+            return [Pump(subscriber, self._on_data, f"{self._key} samples")]
+        return [session.declare_subscriber(self._key, _direct(self._on_data))]
 
     def _on_data(self, sample: zenoh.Sample) -> None:
         received = time.time_ns()
@@ -159,19 +165,26 @@ class ZenohWriter(Declaration, Writer):
         self._session: zenoh.Session | None = None
         self._hashes = {HUMBLE_HASH if options.humble else type_hash or HUMBLE_HASH}
         self._publishers: tuple[Any, ...] = ()
+        self._writing: list[int] = []
+        self._abandoned = False
+        self._quiet = threading.Condition(self._lock)
         # Kept for keys that are declared later: late subscriptions are owed the last samples.
         latched = qos.durability is Durability.TRANSIENT_LOCAL
         self._history: deque[tuple[bytes | bytearray, bytes]] = deque(maxlen=qos.depth * latched)
 
     def declare(self, session: zenoh.Session) -> list[Any]:
         """Declare the publishers of the keys known so far."""
-        self._session = session
-        return self._declare_publishers(session, self._hashes)
+        with self._lock:
+            self._session, hashes = session, set(self._hashes)
+        return self._declare_publishers(session, hashes)
 
     def write(self, data: bytes | bytearray) -> None:
         """Send a payload; while nothing is linked, only a transient local cache keeps it."""
-        if self._closed:
-            raise NodeClosedError(f"the publisher of {self._topic} is closed")
+        thread = threading.get_ident()
+        with self._lock:
+            if self._closed:
+                raise NodeClosedError(f"the publisher of {self._topic} is closed")
+            self._writing.append(thread)
         note = Attachment(next(self._numbers), time.time_ns(), self._gid).encode()
         self._history.append((data, note))
         try:
@@ -181,6 +194,13 @@ class ZenohWriter(Declaration, Writer):
             if self._closed or self._owner.status().state is ConnectionState.CLOSED:
                 raise NodeClosedError(f"the publisher of {self._topic} is closed") from error
             raise ConnectionLostError(f"cannot publish on {self._topic}: {error}") from error
+        finally:
+            with self._lock:
+                self._writing.remove(thread)
+                late = self._abandoned and not self._writing
+                self._quiet.notify_all()
+            if late:
+                self._release()
 
     def match(self, subscriptions: Sequence[EndpointInfo]) -> None:
         """Send under a further key for subscriptions that name the type's definition otherwise.
@@ -189,11 +209,22 @@ class ZenohWriter(Declaration, Writer):
         """
         ours = {self._type_hash or HUMBLE_HASH, HUMBLE_HASH}
         wanted = {endpoint.type_hash or HUMBLE_HASH for endpoint in subscriptions}
-        new = (wanted & ours) - self._hashes
-        if new and not self._closed:
-            self._hashes = self._hashes | new
-            if self._session is not None:
-                self._keep(self._declare_publishers(self._session, new))
+        with self._lock:
+            new = (wanted & ours) - self._hashes
+            self._hashes |= new
+            session = None if self._closed else self._session
+        if new and session is not None:
+            self._keep(self._declare_publishers(session, new))
+
+    def _release(self) -> None:
+        # Zenoh refuses to undeclare what is in use; a write ends soon, or does this when it ends.
+        own = threading.get_ident()
+        with self._lock:
+            self._quiet.wait_for(lambda: not set(self._writing) - {own}, _PATIENCE)
+            self._abandoned = bool(self._writing)
+            if self._abandoned:
+                return
+        super()._release()
 
     def _declare_publishers(self, session: zenoh.Session, hashes: set[str]) -> list[Any]:
         publishers = [self._declare_publisher(session, name) for name in sorted(hashes)]
@@ -231,12 +262,6 @@ class ZenohWriter(Declaration, Writer):
         )
 
 
-def _undeclare(handles: list[Any]) -> None:
-    for handle in handles:
-        with suppress(zenoh.ZError):  # the session went first
-            handle.undeclare()
-
-
 def _guarded(callback: Callable[[Any], None]) -> Callable[[Any], None]:
     """Log what `callback` raises: Zenoh would only print it."""
 
@@ -249,16 +274,41 @@ def _guarded(callback: Callable[[Any], None]) -> Callable[[Any], None]:
     return guarded
 
 
-def direct(callback: Callable[[Any], None]) -> Any:
+def _direct(callback: Callable[[Any], None]) -> Any:
     """Run `callback` on the thread that receives; only for the samples of plain subscribers."""
     return zenoh.handlers.Callback(_guarded(callback), indirect=False)
 
 
-def queued(callback: Callable[[Any], None]) -> Any:
-    """Run `callback` on a thread of its own.
+class Pump:
+    """Hands what a Zenoh channel receives to a callback, on a thread of its own.
 
     Zenoh's "net" threads must never wait for Python's global lock: undeclaring an advanced
     publisher holds that lock while it waits for a task of theirs (measured with eclipse-zenoh
-    1.10.2: the whole program stands still for 10 s).
+    1.10.2: the whole program stands still for 10 s). Only the samples of plain subscribers come
+    on other threads. Zenoh's own queueing callbacks keep a program from ending.
+
+    Args:
+        source: What was declared with :data:`CHANNEL`; it ends the thread when it is undeclared.
+        callback: Takes each item.
+        name: The thread's name.
     """
-    return zenoh.handlers.Callback(_guarded(callback), indirect=True)
+
+    def __init__(self, source: Any, callback: Callable[[Any], None], name: str) -> None:
+        self._source, self._callback = source, _guarded(callback)
+        self._thread = threading.Thread(target=self._work, name=name, daemon=True)
+        self._thread.start()
+
+    def undeclare(self) -> None:
+        """Undeclare the source and wait for the thread, unless this is it."""
+        with suppress(zenoh.ZError):  # the session went first
+            self._source.undeclare()
+        if self._thread is not threading.current_thread():
+            self._thread.join()
+
+    def _work(self) -> None:
+        for item in self._source.handler:
+            self._callback(item)
+
+
+#: Channel for a :class:`Pump`; so long that its end is never met while the pump's thread lives.
+CHANNEL = zenoh.handlers.FifoChannel(100_000)

@@ -6,6 +6,7 @@ import os
 import signal
 import socket
 import subprocess
+import sys
 import threading
 import time
 from contextlib import suppress
@@ -200,6 +201,14 @@ def test_closing_after_the_peer_and_the_router_have_gone(start_router, start_pee
     assert node.status().state is CLOSED
 
 
+def test_every_new_connection_receives(router, start_peer):
+    peer = start_peer("rosglass", router, publish={"/count": TWIST}, period=0.02)
+    for _ in range(40):
+        with rosglass.connect(router.url, "visitor") as node:
+            assert node.create_subscription("/count", TWIST).wait(2) is not None
+    peer.end()
+
+
 def own_descriptors():
     return len(list(Path("/proc/self/fd").iterdir()))
 
@@ -339,3 +348,33 @@ def test_the_router_command_ends_cleanly(number, start_router):
     router.popen.send_signal(number)
     assert router.popen.wait(5) == 0
     assert "Zenoh router ended\n" in router.output
+
+
+FORGETFUL = """
+import threading, time, rosglass
+node = rosglass.connect({url!r}, "forgetful")
+latched = rosglass.QoS.latched()
+for topic, qos in (("/a", 10), ("/b", latched)):
+    node.create_subscription(topic, {type!r}, id, qos)
+publishers = [node.create_publisher("/a", {type!r}), node.create_publisher("/b", {type!r}, latched)]
+
+def publish():
+    try:
+        while True:
+            for publisher in publishers:
+                publisher.publish()
+    except rosglass.NodeClosedError:
+        pass
+
+threading.Thread(target=publish, daemon=True).start()
+time.sleep(0.2)
+"""
+
+
+def test_a_program_that_forgets_to_close_its_node_ends_all_the_same(router):
+    program = FORGETFUL.format(url=router.url, type=TWIST)
+    for _ in range(3):
+        done = subprocess.run(
+            [sys.executable, "-c", program], capture_output=True, text=True, timeout=20, check=False
+        )
+        assert (done.returncode, done.stderr) == (0, "")
