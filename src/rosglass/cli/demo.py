@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from contextlib import ExitStack
 from pathlib import Path
@@ -27,7 +28,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Declare the command's options."""
     parser.add_argument(
         "--url",
-        default="zenoh://127.0.0.1:7447",
+        default=os.environ.get("ROSGLASS_URL") or "zenoh://127.0.0.1:7447",
         help="Zenoh router to meet at; one is started when none answers (default: %(default)s)",
     )
     parser.add_argument(
@@ -102,7 +103,6 @@ def _show(
     code = cockpit.run(seconds)
     if screenshot is not None and seconds is None:
         shoot()
-    cockpit.call("stick", "letGo")
     print(f"\n{cockpit.report()}", flush=True)
     if screenshot is not None and not failures:
         print(f"picture of the cockpit: {screenshot.resolve()}")
@@ -147,19 +147,22 @@ def _use_virtual_screen(stack: ExitStack, seconds: float | None) -> None:
 
 
 def _find_router(stack: ExitStack, url: str) -> str:
-    """Return the URL to use, after starting a router there when nobody answers."""
+    """Return the URL to use, after starting a router on this machine when nobody answers."""
     from rosglass.ros2.router import Router, is_router_reachable
+    from rosglass.ros2.zenoh_options import ZenohOptions
 
     if is_router_reachable(url):
         print(f"using the Zenoh router at {url}", flush=True)
+        return url
+    host = ZenohOptions.parse(url, os.environ).host or "127.0.0.1"
+    if not re.fullmatch(r"localhost|127(\.\d+){3}|::1", host):
+        print(f"no Zenoh router at {url} yet: the cockpit keeps trying", flush=True)
         return url
     listen = "tcp/" + url.removeprefix("zenoh://").partition("?")[0].rstrip("/")
     router = Router(listen)
     stack.callback(router.close)
     print(f"no Zenoh router at {url}: started one, on {router.listen}", flush=True)
-    # Port 0 takes a free one.
-    query = url.partition("?")[2]
-    return f"{router.url}?{query}" if query else router.url
+    return url
 
 
 def _start_robot(stack: ExitStack, url: str) -> Child:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import threading
@@ -16,13 +17,13 @@ if TYPE_CHECKING:
 
 __all__ = ["configure", "run"]
 
-DEFAULT_URL = "zenoh://127.0.0.1:7447"
-
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Declare the command's options."""
     parser.add_argument(
-        "--url", default=DEFAULT_URL, help="where to find the other nodes (default: %(default)s)"
+        "--url",
+        default=os.environ.get("ROSGLASS_URL") or "zenoh://127.0.0.1:7447",
+        help="where to find the other nodes (default: %(default)s)",
     )
     parser.add_argument("--name", default="robot", help="name of the node (default: %(default)s)")
     parser.add_argument(

@@ -116,7 +116,15 @@ class Cockpit:
             QtCore.QTimer.singleShot(round(seconds * 1000), loop.quit)
         with QuitOnSignal(interrupted):
             loop.exec()
+            self._let_go()
         return 128 + signals[0] if signals else 0
+
+    def _let_go(self) -> None:
+        """Release the stick and give it the time to say so more than once."""
+        self.call("stick", "letGo")
+        loop = QtCore.QEventLoop()
+        QtCore.QTimer.singleShot(200, loop.quit)
+        loop.exec()
 
     def close(self) -> None:
         """Take the window down and leave the graph; safe to call twice."""
@@ -144,13 +152,11 @@ class Cockpit:
         rows = [["topic", "type", "Hz", "newest"]]
         for item in self.topics():
             age = item.property("age")
-            rate = item.property("frequency")
-            kind = item.property("messageType") or getattr(item, "kind", "")
             rows.append(
                 [
                     item.property("topic"),
-                    kind,
-                    "" if rate is None else f"{rate:.1f}",
+                    item.property("messageType"),
+                    f"{item.property('frequency'):.1f}",
                     "never" if age < 0 else f"{age * 1000:.0f} ms ago",
                 ]
             )

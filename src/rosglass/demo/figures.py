@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import os
-import resource
 import time
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -131,13 +131,12 @@ class ProcessFigures:
 
     @staticmethod
     def memory() -> float:
-        """Return the resident memory in MiB; the peak where the system tells no more."""
+        """Return the resident memory in MiB; NaN where the system does not tell."""
         try:
-            with open("/proc/self/statm", encoding="ascii") as file:  # noqa: PTH123 - not a file
-                pages = int(file.read().split()[1])
-            return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
+            pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
         except OSError:
-            return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+            return math.nan
+        return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
 def table(rows: Sequence[Sequence[str]]) -> str:

@@ -19,7 +19,7 @@ import numpy as np
 from rosglass.comm import Dispatcher, QoS
 from rosglass.errors import Error
 from rosglass.qml.element import TopicElement
-from rosglass.qt import Property, QtCore, QtGui, QtQml, QtQuick, Signal, engine_of
+from rosglass.qt import Property, QtCore, QtGui, QtQml, QtQuick, Signal, Slot, engine_of
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -183,6 +183,8 @@ class _Picture(TopicElement):
         with suppress(RuntimeError):  # the QML object went while its picture was painted
             self._painted.emit(result)
 
+    # Slots: QML elements with properties of their own hide methods that are not declared.
+    @Slot(object)
     def _show(self, result: object) -> None:
         if isinstance(result, Error):
             self._say(f"{self._topic}: {result}")
@@ -201,6 +203,7 @@ class _Picture(TopicElement):
         self.ageChanged.emit()
         self._judge()
 
+    @Slot()
     def _on_tick(self) -> None:
         if self._version:
             self._age = time.monotonic() - self._stamp
@@ -230,6 +233,9 @@ class _Picture(TopicElement):
             self.limitChanged.emit()
             self._judge()
 
+    def _frequency(self) -> float:
+        return 0.0 if self._subscription is None else self._subscription.statistics().frequency
+
     def _source(self) -> QtCore.QUrl:
         return QtCore.QUrl(f"image://{self._name}/{self._version}" if self._version else "")
 
@@ -242,6 +248,9 @@ class _Picture(TopicElement):
     age = Property(float, lambda self: self._age, notify=ageChanged)
     stale = Property(bool, lambda self: self._stale, notify=staleChanged)
     problem = Property(str, lambda self: self._problem, notify=problemChanged)
+    #: Messages per second.
+    frequency = Property(float, _frequency, notify=ageChanged)
+    messageType = Property(str, lambda self: self.kind, constant=True)  # noqa: N815
 
 
 class MapPicture(_Picture):

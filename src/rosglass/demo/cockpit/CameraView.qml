@@ -1,7 +1,6 @@
 // The camera picture. It never passes off an old picture as live: once pictures stop, or arrive
 // late, it turns grey under a red frame that says how old they are.
 import QtQuick
-import QtQuick.Effects
 import Ros2 1.0
 
 Item {
@@ -17,9 +16,10 @@ Item {
     property bool received: false
     property double stamp: 0
     property real age: -1
-    // Milliseconds from the robot's stamp to here; means something while the clocks agree.
+    // Milliseconds from the robot's stamp to here. More than a second is a picture of the past, or
+    // clocks that differ so much that nobody can tell: neither may be shown as live.
     readonly property real latency: camera.latency
-    readonly property bool late: received && !camera.stale && latency > 1000
+    readonly property bool late: received && !camera.stale && Math.abs(latency) > 1000
     readonly property bool live: received && age <= limit && !camera.stale && !late
     readonly property real framerate: camera.framerate
     // Where the picture is, in this item's coordinates.
@@ -55,12 +55,6 @@ Item {
         objectName: "picture"
         anchors.fill: parent
         source: camera
-        layer.enabled: !view.live
-        layer.effect: MultiEffect {
-            saturation: -1
-            brightness: -0.25
-            contrast: -0.2
-        }
     }
 
     // Name, rate and latency of the stream.
@@ -110,7 +104,8 @@ Item {
         objectName: "noSignal"
         anchors.fill: parent
         visible: !view.live
-        color: view.received ? "#60200008" : "#160a0e"
+        // A veil, not a shader: one that has to be compiled first would come late.
+        color: view.received ? "#b8403a3d" : "#160a0e"
         border { color: Theme.bad; width: 6 }
 
         Rectangle {
@@ -127,7 +122,7 @@ Item {
                 spacing: 8
                 Text {
                     anchors.horizontalCenter: parent.horizontalCenter
-                    text: view.late ? "PICTURE DELAYED" : "NO SIGNAL"
+                    text: !view.late ? "NO SIGNAL" : view.latency > 0 ? "PICTURE DELAYED" : "CLOCKS DIFFER"
                     color: Theme.bad
                     font { pixelSize: 38; weight: Font.Black; letterSpacing: 3 }
                     SequentialAnimation on opacity {
@@ -144,7 +139,7 @@ Item {
                     anchors.horizontalCenter: parent.horizontalCenter
                     text: !view.received ? "no picture received yet"
                         : view.late
-                            ? "by " + (view.latency / 1000).toFixed(1) + " s"
+                            ? "by " + Math.abs(view.latency / 1000).toFixed(1) + " s"
                             : "last image " + view.age.toFixed(1) + " s old"
                     color: Theme.text
                     font.pixelSize: Theme.large
@@ -153,7 +148,8 @@ Item {
                     anchors.horizontalCenter: parent.horizontalCenter
                     width: Math.min(implicitWidth, view.width - 90)
                     visible: text !== ""
-                    text: view.reason || camera.problem
+                    text: view.late ? "or the clocks of robot and cockpit differ by that much"
+                        : view.reason || camera.problem
                     color: Theme.dim
                     wrapMode: Text.Wrap
                     horizontalAlignment: Text.AlignHCenter

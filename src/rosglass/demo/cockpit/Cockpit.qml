@@ -59,7 +59,6 @@ Item {
         id: link
         objectName: "link"
         pulse: map.odom
-        detail: Ros2.connectionDetail
     }
     Drive {
         id: drive

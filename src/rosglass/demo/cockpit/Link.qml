@@ -7,11 +7,11 @@ QtObject {
 
     // The feed that beats fastest.
     required property var pulse
-    // What the middleware says about its own connection.
-    property string detail
     readonly property bool alive: pulse.fresh
     readonly property string text: alive ? "CONNECTED"
         : pulse.received ? "ROBOT LOST " + pulse.age.toFixed(0) + " s AGO" : "WAITING FOR THE ROBOT"
     // Why there is nothing to see, for the places that have room for it.
-    readonly property string reason: alive ? "" : detail
+    readonly property string reason: alive ? ""
+        : Ros2.connectionState === "connected"
+            ? "the " + Ros2.connectionDetail + " answers, the robot does not" : Ros2.connectionDetail
 }
