@@ -17,22 +17,12 @@ if TYPE_CHECKING:
 __all__ = ["ActionType", "ServiceType", "default_library", "load"]
 
 
-class ServiceType:
-    """A service type.
+class _Interface:
+    """What types made of several messages have in common."""
 
-    Attributes:
-        definition: The definition it was made from.
-        name: Full name, ``pkg/srv/Type``.
-        ros: 1 or 2.
-        request: Type of the request.
-        response: Type of the response.
-    """
-
-    def __init__(self, definition: ServiceDefinition) -> None:
+    def __init__(self, definition: ServiceDefinition | ActionDefinition) -> None:
         self.definition = definition
         self.name, self.ros = definition.name, definition.ros
-        self.request = MessageType(definition.request)
-        self.response = MessageType(definition.response)
 
     @property
     def md5(self) -> str:
@@ -45,10 +35,29 @@ class ServiceType:
         return interfaces.rihs01(self.definition)
 
     def __repr__(self) -> str:
-        return f"<ServiceType {self.name} (ROS {self.ros})>"
+        return f"<{type(self).__name__} {self.name} (ROS {self.ros})>"
 
 
-class ActionType:
+class ServiceType(_Interface):
+    """A service type.
+
+    Attributes:
+        definition: The definition it was made from.
+        name: Full name, ``pkg/srv/Type``.
+        ros: 1 or 2.
+        request: Type of the request.
+        response: Type of the response.
+    """
+
+    definition: ServiceDefinition
+
+    def __init__(self, definition: ServiceDefinition) -> None:
+        super().__init__(definition)
+        self.request = MessageType(definition.request)
+        self.response = MessageType(definition.response)
+
+
+class ActionType(_Interface):
     """An action type.
 
     Attributes:
@@ -60,25 +69,13 @@ class ActionType:
         feedback: Type of the feedback.
     """
 
+    definition: ActionDefinition
+
     def __init__(self, definition: ActionDefinition) -> None:
-        self.definition = definition
-        self.name, self.ros = definition.name, definition.ros
+        super().__init__(definition)
         self.goal = MessageType(definition.goal)
         self.result = MessageType(definition.result)
         self.feedback = MessageType(definition.feedback)
-
-    @property
-    def md5(self) -> str:
-        """ROS 1's md5 sum of the definition."""
-        return interfaces.md5(self.definition)
-
-    @property
-    def rihs01(self) -> str:
-        """ROS 2's type hash (REP 2016)."""
-        return interfaces.rihs01(self.definition)
-
-    def __repr__(self) -> str:
-        return f"<ActionType {self.name} (ROS {self.ros})>"
 
 
 _lock = threading.RLock()

@@ -190,7 +190,11 @@ class MessageType:
             wire = self.wire
         try:
             message: Message = self._shells[wire]()
-            if buffer.__class__ is bytes and (wire == "ros1" or (buffer[1] == 1 and not buffer[0])):
+            if (
+                buffer.__class__ is bytes
+                and (wire == "ros1" or (buffer[1] == 1 and not buffer[0]))
+                and wstring_width is None
+            ):
                 message._buffer__ = buffer
                 return message
         except LookupError:
