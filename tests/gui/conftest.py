@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 os.environ.setdefault("QSG_RENDER_LOOP", "basic")
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
-from memory_world import MemoryNode, MemoryWorld  # noqa: E402
+from memory_world import MemoryNode, MemoryWorld
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -89,10 +89,8 @@ class Bench:
         """Run JavaScript in a file of its own and return its result as JSON does it."""
         import json
 
-        root = self.load(
-            "QtObject { function go() { return JSON.stringify((function() { %s })()) } }" % script,
-            imports,
-        )
+        body = "QtObject { function go() { return JSON.stringify((function() { SCRIPT })()) } }"
+        root = self.load(body.replace("SCRIPT", script), imports)
         from PySide6.QtCore import Q_RETURN_ARG, QMetaObject
 
         text = QMetaObject.invokeMethod(root, "go", Q_RETURN_ARG("QVariant"))

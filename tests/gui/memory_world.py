@@ -134,7 +134,7 @@ class MemoryNode(Node):
             executor or self.dispatcher,
             callback,
             raw_callback,
-            lambda s: self.world.subscriptions.remove(s),
+            self.world.subscriptions.remove,
         )
         self.world.subscriptions.append(subscription)
         latched = subscription.qos.durability is Durability.TRANSIENT_LOCAL

@@ -30,10 +30,11 @@ def load(bench: Any, more: str = "") -> Any:
             property var sent
             property int advertised: 0
             property var c: Connections { target: pub; function onAdvertised() { ++advertised } }
-            function send(x) { try { sent = pub.publish({linear: {x: x}}) } catch (e) { error = String(e) } }
-            %s
-        }"""
-        % more
+            function send(x) {
+                try { sent = pub.publish({linear: {x: x}}) } catch (e) { error = String(e) }
+            }
+            MORE
+        }""".replace("MORE", more)
     )
 
 
@@ -67,7 +68,7 @@ def test_what_does_not_fit_throws_and_is_logged_with_its_place(
     records = [r for r in caplog.records if "linear.x" in r.getMessage()]
     assert len(records) == 1
     assert records[0].pathname.endswith(".qml")
-    assert records[0].lineno == 11
+    assert records[0].lineno == 12
     assert records[0].funcName == "send"
     wait(50)
     assert not received
@@ -121,9 +122,10 @@ def test_a_publisher_lives_as_long_as_javascript_holds_it(running: Any, wait: An
 def test_properties(running: Any, wait: Any, received: list) -> None:
     root = running.load(
         """QtObject {
-            property var pub: Ros2.createPublisher("~/state", "std_msgs/msg/Bool",
-                                                   Ros2.QoS().reliable().transient_local().keep_last(2))
-            property var facts: [pub.topic, pub.type, pub.queueSize, pub.isAdvertised, pub.qos.durability]
+            property var qos: Ros2.QoS().reliable().transient_local().keep_last(2)
+            property var pub: Ros2.createPublisher("~/state", "std_msgs/msg/Bool", qos)
+            property var facts: [pub.topic, pub.type, pub.queueSize, pub.isAdvertised,
+                                 pub.qos.durability]
         }"""
     )
     assert root.property("facts").toVariant()[1:] == [
@@ -159,7 +161,8 @@ def test_bad_arguments_throw(running: Any, arguments: str, reason: str) -> None:
 def test_unknown_types_are_said_and_looked_for_again(running: Any, wait: Any, caplog: Any) -> None:
     running.world.missing.add("std_msgs/msg/Bool")
     root = running.load(
-        'QtObject { property var pub: Ros2.createPublisher("/x", "std_msgs/msg/Bool"); property string problem: pub.problem }'
+        """QtObject { property var pub: Ros2.createPublisher("/x", "std_msgs/msg/Bool")
+            property string problem: pub.problem }"""
     )
     wait(lambda: "std_msgs/msg/Bool" in root.property("problem"))
     assert any(r.levelno == logging.WARNING for r in caplog.records)
@@ -173,7 +176,8 @@ def test_keep_all_never_waits_on_the_gui_thread(running: Any, wait: Any) -> None
 
     root = running.load(
         """QtObject {
-            property var pub: Ros2.createPublisher("/x", "std_msgs/msg/Bool", Ros2.QoS().reliable().keep_all())
+            property var qos: Ros2.QoS().reliable().keep_all()
+            property var pub: Ros2.createPublisher("/x", "std_msgs/msg/Bool", qos)
             function send() { return pub.publish({data: true}) }
         }"""
     )

@@ -16,11 +16,12 @@ from rosglass.qml import Session, install
 LOG = """QtObject {
     id: root
     property var log: []
+    function say(text) { log.push(text) }
     property string state: Ros2.connectionState + "|" + Ros2.connectionDetail
     property var c: Connections {
         target: Ros2
-        function onInitialized() { log.push("initialized " + Ros2.isInitialized() + Ros2.getName()) }
-        function onAboutToShutdown() { log.push("aboutToShutdown " + Ros2.isInitialized()) }
+        function onInitialized() { say("initialized " + Ros2.isInitialized() + Ros2.getName()) }
+        function onAboutToShutdown() { say("aboutToShutdown " + Ros2.isInitialized()) }
         function onConnectionChanged() { log.push(Ros2.connectionState) }
     }
 }"""
@@ -39,7 +40,8 @@ def test_before_init(bench: Any) -> None:
 def test_life(bench: Any, wait: Any) -> None:
     root = bench.load(LOG)
     wait(20)
-    script = "Ros2.init('ui'); return [Ros2.isInitialized(), Ros2.ok(), Ros2.getName(), Ros2.getNamespace()]"
+    script = """Ros2.init('ui');
+        return [Ros2.isInitialized(), Ros2.ok(), Ros2.getName(), Ros2.getNamespace()]"""
     assert bench.run(script) == [True, True, "ui", "/"]
     wait(lambda: bench.session.state == "connected")
     bench.run("Ros2.init('ui')")
@@ -226,7 +228,8 @@ def test_the_graph_can_be_asked(running: Any, wait: Any) -> None:
 
 def test_empty_messages(bench: Any, caplog: Any) -> None:
     script = """const m = Ros2.createEmptyMessage("geometry_msgs/PoseStamped");
-        return [m.pose.orientation.w, m.header.frame_id, m["#messageType"], m.header.stamp.isZero()]"""
+        return [m.pose.orientation.w, m.header.frame_id, m["#messageType"],
+                m.header.stamp.isZero()]"""
     assert bench.run(script) == [1, "", "geometry_msgs/msg/PoseStamped", True]
     assert bench.run("return Ros2.createEmptyMessage('no/msg/Type') === undefined") is True
     assert "no/msg/Type" in caplog.text

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import time
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 GOOD = """import QtQuick
 Rectangle {
@@ -73,7 +74,10 @@ def test_ctrl_c_ends_an_interface_that_hangs(start: Any, file: Path) -> None:
     file.write_text(
         """import QtQuick
         Item {
-            Timer { running: true; interval: 1; onTriggered: { console.log("hanging"); while (true) ; } }
+            Timer {
+                running: true; interval: 1
+                onTriggered: { console.log("hanging"); while (true) ; }
+            }
         }"""
     )
     program = start("run", file)
@@ -147,7 +151,7 @@ def test_live_reload_keeps_the_last_good_interface(start: Any, file: Path) -> No
     # Editors save by renaming a new file over the old one.
     new = part.with_suffix(".tmp")
     new.write_text('import QtQuick\nItem { Component.onCompleted: console.log("part 3") }')
-    os.replace(new, part)
+    new.replace(part)
     program.until("part 3")
     program.until("reloaded")
     file.with_name("New.qml").write_text("import QtQuick\nItem { }")
@@ -191,7 +195,10 @@ def test_bad_urls_are_shown(start: Any, file: Path) -> None:
         Item {
             Component.onCompleted: Ros2.init("ui")
             property string s: Ros2.connectionState
-            onSChanged: if (s == "failed") { console.log("failed:", Ros2.connectionDetail); Qt.exit(5) }
+            onSChanged: if (s == "failed") {
+                console.log("failed:", Ros2.connectionDetail)
+                Qt.exit(5)
+            }
         }"""
     )
     program = start("run", file, "--url", "carrier-pigeon://loft")

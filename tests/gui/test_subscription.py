@@ -23,15 +23,14 @@ def load(bench: Any, properties: str = 'topic: "/chat"', more: str = "") -> Any:
             property var log: []
             property var texts: []
             property string shown: sub.message ? sub.message.data : "none"
-            property QtObject sub: Subscription { id: sub; %s
+            property QtObject sub: Subscription { id: sub; PROPERTIES
                 onMessageTypeChanged: root.log.push("type " + messageType)
                 onMessageChanged: root.log.push("message " + (message ? message.data : message))
                 onStaleChanged: root.log.push("stale " + stale)
                 onNewMessage: (m) => { root.log.push("new " + m.data); root.texts.push(m.data) }
             }
-            %s
-        }"""
-        % (properties, more)
+            MORE
+        }""".replace("PROPERTIES", properties).replace("MORE", more)
     )
 
 
@@ -152,7 +151,8 @@ def test_changing_the_topic_in_the_handler(running: Any, chat: Any, wait: Any) -
     root = load(
         running,
         'topic: "/chat"; throttleRate: 0',
-        'property var c: Connections { target: sub; function onNewMessage(m) { sub.topic = "/other" } }',
+        """property var c: Connections { target: sub
+            function onNewMessage(m) { sub.topic = "/other" } }""",
     )
     sub = root.property("sub")
     wait(lambda: sub.property("subscribed"))
@@ -195,7 +195,8 @@ def test_subscriptions_made_by_a_function_end_with_their_owner(
             id: root
             property var sub
             property string shown: sub && sub.message ? sub.message.data : "none"
-            Component.onCompleted: sub = Ros2.createSubscription("/chat", "std_msgs/String", Ros2.QoS())
+            Component.onCompleted:
+                sub = Ros2.createSubscription("/chat", "std_msgs/String", Ros2.QoS())
             function drop() { sub = null; gc() }
         }"""
     )
@@ -350,8 +351,10 @@ def test_an_impossible_profile_is_refused_with_its_place(running: Any, caplog: A
 
 def test_every_property_reads_back(running: Any) -> None:
     shown = running.run(
-        """const s = Ros2.createSubscription("/t", "std_msgs/msg/Int32", Ros2.QoS().reliable().keep_last(3));
-        s.throttleRate = 7; s.enabled = false; s.timeout = 9; const before = s.queueSize; s.queueSize = 4;
+        """const qos = Ros2.QoS().reliable().keep_last(3);
+        const s = Ros2.createSubscription("/t", "std_msgs/msg/Int32", qos);
+        s.throttleRate = 7; s.enabled = false; s.timeout = 9;
+        const before = s.queueSize; s.queueSize = 4;
         return [s.topic, s.messageType, s.qos.reliability, before, s.qos.depth(), s.throttleRate,
                 s.enabled, s.timeout, s.message === undefined, s.getPublisherCount()]"""
     )

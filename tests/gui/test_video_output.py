@@ -16,36 +16,38 @@ pytestmark = pytest.mark.xvfb
 QUARTERS = [(220, 30, 30), (30, 200, 40), (40, 50, 230), (230, 220, 60)]
 COLOURS = ["rgb8", "bgr8", "rgba8", "bgra8", "yuv422", "yuv422_yuy2", "nv12", "nv21"]
 GREYS = ["mono8", "mono16"]
+HEAD = """import QtQuick
+    import QtMultimedia
+    import Ros2 1.0
+    Rectangle {
+        color: "black"
+        Component.onCompleted: Ros2.init("ui")
+        ImageTransportSubscription {
+            id: sub; objectName: "camera"; topic: "/cam"; timeout: 600
+        }
+    """
 FORMS = {
-    "native": """import QtQuick
-        import QtMultimedia
-        import Ros2 1.0
-        Rectangle { color: "black";
-            Component.onCompleted: Ros2.init("ui")
-            ImageTransportSubscription { id: sub; objectName: "camera"; topic: "/cam"; timeout: 600; videoSink: out.videoSink }
-            VideoOutput { id: out; anchors.fill: parent } }""",
-    "source": """import QtQuick
-        import Ros2 1.0
-        Rectangle { color: "black";
-            Component.onCompleted: Ros2.init("ui")
-            ImageTransportSubscription { id: sub; objectName: "camera"; topic: "/cam"; timeout: 600 }
-            VideoOutput { anchors.fill: parent; source: sub; fillMode: VideoOutput.PreserveAspectCrop } }""",
-    "painted": """import QtQuick
-        import Ros2 1.0
-        Rectangle { color: "black";
-            Component.onCompleted: Ros2.init("ui")
-            ImageTransportSubscription { id: sub; objectName: "camera"; topic: "/cam"; timeout: 600 }
-            ImageItem { anchors.fill: parent; source: sub } }""",
-    "both": """import QtQuick
-        import Ros2 1.0
-        Rectangle { color: "black";
-            Component.onCompleted: Ros2.init("ui")
-            ImageTransportSubscription { id: sub; objectName: "camera"; topic: "/cam"; timeout: 600 }
-            VideoOutput { width: 160; height: parent.height; source: sub
-                          fillMode: VideoOutput.Stretch; Component.onCompleted: {} }
-            ImageTransportSubscription { id: other; topic: "/cam"; timeout: 600 }
-            ImageItem { x: 160; width: 160; height: parent.height; source: other; fillMode: ImageItem.Stretch } }""",
+    "native": """
+        VideoOutput { id: out; anchors.fill: parent }
+        Binding { target: sub; property: "videoSink"; value: out.videoSink }""",
+    "source": """
+        VideoOutput { anchors.fill: parent; source: sub
+                      fillMode: VideoOutput.PreserveAspectCrop }""",
+    "painted": """
+        ImageItem { anchors.fill: parent; source: sub }""",
+    "both": """
+        VideoOutput { width: 160; height: parent.height; source: sub
+                      fillMode: VideoOutput.Stretch }
+        ImageTransportSubscription { id: other; topic: "/cam"; timeout: 600 }
+        ImageItem { x: 160; width: 160; height: parent.height; source: other
+                    fillMode: ImageItem.Stretch }""",
 }
+
+
+def interface(folder: Path, form: str) -> Path:
+    file = folder / "View.qml"
+    file.write_text(HEAD + FORMS[form] + "}")
+    return file
 
 
 def show(file: Path, screen: str, encodings: list[str]) -> dict[str, list]:
@@ -66,9 +68,7 @@ def show(file: Path, screen: str, encodings: list[str]) -> dict[str, list]:
 
 @pytest.mark.parametrize("form", ["native", "source", "painted"])
 def test_every_encoding_shows_the_right_colours(tmp_path: Path, screen: str, form: str) -> None:
-    file = tmp_path / "View.qml"
-    file.write_text(FORMS[form])
-    seen = show(file, screen, COLOURS + GREYS)
+    seen = show(interface(tmp_path, form), screen, COLOURS + GREYS)
     for encoding in COLOURS:
         exact = encoding in {"rgb8", "bgr8", "rgba8", "bgra8"}
         np.testing.assert_allclose(
@@ -81,9 +81,7 @@ def test_every_encoding_shows_the_right_colours(tmp_path: Path, screen: str, for
 
 
 def test_a_stream_shown_in_both_ways_at_once(tmp_path: Path, screen: str) -> None:
-    file = tmp_path / "View.qml"
-    file.write_text(FORMS["both"])
-    seen = show(file, screen, ["rgb8", "yuv422", "mono8"])
+    seen = show(interface(tmp_path, "both"), screen, ["rgb8", "yuv422", "mono8"])
     # Each half shows the whole picture: left column of each is its middle.
     for encoding in ("rgb8", "yuv422", "mono8"):
         left, right, below_left, below_right = seen[encoding]

@@ -1,7 +1,7 @@
 """Run by test_video_output.py on a virtual screen: shows pictures and prints what pixels became.
 
-Arguments: a QML file with an object called "camera", and names of encodings. Prints a JSON object per
-encoding: the colours in the middle of the picture's four quarters.
+Arguments: a QML file with an object called "camera", and names of encodings. Prints a JSON object
+per encoding: the colours in the middle of the picture's four quarters.
 """
 
 from __future__ import annotations
