@@ -156,7 +156,7 @@ class Cockpit:
                 [
                     item.property("topic"),
                     item.property("messageType"),
-                    f"{item.property('frequency'):.1f}",
+                    f"{item.property('frequency'):.1f}" if item.property("frequency") else "",
                     "never" if age < 0 else f"{age * 1000:.0f} ms ago",
                 ]
             )

@@ -88,8 +88,7 @@ class Robot:
         self._ending = threading.Event()
         self._threads: list[threading.Thread] = []
         self._rejected, self._logged_at = 0, -_LOG_EVERY
-        self._pictures_skipped = 0
-        self._frame_rate, self._render_time = 0.0, 0.0
+        self._frame_period, self._render_time = 0.0, 0.0
         self._send = _publishers(node, self.options)
         self._subscriptions = [
             node.create_subscription(topic, kind, self._guarded(topic, take), qos)
@@ -232,7 +231,7 @@ class Robot:
                     telemetry.diagnostics(
                         state,
                         now,
-                        frames_per_second=self._frame_rate,
+                        frames_per_second=1 / self._frame_period if self._frame_period else 0.0,
                         render_time=self._render_time,
                         rejected=self._rejected,
                     )
@@ -255,7 +254,8 @@ class Robot:
             self._send_picture(picture, stamp)
             number += 1
             now = time.monotonic()
-            self._frame_rate += 0.1 * (1 / max(1e-6, now - since) - self._frame_rate)
+            period = now - since
+            self._frame_period += (0.1 if number > 1 else 1.0) * (period - self._frame_period)
             since = now
 
     def _send_picture(self, picture: Any, stamp: Time) -> None:

@@ -87,6 +87,8 @@ Panel {
                             text: Math.abs(parent.modelData)
                             color: "#b0e8f2fa"
                             font.pixelSize: 9
+                            // The window's native text does not turn well.
+                            renderType: Text.QtRendering
                         }
                     }
                 }
