@@ -170,5 +170,7 @@ def test_a_robot_that_dies_shows_within_a_second_and_comes_back(
         robot.close()
 
 
-def test_the_example_is_short() -> None:
-    assert len(EXAMPLE.read_text().splitlines()) <= 36
+def test_the_example_is_short_and_the_one_in_the_documentation() -> None:
+    text = EXAMPLE.read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 36
+    assert text in (EXAMPLE.parents[1] / "docs" / "qml.md").read_text(encoding="utf-8")
