@@ -189,6 +189,15 @@ def test_engines_share_a_session_and_may_go_first(running: Any, wait: Any, tmp_p
     assert running.run("return Ros2.getName()") == "ui"
 
 
+def test_engines_without_a_session_share_the_application_s(app: Any) -> None:
+    engines = [QQmlEngine(), QQmlEngine()]
+    sessions = {install(engine) for engine in engines}
+    assert sessions == {Session.default()}
+    Session.default().close()
+    assert Session.default() not in sessions
+    Session.default().close()
+
+
 def test_a_node_made_in_python_can_be_used(bench: Any, wait: Any) -> None:
     node = bench.world.connect("memory://mine", "mine")
     bench.session.adopt(node)

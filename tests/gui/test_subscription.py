@@ -258,6 +258,26 @@ class TestStale:
         root.property("sub").setProperty("timeout", 100)
         assert root.property("sub").property("timeout") == 100
 
+    def test_latched_messages_are_live_again_when_the_connection_is(
+        self, running: Any, wait: Any
+    ) -> None:
+        latched = QoS(depth=1, durability=Durability.TRANSIENT_LOCAL)
+        publisher = running.robot.create_publisher("/chat", TEXT, latched)
+        publisher.publish(data="map")
+        root = load(running, 'topic: "/chat"; qos: Ros2.QoS().transient_local()')
+        sub = root.property("sub")
+        wait(lambda: not sub.property("stale"))
+        running.session.node.set_status(ConnectionState.LOST, "gone")
+        wait(lambda: sub.property("stale"))
+        running.session.node.set_status(ConnectionState.CONNECTED)
+        wait(lambda: not sub.property("stale"))
+        publisher.close()
+        wait(lambda: sub.property("stale"))
+        running.session.node.set_status(ConnectionState.LOST, "gone")
+        running.session.node.set_status(ConnectionState.CONNECTED)
+        wait(100)
+        assert sub.property("stale")
+
     def test_default(self, running: Any) -> None:
         assert load(running).property("sub").property("timeout") == 3000
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import gc
 import logging
 import os
@@ -12,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 from rosglass.errors import QmlError, UnsupportedError
 
 if TYPE_CHECKING:
-    import argparse
     from collections.abc import Sequence
 
     from rosglass.qml.runner import Runner
@@ -59,9 +59,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def _seconds(text: str) -> float:
-    value = float(text)
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
     if not 0 <= value <= 86_400:
-        raise ValueError(text)
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds from 0 to 86400")
     return value
 
 

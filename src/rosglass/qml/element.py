@@ -175,14 +175,21 @@ class TopicElement(Element):
     def _on_connection(self) -> None:
         if self._session is not None and self._session.state != "connected":
             self._suspect = True
-            self._judge()
+        else:
+            self._trust_again()
+        self._judge()
 
     def _on_graph(self) -> None:
         before, self._publishers = self._publishers, self._count_publishers()
         if before and not self._publishers:
             # The robot is gone: what is on the screen is the past, however recent.
             self._suspect = True
-            self._judge()
+        else:
+            self._trust_again()
+        self._judge()
+
+    def _trust_again(self) -> None:
+        """Take back a suspicion that the graph has disproved."""
 
     def _on_tick(self) -> None:
         self._judge()

@@ -37,7 +37,8 @@ class QuitOnSignal:
         self._thread = threading.Thread(target=self._watch, name="signals", daemon=True)
 
     def __enter__(self) -> QuitOnSignal:
-        os.set_blocking(self._writer, False)
+        if sys.platform != "win32":
+            os.set_blocking(self._writer, False)
         self._wakeup = signal.set_wakeup_fd(self._writer, warn_on_full_buffer=False)
         for number in (signal.SIGINT, signal.SIGTERM):
             self._before[number] = signal.signal(number, lambda *_: None)

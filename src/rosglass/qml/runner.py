@@ -29,11 +29,15 @@ _WIDGET_MODULES = re.compile(r"^\s*import\s+(QtCharts|Qt\.labs\.platform)\b", re
 
 def needs_widgets(file: Path) -> bool:
     """Return whether an interface imports a module that crashes without a QApplication."""
-    return any(
-        _WIDGET_MODULES.search(path.read_text(encoding="utf-8", errors="replace"))
-        for path in {file, *file.parent.glob("*.qml")}
-        if path.is_file()
-    )
+    return any(_WIDGET_MODULES.search(_text(path)) for path in {file, *file.parent.glob("*.qml")})
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        # Qt says it better, if it is needed at all.
+        return ""
 
 
 class Runner(QtCore.QObject):

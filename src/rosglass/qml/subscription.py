@@ -400,6 +400,13 @@ class Subscription(TopicElement):
         timeout = self._get_timeout()
         return timeout > 0 and time.monotonic() - self._shown_at > timeout / 1000
 
+    def _trust_again(self) -> None:
+        # Who latched the message is there: had it changed, the new one would have come.
+        latched = self._qos.durability is Durability.TRANSIENT_LOCAL
+        connected = self._session is not None and self._session.state == "connected"
+        if latched and connected and self._get_subscribed() and self._count_publishers():
+            self._suspect = False
+
     def _stale_changed(self) -> None:
         self.staleChanged.emit()
 
