@@ -74,7 +74,8 @@ class Codec:
     def root(self) -> type[Message]:
         """The class of shells around a whole message."""
         found: type[Message] = self.made(
-            "root", lambda: shell_class(self, True, lambda shell: self._fill(shell, True))
+            "root",
+            lambda: shell_class(self, True, lambda shell, attr: self._fill(shell, True, attr)),
         )
         return found
 
@@ -82,22 +83,24 @@ class Codec:
     def shell(self) -> type[Message]:
         """The class of shells around a message inside another."""
         found: type[Message] = self.made(
-            "shell", lambda: shell_class(self, False, lambda shell: self._fill(shell, False))
+            "shell",
+            lambda: shell_class(self, False, lambda shell, attr: self._fill(shell, False, attr)),
         )
         return found
 
-    def _fill(self, shell: type[Message], root: bool) -> Callable[[Message], None]:
+    def _fill(self, shell: type[Message], root: bool, attr: str) -> Callable[[Message], Any]:
+        """Return the function that decodes a shell's level, and returns the attribute if any."""
         source = Source()
         cursor = self._start() if root else Cursor(self.wire, "o", 0, ANYWHERE)
         reader = Reader(self, source, cursor)
 
-        def failed(message: Message, error: Exception) -> None:
+        def failed(message: Message, error: Exception) -> Any:
             try:
                 buffer = message._buffer__
                 offset = self.wire.origin if root else message._offset__
             except AttributeError:
                 await_fill(message, shell)
-                return
+                return getattr(message, attr) if attr else None
             raise diagnosis.explain(self.schema, self.wire, buffer, offset, error) from None
 
         with source.block("try:"):
@@ -115,9 +118,11 @@ class Codec:
         with source.block("except Exception as error:"):
             source.line(f"return {source.bind(failed, 'failed')}(m, error)")
         source.line(f"m.__class__ = {source.bind(self.cls, 'C')}")
-        for attr, name in names:
-            source.line(f"m.{attr} = {name}")
-        filled: Callable[[Message], None] = source.compile("fill(m)", self._title("fill"))
+        for field, name in names:
+            source.line(f"m.{field} = {name}")
+        if attr:
+            source.line(f"return {dict(names)[attr]}")
+        filled: Callable[[Message], Any] = source.compile("fill(m)", self._title(f"fill {attr}"))
         return filled
 
     # -- arrays of messages ----------------------------------------------------------------------

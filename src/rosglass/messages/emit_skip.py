@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Skipper"]
 
+_NEAR = 256
+
 
 class Skipper:
     """Emits steps through a buffer called ``b``.
@@ -75,9 +77,12 @@ class Skipper:
             self.unproved = not targets
 
     def _unpack(self, targets: str, fmt: str, offset: str) -> None:
+        if offset.isdigit() and int(offset) <= _NEAR:
+            # Padding at the start of the layout is quicker than an argument.
+            fmt, offset = f"{fmt[0]}{offset}x{fmt[1:]}", ""
         function = self.source.bind(unpacker(fmt), "u")
         comma = "" if "," in targets else ","
-        at = "" if offset == "0" else f", {offset}"
+        at = f", {offset}" if offset else ""
         self.source.line(f"{targets}{comma} = {function}(b{at})")
 
     def plan_run(self) -> tuple[int, list[tuple[str, int]]]:

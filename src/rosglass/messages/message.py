@@ -8,7 +8,6 @@ costs. Nested messages of some size and arrays of messages stay shells of their 
 from __future__ import annotations
 
 import time
-from functools import lru_cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -16,7 +15,6 @@ from rosglass.errors import DecodeError, FieldPathError
 from rosglass.messages import access, text
 from rosglass.messages.runtime import hint
 from rosglass.messages.schema import Kind
-from rosglass.messages.source import Source
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -268,54 +266,53 @@ def _make_class(schema: Schema) -> type[Message]:
 
 
 def shell_class(
-    codec: Codec, root: bool, compile_fill: Callable[[type[Message]], Callable[[Any], None]]
+    codec: Codec, root: bool, compile_fill: Callable[[Any, str], Callable[[Any], Any]]
 ) -> type[Message]:
     """Return the class of a schema's shells: its plain class with every field shadowed.
 
     Args:
         codec: Whose bytes the shells hold.
         root: Whether a shell's buffer is the whole message.
-        compile_fill: Makes the function that decodes a shell of the class.
+        compile_fill: Called with the class and the name of an attribute; makes the function that
+            decodes a shell and returns that attribute (nothing for an empty name).
     """
     cls = plain_class(codec.schema)
+
+    def fill(message: Message) -> None:
+        made = compile_fill(shell, "")
+        shell._fill__ = staticmethod(made)
+        made(message)
+
     body: dict[str, Any] = {
         "__slots__": (),
         "__module__": cls.__module__,
         "_schema__": codec.schema,
+        "_root__": codec if root else None,
+        "_fill__": staticmethod(fill),
     }
-    body["_root__"] = codec if root else None
+    for member in codec.schema.members:
+        body[member.attr] = _first_access(member.attr, compile_fill)
     shell: Any = type(cls.__name__, (cls,), body)
-
-    def first(message: Message) -> None:
-        install(compile_fill(shell))
-        touch(message)
-
-    def install(fill: Callable[[Any], None]) -> None:
-        shell._fill__ = staticmethod(fill)
-        for member in codec.schema.members:
-            setattr(shell, member.attr, _field(member.attr, fill))
-
-    install(first)
     made: type[Message] = shell
     return made
 
 
-@lru_cache(maxsize=4096)
-def _accessors(attr: str) -> Any:
-    """Return a function from a shell's `fill` to the getter and setter of one attribute."""
-    source = Source()
-    with source.block("def get(m):"):
-        source.line("fill(m)")
-        source.line(f"return m.{attr}")
-    with source.block("def put(m, value):"):
-        source.line("fill(m)")
-        source.line(f"m.{attr} = value")
-    source.line("return get, put")
-    return source.compile("accessors(fill)", f"access {attr}")
+def _first_access(attr: str, compile_fill: Callable[[Any, str], Callable[[Any], Any]]) -> property:
+    """Return the property of a shell's field; the code behind it is made when it is first used."""
 
+    def get(message: Message) -> Any:
+        shell = type(message)
+        if shell._fill__ is None:  # another thread was quicker
+            return getattr(message, attr)
+        made = compile_fill(shell, attr)
+        setattr(shell, attr, property(made, put))
+        return made(message)
 
-def _field(attr: str, fill: Callable[[Any], None]) -> property:
-    return property(*_accessors(attr)(fill))
+    def put(message: Message, value: Any) -> None:
+        touch(message)
+        setattr(message, attr, value)
+
+    return property(get, put)
 
 
 def await_fill(message: Message, shell: type[Message]) -> None:
