@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import threading
 import zlib
 from typing import Any
 
@@ -42,5 +43,10 @@ def summary(value: Any) -> Any:
     return value
 
 
+_lock = threading.Lock()
+
+
 def tell(**event: Any) -> None:
-    print(json.dumps(event), flush=True)
+    """Print one line; callbacks of several threads tell."""
+    with _lock:
+        print(json.dumps(event), flush=True)
