@@ -1,0 +1,415 @@
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+
+import rosglass
+from rosglass.comm import IMMEDIATE, ConnectionState, EndpointKind, NodeName
+from rosglass.interfaces import Library
+from rosglass.ros2 import Ros2Node
+
+PUBLISHER, SUBSCRIPTION = EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION
+STRING, TWIST = "std_msgs/msg/String", "geometry_msgs/msg/Twist"
+HELLO = rosglass.load(STRING).encode({"data": "hello"})
+OTHER_HASH = "RIHS01_" + "0" * 64
+
+
+def hash_of(name):
+    return rosglass.load(name).rihs01
+
+
+@pytest.mark.parametrize(
+    ("name", "namespace", "told"),
+    [("my node", "/", "node name 'my node'"), ("n", "arm", "write '/arm'"), ("", "/", "empty")],
+)
+def test_a_node_needs_valid_names(middleware, name, namespace, told):
+    with pytest.raises(rosglass.InvalidNameError, match=told):
+        Ros2Node(middleware, "fake://", name, namespace)
+
+
+def test_names_are_resolved_against_the_node(node, middleware):
+    assert node.resolve("x") == "/arm/x"
+    assert node.resolve("~/x") == "/arm/cockpit/x"
+    assert node.create_publisher("x", STRING).topic == "/arm/x"
+    assert node.create_subscription("/y", STRING).topic == "/y"
+    assert middleware.announced == [NodeName("/arm", "cockpit")]
+    with pytest.raises(rosglass.InvalidNameError, match="contains ' '"):
+        node.create_publisher("a b", STRING)
+    with pytest.raises(rosglass.InvalidNameError, match="contains ' '"):
+        node.create_subscription("a b")
+    assert middleware.writers[1:] == []
+
+
+@pytest.mark.parametrize("create", ["create_publisher", "create_subscription"])
+@pytest.mark.parametrize(
+    ("type_", "error", "told"),
+    [
+        ("nowhere_msgs/msg/Nothing", rosglass.TypeNotFoundError, "nowhere_msgs/msg/Nothing"),
+        ("std_srvs/srv/Trigger", rosglass.TypeNotFoundError, "is not a message type"),
+        (7, rosglass.TypeNotFoundError, "7 is not a message type"),
+        (rosglass.load(STRING, ros=1), rosglass.UnsupportedError, "is ROS 1's definition"),
+    ],
+    ids=["unknown", "service", "number", "ROS 1"],
+)
+def test_types_that_cannot_be_used_are_refused_at_creation(node, create, type_, error, told):
+    with pytest.raises(error, match=told):
+        getattr(node, create)("/t", type_)
+
+
+@pytest.mark.parametrize("create", ["create_publisher", "create_subscription"])
+def test_a_bad_depth_is_refused(node, create):
+    with pytest.raises(rosglass.UnsupportedError, match="depth"):
+        getattr(node, create)("/t", STRING, qos=0)
+
+
+# -- publishing ----------------------------------------------------------------------------------
+
+
+def test_publishing_a_message_a_dict_or_fields(node, middleware):
+    publisher = node.create_publisher("/t", STRING)
+    publisher.publish({"data": "hello"})
+    publisher.publish(data="hello")
+    publisher.publish(rosglass.load(STRING).create(data="hello"))
+    publisher.publish_serialized(HELLO)
+    publisher.publish_serialized(memoryview(bytearray(HELLO)))
+    assert middleware.writers[0].written == [HELLO] * 5
+    assert middleware.writers[0].what[:3] == ("/t", STRING, hash_of(STRING))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fields", "told"),
+    [
+        (({"data": 7},), {}, "data: expected"),
+        (({"text": "x"},), {}, "text"),
+        (({"data": "x"},), {"data": "y"}, "either a message or keyword fields"),
+        (("hello",), {}, "expected"),
+    ],
+)
+def test_values_that_do_not_fit_are_refused_and_not_sent(node, middleware, arguments, fields, told):
+    publisher = node.create_publisher("/t", STRING)
+    with pytest.raises(rosglass.ConversionError, match=told):
+        publisher.publish(*arguments, **fields)
+    assert middleware.writers[0].written == []
+
+
+@pytest.mark.parametrize("data", [b"", b"abc", b"\x01\x00\x00\x00x", "text", None])
+def test_bytes_without_an_encapsulation_header_are_not_sent(node, middleware, data):
+    publisher = node.create_publisher("/t", STRING)
+    with pytest.raises(rosglass.ConversionError, match=STRING):
+        publisher.publish_serialized(data)
+    assert middleware.writers[0].written == []
+
+
+def test_counting_matching_subscriptions(node, middleware, eventually, caplog):
+    publisher = node.create_publisher("/t", STRING)
+    assert publisher.subscription_count() == 0
+    key = middleware.appear(SUBSCRIPTION, "/t", STRING, hash_of(STRING))
+    middleware.appear(SUBSCRIPTION, "/t", STRING, "", node="humble")
+    middleware.appear(SUBSCRIPTION, "/t", STRING, OTHER_HASH, node="other")
+    middleware.appear(SUBSCRIPTION, "/t", TWIST, hash_of(TWIST), node="wrong")
+    assert publisher.subscription_count() == 2
+    matched = eventually(lambda: len(w := middleware.writers[0].matched) == 2 and w)
+    assert {endpoint.node.name for endpoint in matched} == {"robot", "humble"}
+    assert "/other has another definition" in caplog.text
+    assert OTHER_HASH in caplog.text
+    middleware.graph.remove(key)
+    assert publisher.subscription_count() == 1
+
+
+def test_where_profiles_must_match_they_do(node, middleware):
+    middleware.matches_qos = True
+    best_effort = rosglass.QoS.sensor_data()
+    publisher = node.create_publisher("/t", STRING, best_effort)
+    middleware.appear(SUBSCRIPTION, "/t", STRING, hash_of(STRING))
+    assert publisher.subscription_count() == 0
+    middleware.appear(SUBSCRIPTION, "/t", STRING, hash_of(STRING), best_effort, "second")
+    assert publisher.subscription_count() == 1
+
+
+# -- receiving -----------------------------------------------------------------------------------
+
+
+def test_callbacks_get_messages_on_the_dispatcher(node, middleware, eventually):
+    seen = []
+    node.create_subscription(
+        "/t", STRING, lambda m: seen.append((m.data, threading.current_thread().name))
+    )
+    middleware.readers[0].receive(HELLO)
+    eventually(lambda: seen)
+    assert seen == [("hello", "cockpit callbacks")]
+
+
+def test_samples_say_where_they_come_from(node, middleware):
+    subscription = node.create_subscription("/t", STRING)
+    middleware.readers[0].receive(HELLO)
+    sample = subscription.wait(1)
+    assert (sample.data, sample.wire, sample.type.name) == (HELLO, "cdr", STRING)
+    assert (sample.publisher, sample.sequence) == (b"g" * 16, 1)
+    assert abs((sample.received - sample.sent).seconds) < 1
+
+
+def test_repeated_samples_are_delivered_once(node, middleware):
+    subscription = node.create_subscription("/t", STRING)
+    for _ in range(2):
+        middleware.readers[0].on_sample(HELLO, 10, 5, b"g" * 16, 1, "")
+    assert subscription.statistics().received == 1
+
+
+def test_the_type_is_taken_from_the_publisher(node, middleware, eventually):
+    seen = []
+    subscription = node.create_subscription("/t", callback=seen.append)
+    assert subscription.type is None
+    assert middleware.readers == []
+    assert subscription.problem == ""
+    middleware.appear(PUBLISHER, "/t", STRING, hash_of(STRING))
+    reader = eventually(lambda: middleware.readers)[0]
+    assert subscription.type.name == STRING
+    assert (reader.topic, reader.type_name, reader.type_hash) == ("/t", STRING, hash_of(STRING))
+    reader.receive(HELLO)
+    eventually(lambda: seen)
+    assert seen[0].data == "hello"
+
+
+def test_a_publisher_that_is_there_before_the_subscription(node, middleware, eventually):
+    middleware.appear(PUBLISHER, "/t", STRING)
+    subscription = node.create_subscription("/t")
+    eventually(lambda: subscription.type)
+
+
+def test_several_types_need_a_choice(node, middleware, eventually):
+    middleware.appear(PUBLISHER, "/t", STRING, node="a")
+    key = middleware.appear(PUBLISHER, "/t", TWIST, node="b")
+    subscription = node.create_subscription("/t")
+    told = eventually(lambda: subscription.problem)
+    assert f"{TWIST} by /b, {STRING} by /a" in told
+    assert "create_subscription('/t', 'geometry_msgs/msg/Twist')" in told
+    assert middleware.readers == []
+    middleware.graph.remove(key)
+    eventually(lambda: subscription.type)
+    assert subscription.type.name == STRING
+    eventually(lambda: subscription.problem == "")
+
+
+def test_the_type_follows_a_robot_that_comes_back_with_another_one(node, middleware, eventually):
+    key = middleware.appear(PUBLISHER, "/t", STRING)
+    subscription = node.create_subscription("/t")
+    eventually(lambda: subscription.type)
+    middleware.graph.remove(key)
+    middleware.appear(PUBLISHER, "/t", TWIST)
+    eventually(lambda: subscription.type.name == TWIST)
+    first, second = eventually(lambda: len(r := middleware.readers) == 2 and r)
+    eventually(lambda: first.closed)
+    assert not second.closed
+
+
+def test_a_given_type_stays_and_others_are_named(node, middleware, eventually):
+    subscription = node.create_subscription("/t", STRING)
+    middleware.appear(PUBLISHER, "/t", TWIST)
+    told = eventually(lambda: subscription.problem)
+    assert told == f"/robot publishes {TWIST} here, not {STRING}"
+    assert subscription.type.name == STRING
+
+
+def test_an_unknown_definition_is_a_problem_until_it_is_added(middleware, eventually, tmp_path):
+    library = Library()
+    node = Ros2Node(middleware, "fake://", "cockpit", library=library)
+    middleware.appear(PUBLISHER, "/t", "secret_msgs/msg/Thing")
+    subscription = node.create_subscription("/t")
+    told = eventually(lambda: subscription.problem)
+    assert "/robot publishes secret_msgs/msg/Thing, which cannot be decoded" in told
+    assert "tried again" in told
+    library.add_text("secret_msgs/msg/Thing", "int32 number\n")
+    eventually(lambda: subscription.type)
+    eventually(lambda: subscription.problem == "")
+    node.close()
+
+
+def test_another_definition_is_refused_with_both_hashes(node, middleware, eventually):
+    fixed = node.create_subscription("/t", rosglass.load(STRING))
+    middleware.appear(PUBLISHER, "/t", STRING, OTHER_HASH)
+    told = eventually(lambda: fixed.problem)
+    assert OTHER_HASH in told
+    assert hash_of(STRING) in told
+    middleware.readers[0].receive(HELLO, OTHER_HASH)
+    assert fixed.take() is None
+    middleware.readers[0].receive(HELLO, "")
+    assert fixed.take() is not None, "a robot without hashes is believed"
+
+
+def test_another_definition_is_refused_also_when_nobody_announced_it(node, middleware, eventually):
+    subscription = node.create_subscription("/t", STRING)
+    middleware.readers[0].receive(HELLO, OTHER_HASH)
+    told = eventually(lambda: subscription.problem)
+    assert OTHER_HASH in told
+    assert subscription.take() is None
+
+
+@pytest.mark.parametrize("given", [None, "pkg/msg/T"])
+def test_the_robots_version_of_a_type_is_taken_if_it_is_known(middleware, eventually, given):
+    library = Library()
+    library.add_text("pkg/msg/T", "int32 new\n")
+    ours = rosglass.load("pkg/msg/T", library=library)
+    other = Library()
+    other.add_text("pkg/msg/T", "int32 old\n")
+    robots = rosglass.load("pkg/msg/T", library=other)
+    real_definition = library.definition
+
+    def definition(name, ros=2, *, hash=""):
+        wanted = other if hash == robots.rihs01 else library
+        return other.definition(name, ros) if wanted is other else real_definition(name, ros)
+
+    library.definition = definition
+    node = Ros2Node(middleware, "fake://", "cockpit", library=library)
+    subscription = node.create_subscription("/t", given)
+    if given:
+        assert subscription.type == ours
+    middleware.appear(PUBLISHER, "/t", "pkg/msg/T", robots.rihs01)
+    eventually(lambda: subscription.type and subscription.type.fields[0].name == "old")
+    eventually(lambda: subscription.problem == "")
+    middleware.readers[-1].receive(robots.encode({"old": 5}), robots.rihs01)
+    assert subscription.wait(1).message().old == 5
+    node.close()
+
+
+def test_profiles_that_do_not_match_are_a_problem(node, middleware, eventually):
+    subscription = node.create_subscription("/t", STRING, qos=rosglass.QoS.latched())
+    middleware.appear(PUBLISHER, "/t", STRING, hash_of(STRING))
+    told = eventually(lambda: subscription.problem)
+    assert "durability: transient local requested, volatile offered" in told
+    assert "received without that guarantee" in told
+
+
+def test_profiles_that_do_not_match_keep_samples_away_where_they_must_match(
+    node, middleware, eventually
+):
+    middleware.matches_qos = True
+    subscription = node.create_subscription("/t", STRING)
+    middleware.appear(PUBLISHER, "/t", STRING, "", rosglass.QoS.sensor_data())
+    assert "nothing is received from it" in eventually(lambda: subscription.problem)
+
+
+# -- graph and status ----------------------------------------------------------------------------
+
+
+def test_the_graph(node, middleware):
+    middleware.appear(PUBLISHER, "/t", STRING)
+    middleware.appear(SUBSCRIPTION, "/arm/x", TWIST)
+    assert node.nodes() == [NodeName("/", "robot"), NodeName("/arm", "cockpit")]
+    assert node.topics() == {"/arm/x": [TWIST], "/t": [STRING]}
+    assert node.publishers("/t")[0].type == STRING
+    assert node.subscriptions("x")[0].node.full == "/robot"
+    assert node.publishers("x") == []
+
+
+def test_graph_changes_are_told_and_merged(node, middleware, eventually):
+    go_on, started = threading.Event(), threading.Event()
+    calls = []
+    middleware.appear(PUBLISHER, "/first", STRING)
+    eventually(lambda: node._graph_moved is False)
+    handle = node.on_graph_change(lambda: (calls.append(1), started.set(), go_on.wait(5)))
+    middleware.appear(PUBLISHER, "/t", STRING)
+    assert started.wait(5)
+    for number in range(50):
+        middleware.appear(PUBLISHER, f"/t{number}", STRING)
+        time.sleep(0.001)
+    go_on.set()
+    eventually(lambda: len(calls) >= 2)
+    time.sleep(0.05)
+    assert len(calls) <= 3
+    handle.close()
+    count = len(calls)
+    middleware.appear(PUBLISHER, "/more", STRING)
+    time.sleep(0.05)
+    assert len(calls) == count
+
+
+def test_status_changes_are_told_in_order_and_once(node, middleware, eventually):
+    seen = []
+    node.on_status_change(seen.append)
+    assert node.status().state is ConnectionState.CONNECTING
+    for state in (ConnectionState.CONNECTED, ConnectionState.LOST, ConnectionState.CONNECTED):
+        middleware.become(state, state.value)
+        middleware.changed()
+        eventually(lambda s=state: seen and seen[-1].state is s)
+    assert [s.detail for s in seen] == ["connected", "lost", "connected"]
+
+
+def test_a_lost_connection_is_logged(node, middleware, eventually, caplog):
+    middleware.become(ConnectionState.LOST, "connection to x lost, trying again every second")
+    eventually(lambda: "connection to x lost" in caplog.text)
+
+
+def test_now_is_the_systems_time(node):
+    assert abs(node.now().nanoseconds - time.time_ns()) < 1_000_000_000
+
+
+# -- the end -------------------------------------------------------------------------------------
+
+
+def test_closing_ends_everything(middleware):
+    before = threading.active_count()
+    node = Ros2Node(middleware, "fake://", "cockpit")
+    states = []
+    node.on_status_change(states.append, IMMEDIATE)
+    publisher = node.create_publisher("/t", STRING)
+    subscription = node.create_subscription("/t", STRING, id)
+    node.close()
+    node.close()
+    assert middleware.closed == 1
+    assert threading.active_count() == before
+    assert subscription.closed
+    assert middleware.readers[0].closed
+    assert middleware.writers[0].closed
+    assert [s.state for s in states] == [ConnectionState.CLOSED]
+    assert node.nodes() == []
+    assert publisher.subscription_count() == 0
+    publisher.close()
+    subscription.close()
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        lambda node, _: node.create_publisher("/t", STRING),
+        lambda node, _: node.create_subscription("/t"),
+        lambda node, _: node.on_graph_change(lambda: None),
+        lambda node, _: node.on_status_change(lambda _: None),
+        lambda _, publisher: publisher.publish(data="x"),
+        lambda _, publisher: publisher.publish_serialized(HELLO),
+    ],
+)
+def test_after_closing_everything_says_so(middleware, use):
+    node = Ros2Node(middleware, "fake://", "cockpit")
+    publisher = node.create_publisher("/t", STRING)
+    node.close()
+    with pytest.raises(rosglass.NodeClosedError, match="closed"):
+        use(node, publisher)
+
+
+def test_a_callback_may_close_the_node(middleware, eventually):
+    node = Ros2Node(middleware, "fake://", "cockpit")
+    node.create_subscription("/t", STRING, lambda _: node.close())
+    middleware.readers[0].receive(HELLO)
+    eventually(lambda: middleware.closed)
+
+
+def test_closing_one_subscription_leaves_the_others(node, middleware):
+    one, two = (node.create_subscription("/t", STRING) for _ in range(2))
+    one.close()
+    assert middleware.readers[0].closed
+    assert not middleware.readers[1].closed
+    middleware.readers[1].receive(HELLO)
+    assert two.wait(1) is not None
+
+
+def test_a_middleware_that_cannot_start_leaves_no_thread(middleware):
+    def refuse(graph, changed):
+        raise rosglass.ConnectionLostError("no network")
+
+    middleware.open = refuse
+    before = threading.active_count()
+    with pytest.raises(rosglass.ConnectionLostError):
+        Ros2Node(middleware, "fake://", "cockpit")
+    assert threading.active_count() == before
