@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import logging
-import platform
 import re
 from typing import TYPE_CHECKING, Any
 
@@ -126,7 +125,13 @@ class Ros2(QtCore.QObject):
     url = Property(str, lambda self: self._session.url, _set_url, notify=urlChanged)
     connectionState = Property(str, lambda self: self._session.state, notify=connectionChanged)
     connectionDetail = Property(str, lambda self: self._session.detail, notify=connectionChanged)
-    hostname = Property(str, lambda _: platform.node(), constant=True)
+
+    def _get_hostname(self) -> str:
+        import platform  # noqa: PLC0415 - few interfaces ask
+
+        return platform.node()
+
+    hostname = Property(str, _get_hostname, constant=True)
 
     # Profiles.
 

@@ -8,7 +8,7 @@ from collections import deque
 from typing import TYPE_CHECKING
 
 from rosglass.comm.node import Executor
-from rosglass.qt import QtCore, Signal
+from rosglass.qt import QtCore
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -19,9 +19,27 @@ _log = logging.getLogger("rosglass.qml")
 
 
 class _Waker(QtCore.QObject):
-    """Lives on the GUI thread; the queued signal carries wake-ups there."""
+    """Lives on the GUI thread, which its events wake.
 
-    wake = Signal()
+    A queued signal would do the same, but naming the kind of connection makes PySide load every
+    enumeration of Qt, which takes longer than anything else here.
+    """
+
+    def __init__(self, job: Callable[[], None]) -> None:
+        super().__init__()
+        self._job = job
+        self._kind = QtCore.QEvent.Type.User
+
+    def wake(self) -> None:
+        """Run the job soon; from any thread."""
+        QtCore.QCoreApplication.postEvent(self, QtCore.QEvent(self._kind))
+
+    def event(self, event: QtCore.QEvent) -> bool:
+        """Run the job; Qt calls this on the GUI thread."""
+        if event.type() == self._kind:
+            self._job()
+            return True
+        return super().event(event)
 
 
 class GuiExecutor(Executor):
@@ -34,8 +52,7 @@ class GuiExecutor(Executor):
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._jobs: deque[Callable[[], None]] = deque()
-        self._waker = _Waker()
-        self._waker.wake.connect(self._run, QtCore.Qt.ConnectionType.QueuedConnection)
+        self._waker = _Waker(self._run)
         self._closed = False
 
     def post(self, job: Callable[[], None]) -> None:
@@ -46,7 +63,7 @@ class GuiExecutor(Executor):
             self._jobs.append(job)
             first = len(self._jobs) == 1
         if first:
-            self._waker.wake.emit()
+            self._waker.wake()
 
     def close(self) -> None:
         """Forget the waiting jobs and take no more; safe to call twice."""

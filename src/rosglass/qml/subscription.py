@@ -107,7 +107,6 @@ class Subscription(TopicElement):
         self._have: tuple[Node, str, str, QoS] | None = None
         self._timer = QtCore.QTimer(self)
         self._timer.setSingleShot(True)
-        self._timer.setTimerType(QtCore.Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._deliver_waiting)
         self._retry = QtCore.QTimer(self)
         self._retry.setSingleShot(True)
