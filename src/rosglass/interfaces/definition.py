@@ -49,7 +49,8 @@ class FieldType:
             name of a message type.
         array: Whether and how the field repeats.
         size: Element count of a fixed array, maximum of a bounded sequence, otherwise None.
-        string_bound: Maximum length of a bounded string in characters, otherwise None.
+        string_bound: Maximum length of a bounded string, in UTF-8 bytes (wstring: UTF-16 units),
+            otherwise None.
     """
 
     name: str
