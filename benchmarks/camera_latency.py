@@ -238,9 +238,7 @@ def main() -> int:
     args = parser.parse_args()
     processors = os.cpu_count()
     model = re.search(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text())
-    print(
-        f"{WIDTH}x{HEIGHT} at 30 Hz, {args.transport}; Xvfb, software OpenGL, {processors} cores"
-    )
+    print(f"{WIDTH}x{HEIGHT} at 30 Hz, {args.transport}; Xvfb, software OpenGL, {processors} cores")
     print(model[1] if model else "", f"load {os.getloadavg()[0]:.1f} before the start")
     heading = "median     p90   worst  per s  missing     CPU     MiB   poll"
     print(f"\n{'stamp -> pixel (ms)':28}  {heading}")
