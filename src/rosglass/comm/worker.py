@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 __all__ = ["Worker"]
 
 _log = logging.getLogger("rosglass.comm")
+#: Seconds that closing waits for a run in progress.
+_PATIENCE = 2.0
 
 
 class Worker:
@@ -35,11 +37,18 @@ class Worker:
         self._wanted.set()
 
     def close(self) -> None:
-        """End the thread after the run in progress and wait for it; safe to call twice."""
+        """End the thread after the run in progress and wait for it; safe to call twice.
+
+        A run that takes longer than 2 s more is left to its daemon thread, with a warning: closing
+        must not hang a program.
+        """
         self._closed = True
         self._wanted.set()
-        if self._thread is not threading.current_thread():
-            self._thread.join()
+        if self._thread is threading.current_thread():
+            return
+        self._thread.join(_PATIENCE)
+        if self._thread.is_alive():
+            _log.warning("%s still runs %.0f s after closing", self._thread.name, _PATIENCE)
 
     def _work(self) -> None:
         while True:

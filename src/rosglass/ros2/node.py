@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import logging
 import threading
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rosglass.comm import (
@@ -275,18 +276,25 @@ class Ros2Node(Node):
             return
         with self._lock:
             readings, publishers = list(self._readings.values()), list(self._publishers)
-        for reading in readings:
-            topic = reading.subscription.topic
-            try:
-                reading.update(self._graph.endpoints(EndpointKind.PUBLISHER, topic), retry=idle)
-            except NodeClosedError:
-                return
-            except Error as error:
-                reading.subscription.set_problem(str(error))
+        # Another thread may close the node, or one of these, meanwhile.
+        with suppress(NodeClosedError):
+            for reading in readings:
+                self._update(reading, idle)
+            if moved:
+                for publisher in publishers:
+                    publisher.follow()
         if moved:
-            for publisher in publishers:
-                publisher.follow()
             self._graph_listeners.notify(None)
+
+    def _update(self, reading: Reading, idle: bool) -> None:
+        subscription = reading.subscription
+        found = self._graph.endpoints(EndpointKind.PUBLISHER, subscription.topic)
+        try:
+            reading.update(found, retry=idle)
+        except NodeClosedError:
+            raise
+        except Error as error:
+            subscription.set_problem(str(error))
 
     def _tell_status(self) -> None:
         status = self._middleware.status()

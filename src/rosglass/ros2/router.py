@@ -38,6 +38,7 @@ class Router:
     Attributes:
         listen: Where it listens, with the real port.
         url: URL to pass to :func:`rosglass.connect`.
+        is_local: Whether only programs on this machine can reach it.
 
     Raises:
         ConversionError: `listen` is not an address.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import logging
 import threading
 from dataclasses import replace
@@ -56,7 +57,7 @@ class ZenohMiddleware(Middleware):
         self._options = options
         self._config, self._address = session_config(options)
         self._session: zenoh.Session | None = None
-        self._id = str(self._config.get_json("id")).strip('"')
+        self._id = json.loads(self._config.get_json("id"))
         self._numbers = itertools.count(1)
         self._lock = threading.Lock()
         self._declared: dict[int, Declaration] = {}
@@ -71,7 +72,11 @@ class ZenohMiddleware(Middleware):
     def open(self, graph: Graph, changed: Callable[[], None]) -> None:
         """Open the session; a peer's opens at once, a client's when its router answers."""
         self._graph, self._changed = graph, changed
-        self._open()
+        if json.loads(self._config.get_json("mode")) == "client":
+            self._refused = True  # it would wait for the router: poll() does
+            changed()
+        else:
+            self._open()
 
     def status(self) -> Status:
         """Return whether a router or at least a peer is linked."""

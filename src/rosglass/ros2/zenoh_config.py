@@ -21,6 +21,9 @@ __all__ = ["close_session", "router_config", "session_config"]
 
 #: Pause between two attempts to connect, in milliseconds: first, and at most.
 _RETRY = {"period_init_ms": 250, "period_max_ms": 1000, "period_increase_factor": 2}
+#: Longest time for opening a link, in milliseconds: closing a session waits for an attempt under
+#: way, and three round trips over a satellite have to fit.
+_OPEN_TIMEOUT_MS = 3000
 #: Of two peers only one opens the link, so that their attempts do not cross (rmw_zenoh's choice).
 _STRATEGY = {"peer": {"to_router": "always", "to_peer": "greater-zid"}}
 
@@ -49,6 +52,9 @@ def session_config(options: ZenohOptions) -> tuple[zenoh.Config, str]:
         settings["scouting/gossip/enabled"] = True
         settings["scouting/gossip/autoconnect_strategy"] = _STRATEGY
         settings["connect/retry"] = _RETRY
+        settings["transport/unicast/open_timeout"] = _OPEN_TIMEOUT_MS
+        if settings["mode"] == "client":
+            settings["connect/timeout_ms"] = _OPEN_TIMEOUT_MS
         settings["transport/shared_memory/enabled"] = bool(options.shared_memory)
         host = options.host or "127.0.0.1"
     else:

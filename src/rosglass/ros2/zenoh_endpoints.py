@@ -8,7 +8,7 @@ import threading
 import time
 from abc import abstractmethod
 from collections import deque
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, Protocol
 
 import zenoh
@@ -20,7 +20,7 @@ from rosglass.ros2.middleware import OnSample, Writer
 from rosglass.ros2.zenoh_keys import HUMBLE_HASH, NO_ATTACHMENT, Attachment, gid_of, topic_key
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from rosglass.comm import EndpointInfo, QoS, Status
     from rosglass.ros2.zenoh_options import ZenohOptions
@@ -61,9 +61,10 @@ class Declaration(Handle):
                 return
             self._attached = True
         # Declaring may call back at once, into code that closes this very declaration.
-        handles = self.declare(session)
-        # The token comes last and goes first: who sees it can count on the rest.
-        self._keep([session.liveliness().declare_token(self.token), *handles])
+        with self._errors():
+            handles = self.declare(session)
+            # The token comes last and goes first: who sees it can count on the rest.
+            self._keep([session.liveliness().declare_token(self.token), *handles])
 
     @abstractmethod
     def declare(self, session: zenoh.Session) -> list[Any]:
@@ -77,6 +78,16 @@ class Declaration(Handle):
             self._closed = True
         self._owner.forget(self)
         self._release()
+
+    @contextmanager
+    def _errors(self) -> Iterator[None]:
+        """Turn Zenoh's errors into ours."""
+        try:
+            yield
+        except zenoh.ZError as error:
+            if self._closed or self._owner.status().state is ConnectionState.CLOSED:
+                raise NodeClosedError("the node is closed; connect again") from error
+            raise ConnectionLostError(f"Zenoh refused {self.token}: {error}") from error
 
     def _keep(self, handles: list[Any]) -> None:
         with self._lock:
@@ -188,12 +199,9 @@ class ZenohWriter(Declaration, Writer):
         note = Attachment(next(self._numbers), time.time_ns(), self._gid).encode()
         self._history.append((data, note))
         try:
-            for publisher in self._publishers:
-                publisher.put(data, attachment=note)
-        except zenoh.ZError as error:
-            if self._closed or self._owner.status().state is ConnectionState.CLOSED:
-                raise NodeClosedError(f"the publisher of {self._topic} is closed") from error
-            raise ConnectionLostError(f"cannot publish on {self._topic}: {error}") from error
+            with self._errors():
+                for publisher in self._publishers:
+                    publisher.put(data, attachment=note)
         finally:
             with self._lock:
                 self._writing.remove(thread)
@@ -214,7 +222,8 @@ class ZenohWriter(Declaration, Writer):
             self._hashes |= new
             session = None if self._closed else self._session
         if new and session is not None:
-            self._keep(self._declare_publishers(session, new))
+            with self._errors():
+                self._keep(self._declare_publishers(session, new))
 
     def _release(self) -> None:
         # Zenoh refuses to undeclare what is in use; a write ends soon, or does this when it ends.

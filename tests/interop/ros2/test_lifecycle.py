@@ -110,6 +110,26 @@ def test_nobody_listens_then_somebody_does(mode, start_router, connect, wait_for
 
 
 @pytest.mark.parametrize("mode", ["peer", "client"])
+def test_a_program_that_answers_nothing_blocks_nobody(mode, free_port):
+    with socket.create_server(("127.0.0.1", free_port)):
+        before = time.monotonic()
+        node = rosglass.connect(f"zenoh://127.0.0.1:{free_port}?mode={mode}", "patient")
+        node.create_publisher("/count", TWIST, rosglass.QoS.latched()).publish()
+        node.create_subscription("/count", TWIST)
+        assert time.monotonic() - before < 0.5
+        time.sleep(0.3)
+        assert node.status().state is CONNECTING
+        ticks = []
+        ticking = threading.Timer(0.2, lambda: ticks.append(time.monotonic()))
+        ticking.start()
+        before = time.monotonic()
+        node.close()
+        assert time.monotonic() - before < 4
+        ticking.join()
+        assert ticks[0] - before < 1, "other threads go on while a session closes"
+
+
+@pytest.mark.parametrize("mode", ["peer", "client"])
 def test_a_router_that_dies_and_returns(mode, start_router, connect, wait_for, count):
     router = start_router()
     talker = connect("talker", f"?mode={mode}", url=start_router.url)

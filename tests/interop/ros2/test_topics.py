@@ -153,3 +153,75 @@ def test_our_last_latched_message_reaches_a_late_peer(
         process.end()
         attempts -= 1
     assert received == peer_values.VALUES[name]
+
+
+def test_pictures_through_shared_memory(router, start_peer, connect, peer_values):
+    name = "sensor_msgs/msg/Image"
+    process = start_peer("rosglass", router, publish={"/shm": name}, domain=3, options="&shm=true")
+    node = connect("receiver", "?domain=3&shm=true")
+    sample = node.create_subscription("/shm").wait(10)
+    received = peer_values.summary(sample.message().to_dict())
+    assert received == peer_values.summary(peer_values.VALUES[name])
+    process.end()
+
+
+def test_humbles_spelling_between_our_own_nodes(connect, wait_for):
+    name = "std_msgs/msg/String"
+    old = connect("old", "?domain=4&distro=humble")
+    new = connect("new", "?domain=4")
+    from_old = new.create_subscription("/from_old", name)
+    from_new = old.create_subscription("/from_new")
+    one, two = old.create_publisher("/from_old", name), new.create_publisher("/from_new", name)
+    wait_for(lambda: one.subscription_count() and two.subscription_count())
+    (endpoint,) = wait_for(lambda: new.publishers("/from_old"))
+    assert endpoint.type_hash == ""
+    one.publish(data="old")
+    two.publish(data="new")
+    assert from_old.wait(5).message().data == "old"
+    assert from_new.wait(5).message().data == "new"
+
+
+def test_serving_two_spellings_sends_nothing_twice(connect, wait_for):
+    name = "std_msgs/msg/String"
+    talker = connect("talker", "?domain=5")
+    humble = connect("humble", "?domain=5&distro=humble")
+    listener = connect("listener", "?domain=5")
+    plain, latched = rosglass.QoS(100), rosglass.QoS.latched(100)
+    publishers = [
+        talker.create_publisher(f"/t{i}", name, q) for i, q in enumerate((plain, latched))
+    ]
+    publishers[1].publish(data="before")
+    subscriptions = [
+        node.create_subscription(publisher.topic, name, qos=publisher.qos)
+        for node in (humble, listener)
+        for publisher in publishers
+    ]
+    wait_for(lambda: all(p.subscription_count() == 2 for p in publishers))
+    texts = [str(number) for number in range(20)]
+    for text in texts:
+        for publisher in publishers:
+            publisher.publish(data=text)
+    for subscription in subscriptions:
+        expected = texts if subscription.qos is plain else ["before", *texts]
+        received = [subscription.wait(5).message().data for _ in expected]
+        assert received == expected
+        assert subscription.wait(0.1) is None
+
+
+def test_a_session_configuration_as_rmw_zenoh_has_it(router, monkeypatch, tmp_path, wait_for):
+    address = router.listen
+    file = tmp_path / "session.json5"
+    file.write_text(f"""{{
+        mode: "peer",
+        connect: {{ endpoints: ["{address}"] }},
+        listen: {{ endpoints: ["tcp/127.0.0.1:0"] }},
+        scouting: {{ multicast: {{ enabled: false }} }},
+    }}""")
+    monkeypatch.setenv("ZENOH_SESSION_CONFIG_URI", str(file))
+    monkeypatch.setenv("ROS_DOMAIN_ID", "6")
+    monkeypatch.delenv("ROSGLASS_URL", raising=False)
+    monkeypatch.delenv("RMW_IMPLEMENTATION", raising=False)
+    with rosglass.connect(name="configured") as node, rosglass.connect(name="other") as other:
+        wait_for(lambda: node.status().detail == f"router at {address}")
+        wait_for(lambda: NodeName("/", "configured") in other.nodes())
+        assert node.url == "zenoh://"

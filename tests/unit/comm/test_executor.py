@@ -132,3 +132,14 @@ def test_a_worker_survives_an_error_in_its_job(caplog):
     assert twice.wait(5)
     worker.close()
     assert "of the job" in caplog.text
+
+
+def test_a_worker_that_hangs_does_not_hang_closing(monkeypatch, caplog):
+    monkeypatch.setattr("rosglass.comm.worker._PATIENCE", 0.05)
+    started, go_on = threading.Event(), threading.Event()
+    worker = Worker("test worker", lambda _: (started.set(), go_on.wait(5)), pause=10)
+    worker.wake()
+    assert started.wait(5)
+    worker.close()
+    assert "test worker still runs" in caplog.text
+    go_on.set()

@@ -10,10 +10,12 @@ from summary import VALUES, summary, tell
 
 import rosglass
 
-# The plan: "port", "domain", "publish" and "subscribe" (type by topic), "latched", "quiet" (topics
-# not to report), "depth" of queues, "period" in seconds, "count" of messages to publish.
+# The plan: "port", "domain", further "options" of the URL, "publish" and "subscribe" (type by
+# topic), "latched", "quiet" (topics not to report), "depth" of queues, "period" in seconds,
+# "count" of messages to publish.
 plan = json.loads(sys.argv[1])
-node = rosglass.connect(f"zenoh://127.0.0.1:{plan['port']}?domain={plan['domain']}", "peer", "/own")
+url = f"zenoh://127.0.0.1:{plan['port']}?domain={plan['domain']}{plan.get('options', '')}"
+node = rosglass.connect(url, "peer", "/own")
 qos = rosglass.QoS.latched() if plan.get("latched") else rosglass.QoS(plan.get("depth", 10))
 
 

@@ -1,0 +1,105 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+
+import rosglass
+from rosglass.ros2.zenoh_config import router_config, session_config
+from rosglass.ros2.zenoh_options import ZenohOptions
+
+RMW_FILE = """
+// As rmw_zenoh ships it: JSON5 with comments, settings for each mode.
+{
+  mode: "client",
+  connect: { endpoints: { router: [], peer: ["tcp/localhost:7447"], client: ["tcp/far:7447"] } },
+  scouting: { multicast: { enabled: true } },
+  transport: { shared_memory: { enabled: true } },
+}
+"""
+
+
+def setting(config, key):
+    return json.loads(config.get_json(key))
+
+
+@pytest.fixture
+def rmw_file(tmp_path):
+    file = tmp_path / "session.json5"
+    file.write_text(RMW_FILE)
+    return str(file)
+
+
+def test_a_session_is_shy_by_default():
+    config, address = session_config(ZenohOptions("robot", 8000))
+    assert address == "tcp/robot:8000"
+    assert setting(config, "mode") == "peer"
+    assert setting(config, "connect/endpoints") == ["tcp/robot:8000"]
+    assert setting(config, "listen/endpoints") == ["tcp/127.0.0.1:0"]
+    assert setting(config, "scouting/multicast/enabled") is False
+    assert setting(config, "scouting/gossip/enabled") is True
+    assert setting(config, "transport/shared_memory/enabled") is False
+
+
+def test_without_a_host_it_is_this_machine():
+    assert session_config(ZenohOptions())[1] == "tcp/127.0.0.1:7447"
+
+
+def test_clients_do_not_listen():
+    config, _ = session_config(ZenohOptions(mode="client"))
+    assert setting(config, "mode") == "client"
+    assert setting(config, "listen/endpoints") == []
+
+
+def test_shared_memory_on_request():
+    config, _ = session_config(ZenohOptions(shared_memory=True))
+    assert setting(config, "transport/shared_memory/enabled") is True
+
+
+def test_every_session_has_an_id_of_its_own_without_leading_zeros():
+    ids = {setting(session_config(ZenohOptions())[0], "id") for _ in range(50)}
+    assert len(ids) == 50
+    assert all(len(i) == 32 and i[0] != "0" for i in ids)
+
+
+def test_a_configuration_file_decides_what_the_url_leaves_open(rmw_file):
+    config, address = session_config(ZenohOptions(config_file=rmw_file))
+    assert address == "tcp/far:7447"
+    assert setting(config, "mode") == "client"
+    assert setting(config, "scouting/multicast/enabled") is True
+    assert setting(config, "transport/shared_memory/enabled") is True
+    assert setting(config, "timestamping/enabled") is True, "latched publishers need it"
+
+
+def test_the_url_wins_over_the_configuration_file(rmw_file):
+    options = ZenohOptions(
+        "near", mode="peer", shared_memory=False, config_file=f"file://{rmw_file}"
+    )
+    config, address = session_config(options)
+    assert address == "tcp/near:7447"
+    assert setting(config, "mode") == "peer"
+    assert setting(config, "transport/shared_memory/enabled") is False
+
+
+def test_a_file_without_addresses_is_named_so(tmp_path):
+    file = tmp_path / "x.json5"
+    file.write_text("{mode: 'peer'}")
+    assert session_config(ZenohOptions(config_file=str(file)))[1].startswith("any address")
+
+
+@pytest.mark.parametrize("content", [None, "{", "{mode: 'nonsense'}", "{no_such_setting: 1}"])
+def test_a_bad_configuration_file_is_named(tmp_path, content):
+    file = tmp_path / "bad.json5"
+    if content is not None:
+        file.write_text(content)
+    with pytest.raises(rosglass.ConversionError) as error:
+        session_config(ZenohOptions(config_file=str(file)))
+    assert str(error.value).startswith("ZENOH_SESSION_CONFIG_URI: expected a Zenoh configuration")
+    assert str(file) in str(error.value)
+
+
+def test_a_router_listens_where_it_is_told_and_nowhere_else():
+    config = router_config("tcp/127.0.0.1:7447")
+    assert setting(config, "mode") == "router"
+    assert setting(config, "listen/endpoints") == ["tcp/127.0.0.1:7447"]
+    assert setting(config, "scouting/multicast/enabled") is False
