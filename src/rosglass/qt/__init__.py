@@ -99,7 +99,7 @@ QJSValue = QtQml.QJSValue
 
 
 def optional(module: str) -> Any:
-    """Return a Qt module that not every installation has, e.g. ``QtMultimedia``; None without it."""
+    """Return a Qt module that not every installation has, e.g. ``QtMultimedia``, or None."""
     try:
         return import_module(f"{BINDING}.{module}")
     except ImportError:
