@@ -44,6 +44,17 @@ def chat(running: Any) -> Any:
     return running.robot.create_publisher("/chat", TEXT, QoS(depth=10))
 
 
+@pytest.mark.parametrize("extension", ["property int mine: 7", "function mine() { return 7 }"])
+def test_interfaces_may_extend_it(running: Any, chat: Any, wait: Any, extension: str) -> None:
+    # PySide loses the undecorated methods of an object that QML gives properties of its own.
+    root = load(running, f'{extension}\ntopic: "/chat"; timeout: 300')
+    sub = root.property("sub")
+    wait(lambda: sub.property("subscribed"))
+    chat.publish(data="hello")
+    wait(lambda: root.property("shown") == "hello")
+    wait(lambda: sub.property("stale"))
+
+
 def test_type_is_discovered_and_signals_come_in_order(running: Any, chat: Any, wait: Any) -> None:
     root = load(running)
     sub = root.property("sub")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rosglass.errors import Error
 from rosglass.qml.log import Caller, RateLimit, log_from_qml
 from rosglass.qml.runtime import runtime_of
-from rosglass.qt import QtCore, is_alive
+from rosglass.qt import QtCore, Slot, is_alive
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -60,11 +60,13 @@ class Element(QtCore.QObject):
         """The node; None while there is none."""
         return self._session.node if self._session is not None else None
 
+    @Slot()
     def _schedule(self) -> None:
         if not self._scheduled:
             self._scheduled = True
             QtCore.QTimer.singleShot(0, self._settle)
 
+    @Slot()
     def _settle(self) -> None:
         if not is_alive(self):
             return
@@ -104,6 +106,7 @@ class Element(QtCore.QObject):
         """Bring about what the properties ask for."""
         raise AssertionError("every element has its own")
 
+    @Slot()
     def _on_node(self) -> None:
         """There is a node now, or none any more, which must not be used a moment longer."""
         if self.node is None:
@@ -111,12 +114,15 @@ class Element(QtCore.QObject):
         else:
             self._schedule()
 
+    @Slot()
     def _on_connection(self) -> None:
         """The session's connection state changed."""
 
+    @Slot()
     def _on_graph(self) -> None:
         """Nodes or endpoints appeared or went."""
 
+    @Slot()
     def _on_tick(self) -> None:
         """A tenth of a second has passed."""
 
@@ -172,6 +178,7 @@ class TopicElement(Element):
         except Error:
             return 0
 
+    @Slot()
     def _on_connection(self) -> None:
         if self._session is not None and self._session.state != "connected":
             self._suspect = True
@@ -179,6 +186,7 @@ class TopicElement(Element):
             self._trust_again()
         self._judge()
 
+    @Slot()
     def _on_graph(self) -> None:
         before, self._publishers = self._publishers, self._count_publishers()
         if before and not self._publishers:
@@ -191,6 +199,7 @@ class TopicElement(Element):
     def _trust_again(self) -> None:
         """Take back a suspicion that the graph has disproved."""
 
+    @Slot()
     def _on_tick(self) -> None:
         self._judge()
 

@@ -271,6 +271,7 @@ class ImageTransportSubscription(TopicElement):
     def _problem_changed(self) -> None:
         self._refresh()
 
+    @Slot()
     def _on_tick(self) -> None:
         super()._on_tick()
         self._refresh()

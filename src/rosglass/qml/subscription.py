@@ -263,6 +263,7 @@ class Subscription(TopicElement):
             self.topicChanged.emit()
         self._attach()
 
+    @Slot()
     def _attach_again(self) -> None:
         if self._have is not None and self._feed is None:
             self._attach()
@@ -337,6 +338,7 @@ class Subscription(TopicElement):
         else:
             self._deliver_waiting()
 
+    @Slot()
     def _deliver_waiting(self) -> None:
         feed = self._feed
         if feed is None:
@@ -412,6 +414,7 @@ class Subscription(TopicElement):
     def _problem_changed(self) -> None:
         self.problemChanged.emit()
 
+    @Slot()
     def _on_tick(self) -> None:
         super()._on_tick()
         if self._sample is not None:
