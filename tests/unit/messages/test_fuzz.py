@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
     from rosglass.messages import MessageType
 
+pytestmark = pytest.mark.exhaustive
+
 SEED = 5
 MUTANTS = 2_600
 WIRE = {1: "ros1", 2: "cdr"}

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
     from .corpus import Field, Types
 
+pytestmark = pytest.mark.exhaustive
+
 WIRE = {1: "ros1", 2: "cdr"}
 SEED = 20_26
 INVENTED = {ros: corpus.invented(SEED, 40, ros) for ros in (1, 2)}
