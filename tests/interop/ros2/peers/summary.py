@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import sys
 import threading
 import zlib
 from typing import Any
@@ -47,6 +48,7 @@ _lock = threading.Lock()
 
 
 def tell(**event: Any) -> None:
-    """Print one line; callbacks of several threads tell."""
+    """Print one line in one piece: other threads tell, too, and the log goes the same way."""
     with _lock:
-        print(json.dumps(event), flush=True)
+        sys.stdout.write(json.dumps(event) + "\n")
+        sys.stdout.flush()
