@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 __all__ = ["LoadType", "Reading"]
 
+#: Unknown definitions that are named, of publishers that announce nothing.
+_MAX_STRANGERS = 16
+
 
 class LoadType(Protocol):
     """Finds types by name."""
@@ -193,7 +196,7 @@ class Reading:
             data: bytes, received: int, sent: int | None, gid: bytes, sequence: int, hash: str
         ) -> None:
             if hash not in ("", ours):
-                if hash not in strangers:
+                if hash not in strangers and len(strangers) < _MAX_STRANGERS:
                     strangers.add(hash)
                     self._wake()
             elif not repeats.seen(gid, sequence, sent):

@@ -42,6 +42,8 @@ if TYPE_CHECKING:
 __all__ = ["ZenohMiddleware"]
 
 _log = logging.getLogger("rosglass.ros2")
+#: Tokens that are not understood are logged up to so many.
+_MAX_STRANGE = 100
 
 
 class ZenohMiddleware(Middleware):
@@ -219,7 +221,7 @@ class ZenohMiddleware(Middleware):
         try:
             token = Token.parse(key)
         except ValueError as error:
-            if key not in self._strange:
+            if key not in self._strange and len(self._strange) < _MAX_STRANGE:
                 self._strange.add(key)
                 _log.warning("ignoring a graph token that is not understood: %s: %s", key, error)
             return
