@@ -3,7 +3,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 scripts/setup.sh test
-for script in benchmarks/*.py; do
+for script in $(grep -l __main__ benchmarks/*.py); do
   case $script in
     benchmarks/codec.py|benchmarks/imports.py) python=.venv-system/bin/python ;;
     *) python=.venv/bin/python ;;
