@@ -3,11 +3,13 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 scripts/setup.sh test
+missed=()
 for script in $(grep -l __main__ benchmarks/*.py); do
   case $script in
     benchmarks/codec.py|benchmarks/imports.py) python=.venv-system/bin/python ;;
     *) python=.venv/bin/python ;;
   esac
   printf '\n==> %s\n' "$script"
-  "$python" "$script"
+  "$python" "$script" || missed+=("$script")
 done
+[ ${#missed[@]} -eq 0 ] || { printf '\nmissed a target or failed: %s\n' "${missed[*]}" >&2; exit 1; }
