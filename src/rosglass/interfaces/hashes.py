@@ -60,15 +60,24 @@ _BUILT_IN = {
 }
 
 
+def check_definition(value: object) -> None:
+    """Raise UnsupportedError when `value` is no definition, such as a type's name."""
+    if not isinstance(value, (Definition, ServiceDefinition, ActionDefinition)):
+        raise UnsupportedError(
+            f"a definition is expected, as Library.definition(name) returns it, not {value!r:.80}"
+        )
+
+
 def md5(definition: InterfaceDefinition) -> str:
     """Return the md5 sum that ROS 1 peers compare.
 
     An action's is that of its ``pkg/TypeAction`` message.
 
     Raises:
-        UnsupportedError: `definition` is a ROS 2 one.
+        UnsupportedError: `definition` is a ROS 2 one, or no definition.
         DefinitionError: `definition` is not resolved.
     """
+    check_definition(definition)
     if definition.ros != 1:
         raise UnsupportedError(
             f"{definition.name} is a ROS 2 definition, which has no md5 sum; use rihs01()"
@@ -117,7 +126,7 @@ def rihs01(definition: InterfaceDefinition) -> str:
     """Return the type hash of REP 2016, ``RIHS01_`` and 64 hexadecimal digits.
 
     Raises:
-        UnsupportedError: `definition` is a ROS 1 one.
+        UnsupportedError: `definition` is a ROS 1 one, or no definition.
         DefinitionError: `definition` is not resolved.
     """
     import hashlib  # noqa: PLC0415 - as above
@@ -139,9 +148,10 @@ def type_description(definition: InterfaceDefinition) -> dict[str, Any]:
         ``type_name`` and ``fields``.
 
     Raises:
-        UnsupportedError: `definition` is a ROS 1 one.
+        UnsupportedError: `definition` is a ROS 1 one, or no definition.
         DefinitionError: `definition` is not resolved.
     """
+    check_definition(definition)
     if definition.ros != 2:
         raise UnsupportedError(
             f"{definition.name} is a ROS 1 definition, which has no RIHS01 hash; use md5()"
@@ -255,8 +265,10 @@ def full_text(definition: InterfaceDefinition) -> str:
     """Return the definition with those it needs appended, as ROS 1 connection headers carry it.
 
     Raises:
+        UnsupportedError: `definition` is no definition.
         DefinitionError: `definition` is not resolved.
     """
+    check_definition(definition)
     if isinstance(definition, ServiceDefinition):
         parts: Iterable[Definition] = (definition.request, definition.response)
     elif isinstance(definition, ActionDefinition):

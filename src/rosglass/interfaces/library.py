@@ -20,7 +20,7 @@ from rosglass.interfaces.definition import ActionDefinition, Definition, Service
 from rosglass.interfaces.derived import derive, derived_from
 from rosglass.interfaces.distributions import Distributions
 from rosglass.interfaces.folders import Folders, workspace
-from rosglass.interfaces.hashes import md5, rihs01
+from rosglass.interfaces.hashes import check_definition, md5, rihs01
 from rosglass.interfaces.idl import parse_idl
 from rosglass.interfaces.names import KINDS, join_name, split_name
 from rosglass.interfaces.parser import parse
@@ -148,6 +148,8 @@ class Library:
         Raises:
             TypeNotFoundError: There is no such folder.
         """
+        if not isinstance(folder, (str, os.PathLike)):
+            raise TypeNotFoundError(f"a folder is given by its path, not by {folder!r:.80}")
         path = os.path.abspath(os.path.expanduser(folder))
         if not os.path.isdir(path):
             raise TypeNotFoundError(f"{path} is not a folder; no definitions can be read from it")
@@ -195,7 +197,9 @@ class Library:
 
         Raises:
             DefinitionConflictError: As for :meth:`add_text`.
+            UnsupportedError: It is no definition.
         """
+        check_definition(definition)
         with self._lock:
             for nested in _nested(definition).values():
                 self._add_one(nested)
@@ -358,9 +362,12 @@ class Library:
         looked = [text for text in (p.describe(ros) for p in self._chain) if text]
         names = self.names(ros)
         other = self.names(3 - ros)
-        short = {f"{n.split('/')[0]}/{n.split('/')[2]}": n for n in reversed(names)}
+        short = {f"{n.split('/')[0]}/{n.split('/')[2]}".lower(): n for n in reversed(names)}
         wanted = "/".join(part for part in name.split("/") if part not in KINDS)
-        close = [short[match] for match in difflib.get_close_matches(wanted, short, 3, 0.75)]
+        near = difflib.get_close_matches(wanted.lower(), short, 3, 0.75)
+        if near[:1] == [wanted.lower()]:
+            del near[1:]  # only the case is wrong
+        close = [short[match] for match in near]
         text = f"looked in {'; '.join(looked) or 'nothing: there are no providers'}."
         if close:
             text += f" Did you mean {' or '.join(close)}?"

@@ -54,14 +54,14 @@ def split_name(name: str) -> tuple[str, str, str]:
         package, kind, base = parts
     else:
         raise InvalidNameError(
-            f"{name!r} is not a type name; write pkg/msg/Type, pkg/srv/Type, pkg/action/Type "
+            f"{name!r:.80} is not a type name; write pkg/msg/Type, pkg/srv/Type, pkg/action/Type "
             "or pkg/Type"
         )
     for part in (package, base):
         if not _IDENTIFIER.fullmatch(part):
             raise InvalidNameError(
-                f"{name!r} is not a type name: {part!r} must start with a letter and may go on "
-                "with letters, digits and underscores"
+                f"{name!r:.80} is not a type name: {part!r:.80} must start with a letter and may "
+                "go on with letters, digits and underscores"
             )
     return package, kind, base
 

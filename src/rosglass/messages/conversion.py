@@ -295,7 +295,8 @@ def complete(schema: Schema, value: Any) -> dict[str, Any]:
     """Return a dict with every field, the missing ones with their defaults; checks no values.
 
     Raises:
-        LookupError, TypeError, AttributeError: There is more amiss than missing fields.
+        LookupError, TypeError, AttributeError, ConversionError: There is more amiss than missing
+            fields.
     """
     if isinstance(value, Message):
         if value._schema__ is not schema:
@@ -311,7 +312,8 @@ def complete(schema: Schema, value: Any) -> dict[str, Any]:
         if struct is None:
             made[member.name] = given
         elif member.is_array:
-            made[member.name] = [complete(struct, item) for item in given]
+            items = _sequence(given, name, struct.name)
+            made[member.name] = [complete(struct, item) for item in items]
         else:
             made[member.name] = complete(struct, given)
     return made

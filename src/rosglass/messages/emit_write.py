@@ -196,8 +196,11 @@ class Writer:
         if self.from_dict:
             strange = self.source.bind(odd, "odd")
             count = len(schema.members)
-            # Neither an unknown field nor a missing one can hide behind the right number.
-            self.source.line(f"if len({holder}) != {count}: {strange}()")
+            # Neither an unknown field nor a missing one can hide behind the right number; without
+            # fields, anything empty could.
+            empty = f"type({holder}) is dict and not {holder}"
+            right = f"len({holder}) == {count}" if count else empty
+            self.source.line(f"if not ({right}): {strange}()")
         else:
             cls = self.source.bind(self.codec.of(schema).cls, "C")
             mine = self.source.bind(own, "own")

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import threading
 import weakref
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 from rosglass import interfaces
+from rosglass.errors import UnsupportedError
 from rosglass.interfaces.definition import ActionDefinition, ServiceDefinition
-from rosglass.messages.types import MessageType
+from rosglass.messages.types import MessageType, portable
 
 if TYPE_CHECKING:
     from rosglass.interfaces import Library
-    from rosglass.interfaces.definition import InterfaceDefinition
+    from rosglass.interfaces.definition import Field, InterfaceDefinition
+    from rosglass.messages.types import Constants
 
 __all__ = ["ActionType", "ServiceType", "default_library", "load"]
 
 
 class _Interface:
     """What types made of several messages have in common."""
+
+    parts: dict[str, MessageType]
 
     def __init__(self, definition: ServiceDefinition | ActionDefinition) -> None:
         self.definition = definition
@@ -34,6 +39,30 @@ class _Interface:
         """ROS 2's type hash (REP 2016)."""
         return interfaces.rihs01(self.definition)
 
+    @property
+    def fields(self) -> dict[str, tuple[Field, ...]]:
+        """The fields of each part."""
+        return {name: part.fields for name, part in self.parts.items()}
+
+    @property
+    def constants(self) -> dict[str, Constants]:
+        """The constants of each part."""
+        return {name: part.constants for name, part in self.parts.items()}
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, _Interface):
+            return NotImplemented
+        return (self.name, self.parts) == (other.name, other.parts)
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.ros))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        parts: dict[str, Any] = {
+            name: portable(part.definition) for name, part in self.parts.items()
+        }
+        return type(self), (replace(self.definition, **parts),)
+
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.name} (ROS {self.ros})>"
 
@@ -47,6 +76,7 @@ class ServiceType(_Interface):
         ros: 1 or 2.
         request: Type of the request.
         response: Type of the response.
+        parts: Both by these names.
     """
 
     definition: ServiceDefinition
@@ -55,6 +85,7 @@ class ServiceType(_Interface):
         super().__init__(definition)
         self.request = MessageType(definition.request)
         self.response = MessageType(definition.response)
+        self.parts = {"request": self.request, "response": self.response}
 
 
 class ActionType(_Interface):
@@ -67,6 +98,7 @@ class ActionType(_Interface):
         goal: Type of the goal.
         result: Type of the result.
         feedback: Type of the feedback.
+        parts: All three by these names.
     """
 
     definition: ActionDefinition
@@ -76,6 +108,7 @@ class ActionType(_Interface):
         self.goal = MessageType(definition.goal)
         self.result = MessageType(definition.result)
         self.feedback = MessageType(definition.feedback)
+        self.parts = {"goal": self.goal, "result": self.result, "feedback": self.feedback}
 
 
 _lock = threading.RLock()
@@ -106,7 +139,10 @@ def load(
     Raises:
         TypeNotFoundError: No provider has a definition.
         DefinitionError: The definition has errors, or is cyclic.
+        UnsupportedError: `library` is no library, or `ros` neither 1 nor 2.
     """
+    if library is not None and not isinstance(library, interfaces.Library):
+        raise UnsupportedError(f"a library is a rosglass.Library, not {library!r:.80}")
     source = default_library() if library is None else library
     with _lock:
         types = _libraries.setdefault(source, {})

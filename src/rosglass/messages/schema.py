@@ -234,7 +234,9 @@ def _resolve(
             inner = inner or nested.get(ftype.name)
             if inner is None:
                 raise DefinitionError(
-                    f"{definition.name}.{field.name}: no definition of {ftype.name!r}", file
+                    f"{definition.name}.{field.name}: no definition of {ftype.name!r}",
+                    file,
+                    *field.place,
                 )
             kind = Kind.STRUCT
             inside = inner.nested if inner.nested else nested

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rosglass.interfaces.definition import Field
     from rosglass.messages.message import Message
 
-__all__ = ["Constants", "MessageType"]
+__all__ = ["Constants", "MessageType", "portable"]
 
 _WIRES = {
     (name, big, wide): Wire(name, big, wide)
@@ -92,7 +92,7 @@ class MessageType:
         def find(wanted: str, owner: Definition, field: Field) -> Definition:
             if wanted not in parsed.nested:
                 problem = f"{owner.name}.{field.name}: the text does not define {wanted}"
-                raise DefinitionError(problem, parsed.source.file)
+                raise DefinitionError(problem, owner.source.file, *field.place)
             return parsed.nested[wanted]
 
         return cls(Resolver(find).message(parsed))
@@ -115,7 +115,7 @@ class MessageType:
         return hash((self.name, self.ros))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return MessageType, (_portable(self.definition),)
+        return MessageType, (portable(self.definition),)
 
     @property
     def md5(self) -> str:
@@ -444,7 +444,7 @@ def _width(wide: int | None) -> int:
     return wide or 2
 
 
-def _portable(definition: Definition) -> Definition:
+def portable(definition: Definition) -> Definition:
     """Return the definition with plain dicts inside, for pickling."""
     inner = {name: replace(nested, nested={}) for name, nested in definition.nested.items()}
     return replace(definition, nested=inner)

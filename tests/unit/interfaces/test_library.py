@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -20,6 +20,7 @@ from rosglass.interfaces import (
     Distributions,
     Library,
     MemoryProvider,
+    full_text,
     join_name,
     md5,
     parse_message,
@@ -86,6 +87,8 @@ def test_bad_world(library: Library) -> None:
     ("name", "ros", "words"),
     [
         ("geometry_msgs/PoseStampd", 2, "Did you mean geometry_msgs/msg/PoseStamped"),
+        ("geometry_msgs/msg/twist", 2, "Did you mean geometry_msgs/msg/Twist? "),
+        ("GEOMETRY_msgs/TWIST", 2, "Did you mean geometry_msgs/msg/Twist? "),
         ("geometry_msg/msg/Twist", 2, "Did you mean geometry_msgs/msg/Twist"),
         ("std_srv/srv/Trigger", 2, "std_srvs/srv/Trigger"),
         ("bond/Status", 2, "ROS 1 has it."),
@@ -98,6 +101,22 @@ def test_unknown_types(library: Library, name: str, ros: int, words: str) -> Non
     with pytest.raises(TypeNotFoundError) as caught:
         library.definition(name, ros)
     assert words in str(caught.value)
+
+
+def test_errors_about_names_stay_short() -> None:
+    for name in ("x" * 100_000, f"pkg/{'-' * 100_000}"):
+        with pytest.raises(InvalidNameError) as caught:
+            join_name(name)
+        assert len(str(caught.value)) < 300
+
+
+@pytest.mark.parametrize("wrong", ["std_msgs/String", 3, None])
+def test_arguments_of_another_kind(library: Library, wrong: Any) -> None:
+    for attempt in (library.add, md5, rihs01, full_text):
+        with pytest.raises(UnsupportedError, match="a definition is expected, as Library"):
+            attempt(wrong)
+    with pytest.raises(TypeNotFoundError, match="folder"):
+        library.add_path(wrong)
 
 
 def test_unknown_type_is_found_once_it_is_added(library: Library) -> None:

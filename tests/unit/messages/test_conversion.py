@@ -200,6 +200,9 @@ def test_arrays_that_do_not_fit(kind: str, value: Any, path: str, expected: str)
         ({5: 1}, "5", "a field of nav_msgs/msg/Path"),
         ({"poses": [{}, {"pose": {"position": {"x": "a"}}}]}, "poses[1].pose.position.x", "a num"),
         ({"poses": {"x": 1}}, "poses", "a list of geometry_msgs/msg/PoseStamped"),
+        ({"poses": {}}, "poses", "a list of geometry_msgs/msg/PoseStamped"),
+        ({"poses": ""}, "poses", "a list of geometry_msgs/msg/PoseStamped"),
+        ({"poses": iter([{}])}, "poses", "a list of geometry_msgs/msg/PoseStamped"),
         ({"poses": [None]}, "poses[0]", "a dict or a geometry_msgs/msg/PoseStamped"),
         ({"header": []}, "header", "a dict or a std_msgs/msg/Header"),
         ({"header": 3}, "header", "a dict or a std_msgs/msg/Header"),
@@ -215,6 +218,16 @@ def test_messages_that_do_not_fit(value: Any, path: str, expected: str) -> None:
         assert caught.value.path == path
         assert expected in caught.value.expected
         assert "nav_msgs/msg/Path" in str(caught.value)
+
+
+@pytest.mark.parametrize("value", ["", b"", [], (), set(), np.array([])])
+def test_nothing_but_a_dict_makes_an_empty_message(value: Any) -> None:
+    kind = MessageType.from_text("t/msg/Has", "Empty e\n===\nMSG: t/Empty\n")
+    for attempt in (kind.encode, kind.encode_parts, kind.create):
+        with pytest.raises(ConversionError) as caught:
+            attempt({"e": value})
+        assert caught.value.path == "e"
+    assert kind.encode({"e": {}}) == kind.encode(e=collections.OrderedDict()) == kind.encode()
 
 
 def test_other_messages_are_refused() -> None:

@@ -51,6 +51,10 @@ def test_services_and_actions_have_their_messages() -> None:
     assert action.goal.create(order=5).order == 5
     assert list(action.result.create(sequence=[1, 1]).sequence) == [1, 1]
     assert type_of(action.feedback.create()) == action.feedback
+    assert [field.name for field in service.fields["request"]] == ["a", "b"]
+    assert list(action.fields) == list(action.parts) == ["goal", "result", "feedback"]
+    assert service.constants == {"request": {}, "response": {}}
+    assert load("example_interfaces/srv/AddTwoInts", library=Library()) == service != action
     assert "AddTwoInts" in repr(service)
     assert "Fibonacci" in repr(action)
 
@@ -90,10 +94,19 @@ def test_type_is_reached_from_every_message() -> None:
     assert pose.position.type == load("geometry_msgs/msg/Point")
 
 
-@pytest.mark.parametrize("name", ["sensor_msgs/msg/Image", "std_msgs/msg/Empty"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "sensor_msgs/msg/Image",
+        "std_msgs/msg/Empty",
+        "std_srvs/srv/SetBool",
+        "tf2_msgs/action/LookupTransform",
+    ],
+)
 def test_types_can_be_pickled(name: str) -> None:
     again = pickle.loads(pickle.dumps(load(name)))
     assert again == load(name)
+    assert hash(again) == hash(load(name))
     assert again.rihs01 == load(name).rihs01
 
 
@@ -102,6 +115,8 @@ def test_unknown_types_are_errors() -> None:
         load("no_msgs/msg/Nothing")
     with pytest.raises(UnsupportedError, match=r"rosglass\.load"):
         MessageType("std_msgs/msg/String")  # type: ignore[arg-type]
+    with pytest.raises(UnsupportedError, match=r"a library is a rosglass\.Library"):
+        load("std_msgs/msg/String", library="mine")  # type: ignore[arg-type]
 
 
 def compound(name: str, *fields: tuple[str, str], **nested: Definition) -> Definition:
@@ -146,7 +161,7 @@ def test_deep_nesting_is_an_error() -> None:
 def test_text_has_to_bring_what_it_needs() -> None:
     text = "other_msgs/Part part\n" + "=" * 80 + "\nMSG: other_msgs/Part\nint8 x"
     assert MessageType.from_text("t/msg/A", text, ros=1).create(part={"x": 3}).part.x == 3
-    with pytest.raises(DefinitionError, match="does not define other_msgs/msg/Part"):
+    with pytest.raises(DefinitionError, match=r":1:1: .* does not define other_msgs/msg/Part"):
         MessageType.from_text("t/msg/A", "other_msgs/Part part", ros=1)
 
 
