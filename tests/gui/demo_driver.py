@@ -51,6 +51,12 @@ class CockpitProcess:
         """Press or release a key: ``Key_W``."""
         self._ask("key", action, key)
 
+    def repeat(self, key: str, times: int) -> None:
+        """Repeat a key 25 times a second as X11 does at worst: released and pressed, unmarked."""
+        for _ in range(times):
+            self._ask("repeat", key)
+            time.sleep(0.04)
+
     def mouse(self, action: str, item: str, x: float, y: float) -> None:
         """Press, move or release the left button, at shares of the item's size."""
         self._ask("mouse", action, item, x, y)
@@ -133,6 +139,11 @@ class _Driver:
     def key(self, action: str, key: str) -> None:
         act = self._test.keyPress if action == "press" else self._test.keyRelease
         act(self.cockpit.window, getattr(self._core.Qt.Key, key))
+
+    def repeat(self, key: str) -> None:
+        self.key("release", key)
+        self._test.qWait(4)
+        self.key("press", key)
 
     def mouse(self, action: str, item: str, x: float, y: float) -> None:
         point = self._point(item, x, y)

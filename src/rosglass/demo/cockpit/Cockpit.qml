@@ -30,6 +30,7 @@ Item {
 
     // Whatever was held down: its release may never be seen.
     function letGo() {
+        keyboard.clear()
         keys.clear()
         drive.release()
     }
@@ -38,8 +39,10 @@ Item {
         event.accepted = true
         if (event.key === Qt.Key_Space || event.key === Qt.Key_Escape)
             stop.press()
-        else if (event.isAutoRepeat || event.modifiers & (Qt.ControlModifier | Qt.AltModifier))
+        else if (event.modifiers & (Qt.ControlModifier | Qt.AltModifier))
             event.accepted = event.isAutoRepeat
+        else if (event.isAutoRepeat || !keyboard.press(event.key))
+            return
         else if (keys.press(event.key))
             return
         else if (event.key === Qt.Key_L)
@@ -52,7 +55,8 @@ Item {
             event.accepted = false
     }
     Keys.onReleased: function (event) {
-        event.accepted = event.isAutoRepeat || keys.lift(event.key)
+        if (!event.isAutoRepeat)
+            keyboard.lift(event.key)
     }
 
     Link {
@@ -71,6 +75,10 @@ Item {
     DriveKeys {
         id: keys
         drive: drive
+    }
+    Keyboard {
+        id: keyboard
+        onLifted: function (key) { keys.lift(key) }
     }
 
     TopBar {

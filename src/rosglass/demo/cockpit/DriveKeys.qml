@@ -27,11 +27,8 @@ QtObject {
     }
 
     function lift(key) {
-        if (!(key in directions))
-            return false
         delete down[key]
         apply()
-        return true
     }
 
     // Forget all keys: their release may have gone to another window.
