@@ -7,7 +7,7 @@ from functools import lru_cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from rosglass.errors import FieldPathError
+from rosglass.errors import ConversionError, Error, FieldPathError
 from rosglass.messages.runtime import hint, number_type
 from rosglass.messages.schema import Kind
 
@@ -132,7 +132,18 @@ def _check_index(index: int, count: int, path: str) -> None:
 
 def get(message: Message, path: str) -> Any:
     """Return what a path leads to; slices of messages continue in every element."""
-    return _follow(message, resolve(message._schema__, path), path)
+    route = resolve(message._schema__, path)
+    try:
+        return _follow(message, route, path)
+    except (AttributeError, TypeError) as error:
+        raise _astray(error, path) from None
+
+
+def _astray(error: Exception, path: str) -> Exception:
+    # Assigned values are not checked before they are encoded.
+    if isinstance(error, Error):
+        return error
+    return FieldPathError(f"field path {path!r} meets an assigned value of the wrong kind: {error}")
 
 
 def _follow(message: Any, route: list[tuple[Member, Step | None]], path: str) -> Any:
@@ -155,8 +166,23 @@ def _follow(message: Any, route: list[tuple[Member, Step | None]], path: str) ->
 
 
 def put(message: Message, path: str, value: Any) -> None:
-    """Set what a path leads to; an array still in the received bytes is copied first."""
+    """Set what a path leads to; an array still in the received bytes is copied first.
+
+    Raises:
+        FieldPathError: The path leads nowhere.
+        ConversionError: A number does not fit its array; other values are checked when encoding.
+    """
     route = resolve(message._schema__, path)
+    try:
+        _put(message, route, path, value)
+    except ConversionError as error:
+        name = message._schema__.name
+        raise ConversionError(error.path, error.value, error.expected, name) from None
+    except (AttributeError, TypeError) as error:
+        raise _astray(error, path) from None
+
+
+def _put(message: Message, route: list[tuple[Member, Step | None]], path: str, value: Any) -> None:
     target: Any = message
     for place, (member, step) in enumerate(route):
         final = place + 1 == len(route)
@@ -174,6 +200,8 @@ def put(message: Message, path: str, value: Any) -> None:
         if final:
             if member.number is not None:
                 target = _own(holder, member)
+                count = len(range(len(target))[step]) if isinstance(step, slice) else 1
+                value = _conversion().elements(member, step, count, value, path)
             target[step] = value
         else:
             target = target[step]
@@ -195,7 +223,16 @@ def writable(message: Message, path: str) -> np.ndarray:
 def _own(holder: Any, member: Member) -> Any:
     array = getattr(holder, member.attr)
     flags = getattr(array, "flags", None)
-    if flags is not None and not flags.writeable:
+    if flags is None:  # what was assigned to the field
+        array = _conversion().numbers(member, array, member.name)
+    elif flags.writeable:
+        return array
+    else:
         array = array.copy()
-        setattr(holder, member.attr, array)
+    setattr(holder, member.attr, array)
     return array
+
+
+def _conversion() -> Any:
+    # It makes messages, which need this module.
+    return import_module("rosglass.messages.conversion")

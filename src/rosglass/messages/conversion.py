@@ -30,7 +30,16 @@ if TYPE_CHECKING:
     from rosglass.messages.layout import Wire
     from rosglass.messages.schema import Member, Number, Schema
 
-__all__ = ["array_packer", "as_bool", "as_float", "as_int", "complete", "convert"]
+__all__ = [
+    "array_packer",
+    "as_bool",
+    "as_float",
+    "as_int",
+    "complete",
+    "convert",
+    "elements",
+    "numbers",
+]
 
 _FLOAT32_MAX = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]
 _NANO = 1_000_000_000
@@ -147,10 +156,36 @@ def _sequence(value: Any, path: str, what: str) -> Sequence[Any]:
     raise ConversionError(path, value, f"a list of {what}")
 
 
-def _numbers(member: Member, value: Any, path: str) -> np.ndarray:
-    """Return a numeric array in the machine's byte order, or little endian."""
-    number = member.number
-    assert number is not None
+def numbers(member: Member, value: Any, path: str) -> np.ndarray:
+    """Return a numeric array in the machine's byte order, or little endian.
+
+    Raises:
+        ConversionError: An element, or their number, does not fit.
+    """
+    assert member.number is not None
+    made = _some_numbers(member.number, value, path)
+    _check_length(member, len(made), value, path)
+    return made
+
+
+def elements(member: Member, step: int | slice, count: int, value: Any, path: str) -> Any:
+    """Return what to set an element of a numeric array to, or a slice of `count` elements.
+
+    A single number for a slice is meant for all of them.
+
+    Raises:
+        ConversionError: It does not fit.
+    """
+    assert member.number is not None
+    if isinstance(step, int) or isinstance(value, (int, float)) or _numpy_kind(value):
+        return _number(member.number, value, path)
+    made = _some_numbers(member.number, value, path)
+    if len(made) != count:
+        raise ConversionError(path, value, f"exactly {count} elements, not {len(made)}")
+    return made
+
+
+def _some_numbers(number: Number, value: Any, path: str) -> np.ndarray:
     numpy = import_module("numpy")
     dtype = numpy.dtype(bool) if number.python is bool else number_type(number.dtype, "<")
     if isinstance(value, (bytes, bytearray, memoryview)):
@@ -163,7 +198,6 @@ def _numbers(member: Member, value: Any, path: str) -> np.ndarray:
         items = _sequence(value, path, number.name)
         plain = [_number(number, item, f"{path}[{index}]") for index, item in enumerate(items)]
         made = numpy.array(plain, dtype)
-    _check_length(member, len(made), value, path)
     return numpy.ascontiguousarray(made)  # type: ignore[no-any-return]
 
 
@@ -229,7 +263,7 @@ def array_packer(member: Member, wire: Wire) -> Callable[[Any], tuple[Any, int]]
         if found is list or found is tuple:
             count = len(value)
             if count and set(map(type, value)) != {kind}:
-                value = _numbers(member, value, "").tolist()
+                value = numbers(member, value, "").tolist()
             data: Any = struct.pack(f"{order}{count}{code}", *value)
         elif found is bytes and raw_allowed:
             data, count = value, len(value)
@@ -237,7 +271,7 @@ def array_packer(member: Member, wire: Wire) -> Callable[[Any], tuple[Any, int]]
             if wanted is None:
                 wanted = target()
             if getattr(value, "dtype", None) is not wanted or value.ndim != 1:
-                value = _numbers(member, value, "")
+                value = numbers(member, value, "")
                 if value.dtype != wanted:
                     value = value.astype(wanted)
             # Gaps between the elements show when the parts are joined, see Codec.
@@ -355,7 +389,7 @@ def _member(member: Member, value: Any, path: str) -> Any:
     if not member.is_array:
         return _element(member, value, path)
     if member.number is not None:
-        return _numbers(member, value, path)
+        return numbers(member, value, path)
     items = _sequence(value, path, member.field.type.name)
     _check_length(member, len(items), value, path)
     return [_element(member, item, f"{path}[{index}]") for index, item in enumerate(items)]

@@ -127,6 +127,44 @@ def test_arrays_are_views_until_they_are_written_to() -> None:
             message.writable(path)
 
 
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        ("data[0]", 1.7),
+        ("data[0]", 256),
+        ("data[0]", True),
+        ("data[0]", "7"),
+        ("data[*]", 1.5),
+        ("data[0:2]", [1, 1.5]),
+        ("data[0:2]", np.array([300, 1])),
+        ("data[0:2]", [1, 2, 3]),
+        ("data[0:2]", "ab"),
+    ],
+)
+def test_elements_are_set_as_strictly_as_fields(path: str, value: Any) -> None:
+    kind = load("sensor_msgs/msg/Image")
+    message = kind.decode(kind.encode(data=b"abc"))
+    with pytest.raises(ConversionError, match=r"sensor_msgs/msg/Image: data\["):
+        message[path] = value
+    assert bytes(message.data) == b"abc"
+    message["data[*]"] = 120.0
+    message["data[1:]"] = b"yz"
+    assert bytes(kind.decode(kind.encode(message)).data) == b"xyz"
+
+
+def test_paths_meet_what_was_assigned() -> None:
+    message = load("sensor_msgs/msg/Image").create()
+    message.data = [1, 2]
+    message["data[0]"] = 5
+    assert list(message.writable("data")) == [5, 2]
+    message.header = message.data = 3
+    for path in ("header.stamp.sec", "data[0]"):
+        with pytest.raises(FieldPathError, match="an assigned value of the wrong kind"):
+            message[path] = 1
+        with pytest.raises(FieldPathError, match="an assigned value of the wrong kind"):
+            _ = message[path]
+
+
 def test_other_buffers_are_copied_at_once() -> None:
     buffer = bytearray(imu())
     messages = [IMU.decode(buffer), IMU.decode(memoryview(buffer)), IMU.decode_all(buffer)]
