@@ -8,7 +8,7 @@ import threading
 import time
 from abc import abstractmethod
 from collections import deque
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Protocol
 
 import zenoh
@@ -20,7 +20,7 @@ from rosglass.ros2.middleware import OnSample, Writer
 from rosglass.ros2.zenoh_keys import HUMBLE_HASH, NO_ATTACHMENT, Attachment, gid_of, topic_key
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Sequence
 
     from rosglass.comm import EndpointInfo, QoS, Status
     from rosglass.ros2.zenoh_options import ZenohOptions
@@ -61,10 +61,12 @@ class Declaration(Handle):
                 return
             self._attached = True
         # Declaring may call back at once, into code that closes this very declaration.
-        with self._errors():
+        try:
             handles = self.declare(session)
             # The token comes last and goes first: who sees it can count on the rest.
             self._keep([session.liveliness().declare_token(self.token), *handles])
+        except zenoh.ZError as error:
+            raise self._error(error) from error
 
     @abstractmethod
     def declare(self, session: zenoh.Session) -> list[Any]:
@@ -79,15 +81,10 @@ class Declaration(Handle):
         self._owner.forget(self)
         self._release()
 
-    @contextmanager
-    def _errors(self) -> Iterator[None]:
-        """Turn Zenoh's errors into ours."""
-        try:
-            yield
-        except zenoh.ZError as error:
-            if self._closed or self._owner.status().state is ConnectionState.CLOSED:
-                raise NodeClosedError("the node is closed; connect again") from error
-            raise ConnectionLostError(f"Zenoh refused {self.token}: {error}") from error
+    def _error(self, error: zenoh.ZError) -> ConnectionLostError | NodeClosedError:
+        if self._closed or self._owner.status().state is ConnectionState.CLOSED:
+            return NodeClosedError("the node is closed; connect again")
+        return ConnectionLostError(f"Zenoh refused {self.token}: {error}")
 
     def _keep(self, handles: list[Any]) -> None:
         with self._lock:
@@ -196,17 +193,19 @@ class ZenohWriter(Declaration, Writer):
             if self._closed:
                 raise NodeClosedError(f"the publisher of {self._topic} is closed")
             self._writing.append(thread)
-        note = Attachment(next(self._numbers), time.time_ns(), self._gid).encode()
-        self._history.append((data, note))
         try:
-            with self._errors():
-                for publisher in self._publishers:
-                    publisher.put(data, attachment=note)
+            note = Attachment(next(self._numbers), time.time_ns(), self._gid).encode()
+            self._history.append((data, note))
+            for publisher in self._publishers:
+                publisher.put(data, attachment=note)
+        except zenoh.ZError as error:
+            raise self._error(error) from error
         finally:
             with self._lock:
                 self._writing.remove(thread)
+                if self._closed:
+                    self._quiet.notify_all()
                 late = self._abandoned and not self._writing
-                self._quiet.notify_all()
             if late:
                 self._release()
 
@@ -222,8 +221,10 @@ class ZenohWriter(Declaration, Writer):
             self._hashes |= new
             session = None if self._closed else self._session
         if new and session is not None:
-            with self._errors():
+            try:
                 self._keep(self._declare_publishers(session, new))
+            except zenoh.ZError as error:
+                raise self._error(error) from error
 
     def _release(self) -> None:
         # Zenoh refuses to undeclare what is in use; a write ends soon, or does this when it ends.
