@@ -60,6 +60,10 @@ _BUILT_IN = {
 }
 
 
+class NoSuchHashError(UnsupportedError, AttributeError):
+    """The hash belongs to the other ROS; an AttributeError so that hasattr() and debuggers work."""
+
+
 def check_definition(value: object) -> None:
     """Raise UnsupportedError when `value` is no definition, such as a type's name."""
     if not isinstance(value, (Definition, ServiceDefinition, ActionDefinition)):
@@ -79,7 +83,7 @@ def md5(definition: InterfaceDefinition) -> str:
     """
     check_definition(definition)
     if definition.ros != 1:
-        raise UnsupportedError(
+        raise NoSuchHashError(
             f"{definition.name} is a ROS 2 definition, which has no md5 sum; use rihs01()"
         )
     sums: dict[str, str] = {}
@@ -153,7 +157,7 @@ def type_description(definition: InterfaceDefinition) -> dict[str, Any]:
     """
     check_definition(definition)
     if definition.ros != 2:
-        raise UnsupportedError(
+        raise NoSuchHashError(
             f"{definition.name} is a ROS 1 definition, which has no RIHS01 hash; use md5()"
         )
     described: dict[str, dict[str, Any]] = {}

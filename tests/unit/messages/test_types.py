@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import pickle
 import threading
 import traceback
@@ -65,6 +66,17 @@ def test_hashes_are_the_well_known_ones() -> None:
     assert load("std_msgs/msg/String").rihs01 == (
         "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
     )
+
+
+@pytest.mark.parametrize("name", ["std_msgs/msg/String", "std_srvs/srv/Trigger"])
+@pytest.mark.parametrize(("ros", "there", "missing"), [(1, "md5", "rihs01"), (2, "rihs01", "md5")])
+def test_types_can_be_inspected(name: str, ros: int, there: str, missing: str) -> None:
+    kind = load(name, ros=ros)
+    with pytest.raises(UnsupportedError, match="which has no"):
+        getattr(kind, missing)
+    assert hasattr(kind, there)
+    assert not hasattr(kind, missing)
+    assert there in dict(inspect.getmembers(kind))
 
 
 def test_constants_by_name_and_attribute() -> None:
