@@ -276,6 +276,10 @@ def test_rate_and_latency_are_not_rounded(running: Any, camera: Any, wait: Any) 
         sub.property("networkLatency") + sub.property("processingLatency"), abs=0.5
     )
     wait(lambda: sub.property("framerate") < 10, timeout=4)
+    # What is not live has no rate and no latency any more.
+    wait(lambda: sub.property("stale"), timeout=4)
+    wait(lambda: sub.property("framerate") == 0)
+    assert sub.property("latency") == sub.property("networkLatency") == -1
 
 
 def test_a_sink_that_is_destroyed_ends_the_subscription(

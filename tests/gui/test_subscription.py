@@ -198,6 +198,42 @@ def test_an_element_may_destroy_itself_in_its_handler(running: Any, chat: Any, w
     assert root.property("count") >= 1
 
 
+def test_a_destroyed_element_is_left_alone_and_holds_nothing(
+    running: Any, chat: Any, wait: Any, caplog: Any, capfd: Any
+) -> None:
+    from rosglass.comm.subscription import Sample
+
+    root = running.load(
+        """QtObject {
+            id: root
+            property int count: 0
+            property int ages: 0
+            property Component maker: Component {
+                Subscription { topic: "/chat"; onMessageChanged: ++root.count }
+            }
+            property QtObject other: Subscription { topic: "/chat"; onAgeChanged: ++root.ages }
+            property var made: []
+            function make() { for (let i = 0; i < 20; ++i) made.push(maker.createObject(root)) }
+            function drop() { for (const one of made) one.destroy(); made = [] }
+        }"""
+    )
+    from PySide6.QtCore import QMetaObject
+
+    QMetaObject.invokeMethod(root, "make")
+    wait(lambda: len(running.world.subscriptions) == 21)
+    chat.publish(data="x")
+    wait(lambda: root.property("count") == 20)
+    QMetaObject.invokeMethod(root, "drop")
+    wait(lambda: len(running.world.subscriptions) == 1)
+    ages = root.property("ages")
+    wait(lambda: root.property("ages") > ages + 3)
+    # PySide keeps the Python halves; the messages must go.
+    gc.collect()
+    assert sum(type(item) is Sample for item in gc.get_objects()) < 5
+    assert "Traceback" not in capfd.readouterr().err
+    assert not [record for record in caplog.records if record.exc_info]
+
+
 def test_subscriptions_made_by_a_function_end_with_their_owner(
     running: Any, chat: Any, wait: Any
 ) -> None:

@@ -42,6 +42,10 @@ class Element(QtCore.QObject):
         runtime: For objects made by a function of QML; elements find their own.
     """
 
+    #: Attributes with messages and pictures, let go when QML destroys the object: PySide 6.11 never
+    #: frees the Python half of what QML has made.
+    _HOLDS: tuple[str, ...] = ()
+
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
@@ -81,18 +85,26 @@ class Element(QtCore.QObject):
             self._say("this object belongs to no QML engine")
             return False
         session = self._session = runtime.session
-        session.node_changed.connect(self._on_node)
-        session.connection_changed.connect(self._on_connection)
-        session.graph_changed.connect(self._on_graph)
-        session.tick.connect(self._on_tick)
-        session.use_ticks(True)
         at_end = self._at_end
+        at_end["signals"] = session.attach(
+            self,
+            node_changed=self._on_node,
+            connection_changed=self._on_connection,
+            graph_changed=self._on_graph,
+            tick=self._on_tick,
+        )
+        session.use_ticks(True)
         at_end["ticks"] = lambda: session.use_ticks(False)
+
+        state, held = self.__dict__, self._HOLDS
 
         def end() -> None:
             # At the end of the program the session may be gone before the last element.
-            for job in at_end.values() if is_alive(session) else ():
+            for job in list(at_end.values()) if is_alive(session) else ():
                 job()
+            at_end.clear()
+            for name in held:
+                state.pop(name, None)
 
         self.destroyed.connect(end)
         return True

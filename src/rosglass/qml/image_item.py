@@ -34,6 +34,9 @@ class ImageItem(QtQuick.QQuickPaintedItem):
         self._image: QtGui.QImage | None = None
         self._fill = int(self.FillMode.PreserveAspectFit)
         self._source: QtCore.QObject | None = None
+        # PySide 6.11 never frees the Python half of what QML has made.
+        state = self.__dict__
+        self.destroyed.connect(lambda: state.update(_image=None, _source=None))
 
     def present(self, image: QtGui.QImage | None) -> None:
         """Show an image; None clears the item. On the GUI thread only."""

@@ -87,7 +87,7 @@ class SharedStream(QtCore.QObject):
         self._linger.setSingleShot(True)
         self._linger.setInterval(_LINGER)
         self._linger.timeout.connect(self.close)
-        session.node_changed.connect(self._node_changed)
+        self._detach = session.attach(self, node_changed=self._node_changed)
 
     @classmethod
     def join(
@@ -117,6 +117,7 @@ class SharedStream(QtCore.QObject):
     def close(self) -> None:
         """End the stream; safe to call twice."""
         self.stream.close()
+        self._detach()
         if not is_alive(self):
             return
         self._linger.stop()

@@ -52,6 +52,8 @@ class ImageTransportSubscription(TopicElement):
     lostChanged = Signal()
     problemChanged = Signal()
 
+    _HOLDS = ("_frame", "_stream", "_have")
+
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
@@ -282,17 +284,19 @@ class ImageTransportSubscription(TopicElement):
         now = dict(_START)
         if shared is not None:
             network, processing, latency = shared.latencies
-            now = {
+            now |= {
                 "subscribed": shared.stream.subscribed,
                 "transport": shared.stream.transport,
-                "framerate": shared.frame_rate,
-                "networkLatency": network,
-                "processingLatency": processing,
-                "latency": latency,
                 "dropped": shared.dropped,
                 "lost": shared.lost,
                 "problem": shared.stream.problem,
             }
+            if not self._stale:
+                # How fast pictures came once says nothing about one that is not live.
+                now["framerate"] = shared.frame_rate
+                now["networkLatency"] = network
+                now["processingLatency"] = processing
+                now["latency"] = latency
         now["problem"] = self._problem or now["problem"]
         for name, value in now.items():
             before = self._values[name]

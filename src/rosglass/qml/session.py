@@ -11,7 +11,7 @@ from rosglass.comm.executor import Dispatcher
 from rosglass.comm.graph import ConnectionState, Status
 from rosglass.errors import ConnectionLostError, Error, InvalidNameError
 from rosglass.qml.executor import GuiExecutor
-from rosglass.qt import QtCore, Signal
+from rosglass.qt import QtCore, Signal, is_alive
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -90,6 +90,10 @@ class Session(QtCore.QObject):
         self._ticker = QtCore.QTimer(self)
         self._ticker.setInterval(TICK)
         self._ticker.timeout.connect(self.tick)
+        self._handlers: dict[str, dict[int, tuple[QtCore.QObject, Callable[[], None]]]] = {}
+        for signal in ("node_changed", "connection_changed", "graph_changed", "tick"):
+            handlers = self._handlers[signal] = {}
+            getattr(self, signal).connect(lambda handlers=handlers: _call_all(handlers))
         app = QtCore.QCoreApplication.instance()
         if app is not None:
             app.aboutToQuit.connect(self.close)
@@ -238,6 +242,29 @@ class Session(QtCore.QObject):
 
         self._worker.post(run)
 
+    def attach(self, item: QtCore.QObject, **handlers: Callable[[], None]) -> Callable[[], None]:
+        """Have signals handled for an object.
+
+        Plain calls, because a signal connected to a method of an object that QML destroys, or
+        extends, keeps being delivered to what is left of it, or is not delivered at all.
+
+        Args:
+            item: The object.
+            handlers: What to call, by name of the signal.
+
+        Returns:
+            A function that ends it, to be called when the object is destroyed.
+        """
+        key = id(item)
+        for name, handler in handlers.items():
+            self._handlers[name][key] = (item, handler)
+
+        def detach() -> None:
+            for name in handlers:
+                self._handlers[name].pop(key, None)
+
+        return detach
+
     def use_ticks(self, wanted: bool) -> None:
         """Start or stop taking part in :attr:`tick`; an idle program has none."""
         self._ticking += 1 if wanted else -1
@@ -314,6 +341,16 @@ class Session(QtCore.QObject):
         if (self.state, self.detail) != before or not self.is_initialized:
             _log.info("%s: %s", self.state, self.detail or "no node")
             self.connection_changed.emit()
+
+
+def _call_all(handlers: dict[int, tuple[QtCore.QObject, Callable[[], None]]]) -> None:
+    for item, handler in list(handlers.values()):
+        # Any of them may have destroyed others.
+        if is_alive(item):
+            try:
+                handler()
+            except Exception:
+                _log.exception("internal error in %s", type(item).__name__)
 
 
 def _with_domain(url: str, domain: int) -> str:

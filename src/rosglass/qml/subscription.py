@@ -89,6 +89,8 @@ class Subscription(TopicElement):
     problemChanged = Signal()
     newMessage = Signal(QJSValue, arguments=["message"])
 
+    _HOLDS = ("_sample", "_value", "_feed", "_have")
+
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
