@@ -228,6 +228,13 @@ def test_arrays_fit(bench: Any, script: str, expected: list) -> None:
     np.testing.assert_array_equal(scan["ranges"], expected)
 
 
+@pytest.mark.parametrize("count", [3, 500])
+def test_exact_integers_fit_into_arrays(bench: Any, count: int) -> None:
+    script = f"{{data: Array({count}).fill('{2**63 - 1}')}}"
+    data = convert(bench, "std_msgs/msg/Int64MultiArray", script)["data"]
+    assert list(data) == [2**63 - 1] * count
+
+
 def test_byte_buffers_fit(bench: Any) -> None:
     image = convert(bench, "sensor_msgs/msg/Image", "{data: new Uint8Array([1, 2, 255]).buffer}")
     assert bytes(image["data"]) == b"\x01\x02\xff"
@@ -252,6 +259,7 @@ def test_received_messages_can_be_sent_back(bench: Any, count: int) -> None:
         ("geometry_msgs/msg/Twist", "{linear: {x: 'fast'}}", "linear.x", "'fast'"),
         ("geometry_msgs/msg/Twist", "{linear: 5}", "linear", "geometry_msgs/msg/Vector3"),
         ("geometry_msgs/msg/Twist", "{linear: {q: 1}}", "linear.q", "q"),
+        ("geometry_msgs/msg/Twist", "{linear: {q: 'x'}}", "linear.q", "got 'x'"),
         ("geometry_msgs/msg/Twist", "[1]", "", "an object with"),
         ("geometry_msgs/msg/Twist", "undefined", "", "an object with"),
         ("geometry_msgs/msg/Twist", "new Map([[1, 2]])", "", "Map"),
@@ -261,6 +269,9 @@ def test_received_messages_can_be_sent_back(bench: Any, count: int) -> None:
         ("std_msgs/msg/Int32", "{data: true}", "data", "True"),
         ("std_msgs/msg/Int32", "{data: null}", "data", "None"),
         ("std_msgs/msg/Int32", "{data: function() {}}", "data", "a function"),
+        ("std_msgs/msg/Int64", "{data: '9'.repeat(5000)}", "data", "'9999"),
+        ("std_msgs/msg/Int64MultiArray", "{data: Array(99).fill('x')}", "data[0]", "'x'"),
+        ("sensor_msgs/msg/Joy", "{axes: Array(4e9)}", "axes", "4000000000"),
         ("std_msgs/msg/Bool", "{data: 1}", "data", "1"),
         ("std_msgs/msg/String", "{data: 5}", "data", "5"),
         ("tf2_msgs/msg/TFMessage", "{transforms: 5}", "transforms", "an array"),

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 __all__ = ["fields_from_js", "qos_from_js"]
 
-_WHOLE = re.compile(r"-?[0-9]+\Z")
+#: No 64-bit integer has more digits.
+_WHOLE = re.compile(r"-?0*[0-9]{1,20}\Z")
 _TYPED = {
     "Int8Array": "i1",
     "Uint8Array": "u1",
@@ -34,6 +35,8 @@ _TYPED = {
 }
 #: Arrays longer than this cross into Python in one call instead of one call per element.
 _BULK = 32
+#: Longer arrays than this are a mistake (``a.length = 4e9``) that would freeze the screen.
+_LONGEST = 1 << 24
 
 
 def fields_from_js(value: QJSValue, schema: Schema, path: str = "") -> dict[str, Any]:
@@ -77,7 +80,7 @@ def _read(names: list[str], value: QJSValue, schema: Schema, path: str) -> dict[
         member = schema.by_name.get(name)
         # An unknown field goes along: the codec refuses it and names those that exist.
         here = f"{path}.{name}" if path else name
-        fields[name] = None if member is None else _field(inner, member, here)
+        fields[name] = _shown(inner) if member is None else _field(inner, member, here)
     return fields
 
 
@@ -101,10 +104,18 @@ def _elements(value: QJSValue, member: Member, path: str) -> Any:
         # A received array on its way back, untouched: no need to fetch it into JavaScript.
         held: Any = source.toQObject()
         return held.arrays[value.property("#index").toInt()][1]
-    length = value.property("length").toInt()
+    count = value.property("length").toNumber()
+    if count > _LONGEST:
+        raise ConversionError(
+            path, _Shown(f"{count:.0f}"), f"an array of at most {_LONGEST} elements"
+        )
+    length = int(count)
     if length > _BULK and member.struct is None:
         whole = member.number is not None and member.number.low is not None
-        return [_integral(v) if whole else v for v in value.toVariant()]
+        elements = value.toVariant()
+        if _is_wide(member):
+            return [_wide(v) if isinstance(v, str) else _integral(v) for v in elements]
+        return [_integral(v) if whole else v for v in elements]
     return [_single(value.property(i), member, f"{path}[{i}]") for i in range(length)]
 
 
@@ -128,11 +139,18 @@ def _single(value: QJSValue, member: Member, path: str) -> Any:
         return _integral(number) if whole else number
     if value.isString():
         text = value.toString()
-        wide = member.number is not None and member.number.code in "qQ"
-        return int(text) if wide and _WHOLE.match(text) else text
+        return _wide(text) if _is_wide(member) else text
     if value.isBool():
         return value.toBool()
     return _shown(value)
+
+
+def _is_wide(member: Member) -> bool:
+    return member.number is not None and member.number.code in "qQ"
+
+
+def _wide(text: str) -> int | str:
+    return int(text) if _WHOLE.match(text) else text
 
 
 def _integral(value: Any) -> Any:
