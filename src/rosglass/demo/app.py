@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rosglass.demo import pictures
+from rosglass.demo import keyboard, pictures
 from rosglass.demo.figures import CameraFigures, Latency, ProcessFigures, table
 from rosglass.errors import Error, QmlError
 from rosglass.qml import Session
@@ -57,6 +57,7 @@ class Cockpit:
             QtQuick.QQuickWindow.TextRenderType.NativeTextRendering
         )
         pictures.register()
+        keyboard.register()
         self.session = Session(url)
         self._closed = False
         try:

@@ -1,6 +1,7 @@
 // The operator's cockpit: everything on one screen, usable with mouse, fingers or keyboard.
 import QtQuick
 import Ros2 1.0
+import RosglassDemo 1.0
 
 Item {
     id: cockpit
@@ -19,9 +20,29 @@ Item {
     // Whether the window is the one that gets the keys.
     property bool inFront: true
     readonly property bool wide: width > 1.15 * height
+    // Whether the panels have room; in a smaller window only picture, stick and stop are left.
+    readonly property bool roomy: wide ? width >= 620 && height >= 400
+                                       : width >= 440 && height >= (cramped ? 640 : 520)
+    readonly property real tall: height - bar.height - 2 * Theme.gap
+    // What a picture of 4:3 in full height leaves over.
+    readonly property real sideWidth: Math.max(280, Math.min(420, width - 3 * Theme.gap - tall * 4 / 3))
+    readonly property real cameraWidth: width - 2 * Theme.gap
+        - (wide && roomy ? sideWidth + Theme.gap : 0)
+    // On a picture this small the controls would hide one another: they go below it.
+    readonly property bool cramped: width - 2 * Theme.gap - (wide ? sideWidth + Theme.gap : 0) < 520
+    readonly property real strip: cramped && roomy ? 140 : 0
+    readonly property real cameraTall: !roomy || wide && !cramped ? tall
+        : Math.min(cameraWidth * 0.75, tall - strip - (wide ? 0 : Math.max(200, tall * 0.36) + Theme.gap))
+    readonly property real control: strip > 0 ? strip - 20
+        : Math.min(width * 0.36, tall * 0.6, Math.max(110, Math.min(170, cameraTall * 0.24)))
     // How far the controls stay above the picture's lower edge, where its clock is.
     readonly property real rim: camera.height - camera.pictureRect.y - camera.pictureRect.height
         + camera.pictureRect.height * 26 / 480 + 12
+    readonly property real margin: cockpit.cramped ? 6 : 22
+    // Where the controls' lower edges are.
+    readonly property real floor: strip > 0
+        ? camera.y + cameraTall + (wide ? (tall - cameraTall + control) / 2 : control + 10)
+        : camera.y + cameraTall - rim
 
     focus: true
 
@@ -76,7 +97,7 @@ Item {
         id: keys
         drive: drive
     }
-    Keyboard {
+    HeldKeys {
         id: keyboard
         onLifted: function (key) { keys.lift(key) }
     }
@@ -85,71 +106,72 @@ Item {
         id: bar
         width: parent.width
         link: link
+        live: camera.live
         framerate: camera.framerate
         latency: camera.latency
     }
     CameraView {
         id: camera
         objectName: "camera"
-        anchors { left: parent.left; top: bar.bottom; margins: Theme.gap }
-        width: cockpit.wide ? side.x - 2 * Theme.gap : parent.width - 2 * Theme.gap
-        height: cockpit.wide ? parent.height - bar.height - 2 * Theme.gap
-                             : Math.min(width * 0.75, parent.height * 0.6)
+        x: Theme.gap
+        y: bar.height + Theme.gap
+        width: cockpit.cameraWidth
+        height: cockpit.cameraTall
         reason: link.reason
     }
     Item {
         id: side
-        readonly property real tall: cockpit.wide ? cockpit.height - bar.height - 2 * Theme.gap
-            : cockpit.height - camera.y - camera.height - 2 * Theme.gap
+        objectName: "side"
+        visible: cockpit.roomy
         x: cockpit.wide ? parent.width - width - Theme.gap : Theme.gap
-        y: cockpit.wide ? bar.height + Theme.gap : camera.y + camera.height + Theme.gap
-        // What a picture of 4:3 in full height leaves over.
-        width: !cockpit.wide ? cockpit.width - 2 * Theme.gap
-            : Math.max(280, Math.min(420, cockpit.width - 3 * Theme.gap - camera.height * 4 / 3))
-        height: tall
+        y: cockpit.wide ? camera.y : camera.y + cockpit.cameraTall + cockpit.strip + Theme.gap
+        width: cockpit.wide ? cockpit.sideWidth : cockpit.width - 2 * Theme.gap
+        height: cockpit.wide ? cockpit.tall : cockpit.height - y - Theme.gap
         readonly property real half: (width - Theme.gap) / 2
-        readonly property real mapTall: cockpit.wide ? Math.min(width * 0.86, tall * 0.42) : tall
-        readonly property real rowTall: cockpit.wide ? (tall - mapTall - 3 * Theme.gap - listTall) / 2
-            : (tall - Theme.gap) / 2
-        readonly property real listTall: Math.max(90, Math.min(148, tall * 0.2))
+        readonly property real second: half + Theme.gap
+        readonly property real mapTall: cockpit.wide
+            ? Math.min(width * 0.86, height * (height < 560 ? 0.32 : 0.42)) : height - listTall - Theme.gap
+        readonly property real rowTall: cockpit.wide ? (height - mapTall - 3 * Theme.gap - listTall) / 2
+            : (height - Theme.gap) / 2
+        readonly property real listTall: cockpit.wide ? Math.max(80, Math.min(148, height * 0.2))
+            : Math.max(80, Math.min(148, height * 0.4))
 
         MapView {
             id: map
-        objectName: "map"
+            objectName: "map"
             width: cockpit.wide ? parent.width : parent.half
             height: side.mapTall
         }
         Attitude {
             id: attitude
-        objectName: "attitude"
-            x: cockpit.wide ? 0 : side.half + Theme.gap
+            objectName: "attitude"
+            x: cockpit.wide ? 0 : side.second
             y: cockpit.wide ? side.mapTall + Theme.gap : 0
             width: cockpit.wide ? side.half : (side.half - Theme.gap) / 2
             height: side.rowTall
         }
         Battery {
             id: battery
-        objectName: "battery"
-            x: cockpit.wide ? side.half + Theme.gap : attitude.x + attitude.width + Theme.gap
+            objectName: "battery"
+            x: attitude.x + attitude.width + Theme.gap
             y: attitude.y
             width: attitude.width
             height: side.rowTall
         }
         Flippers {
             id: flippers
-        objectName: "flippers"
+            objectName: "flippers"
             x: attitude.x
             y: attitude.y + side.rowTall + Theme.gap
-            width: cockpit.wide ? side.width : attitude.width
+            width: cockpit.wide ? side.width : side.half
             height: side.rowTall
         }
         Diagnostics {
             id: diagnostics
-        objectName: "diagnostics"
-            x: cockpit.wide ? 0 : battery.x
-            y: cockpit.wide ? flippers.y + side.rowTall + Theme.gap : flippers.y
-            width: cockpit.wide ? side.width : battery.width
-            height: cockpit.wide ? side.listTall : side.rowTall
+            objectName: "diagnostics"
+            y: side.height - height
+            width: cockpit.wide ? side.width : side.half
+            height: side.listTall
         }
     }
 
@@ -157,6 +179,8 @@ Item {
         id: speed
         objectName: "speed"
         anchors { horizontalCenter: camera.horizontalCenter; bottom: camera.bottom; bottomMargin: cockpit.rim }
+        visible: cockpit.roomy
+        room: camera.width - 20 - (cockpit.strip > 0 ? 0 : 2 * cockpit.control + 100)
         odom: map.odom
         drive: drive
     }
@@ -164,21 +188,25 @@ Item {
         id: stick
         objectName: "stick"
         drive: drive
-        width: Math.max(110, Math.min(180, camera.height * 0.25))
+        width: cockpit.control
         height: width
-        anchors { left: camera.left; bottom: camera.bottom; leftMargin: 22; bottomMargin: cockpit.rim }
+        x: camera.x + cockpit.margin
+        y: cockpit.floor - height
     }
     Lamp {
         id: lamp
         objectName: "lamp"
-        anchors { right: stop.left; bottom: stop.bottom; rightMargin: 14 }
+        anchors { right: stop.left; bottom: stop.bottom; rightMargin: Math.min(14, cockpit.margin) }
+        visible: cockpit.roomy
     }
+    // Whatever else finds no room: this is inside the window, and on top.
     EmergencyStop {
         id: stop
         objectName: "stop"
         z: 1000
-        width: Math.max(110, Math.min(170, camera.height * 0.24))
+        width: cockpit.control
         height: width
-        anchors { right: camera.right; bottom: camera.bottom; rightMargin: 22; bottomMargin: cockpit.rim }
+        x: Math.max(0, camera.x + camera.width - cockpit.margin - width)
+        y: Math.max(0, Math.min(cockpit.height - height, cockpit.floor - height))
     }
 }

@@ -9,7 +9,7 @@ QtObject {
     property alias messageType: subscription.messageType
     property alias age: subscription.age
     // Seconds without a message after which the one received last is no longer true.
-    property real limit: 1.0
+    property real limit: 0.7
     // Whether to show a message at once instead of together with the next camera picture.
     property bool urgent: false
     property var message: undefined

@@ -8,9 +8,11 @@ Rectangle {
     required property var drive
     readonly property real forward: odom.received ? odom.message.twist.twist.linear.x : 0
     readonly property real turn: odom.received ? odom.message.twist.twist.angular.z : 0
+    // The widest it may be.
+    property real room: 400
     readonly property bool refused: drive.held && !drive.active
 
-    width: refused ? Math.max(200, text.implicitWidth + 40) : 200
+    width: refused ? Math.min(room, Math.max(200, text.implicitWidth + 40)) : Math.min(room, 200)
     height: 54
     radius: 12
     color: refused ? "#e0400812" : Theme.shade
@@ -20,6 +22,7 @@ Rectangle {
         anchors.centerIn: parent
         spacing: 22
         visible: !speed.refused
+        scale: Math.min(1, speed.width / 180)
         opacity: speed.odom.fresh ? 1 : 0.28
         component Reading: Column {
             property string value
@@ -52,6 +55,11 @@ Rectangle {
         id: text
         anchors.centerIn: parent
         visible: speed.refused
+        width: Math.min(implicitWidth, speed.width - 16)
+        horizontalAlignment: Text.AlignHCenter
+        wrapMode: Text.Wrap
+        maximumLineCount: 2
+        elide: Text.ElideRight
         text: "NOT DRIVING: " + (speed.drive.problem || speed.drive.obstacle || "let go first")
         color: Theme.text
         font { pixelSize: Theme.normal; weight: Font.Bold }

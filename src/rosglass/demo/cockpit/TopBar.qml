@@ -6,6 +6,8 @@ Rectangle {
     id: bar
 
     required property var link
+    // Whether the camera's figures are about now.
+    property bool live: false
     property real framerate: 0
     property real latency: -1
     height: 44
@@ -17,6 +19,7 @@ Rectangle {
         color: Theme.panelEdge
     }
     Row {
+        id: brand
         anchors { left: parent.left; leftMargin: 16; verticalCenter: parent.verticalCenter }
         spacing: 10
         Rectangle {
@@ -33,6 +36,7 @@ Rectangle {
         }
         Text {
             anchors.verticalCenter: parent.verticalCenter
+            visible: bar.width >= 600
             text: "rosglass"
             color: Theme.text
             font { pixelSize: 18; weight: Font.DemiBold; letterSpacing: 0.5 }
@@ -40,7 +44,9 @@ Rectangle {
     }
     Rectangle {
         objectName: "linkPill"
-        anchors.centerIn: parent
+        anchors.verticalCenter: parent.verticalCenter
+        x: Math.max(brand.x + brand.width + 10,
+                    Math.min((parent.width - width) / 2, figures.x - width - 10))
         width: state_.width + 44
         height: 28
         radius: 14
@@ -65,6 +71,8 @@ Rectangle {
         }
     }
     Row {
+        id: figures
+        visible: bar.width >= 400
         anchors { right: parent.right; rightMargin: 16; verticalCenter: parent.verticalCenter }
         spacing: 18
         component Figure: Column {
@@ -84,14 +92,16 @@ Rectangle {
             }
         }
         Figure {
+            objectName: "cameraRate"
             label: "camera"
-            value: bar.link.alive ? bar.framerate.toFixed(0) + " Hz" : "–"
+            value: bar.live ? bar.framerate.toFixed(0) + " Hz" : "–"
         }
         Figure {
             label: "latency"
-            value: bar.link.alive && bar.latency >= 0 ? bar.latency.toFixed(0) + " ms" : "–"
+            value: bar.live && bar.latency >= 0 ? bar.latency.toFixed(0) + " ms" : "–"
         }
         Figure {
+            visible: bar.width >= 560
             label: "time"
             value: clock.text
             Timer {
