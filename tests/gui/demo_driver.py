@@ -30,13 +30,17 @@ class CockpitProcess:
             "QSG_RENDER_LOOP": "threaded",
             "QT_LOGGING_RULES": "qt.multimedia.*=false",
         }
+        self._said: list[str] = []
         self._process = subprocess.Popen(
             [sys.executable, __file__, url],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
             env=environment,
             text=True,
         )
+        self._reader = threading.Thread(target=self._listen, daemon=True)
+        self._reader.start()
         self._ask("ready")
 
     def get(self, item: str, name: str) -> Any:
@@ -65,6 +69,15 @@ class CockpitProcess:
         """Move fingers at once: (action, finger, item, x, y)."""
         self._ask("touch", *fingers)
 
+    def resize(self, width: int, height: int) -> None:
+        """Give the window another size, whatever its least one is."""
+        self._ask("resize", width, height)
+
+    def place(self, item: str) -> tuple[float, float, float, float]:
+        """Return where a part is in the window: left, top, right, bottom."""
+        x, y, width, height = self._ask("place", item)
+        return x, y, x + width, y + height
+
     def cover(self, covered: bool) -> None:
         """Let another window take the keyboard, or give it back."""
         self._ask("cover", covered)
@@ -84,6 +97,11 @@ class CockpitProcess:
             time.sleep(0.02)
         return time.monotonic() - begin
 
+    def complaints(self) -> list[str]:
+        """Return what Qt and QML complained about so far."""
+        words = ("QML", "QFont", ".qml:", "Warning", "Error")
+        return [line for line in self._said if any(word in line for word in words)]
+
     def close(self) -> int:
         """End it; returns its exit code."""
         if self._process.poll() is None:
@@ -94,6 +112,12 @@ class CockpitProcess:
             except subprocess.TimeoutExpired:
                 self._process.kill()
         return self._process.wait()
+
+    def _listen(self) -> None:
+        assert self._process.stderr is not None
+        for line in self._process.stderr:
+            self._said.append(line.rstrip())
+            sys.stderr.write(line)
 
     def _ask(self, *request: Any) -> Any:
         assert self._process.stdin is not None
@@ -160,6 +184,15 @@ class _Driver:
         for action, finger, item, x, y in fingers:
             getattr(event, action)(finger, self._point(item, x, y), self.cockpit.window)
         event.commit()
+
+    def resize(self, width: int, height: int) -> None:
+        self.cockpit.window.setMinimumSize(self._core.QSize(1, 1))
+        self.cockpit.window.resize(width, height)
+
+    def place(self, item: str) -> Any:
+        found = self.cockpit.item(item)
+        corner = found.mapToScene(self._core.QPointF(0, 0))
+        return [corner.x(), corner.y(), found.property("width"), found.property("height")]
 
     def cover(self, covered: bool) -> None:
         self._other.setVisible(covered)

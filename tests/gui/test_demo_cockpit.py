@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 pytest.importorskip("PySide6.QtMultimedia", reason="the cockpit needs the extra `camera`")
 zenoh = pytest.importorskip("zenoh", reason="the cockpit needs the extra `zenoh`")
 
-from demo_driver import CockpitProcess  # noqa: E402
+from demo_driver import SIZE, CockpitProcess  # noqa: E402
 
 from rosglass.demo import framecode  # noqa: E402
 from rosglass.demo.camera import CODE_POSITION, HEIGHT, WIDTH  # noqa: E402
@@ -92,6 +92,7 @@ def window(robot: RobotSide) -> Iterator[CockpitProcess]:
         process = CockpitProcess(robot.url, screen.display)
         yield process
         assert process.close() == 0
+        assert process.complaints() == []
 
 
 @pytest.fixture
@@ -198,7 +199,9 @@ def test_a_key_held_down_neither_stutters_nor_drives_again_after_a_stop(
 ) -> None:
     cockpit.key("press", "Key_W")
     robot.until(lambda: robot.commands and robot.commands[-1][1] > 0)
+    robot.commands.clear()
     cockpit.repeat("Key_W", 12)
+    assert robot.commands
     assert all(c[1] > 0 for c in robot.commands), robot.commands
     cockpit.key("press", "Key_Space")
     robot.until(lambda: robot.stopped is True, 0.5)
@@ -279,6 +282,40 @@ def test_the_emergency_stop_stops_and_stays(
     assert robot.speed == 0.0
 
 
+@pytest.mark.parametrize(
+    ("width", "height"), [(640, 480), (800, 480), (640, 600), (480, 800), (320, 240), (900, 300)]
+)
+def test_nothing_hides_the_stop_in_a_small_window(
+    cockpit: CockpitProcess, width: int, height: int
+) -> None:
+    parts = ["stick", "lamp", "map", "attitude", "battery", "flippers", "diagnostics"]
+    try:
+        cockpit.resize(width, height)
+        cockpit.until("cockpit", "height", height)
+        left, top, right, bottom = cockpit.place("stop")
+        assert 0 <= left < right <= width
+        assert 0 <= top < bottom <= height
+        assert right - left >= 80
+        places = [cockpit.place(part) for part in parts if cockpit.get(part, "visible")]
+        places.append((left, top, right, bottom))
+        assert cockpit.get("map", "visible") == (min(width, height) >= 480)
+        for one in range(len(places)):
+            assert places[one][2] <= width
+            assert places[one][3] <= height
+            for other in range(one):
+                across = min(places[one][2], places[other][2]) - max(
+                    places[one][0], places[other][0]
+                )
+                down = min(places[one][3], places[other][3]) - max(places[one][1], places[other][1])
+                assert min(across, down) <= 0, "one part hides another"
+        cockpit.mouse("press", "mushroom", 0.5, 0.5)
+        cockpit.mouse("release", "mushroom", 0.5, 0.5)
+        assert cockpit.get("stop", "blocks")
+    finally:
+        cockpit.resize(*SIZE)
+        cockpit.until("cockpit", "height", SIZE[1])
+
+
 def test_a_second_finger_stops_while_the_first_one_drives(
     cockpit: CockpitProcess, robot: RobotSide
 ) -> None:
@@ -317,6 +354,7 @@ def test_a_killed_robot_is_seen_within_a_second_and_recovers_by_itself(
         cockpit.until(panel, "fresh", False, timeout=1.0)
     assert time.monotonic() - begin < 1.0
     assert cockpit.get("noSignal", "visible")
+    assert cockpit.get("cameraRate", "value") == "\u2013", "no figures of a picture that is gone"
     assert "ROBOT LOST" in cockpit.get("linkText", "text")
 
     dead = picture_of(cockpit, tmp_path / "dead.png").astype(int)

@@ -21,40 +21,44 @@ Panel {
     }
 
     Column {
-        anchors { left: parent.left; right: parent.right; verticalCenter: parent.verticalCenter }
-        spacing: 8
+        id: column
+        anchors.centerIn: parent
+        // Not a scale: the window's native text does not shrink well.
+        readonly property real part: Math.max(0.2, Math.min(1, parent.width / 128, parent.height / 105))
+        width: 128 * part
+        spacing: 8 * part
         Row {
             anchors.horizontalCenter: parent.horizontalCenter
             Text {
                 objectName: "charge"
                 text: panel.state_.received ? (100 * panel.share).toFixed(1) : "–"
                 color: panel.tint
-                font { pixelSize: 36; weight: Font.Light }
+                font { pixelSize: Math.round(36 * column.part); weight: Font.Light }
             }
             Text {
                 text: " %"
-                y: 16
+                y: 16 * column.part
                 color: Theme.dim
-                font.pixelSize: 16
+                font.pixelSize: Math.round(16 * column.part)
             }
         }
         Item {
             anchors.horizontalCenter: parent.horizontalCenter
-            width: Math.min(parent.width, 128)
-            height: 26
+            width: parent.width
+            height: 26 * column.part
             Rectangle {
-                anchors { fill: parent; rightMargin: 6 }
+                anchors { fill: parent; rightMargin: 6 * column.part }
                 radius: 5
                 color: "transparent"
                 border { color: Theme.faint; width: 2 }
                 Row {
-                    anchors { fill: parent; margins: 5 }
-                    spacing: 3
+                    anchors { fill: parent; margins: 5 * column.part }
+                    spacing: 3 * column.part
                     Repeater {
                         model: 10
                         Rectangle {
                             required property int index
-                            width: (parent.width - 27) / 10
+                            width: (parent.width - 9 * parent.spacing) / 10
                             height: parent.height
                             radius: 2
                             color: panel.share * 10 > index + 0.25 ? panel.tint : "#16202a"
@@ -64,7 +68,7 @@ Panel {
             }
             Rectangle {
                 anchors { right: parent.right; verticalCenter: parent.verticalCenter }
-                width: 4; height: 12; radius: 2
+                width: 4 * column.part; height: 12 * column.part; radius: 2
                 color: Theme.faint
             }
         }
@@ -73,7 +77,7 @@ Panel {
             text: !panel.state_.received ? ""
                 : (panel.charging ? "charging " : "") + Math.abs(panel.state_.message.current).toFixed(1) + " A"
             color: panel.charging ? Theme.good : Theme.dim
-            font.pixelSize: Theme.normal
+            font.pixelSize: Math.max(9, Math.round(Theme.normal * column.part))
         }
     }
 }

@@ -65,7 +65,7 @@ Item {
         height: 28
         radius: 14
         color: Theme.shade
-        visible: view.live
+        visible: view.live && width < output.contentRect.width - 24
         Row {
             id: label
             anchors.centerIn: parent
@@ -110,7 +110,7 @@ Item {
 
         Rectangle {
             anchors.centerIn: parent
-            width: Math.min(parent.width - 40, Math.max(380, banner.implicitWidth + 56))
+            width: Math.min(parent.width - 20, Math.max(380, banner.implicitWidth + 56))
             height: banner.height + 36
             radius: Theme.radius
             color: "#f0200409"
@@ -118,13 +118,13 @@ Item {
             Column {
                 id: banner
                 anchors.centerIn: parent
-                width: Math.min(implicitWidth, view.width - 80)
+                width: Math.max(1, Math.min(implicitWidth, view.width - 40))
                 spacing: 8
                 Text {
                     anchors.horizontalCenter: parent.horizontalCenter
                     text: !view.late ? "NO SIGNAL" : view.latency > 0 ? "PICTURE DELAYED" : "CLOCKS DIFFER"
                     color: Theme.bad
-                    font { pixelSize: 38; weight: Font.Black; letterSpacing: 3 }
+                    font { pixelSize: Math.max(12, Math.min(38, view.width / 14)); weight: Font.Black; letterSpacing: view.width / 200 }
                     SequentialAnimation on opacity {
                         running: !view.live
                         loops: Animation.Infinite
@@ -146,7 +146,7 @@ Item {
                 }
                 Text {
                     anchors.horizontalCenter: parent.horizontalCenter
-                    width: Math.min(implicitWidth, view.width - 90)
+                    width: Math.max(1, Math.min(implicitWidth, view.width - 50))
                     visible: text !== ""
                     text: view.late ? "or the clocks of robot and cockpit differ by that much"
                         : view.reason || camera.problem

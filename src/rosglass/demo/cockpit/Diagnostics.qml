@@ -54,13 +54,14 @@ Panel {
                 id: name
                 x: 16
                 anchors.verticalCenter: parent.verticalCenter
-                width: 82
+                width: Math.min(82, row.width * 0.4)
                 text: row.modelData.name
                 color: Theme.text
                 elide: Text.ElideRight
                 font.pixelSize: Theme.normal
             }
             Text {
+                visible: width > 24
                 anchors { left: name.right; right: value.left; rightMargin: 8; verticalCenter: parent.verticalCenter }
                 text: row.modelData.text
                 color: row.modelData.level === 0 ? Theme.dim : row.tint

@@ -66,7 +66,8 @@ Item {
         }
     }
 
-    onPendingChanged: settle()
+    // Not at once: it may change what this is computed from.
+    onPendingChanged: Qt.callLater(settle)
 
     property Feed state_: Feed {
         topic: "/emergency_stop/state"
@@ -122,7 +123,7 @@ Item {
                 anchors.horizontalCenter: parent.horizontalCenter
                 text: stop.stopped ? "STOPPED" : "STOP"
                 color: "white"
-                font { pixelSize: stop.stopped ? 23 : 34; weight: Font.Black; letterSpacing: 1 }
+                font { pixelSize: stop.width * (stop.stopped ? 0.125 : 0.2); weight: Font.Black; letterSpacing: 1 }
             }
             Text {
                 objectName: "confirmation"
@@ -133,7 +134,7 @@ Item {
                     : stop.stopped ? (stop.wanted ? "confirmed" : "by someone else")
                     : stop.known ? "space bar" : "state unknown"
                 color: stop.overdue ? "#ffe24a" : "#ffd9dc"
-                font { pixelSize: 12; weight: stop.overdue ? Font.Black : Font.Medium }
+                font { pixelSize: Math.max(8, stop.width * 0.07); weight: stop.overdue ? Font.Black : Font.Medium }
             }
         }
     }
@@ -156,7 +157,7 @@ Item {
         objectName: "unlock"
         anchors { horizontalCenter: parent.horizontalCenter; bottom: parent.top; bottomMargin: 10 }
         visible: stop.blocks
-        width: 150
+        width: Math.min(150, stop.width + 12)
         height: 34
         radius: 17
         color: Theme.shade

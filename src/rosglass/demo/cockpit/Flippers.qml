@@ -135,6 +135,8 @@ Panel {
     }
     Item {
         anchors.centerIn: parent
+        // With both flippers up or down it is 100 high, stretched out 170 wide, beside the sliders.
+        scale: Math.max(0, Math.min(1, parent.height / 100, (parent.width - 80) / 170))
         Rectangle {
             x: -44; y: -12; width: 88; height: 24; radius: 12
             color: "#2a3743"

@@ -9,9 +9,11 @@ Rectangle {
     // Seconds since the newest data, -1 for never.
     property real age: 0
     property string note
+    readonly property bool small: height < 110
     default property alias content: body.data
 
     color: Theme.panel
+    clip: true
     radius: Theme.radius
     border.color: fresh ? Theme.panelEdge : Theme.bad
     border.width: 1
@@ -19,7 +21,7 @@ Rectangle {
     Text {
         id: heading
         anchors { left: parent.left; right: aside.left; top: parent.top }
-        anchors { leftMargin: 12; rightMargin: 6; topMargin: 9 }
+        anchors { leftMargin: 12; rightMargin: 6; topMargin: panel.small ? 6 : 9 }
         elide: Text.ElideRight
         text: panel.title.toUpperCase()
         color: Theme.dim
@@ -37,7 +39,7 @@ Rectangle {
         id: body
         anchors {
             fill: parent
-            leftMargin: 12; rightMargin: 12; topMargin: 30; bottomMargin: 10
+            leftMargin: 12; rightMargin: 12; topMargin: panel.small ? 24 : 30; bottomMargin: panel.small ? 5 : 10
         }
         opacity: panel.fresh ? 1 : 0.28
         Behavior on opacity { NumberAnimation { duration: 120 } }

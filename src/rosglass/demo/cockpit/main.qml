@@ -5,10 +5,11 @@ import Ros2 1.0
 Window {
     id: window
     objectName: "window"
-    width: 1340
-    height: 800
-    minimumWidth: 640
-    minimumHeight: 480
+    // Not every window manager brings a window that is larger than the screen back onto it.
+    width: Math.min(1340, Screen.width, Screen.desktopAvailableWidth)
+    height: Math.min(800, Screen.height, Screen.desktopAvailableHeight)
+    minimumWidth: Math.min(640, Screen.width)
+    minimumHeight: Math.min(480, Screen.height)
     visible: true
     color: Theme.background
     title: "rosglass cockpit"
