@@ -127,6 +127,15 @@ def test_a_scan_that_stops_is_stale(running: Any, view: Any, wait: Callable[...,
     wait(lambda: not element.property("stale"))
 
 
+def test_a_destroyed_picture_is_not_subscribed_any_more(
+    running: Any, view: Any, wait: Callable[..., None]
+) -> None:
+    laser = running.robot.create_publisher("/scan", "sensor_msgs/msg/LaserScan")
+    wait(laser.subscription_count)
+    view.property("scan").deleteLater()
+    wait(lambda: laser.subscription_count() == 0)
+
+
 class Window:
     """As much of a window as the figures need."""
 

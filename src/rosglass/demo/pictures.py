@@ -127,6 +127,8 @@ class _Picture(TopicElement):
     staleChanged, problemChanged = Signal(), Signal()  # noqa: N815 - Qt's
     _painted = Signal(object)
 
+    _HOLDS = ("_provider", "_subscription", "_have")
+
     def __init__(self, parent: QtCore.QObject | None = None) -> None:
         super().__init__(parent)
         self._patience, self._age = 0.0, -1.0
@@ -154,6 +156,7 @@ class _Picture(TopicElement):
             return
         self._have = want
         if self._subscription is not None:
+            self._at_end.pop("picture", None)
             self._subscription.close()
             self._subscription = None
         if want is None:
@@ -165,9 +168,12 @@ class _Picture(TopicElement):
             self._provider = _Provider()
             engine.addImageProvider(self._name, self._provider)
         try:
-            self._subscription = want[0].create_subscription(
+            subscription = self._subscription = want[0].create_subscription(
                 topic, self.kind, self._on_message, self.qos, executor=self._painter
             )
+            session = self._session
+            assert session is not None
+            self._at_end["picture"] = lambda: session.background(subscription.close)
             self._say("")
         except Error as error:
             self._say(str(error))
