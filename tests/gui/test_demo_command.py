@@ -114,6 +114,7 @@ def test_a_robot_that_never_comes_is_a_failure(tmp_path: Path, url: str) -> None
     output, _ = process.communicate(timeout=60)
     assert process.returncode == 1
     assert "no camera picture and no odometry ever arrived" in output
+    assert "not measured, no picture" in output
 
 
 @pytest.mark.parametrize(

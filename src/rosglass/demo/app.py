@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -135,6 +136,8 @@ class Cockpit:
         # Elements say goodbye to the session, so they have to go first.
         self._runner.close()
         self.session.close()
+        # PySide takes down what is left in any order at the end of the program, and may crash.
+        gc.collect()
 
     def topics(self) -> list[Any]:
         """Return the interface's subscriptions and pictures, one for each topic, by topic."""
@@ -163,6 +166,12 @@ class Cockpit:
             )
         stream = self.item("cameraStream")
         latency = Latency.of(self.camera.latencies)
+        measured = (
+            f"median {latency.median:.1f} ms, 95 % within {latency.p95:.1f} ms, "
+            f"worst {latency.worst:.1f} ms ({latency.count} pictures)"
+            if latency.count
+            else "not measured, no picture of the simulated camera was shown"
+        )
         rows.append(
             [
                 "/camera/image_raw",
@@ -172,11 +181,7 @@ class Cockpit:
             ]
         )
         driven = self.item("map").property("driven")
-        shown = (
-            f"camera, from the robot's stamp to the screen: median {latency.median:.1f} ms, "
-            f"95 % within {latency.p95:.1f} ms, worst {latency.worst:.1f} ms "
-            f"({latency.count} pictures)"
-        )
+        shown = f"camera, from the robot's stamp to the screen: {measured}"
         cost = (
             f"cockpit: {100 * self.process.cpu():.0f} % of a core, "
             f"{self.process.memory():.0f} MiB; robot: {driven:.1f} m driven"
