@@ -340,6 +340,11 @@ def test_a_stop_by_somebody_else_is_shown_and_not_undone(
     assert cockpit.get("confirmation", "text") == "by someone else"
     time.sleep(0.5)
     assert robot.stopped
+    cockpit.call("stop", "release")
+    cockpit.until("stop", "stopped", False, timeout=1.0)
+    other.publish(data=True)
+    cockpit.until("stop", "stopped", timeout=1.0)
+    assert cockpit.get("confirmation", "text") == "held by someone else"
 
 
 def test_a_killed_robot_is_seen_within_a_second_and_recovers_by_itself(
@@ -371,6 +376,9 @@ def test_a_killed_robot_is_seen_within_a_second_and_recovers_by_itself(
     cockpit.until("camera", "live", timeout=15)
     cockpit.until("link", "alive", timeout=2)
     assert not cockpit.get("noSignal", "visible")
+    assert cockpit.get("camera", "framerate") == -1, "a mean with the interruption in it"
+    cockpit.until("camera", "settled")
+    assert cockpit.get("camera", "framerate") > 0
     back = picture_of(cockpit, tmp_path / "back.png")
     assert code_in(back).age(time.time_ns()) < 1.0
 

@@ -21,7 +21,10 @@ Item {
     readonly property real latency: camera.latency
     readonly property bool late: received && !camera.stale && Math.abs(latency) > 1000
     readonly property bool live: received && age <= limit && !camera.stale && !late
-    readonly property real framerate: camera.framerate
+    // -1 for unknown: the stream's is a mean over some pictures, and of an interruption among them.
+    readonly property real framerate: settled ? camera.framerate : -1
+    property bool settled: false
+    onLiveChanged: settled = false
     // Where the picture is, in this item's coordinates.
     readonly property rect pictureRect: output.contentRect
 
@@ -42,6 +45,11 @@ Item {
             view.received = true
             Beat.picture()
         }
+    }
+    Timer {
+        interval: 1200
+        running: view.live && !view.settled
+        onTriggered: view.settled = true
     }
     Timer {
         interval: 100
@@ -91,7 +99,7 @@ Item {
             }
             Text {
                 anchors.verticalCenter: parent.verticalCenter
-                text: "front camera   " + view.framerate.toFixed(0) + " Hz   "
+                text: "front camera   " + (view.framerate < 0 ? "" : view.framerate.toFixed(0) + " Hz   ")
                     + (view.latency >= 0 ? view.latency.toFixed(0) + " ms" : "")
                 color: Theme.dim
                 font.pixelSize: Theme.small

@@ -14,6 +14,8 @@ Item {
     readonly property bool stopped: known && state_.message.data
     readonly property bool pending: wanted !== null && (!known || stopped !== wanted)
     property bool overdue: false
+    // Released here, and at once stopped again: somebody else holds it.
+    property bool contested: false
     property int sent: 0
     property string problem
     // For others: whether driving makes sense.
@@ -32,6 +34,7 @@ Item {
 
     function release() {
         wanted = false
+        sinceRelease.restart()
         begin()
     }
 
@@ -66,6 +69,7 @@ Item {
         }
     }
 
+    onStoppedChanged: contested = stopped && wanted !== true && sinceRelease.running
     // Not at once: it may change what this is computed from.
     onPendingChanged: Qt.callLater(settle)
 
@@ -84,6 +88,10 @@ Item {
         id: deadline
         interval: 500
         onTriggered: stop.overdue = stop.pending
+    }
+    Timer {
+        id: sinceRelease
+        interval: 3000
     }
     // A stop is never given up. A release is: it must not undo, much later, somebody else's stop.
     Timer {
@@ -131,7 +139,8 @@ Item {
                 horizontalAlignment: Text.AlignHCenter
                 text: stop.overdue ? "NOT CONFIRMED\n" + (stop.problem ? "not sent" : "sending…")
                     : stop.pending ? "sending…"
-                    : stop.stopped ? (stop.wanted ? "confirmed" : "by someone else")
+                    : stop.stopped ? (stop.wanted ? "confirmed"
+                        : stop.contested ? "held by someone else" : "by someone else")
                     : stop.known ? "space bar" : "state unknown"
                 color: stop.overdue ? "#ffe24a" : "#ffd9dc"
                 font { pixelSize: Math.max(8, stop.width * 0.07); weight: stop.overdue ? Font.Black : Font.Medium }

@@ -8,7 +8,7 @@ Rectangle {
     required property var link
     // Whether the camera's figures are about now.
     property bool live: false
-    property real framerate: 0
+    property real framerate: -1
     property real latency: -1
     height: 44
     color: Theme.panel
@@ -94,7 +94,7 @@ Rectangle {
         Figure {
             objectName: "cameraRate"
             label: "camera"
-            value: bar.live ? bar.framerate.toFixed(0) + " Hz" : "–"
+            value: bar.live && bar.framerate >= 0 ? bar.framerate.toFixed(0) + " Hz" : "–"
         }
         Figure {
             label: "latency"
