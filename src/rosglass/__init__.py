@@ -71,8 +71,14 @@ _HOMES = {
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 
+#: Reached as attributes, too: `rosglass.comm.IMMEDIATE`.
+_PACKAGES = ("comm", "connection", "errors", "interfaces", "images", "messages", "qml", "ros2")
+
+
 def __getattr__(name: str) -> object:
     # Imported on first use, so that `import rosglass` and `rosglass --help` stay quick.
+    if name in _PACKAGES:
+        return import_module(f"rosglass.{name}")
     module = _HOME_OF.get(name, "rosglass.errors" if name in __all__ else "")
     if not module:
         raise AttributeError(f"module 'rosglass' has no attribute {name!r}")

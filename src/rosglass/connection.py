@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import itertools
 import os
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from rosglass.errors import ConversionError, UnsupportedError
+from rosglass.interfaces import Library
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from rosglass.comm import Node
-    from rosglass.interfaces import Library
 
 __all__ = ["connect", "default_url"]
 
@@ -60,7 +61,12 @@ def connect(
         url = default_url(os.environ)
     if not isinstance(url, str):
         raise ConversionError("url", url, f"a text such as {_EXAMPLE}")
-    scheme, separator, _ = url.partition("://")
+    scheme, separator, rest = url.partition("://")
+    scheme = scheme.lower()
+    if separator:
+        url = f"{scheme}://{rest}"
+    if library is not None and not isinstance(library, Library):
+        raise ConversionError("library", library, "a rosglass.Library, or None for the shared one")
     if scheme != "zenoh" or not separator:
         reason = _REFUSED.get(scheme, f"unknown scheme {scheme!r}" if separator else "no scheme")
         raise UnsupportedError(
@@ -98,6 +104,11 @@ def default_url(env: Mapping[str, str]) -> str:
 
 def _connect_zenoh(url: str, name: str, namespace: str, library: Library | None) -> Node:
     # Zenoh's package is an extra, and takes a while to import.
+    if find_spec("zenoh") is None or find_spec("xxhash") is None:
+        raise UnsupportedError(
+            f"cannot connect to {url!r}: Zenoh is not installed; "
+            'install it with: pip install "rosglass[zenoh]"'
+        )
     from rosglass.ros2.node import Ros2Node  # noqa: PLC0415
     from rosglass.ros2.zenoh_options import ZenohOptions  # noqa: PLC0415
 

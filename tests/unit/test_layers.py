@@ -78,3 +78,7 @@ def test_public_names_are_all_there() -> None:
     assert dir(rosglass) == sorted(rosglass.__all__)
     with pytest.raises(AttributeError, match="no attribute 'conect'"):
         rosglass.conect  # noqa: B018
+
+
+def test_packages_are_attributes() -> None:
+    assert run("import rosglass; print(rosglass.comm.IMMEDIATE is not None)") == "True"

@@ -29,12 +29,14 @@ def build_parser(command: str | None = None) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="rosglass",
         description="A glass cockpit for robots: operator screens for ROS, without ROS installed.",
-        epilog="Every command has its own --help. Documentation: docs/index.md",
+        epilog="Every command has its own --help. The guide: docs/index.md in the source.",
     )
     parser.add_argument("--version", action="version", version=f"rosglass {rosglass.__version__}")
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name, (module, summary) in COMMANDS.items():
-        sub = subparsers.add_parser(name, help=summary, description=summary.capitalize() + ".")
+        sub = subparsers.add_parser(
+            name, help=summary, description=f"{summary[0].upper()}{summary[1:]}."
+        )
         sub.add_argument(
             "-v", "--verbose", action="count", default=0, help="show more; -vv shows everything"
         )

@@ -84,3 +84,6 @@ class Status:
 
     state: ConnectionState
     detail: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.state.name}: {self.detail}" if self.detail else self.state.name

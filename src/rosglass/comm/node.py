@@ -64,16 +64,20 @@ class Publisher(Handle):
     type: MessageType
     qos: QoS
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.topic} [{self.type.name}]>"
+
     @overload
     def publish(self, message: Message | dict[str, Any], /) -> None: ...
     @overload
     def publish(self, /, **fields: Any) -> None: ...
     @abstractmethod
-    def publish(self, message: Message | dict[str, Any] | None = None, /, **fields: Any) -> None:
+    def publish(self, message: Message | dict[str, Any] = ..., /, **fields: Any) -> None:
         """Send a message.
 
         Args:
             message: A :class:`Message`, or a dict of fields; missing fields get their defaults.
+                None is refused: it is what a function that forgot its return gives.
             fields: The fields as keyword arguments, instead of `message`.
 
         Raises:
@@ -104,6 +108,9 @@ class Node(Handle):
     name: str
     namespace: str
     wire: str
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.resolve(self.name)} on {self.url}>"
 
     @abstractmethod
     def create_publisher(

@@ -8,14 +8,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import TYPE_CHECKING
 
+from rosglass.comm.time import Duration
 from rosglass.errors import UnsupportedError
 
-if TYPE_CHECKING:
-    from rosglass.comm.time import Duration
-
 __all__ = ["Durability", "History", "Liveliness", "QoS", "Reliability"]
+
+
+#: What rmw's profile can carry (a signed 32-bit integer in every middleware).
+_MAX_DEPTH = 2**31 - 1
 
 
 class Reliability(Enum):
@@ -59,6 +60,9 @@ class QoS:
         lifespan: Age at which a sample is worthless, None for no limit.
         liveliness: How a publisher's liveliness is asserted.
         lease_duration: Time without assertion after which it counts as dead, None for no limit.
+
+    Raises:
+        UnsupportedError: A policy has a value that it cannot have.
     """
 
     depth: int = 10
@@ -71,11 +75,28 @@ class QoS:
     lease_duration: Duration | None = None
 
     def __post_init__(self) -> None:
-        if isinstance(self.depth, bool) or not isinstance(self.depth, int) or self.depth < 1:
+        if type(self.depth) is not int or not 1 <= self.depth <= _MAX_DEPTH:
             raise UnsupportedError(
-                f"QoS depth must be an integer of at least 1, got {self.depth!r}; "
+                f"QoS depth must be an integer from 1 to {_MAX_DEPTH}, got {self.depth!r}; "
                 "use History.KEEP_ALL to keep every sample"
             )
+        for name, kind in (
+            ("reliability", Reliability),
+            ("durability", Durability),
+            ("history", History),
+            ("liveliness", Liveliness),
+        ):
+            value = getattr(self, name)
+            if not isinstance(value, kind):
+                choices = " or ".join(f"{kind.__name__}.{member.name}" for member in kind)
+                raise UnsupportedError(f"QoS {name} must be {choices}, got {value!r}")
+        for name in ("deadline", "lifespan", "lease_duration"):
+            value = getattr(self, name)
+            if value is not None and not (isinstance(value, Duration) and value > Duration()):
+                raise UnsupportedError(
+                    f"QoS {name} must be a Duration above zero, e.g. "
+                    f"Duration.from_seconds(0.5), or None for no limit; got {value!r}"
+                )
 
     @classmethod
     def sensor_data(cls) -> QoS:

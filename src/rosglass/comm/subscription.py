@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from rosglass.comm.node import Executor, Handle
 from rosglass.comm.qos import History, QoS
 from rosglass.comm.time import Duration, Time
+from rosglass.errors import ConversionError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -72,7 +73,8 @@ class Statistics:
 class Subscription(Handle):
     """Receives the messages of one topic.
 
-    Worlds create it, call :meth:`deliver` from their threads, and pass `on_close`.
+    Worlds create it, call :meth:`deliver` from their threads, and pass `on_close`. Once closed, it
+    has nothing more to take: :attr:`closed` tells a polling loop when to end.
 
     Attributes:
         topic: Absolute topic name.
@@ -89,6 +91,11 @@ class Subscription(Handle):
         raw_callback: Callable[[Sample], None] | None = None,
         on_close: Callable[[Subscription], None] | None = None,
     ) -> None:
+        for name, given in (("callback", callback), ("raw_callback", raw_callback)):
+            if given is not None and not callable(given):
+                raise ConversionError(name, given, "something that can be called", topic)
+        if not isinstance(executor, Executor):
+            raise ConversionError("executor", executor, "a rosglass.comm.Executor", topic)
         self.topic = topic
         self.qos = qos
         self._type = message_type
@@ -118,6 +125,10 @@ class Subscription(Handle):
     def closed(self) -> bool:
         """Whether :meth:`close` was called."""
         return self._closed
+
+    def __repr__(self) -> str:
+        kind = self._type.name if self._type is not None else "type not known yet"
+        return f"<{type(self).__name__} {self.topic} [{kind}]{' closed' * self._closed}>"
 
     def set_type(self, message_type: MessageType) -> None:
         """Take the type that was discovered; for worlds."""

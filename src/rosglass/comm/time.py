@@ -5,9 +5,16 @@ from __future__ import annotations
 import time as _time
 from dataclasses import dataclass
 
+from rosglass.errors import ConversionError
+
 __all__ = ["Duration", "Time"]
 
 _NS = 1_000_000_000
+
+
+def _check(kind: str, nanoseconds: object, instead: str) -> None:
+    if type(nanoseconds) is not int:
+        raise ConversionError("nanoseconds", nanoseconds, f"an integer; {instead}", kind)
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -19,6 +26,9 @@ class Duration:
     """
 
     nanoseconds: int = 0
+
+    def __post_init__(self) -> None:
+        _check("Duration", self.nanoseconds, "Duration.from_seconds() takes fractions")
 
     @classmethod
     def from_seconds(cls, seconds: float) -> Duration:
@@ -50,6 +60,9 @@ class Time:
     """
 
     nanoseconds: int = 0
+
+    def __post_init__(self) -> None:
+        _check("Time", self.nanoseconds, "Time.from_parts() takes seconds and nanoseconds")
 
     @classmethod
     def now(cls) -> Time:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import logging
+import os
 import threading
 from contextlib import suppress
 from typing import TYPE_CHECKING
@@ -78,6 +79,7 @@ class Ros2Node(Node):
         self._middleware, self._library = middleware, library
         self._lock = threading.Lock()
         self._closed = False
+        self._process = os.getpid()
         self._readings: dict[Subscription, Reading] = {}
         self._publishers: list[Ros2Publisher] = []
         self._graph_listeners: Listeners[None] = Listeners(merge=True)
@@ -192,6 +194,8 @@ class Ros2Node(Node):
 
     def status(self) -> Status:
         """Return the state of the connection and what is being done about it."""
+        if self._process != os.getpid():
+            return Status(ConnectionState.CLOSED, "left behind by a fork; connect again here")
         return self._middleware.status()
 
     def on_status_change(
@@ -219,6 +223,8 @@ class Ros2Node(Node):
                 return
             self._closed = True
             atexit.unregister(self.close)
+            if self._process != os.getpid():
+                return  # the connection is the parent's, and its threads did not come along
             readings, publishers = list(self._readings), list(self._publishers)
         for item in (*readings, *publishers):
             item.close()
@@ -316,6 +322,11 @@ class Ros2Node(Node):
                 self._publishers.remove(publisher)
 
     def _check_open(self) -> None:
+        if self._process != os.getpid():
+            raise NodeClosedError(
+                f"node {self._full_name} belongs to the process that made it, and does not work "
+                "after a fork; connect again in this process"
+            )
         if self._closed:
             raise NodeClosedError(f"node {self._full_name} is closed; connect again")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import EndpointKind, Publisher
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 __all__ = ["Ros2Publisher"]
 
 _log = logging.getLogger("rosglass.ros2")
+#: Tells `publish()` from `publish(None)`.
+_NO_MESSAGE: Any = object()
 
 
 class Ros2Publisher(Publisher):
@@ -38,17 +41,21 @@ class Ros2Publisher(Publisher):
         self._writer, self._graph, self._matches_qos = writer, graph, matches_qos
         self._on_close = on_close
         self._closed = False
+        self._process = os.getpid()
         self._hash = type.rihs01
         self._warned: set[EndpointInfo] = set()
 
-    def publish(self, message: Message | dict[str, Any] | None = None, /, **fields: Any) -> None:
+    def publish(self, message: Message | dict[str, Any] = _NO_MESSAGE, /, **fields: Any) -> None:
         """Encode and send a message; see :meth:`rosglass.comm.Publisher.publish`."""
-        if message is not None and fields:
+        if message is not _NO_MESSAGE and fields:
             raise ConversionError(
                 "", fields, "either a message or keyword fields, not both", self.type.name
             )
         self._check_open()
-        value = fields if message is None else message
+        if message is None:
+            # Most likely a function that forgot its return: it must not become a zero command.
+            raise ConversionError("", None, "a message, a dict or keyword fields", self.type.name)
+        value = fields if message is _NO_MESSAGE else message
         self._writer.write(self.type.encode(value, wire="cdr"))
 
     def publish_serialized(self, data: bytes | bytearray | memoryview) -> None:
@@ -77,6 +84,8 @@ class Ros2Publisher(Publisher):
         """Withdraw the publisher; safe to call twice."""
         if not self._closed:
             self._closed = True
+            if self._process != os.getpid():
+                return
             self._writer.close()
             self._on_close(self)
 
@@ -104,5 +113,10 @@ class Ros2Publisher(Publisher):
             )
 
     def _check_open(self) -> None:
+        if self._process != os.getpid():
+            raise NodeClosedError(
+                f"the publisher of {self.topic} belongs to the process that made it, and does not "
+                "work after a fork; connect again in this process"
+            )
         if self._closed:
             raise NodeClosedError(f"the publisher of {self.topic} is closed; create another one")

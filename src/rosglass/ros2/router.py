@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import zenoh
 
 from rosglass.errors import ConnectionLostError, ConversionError
-from rosglass.ros2.zenoh_config import close_session, router_config, session_config
+from rosglass.ros2.zenoh_config import close_session, reason, router_config, session_config
 from rosglass.ros2.zenoh_options import DEFAULT_PORT, ZenohOptions, locator
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ class Router:
         what = f"cannot run a router at {self.listen}"
         other = "choose another port with --listen tcp/127.0.0.1:PORT"
         if "in use" not in str(error):
-            return f"{what}: {error}"
+            return f"{what}: {reason(error)}; name an address of this machine"
         if is_router_reachable(self.url):
             return f"{what}: a Zenoh router runs there already; use that one, or {other}"
         return f"{what}: another program uses the port; {other}"
@@ -120,7 +120,7 @@ def is_router_reachable(url: str, timeout: float = 0.5) -> bool:
 
 
 def _parse(listen: str) -> tuple[str, int]:
-    match = _LOCATOR.fullmatch(listen)
+    match = _LOCATOR.fullmatch(listen) if isinstance(listen, str) else None
     if match is None or int(match["port"]) > 65535:
         raise ConversionError(
             "listen", listen, "an address such as tcp/127.0.0.1:7447, port 0 to 65535"

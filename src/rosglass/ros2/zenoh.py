@@ -22,7 +22,7 @@ from rosglass.comm import (
 )
 from rosglass.errors import ConnectionLostError, NodeClosedError
 from rosglass.ros2.middleware import Middleware, OnSample, Writer
-from rosglass.ros2.zenoh_config import close_session, session_config
+from rosglass.ros2.zenoh_config import close_session, reason, session_config
 from rosglass.ros2.zenoh_endpoints import (
     CHANNEL,
     Announcement,
@@ -177,7 +177,7 @@ class ZenohMiddleware(Middleware):
             if "Unable to connect" in str(error):
                 self._refused = True  # a client without router; poll() tries again
                 return
-            raise ConnectionLostError(f"cannot open a Zenoh session: {error}") from error
+            raise ConnectionLostError(f"cannot open a Zenoh session: {reason(error)}") from error
         self._refused = False
         events = session.info.declare_transport_events_listener(CHANNEL, history=True)
         tokens = session.liveliness().declare_subscriber(

@@ -7,6 +7,7 @@ of other peers from those it is linked with (gossip), never by multicast.
 from __future__ import annotations
 
 import json
+import re
 import secrets
 from contextlib import suppress
 from pathlib import Path
@@ -17,7 +18,7 @@ import zenoh
 from rosglass.errors import ConversionError
 from rosglass.ros2.zenoh_options import ZenohOptions, locator
 
-__all__ = ["close_session", "router_config", "session_config"]
+__all__ = ["close_session", "reason", "router_config", "session_config"]
 
 #: Pause between two attempts to connect, in milliseconds: first, and at most.
 _RETRY = {"period_init_ms": 250, "period_max_ms": 1000, "period_increase_factor": 2}
@@ -95,6 +96,11 @@ def close_session(session: zenoh.Session) -> None:
         session.close()  # type: ignore[no-untyped-call]
 
 
+def reason(error: zenoh.ZError) -> str:
+    """Return Zenoh's words without the places in its own source."""
+    return re.sub(r" at /\S+?\.rs:\d+\.?", "", str(error)).strip()
+
+
 def _read(file: str) -> zenoh.Config:
     path = Path(file.removeprefix("file://"))
     try:
@@ -103,7 +109,7 @@ def _read(file: str) -> zenoh.Config:
         raise ConversionError(
             "ZENOH_SESSION_CONFIG_URI",
             file,
-            f"a Zenoh configuration file that can be read ({error})",
+            f"a Zenoh configuration file that can be read ({reason(error)})",
         ) from error
     return config
 

@@ -46,9 +46,9 @@ def test_several_conflicts_are_all_named():
     assert "durability" in told
 
 
-@pytest.mark.parametrize("depth", [0, -1, 1.0, "3", True, None])
+@pytest.mark.parametrize("depth", [0, -1, 1.0, "3", True, None, 2**31])
 def test_depth_must_be_a_positive_integer(depth):
-    with pytest.raises(UnsupportedError, match="depth must be an integer of at least 1"):
+    with pytest.raises(UnsupportedError, match="depth must be an integer from 1"):
         QoS(depth=depth)
 
 
@@ -58,3 +58,20 @@ def test_presets_are_ros_2s():
     assert QoS.clock().depth == 1
     assert QoS.services() == QoS(depth=10)
     assert QoS().with_depth(3) == QoS(depth=3)
+
+
+@pytest.mark.parametrize(
+    ("policy", "value", "told"),
+    [
+        ("reliability", "reliable", "Reliability.RELIABLE or Reliability.BEST_EFFORT"),
+        ("durability", 3, "Durability.VOLATILE or"),
+        ("history", None, "History.KEEP_LAST or"),
+        ("liveliness", Reliability.RELIABLE, "Liveliness.AUTOMATIC or"),
+        ("deadline", 1.0, "Duration.from_seconds"),
+        ("lifespan", Duration(-1), "above zero"),
+        ("lease_duration", Duration(0), "above zero"),
+    ],
+)
+def test_policies_are_checked_where_they_are_written(policy, value, told):
+    with pytest.raises(UnsupportedError, match=f"QoS {policy} must be .*{told}"):
+        QoS(**{policy: value})

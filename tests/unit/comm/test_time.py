@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from rosglass import Duration, Time
+from rosglass import ConversionError, Duration, Time
 
 
 def test_times_keep_every_nanosecond():
@@ -36,3 +36,10 @@ def test_durations_from_seconds(seconds, nanoseconds):
 def test_now_is_the_system_clock():
     assert abs(Time.now().nanoseconds - time.time_ns()) < 1_000_000_000
     assert Time.now().seconds == pytest.approx(time.time(), abs=1)
+
+
+@pytest.mark.parametrize("kind", [Time, Duration])
+@pytest.mark.parametrize("value", [1.5, "1", True, None])
+def test_only_whole_nanoseconds(kind, value):
+    with pytest.raises(ConversionError, match=f"{kind.__name__}: nanoseconds: expected an integer"):
+        kind(value)

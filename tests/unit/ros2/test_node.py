@@ -413,3 +413,45 @@ def test_a_middleware_that_cannot_start_leaves_no_thread(middleware):
     with pytest.raises(rosglass.ConnectionLostError):
         Ros2Node(middleware, "fake://", "cockpit")
     assert threading.active_count() == before
+
+
+@pytest.mark.parametrize("argument", ["callback", "raw_callback", "executor"])
+def test_what_cannot_be_called_back_is_refused_at_once(node, argument):
+    with pytest.raises(rosglass.ConversionError, match=f"/x: {argument}: expected .* got 3"):
+        node.create_subscription("/x", STRING, **{argument: 3})
+
+
+def test_a_forgotten_return_is_no_message(node):
+    publisher = node.create_publisher("/cmd_vel", TWIST)
+    with pytest.raises(rosglass.ConversionError, match=r"expected a message.* got None"):
+        publisher.publish(None)
+    publisher.publish()
+
+
+def test_a_fork_does_not_take_the_connection_along(node, monkeypatch):
+    publisher = node.create_publisher("/cmd_vel", TWIST)
+    monkeypatch.setattr("os.getpid", lambda: 1)
+    for use in (publisher.publish, lambda: node.create_publisher("/x", TWIST)):
+        with pytest.raises(rosglass.NodeClosedError, match="after a fork; connect again"):
+            use()
+    assert str(node.status()) == "CLOSED: left behind by a fork; connect again here"
+
+
+def test_reprs_name_the_thing(node):
+    assert repr(node) == "<Ros2Node /arm/cockpit on fake://>"
+    assert repr(node.create_publisher("x", STRING)) == f"<Ros2Publisher /arm/x [{STRING}]>"
+    subscription = node.create_subscription("/y")
+    assert repr(subscription) == "<Subscription /y [type not known yet]>"
+    subscription.close()
+    assert repr(subscription).endswith(" closed>")
+
+
+def test_connect_says_what_is_not_installed(monkeypatch):
+    monkeypatch.setattr("rosglass.connection.find_spec", lambda name: None)
+    with pytest.raises(rosglass.UnsupportedError, match=r'pip install "rosglass\[zenoh\]"'):
+        rosglass.connect("ZENOH://127.0.0.1:7447")
+
+
+def test_connect_wants_a_library():
+    with pytest.raises(rosglass.ConversionError, match=r"library: expected a rosglass\.Library"):
+        rosglass.connect("zenoh://127.0.0.1:7447", library=3)

@@ -3,9 +3,10 @@ from __future__ import annotations
 import json
 
 import pytest
+import zenoh
 
 import rosglass
-from rosglass.ros2.zenoh_config import router_config, session_config
+from rosglass.ros2.zenoh_config import reason, router_config, session_config
 from rosglass.ros2.zenoh_options import ZenohOptions
 
 RMW_FILE = """
@@ -103,3 +104,8 @@ def test_a_router_listens_where_it_is_told_and_nowhere_else():
     assert setting(config, "mode") == "router"
     assert setting(config, "listen/endpoints") == ["tcp/127.0.0.1:7447"]
     assert setting(config, "scouting/multicast/enabled") is False
+
+
+def test_zenohs_own_source_is_not_quoted():
+    error = zenoh.ZError("no (os error 99) at /root/.cargo/git/zenoh-9c/io/tcp.rs:61.] at /x.rs:3.")
+    assert reason(error) == "no (os error 99)]"
