@@ -335,6 +335,7 @@ def test_a_stop_by_somebody_else_is_shown_and_not_undone(
     deadline = time.monotonic() + 3
     while not other.subscription_count() and time.monotonic() < deadline:
         time.sleep(0.02)
+    time.sleep(1.0)  # sooner after a release of ours, it would be said to be held
     other.publish(data=True)
     cockpit.until("stop", "stopped", timeout=1.0)
     assert cockpit.get("confirmation", "text") == "by someone else"

@@ -179,7 +179,8 @@ Item {
         id: speed
         objectName: "speed"
         anchors { horizontalCenter: camera.horizontalCenter; bottom: camera.bottom; bottomMargin: cockpit.rim }
-        visible: cockpit.roomy
+        // On a small picture it would hide why there is none.
+        visible: cockpit.roomy && (camera.live || refused || cockpit.strip === 0)
         room: camera.width - 20 - (cockpit.strip > 0 ? 0 : 2 * cockpit.control + 100)
         odom: map.odom
         drive: drive

@@ -91,7 +91,8 @@ Item {
     }
     Timer {
         id: sinceRelease
-        interval: 3000
+        // A held stop is repeated ten times a second.
+        interval: 1000
     }
     // A stop is never given up. A release is: it must not undo, much later, somebody else's stop.
     Timer {
