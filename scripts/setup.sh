@@ -58,17 +58,17 @@ make_venv() {
       tail -3 .stamps/venv.log >&2; fail "$python cannot make virtual environments" \
         "on Debian and Ubuntu: sudo apt-get install python3-venv, then run this again."; }
   say "installing Python packages into $dir (rosglass[$extras]; a few minutes the first time)"
-  "$dir/bin/python" -m pip install --disable-pip-version-check --progress-bar off -e ".[$extras]" \
-    2>&1 | tee .stamps/pip.log | sed -un 's/^ *Downloading \([^ ]*\)\(.*\)/    \1\2/p'
-  [ "${PIPESTATUS[0]}" -eq 0 ] || {
+  if ! "$dir/bin/python" -m pip install --disable-pip-version-check --progress-bar off -e ".[$extras]" \
+    2>&1 | tee .stamps/pip.log | sed -un 's/^ *Downloading \([^ ]*\)\(.*\)/    \1\2/p'; then
     grep -E '^ *(ERROR|error)' .stamps/pip.log | tail -5 >&2
     if grep -q 'Python\.h' .stamps/pip.log; then
       fail "a package had to be compiled and Python's headers are missing" \
         "sudo apt-get install build-essential python3-dev, then run this again."
-    elif grep -qiE 'connection|resolve|timed out|network' .stamps/pip.log; then
+    elif grep -qiE 'connection|resol|timed out|network' .stamps/pip.log; then
       fail "PyPI could not be reached" "check the network (or set https_proxy / PIP_INDEX_URL) and run this again;" \
         "pip's whole output is in .stamps/pip.log"
-    else fail "pip could not install the Python packages" "pip's whole output is in .stamps/pip.log"; fi; }
+    else fail "pip could not install the Python packages" "pip's whole output is in .stamps/pip.log"; fi
+  fi
   printf '%s\n' "$wanted" >"$dir/.rosglass"
 }
 
