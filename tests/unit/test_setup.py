@@ -1,0 +1,63 @@
+"""What `make demo` says on machines where something is missing."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def checkout(tmp_path: Path) -> Path:
+    """A checkout with nothing set up."""
+    (tmp_path / "scripts").mkdir()
+    shutil.copy(ROOT / "scripts/setup.sh", tmp_path / "scripts")
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, tmp_path)
+    return tmp_path
+
+
+def set_up(checkout: Path, *arguments: str, **env: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        ["bash", str(checkout / "scripts/setup.sh"), *arguments],
+        check=False,
+        env=os.environ | env,
+        capture_output=True,
+        text=True,
+        timeout=100,
+        stdin=subprocess.DEVNULL,
+    )
+
+
+def test_no_such_python(checkout: Path) -> None:
+    done = set_up(checkout, "demo", PYTHON="python-that-is-not-there")
+    assert done.returncode == 1
+    assert "there is no python-that-is-not-there" in done.stderr
+    assert "install Python 3.10 or newer" in done.stderr
+
+
+def test_unknown_purpose(checkout: Path) -> None:
+    done = set_up(checkout, "fly")
+    assert done.returncode == 1
+    assert "use: scripts/setup.sh demo|test" in done.stderr
+
+
+def test_no_network(checkout: Path) -> None:
+    env = {
+        "PYTHON": "/usr/bin/python3",
+        "PIP_INDEX_URL": "http://127.0.0.1:9/simple",
+        "PIP_RETRIES": "0",
+        "PIP_CONFIG_FILE": os.devnull,
+        "PIP_EXTRA_INDEX_URL": "",
+        "PIP_FIND_LINKS": "",
+    }
+    done = set_up(checkout, "demo", **env)
+    assert done.returncode == 1
+    assert "PyPI could not be reached" in done.stderr
+    assert "run this again" in done.stderr
+    assert not (checkout / ".venv/.rosglass").exists()
