@@ -33,11 +33,11 @@ class Executor(ABC):
 
 
 class Handle(ABC):
-    """Something registered that can be taken back."""
+    """Something started or registered that can be ended; ends by itself as a context manager."""
 
     @abstractmethod
     def close(self) -> None:
-        """Undo the registration; safe to call twice."""
+        """End it; safe to call twice."""
 
     def __enter__(self: _H) -> _H:  # noqa: PYI019 - typing.Self needs 3.11
         return self

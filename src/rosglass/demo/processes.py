@@ -10,18 +10,18 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
+from rosglass.comm import Handle
 from rosglass.errors import Error
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from types import TracebackType
 
 __all__ = ["Child", "VirtualScreen", "start_robot"]
 
 _PATIENCE = 3.0
 
 
-class Child:
+class Child(Handle):
     """A program that ends when this one does.
 
     Its standard input is a pipe that nothing is ever written to; a program started with
@@ -66,17 +66,6 @@ class Child:
             self._process.kill()
             self._process.wait()
 
-    def __enter__(self) -> Child:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-
 
 def start_robot(url: str, options: Sequence[str] = ()) -> Child:
     """Start ``rosglass robot`` in a process of its own.
@@ -89,7 +78,7 @@ def start_robot(url: str, options: Sequence[str] = ()) -> Child:
     return Child(command, "the robot")
 
 
-class VirtualScreen:
+class VirtualScreen(Handle):
     """A screen in memory (Xvfb); :attr:`display` is its ``DISPLAY``.
 
     Args:
@@ -142,17 +131,6 @@ class VirtualScreen:
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 self._process.wait()
-
-    def __enter__(self) -> VirtualScreen:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 def _read_line(descriptor: int, timeout: float) -> str:

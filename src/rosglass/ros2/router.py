@@ -7,16 +7,13 @@ import re
 import socket
 import threading
 import time
-from typing import TYPE_CHECKING
 
 import zenoh
 
+from rosglass.comm import Handle
 from rosglass.errors import ConnectionLostError, ConversionError
 from rosglass.ros2.zenoh_config import close_session, reason, router_config, session_config
 from rosglass.ros2.zenoh_options import DEFAULT_PORT, ZenohOptions, locator
-
-if TYPE_CHECKING:
-    from types import TracebackType
 
 __all__ = ["DEFAULT_LISTEN", "Router", "is_router_reachable"]
 
@@ -29,7 +26,7 @@ _LOCATOR = re.compile(
 _LOOPBACK = re.compile(r"localhost|127(?:\.\d+){3}|::1")
 
 
-class Router:
+class Router(Handle):
     """A router in this process, running from creation to :meth:`close`.
 
     Args:
@@ -65,17 +62,6 @@ class Router:
             session, self._session = self._session, None
         if session is not None:
             close_session(session)
-
-    def __enter__(self) -> Router:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _why(self, error: zenoh.ZError) -> str:
         what = f"cannot run a router at {self.listen}"
