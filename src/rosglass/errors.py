@@ -16,9 +16,13 @@ __all__ = [
     "DefinitionError",
     "Error",
     "FieldPathError",
+    "GoalRejectedError",
     "InvalidNameError",
     "NodeClosedError",
+    "ParameterError",
     "QmlError",
+    "ServiceError",
+    "ServiceUnavailableError",
     "TimeoutError",
     "TypeNotFoundError",
     "UnsupportedError",
@@ -111,6 +115,22 @@ class ConnectionLostError(Error):
 
 class TimeoutError(Error, builtins.TimeoutError):  # noqa: A001 - the field's own word
     """What was waited for did not come within the given time."""
+
+
+class ServiceError(Error):
+    """A service was called, and its server says that it failed, or its reply makes no sense."""
+
+
+class ServiceUnavailableError(ServiceError):
+    """No server of the service or action appeared within the given time."""
+
+
+class GoalRejectedError(Error):
+    """An action server did not accept a goal."""
+
+
+class ParameterError(Error):
+    """A parameter does not exist, has another type, or its node refuses the value."""
 
 
 class QmlError(Error):

@@ -134,8 +134,8 @@ class MemoryNode(Node):
             executor or self.dispatcher,
             callback,
             raw_callback,
-            self.world.subscriptions.remove,
         )
+        subscription.on_close = lambda: self.world.subscriptions.remove(subscription)
         self.world.subscriptions.append(subscription)
         latched = subscription.qos.durability is Durability.TRANSIENT_LOCAL
         for publisher in self.world.publishers:

@@ -1,16 +1,43 @@
 """What a robot offers: the abstract node and everything the worlds have in common."""
 
+from rosglass.comm.action import (
+    ActionClient,
+    ActionResult,
+    ActionServer,
+    CancelAnswer,
+    ClientGoal,
+    GoalStatus,
+    ServerGoal,
+)
 from rosglass.comm.executor import IMMEDIATE, Dispatcher
 from rosglass.comm.graph import ConnectionState, EndpointInfo, EndpointKind, NodeName, Status
 from rosglass.comm.listeners import Listeners
-from rosglass.comm.node import Executor, Handle, Node, Publisher
+from rosglass.comm.node import Answer, Executor, Handle, Node, Publisher
+from rosglass.comm.parameters import (
+    ParameterClient,
+    ParameterDescriptor,
+    ParameterEvent,
+    Parameters,
+    ParameterType,
+    ParameterValue,
+    Range,
+    SetResult,
+)
 from rosglass.comm.qos import Durability, History, Liveliness, QoS, Reliability
+from rosglass.comm.service import Call, ServiceClient, ServiceServer
 from rosglass.comm.subscription import Sample, Statistics, Subscription
 from rosglass.comm.time import Duration, Time
 from rosglass.comm.worker import Worker
 
 __all__ = [
     "IMMEDIATE",
+    "ActionClient",
+    "ActionResult",
+    "ActionServer",
+    "Answer",
+    "Call",
+    "CancelAnswer",
+    "ClientGoal",
     "ConnectionState",
     "Dispatcher",
     "Durability",
@@ -18,16 +45,28 @@ __all__ = [
     "EndpointInfo",
     "EndpointKind",
     "Executor",
+    "GoalStatus",
     "Handle",
     "History",
     "Listeners",
     "Liveliness",
     "Node",
     "NodeName",
+    "ParameterClient",
+    "ParameterDescriptor",
+    "ParameterEvent",
+    "ParameterType",
+    "ParameterValue",
+    "Parameters",
     "Publisher",
     "QoS",
+    "Range",
     "Reliability",
     "Sample",
+    "ServerGoal",
+    "ServiceClient",
+    "ServiceServer",
+    "SetResult",
     "Statistics",
     "Status",
     "Subscription",

@@ -7,21 +7,31 @@ package knows which one it talks to.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any, TypeVar, overload
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, overload
+
+from rosglass.errors import UnsupportedError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from concurrent.futures import Future
     from types import TracebackType
 
+    from rosglass.comm.action import ActionClient, ActionServer, ServerGoal
     from rosglass.comm.graph import EndpointInfo, NodeName, Status
+    from rosglass.comm.parameters import ParameterClient, Parameters
     from rosglass.comm.qos import QoS
+    from rosglass.comm.service import ServiceClient, ServiceServer
     from rosglass.comm.subscription import Sample, Subscription
     from rosglass.comm.time import Time
-    from rosglass.messages import Message, MessageType
+    from rosglass.messages import ActionType, Message, MessageType, ServiceType
 
-__all__ = ["Executor", "Handle", "Node", "Publisher"]
+__all__ = ["Answer", "Executor", "Handle", "Node", "Publisher"]
 
 _H = TypeVar("_H", bound="Handle")
+#: What answers a request: a response, or the promise of one.
+Answer: TypeAlias = (
+    "Message | dict[str, Any] | Future[Message] | Future[dict[str, Any] | None] | None"
+)
 
 
 class Executor(ABC):
@@ -155,6 +165,116 @@ class Node(Handle):
             InvalidNameError: The topic name breaks ROS's rules.
             TypeNotFoundError: No definition of the given type is known.
         """
+
+    def create_service_client(
+        self, name: str, type: str | ServiceType | None = None, qos: QoS | None = None
+    ) -> ServiceClient:
+        """Return a client of a service, whether it exists yet or not.
+
+        Args:
+            name: Absolute, relative or private service name.
+            type: Type name or type; None takes the type that the server announces, and needs the
+                server to be there already.
+            qos: Profile of requests and replies; None for the usual one.
+
+        Raises:
+            InvalidNameError: The name breaks ROS's rules.
+            TypeNotFoundError: No definition of the type is known, or no server announces one.
+        """
+        raise self._unsupported("service clients")
+
+    def create_service_server(
+        self,
+        name: str,
+        type: str | ServiceType,
+        callback: Callable[[Message], Answer],
+        qos: QoS | None = None,
+        *,
+        executor: Executor | None = None,
+    ) -> ServiceServer:
+        """Offer a service.
+
+        Args:
+            name: Absolute, relative or private service name.
+            type: Type name or type.
+            callback: Called with each request; returns the response as a message or a dict of
+                fields (None for an empty or all-default one), or a
+                :class:`concurrent.futures.Future` of it to answer later. An exception is logged
+                and, where the world can say so, told to the caller.
+            qos: Profile of requests and replies; None for the usual one.
+            executor: Where `callback` runs; None for the node's own dispatcher thread.
+
+        Raises:
+            InvalidNameError: The name breaks ROS's rules.
+            TypeNotFoundError: No definition of the type is known.
+        """
+        raise self._unsupported("service servers")
+
+    def create_action_client(self, name: str, type: str | ActionType | None = None) -> ActionClient:
+        """Return a client of an action; arguments and errors as for a service client."""
+        raise self._unsupported("action clients")
+
+    def create_action_server(
+        self,
+        name: str,
+        type: str | ActionType,
+        execute: Callable[[ServerGoal], Message | dict[str, Any] | None],
+        *,
+        accept: Callable[[Message], bool] | None = None,
+        cancel: Callable[[ServerGoal], bool] | None = None,
+        executor: Executor | None = None,
+    ) -> ActionServer:
+        """Offer an action.
+
+        Args:
+            name: Absolute, relative or private action name.
+            type: Type name or type.
+            execute: Called with each accepted goal, on a thread of the goal's own, or on
+                `executor`. What it returns is the result of a goal that succeeded, or was
+                cancelled when a request to cancel was accepted meanwhile; an exception aborts the
+                goal. It may also end the goal itself.
+            accept: Decides whether a goal is accepted; None accepts all.
+            cancel: Decides whether a request to cancel is accepted; None accepts all.
+            executor: Where `execute`, `accept` and `cancel` run; None for threads of the goals'
+                own and, for the latter two, the node's dispatcher.
+
+        Raises:
+            InvalidNameError: The name breaks ROS's rules.
+            TypeNotFoundError: No definition of the type is known.
+        """
+        raise self._unsupported("action servers")
+
+    @property
+    def parameters(self) -> Parameters:
+        """This node's own parameters."""
+        raise self._unsupported("parameters")
+
+    def create_parameter_client(self, node: str | NodeName) -> ParameterClient:
+        """Return a client of another node's parameters; `node` is its full name."""
+        raise self._unsupported("parameters")
+
+    def services(self) -> dict[str, list[str]]:
+        """Return every service in the graph with the types announced for it."""
+        raise self._unsupported("a list of services")
+
+    def actions(self) -> dict[str, list[str]]:
+        """Return every action in the graph with the types announced for it."""
+        raise self._unsupported("a list of actions")
+
+    def service_servers(self, name: str) -> list[EndpointInfo]:
+        """Return the servers of a service."""
+        raise self._unsupported("a list of services")
+
+    def service_clients(self, name: str) -> list[EndpointInfo]:
+        """Return the clients of a service."""
+        raise self._unsupported("a list of services")
+
+    def endpoints(self, node: str | NodeName) -> list[EndpointInfo]:
+        """Return what a node publishes, subscribes, serves and calls; `node` is its full name."""
+        raise self._unsupported("a list of endpoints")
+
+    def _unsupported(self, what: str) -> UnsupportedError:
+        return UnsupportedError(f"{self!r} does not support {what}")
 
     @abstractmethod
     def topics(self) -> dict[str, list[str]]:

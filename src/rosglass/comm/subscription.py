@@ -29,7 +29,8 @@ class Sample(NamedTuple):
     """A received message before anyone looked into it; made in a fifth of a dataclass's time.
 
     Attributes:
-        data: The bytes as received, encapsulation header included.
+        data: The bytes as received, encapsulation header included; big ones may come as a
+            read-only view of the middleware's own buffer.
         wire: Their format, ``cdr`` or ``ros1``.
         type: Their type.
         received: System time of reception.
@@ -38,7 +39,7 @@ class Sample(NamedTuple):
         sequence: The publisher's running number, -1 when the world does not say.
     """
 
-    data: bytes
+    data: bytes | memoryview
     wire: str
     type: MessageType
     received: Time
@@ -73,12 +74,13 @@ class Statistics:
 class Subscription(Handle):
     """Receives the messages of one topic.
 
-    Worlds create it, call :meth:`deliver` from their threads, and pass `on_close`. Once closed, it
+    Worlds create it, call :meth:`deliver` from their threads, and set `on_close`. Once closed, it
     has nothing more to take: :attr:`closed` tells a polling loop when to end.
 
     Attributes:
         topic: Absolute topic name.
         qos: The quality of service requested.
+        on_close: Called once when it is closed; for worlds.
     """
 
     def __init__(
@@ -89,7 +91,7 @@ class Subscription(Handle):
         executor: Executor,
         callback: Callable[[Message], None] | None = None,
         raw_callback: Callable[[Sample], None] | None = None,
-        on_close: Callable[[Subscription], None] | None = None,
+        on_close: Callable[[], None] | None = None,
     ) -> None:
         for name, given in (("callback", callback), ("raw_callback", raw_callback)):
             if given is not None and not callable(given):
@@ -101,7 +103,7 @@ class Subscription(Handle):
         self._type = message_type
         self._executor = executor
         self._callback, self._raw_callback = callback, raw_callback
-        self._on_close = on_close
+        self.on_close = on_close
         limit = None if qos.history is History.KEEP_ALL else qos.depth
         self._inbox: deque[Sample] = deque(maxlen=limit)
         self._changed = threading.Condition()
@@ -208,8 +210,8 @@ class Subscription(Handle):
             self._closed = True
             self._inbox.clear()
             self._changed.notify_all()
-        if self._on_close is not None:
-            self._on_close(self)
+        if self.on_close is not None:
+            self.on_close()
 
     def _drain(self) -> None:
         with self._changed:

@@ -113,7 +113,7 @@ class ActionType(_Interface):
 
 _lock = threading.RLock()
 _libraries: weakref.WeakKeyDictionary[
-    Library, dict[tuple[str, int], MessageType | ServiceType | ActionType]
+    Library, dict[tuple[str, int, str], MessageType | ServiceType | ActionType]
 ] = weakref.WeakKeyDictionary()
 _default: list[Library] = []
 
@@ -127,7 +127,7 @@ def default_library() -> Library:
 
 
 def load(
-    name: str, ros: int = 2, library: Library | None = None
+    name: str, ros: int = 2, library: Library | None = None, *, hash: str = ""
 ) -> MessageType | ServiceType | ActionType:
     """Return the type called `name`.
 
@@ -135,9 +135,12 @@ def load(
         name: ``pkg/msg/Type`` or ``pkg/Type`` (also ``srv`` and ``action``).
         ros: 2 for ROS 2's definition, 1 for ROS 1's.
         library: Where to look it up; None for :func:`default_library`.
+        hash: RIHS01 hash (ROS 1: md5 sum) that a peer announced for it; picks the version of the
+            definition that has it.
 
     Raises:
         TypeNotFoundError: No provider has a definition.
+        DefinitionConflictError: No provider has the version with this hash.
         DefinitionError: The definition has errors, or is cyclic.
         UnsupportedError: `library` is no library, or `ros` neither 1 nor 2.
     """
@@ -146,9 +149,13 @@ def load(
     source = default_library() if library is None else library
     with _lock:
         types = _libraries.setdefault(source, {})
-        found = types.get((name, ros))
+        found = types.get((name, ros, hash))
         if found is None:
-            found = types[name, ros] = _make(source.definition(name, ros=ros))
+            definition = source.definition(name, ros=ros, hash=hash)
+            # The usual version, when it is the one that was asked for, stays one object.
+            usual = types.get((name, ros, ""))
+            same = usual is not None and usual.definition is definition
+            found = types[name, ros, hash] = usual if usual and same else _make(definition)
     return found
 
 

@@ -7,9 +7,11 @@ profiles that match or not, callbacks) is :mod:`rosglass.ros2.node`'s business, 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 from rosglass.comm import Handle
+from rosglass.errors import UnsupportedError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -17,19 +19,36 @@ if TYPE_CHECKING:
     from rosglass.comm import EndpointInfo, NodeName, QoS, Status
     from rosglass.ros2.graph import Graph
 
-__all__ = ["Middleware", "OnSample", "Writer"]
+__all__ = [
+    "Middleware",
+    "OnReply",
+    "OnRequest",
+    "OnSample",
+    "Reader",
+    "Replier",
+    "RequestId",
+    "Requester",
+    "Writer",
+]
 
 
 class OnSample(Protocol):
     """Takes a received sample; called on the middleware's thread, must return at once."""
 
     def __call__(
-        self, data: bytes, received: int, sent: int | None, gid: bytes, sequence: int, hash: str
+        self,
+        data: bytes | memoryview,
+        received: int,
+        sent: int | None,
+        gid: bytes,
+        sequence: int,
+        hash: str,
     ) -> None:
         """Take a sample.
 
         Args:
-            data: The payload, with its encapsulation header.
+            data: The payload, with its encapsulation header. A read-only view keeps the
+                middleware's buffer alive for as long as it lives itself.
             received: System time of reception, nanoseconds since the Unix epoch.
             sent: The publisher's time stamp in the same unit, None when there is none.
             gid: Identity of the publisher, empty when unknown.
@@ -51,6 +70,94 @@ class Writer(Handle):
         For middlewares that must address them one way or the other; called on every change of
         the graph, never on a thread of the middleware.
         """
+
+
+class Reader(Handle):
+    """Receives the samples of one subscription."""
+
+    def set_eager(self, eager: bool) -> None:
+        """Say whether samples are handed on as they come, which is how a reader starts.
+
+        Nobody waits for the samples of a reader that is not eager: it may hand them on in
+        batches, some ten times a second, so that a topic nobody looks at costs next to nothing.
+        """
+
+    def flush(self) -> None:
+        """Hand on, in the calling thread, what waits to be handed on."""
+
+
+class OnReply(Protocol):
+    """Takes the reply to a request; called on the middleware's thread, must return at once."""
+
+    def __call__(self, number: int, data: bytes | memoryview | None, error: str) -> None:
+        """Take a reply.
+
+        Args:
+            number: What :meth:`Requester.send` returned for the request.
+            data: The response with its encapsulation header; None when there is none.
+            error: Why there is none.
+        """
+
+
+class Requester(Handle):
+    """Sends the requests of one service client."""
+
+    #: Why some servers in the graph cannot be called, in words; empty when all can.
+    problem: str = ""
+
+    @abstractmethod
+    def ready(self) -> bool:
+        """Return whether a server is linked, so that a request sent now is not lost."""
+
+    @abstractmethod
+    def send(self, data: bytes | bytearray, timeout: float | None) -> int:
+        """Send a request.
+
+        Args:
+            data: The payload with its encapsulation header.
+            timeout: Seconds after which the reply is of no use any more, None for never. The
+                caller keeps the time; the middleware may forget the request then.
+
+        Returns:
+            A number that the reply will bear. The reply may come before this returns.
+        """
+
+    @abstractmethod
+    def forget(self, number: int) -> None:
+        """Drop the reply to a request, should it still come."""
+
+
+@dataclass(frozen=True)
+class RequestId:
+    """Which request a reply answers.
+
+    Attributes:
+        client: Identity of the client that asked.
+        sequence: The client's number for the request.
+        handle: What the middleware needs besides; nobody else looks into it.
+    """
+
+    client: bytes
+    sequence: int
+    handle: object = field(default=None, compare=False, repr=False)
+
+
+class OnRequest(Protocol):
+    """Takes a request; called on the middleware's thread, must return at once."""
+
+    def __call__(self, request: RequestId, data: bytes | memoryview) -> None:
+        """Take a request, to be answered at any time, or never, with :meth:`Replier.reply`."""
+
+
+class Replier(Handle):
+    """Receives the requests of one service server and sends the replies."""
+
+    #: Why some clients in the graph cannot be served, in words; empty when all can.
+    problem: str = ""
+
+    @abstractmethod
+    def reply(self, request: RequestId, data: bytes | bytearray) -> None:
+        """Answer a request; a client that is gone is no error."""
 
 
 class Middleware(ABC):
@@ -95,12 +202,45 @@ class Middleware(ABC):
         type_hash: str,
         qos: QoS,
         on_sample: OnSample,
-    ) -> Handle:
+    ) -> Reader:
         """Announce a subscription and hand what arrives to `on_sample`.
 
         Samples whose type has the same name but another hash are handed over too: whether they
         can be understood is for the caller to say.
         """
+
+    def create_requester(
+        self,
+        node: NodeName,
+        service: str,
+        type_name: str,
+        type_hash: str,
+        qos: QoS,
+        on_reply: OnReply,
+    ) -> Requester:
+        """Announce a service client and return its sending end.
+
+        Args:
+            node: The node it belongs to.
+            service: Absolute name.
+            type_name: ``pkg/srv/Type``, or an action's ``pkg/action/Type_SendGoal`` and the like.
+            type_hash: RIHS01 hash of the service's type.
+            qos: Profile of requests and replies.
+            on_reply: Takes the replies.
+        """
+        raise UnsupportedError(f"{type(self).__name__} has no services")
+
+    def create_replier(
+        self,
+        node: NodeName,
+        service: str,
+        type_name: str,
+        type_hash: str,
+        qos: QoS,
+        on_request: OnRequest,
+    ) -> Replier:
+        """Announce a service server; arguments as in :meth:`create_requester`."""
+        raise UnsupportedError(f"{type(self).__name__} has no services")
 
     @abstractmethod
     def poll(self) -> None:

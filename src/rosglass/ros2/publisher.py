@@ -8,14 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import EndpointKind, Publisher
 from rosglass.errors import ConversionError, NodeClosedError
+from rosglass.ros2.core import Member
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from rosglass.comm import EndpointInfo, QoS
     from rosglass.messages import Message, MessageType
-    from rosglass.ros2.graph import Graph
-    from rosglass.ros2.middleware import Writer
+    from rosglass.ros2.core import Core
 
 __all__ = ["Ros2Publisher"]
 
@@ -24,26 +22,19 @@ _log = logging.getLogger("rosglass.ros2")
 _NO_MESSAGE: Any = object()
 
 
-class Ros2Publisher(Publisher):
+class Ros2Publisher(Publisher, Member):
     """A publisher; made by :meth:`Node.create_publisher`."""
 
-    def __init__(
-        self,
-        topic: str,
-        type: MessageType,
-        qos: QoS,
-        writer: Writer,
-        graph: Graph,
-        matches_qos: bool,
-        on_close: Callable[[Ros2Publisher], None],
-    ) -> None:
+    def __init__(self, core: Core, topic: str, type: MessageType, qos: QoS) -> None:
         self.topic, self.type, self.qos = topic, type, qos
-        self._writer, self._graph, self._matches_qos = writer, graph, matches_qos
-        self._on_close = on_close
+        self._core = core
+        self._hash = type.rihs01
         self._closed = False
         self._process = os.getpid()
-        self._hash = type.rihs01
         self._warned: set[EndpointInfo] = set()
+        self._writer = core.middleware.create_writer(core.name, topic, type.name, self._hash, qos)
+        core.add(self)
+        self._writer.match(self._matching())
 
     def publish(self, message: Message | dict[str, Any] = _NO_MESSAGE, /, **fields: Any) -> None:
         """Encode and send a message; see :meth:`rosglass.comm.Publisher.publish`."""
@@ -75,9 +66,9 @@ class Ros2Publisher(Publisher):
         """Return how many subscriptions in the graph match now; 0 after closing."""
         return 0 if self._closed else len(self._matching())
 
-    def follow(self) -> None:
-        """Follow a change of the graph; for the node."""
-        if not self._closed:
+    def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - the graph alone matters
+        """Follow a change of the graph."""
+        if moved and not self._closed:
             self._writer.match(self._matching())
 
     def close(self) -> None:
@@ -87,16 +78,16 @@ class Ros2Publisher(Publisher):
             if self._process != os.getpid():
                 return
             self._writer.close()
-            self._on_close(self)
+            self._core.remove(self)
 
     def _matching(self) -> list[EndpointInfo]:
         found = []
-        for endpoint in self._graph.endpoints(EndpointKind.SUBSCRIPTION, self.topic):
+        for endpoint in self._core.graph.endpoints(EndpointKind.SUBSCRIPTION, self.topic):
             if endpoint.type != self.type.name:
                 continue
             if endpoint.type_hash not in ("", self._hash):
                 self._warn(endpoint)
-            elif not (self._matches_qos and endpoint.qos.incompatibility(self.qos)):
+            elif not (self._core.middleware.matches_qos and endpoint.qos.incompatibility(self.qos)):
                 found.append(endpoint)
         return found
 

@@ -3,65 +3,47 @@
 from __future__ import annotations
 
 import threading
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
-from rosglass.comm import Sample, Time
-from rosglass.errors import Error
+from rosglass.comm import EndpointKind, Sample, Time
+from rosglass.errors import Error, NodeClosedError
+from rosglass.ros2.core import Member
 from rosglass.ros2.repeats import Repeats
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
-    from rosglass.comm import EndpointInfo, Handle, NodeName, Subscription
+    from rosglass.comm import EndpointInfo, Handle, Subscription
     from rosglass.messages import MessageType
-    from rosglass.ros2.middleware import Middleware, OnSample
+    from rosglass.ros2.core import Core
+    from rosglass.ros2.middleware import OnSample
 
-__all__ = ["LoadType", "Reading"]
+__all__ = ["Reading"]
 
 #: Unknown definitions that are named, of publishers that announce nothing.
 _MAX_STRANGERS = 16
 
 
-class LoadType(Protocol):
-    """Finds types by name."""
-
-    def __call__(self, name: str, hash: str = "") -> MessageType:
-        """Return the type `name`, in the version that has `hash` if one is given.
-
-        Raises:
-            Error: Nobody has it, or it has an error.
-        """
-
-
-class Reading:
-    """Serves a subscription.
+class Reading(Member):
+    """Serves a subscription from its creation to its end.
 
     A subscription created with a type keeps it. One created with a type's name takes the version
     of it that the robot publishes, if the library has it; one created without takes the type that
     is published.
 
     Args:
+        core: The node it belongs to.
         subscription: Whom to serve.
         wanted: Type or type name it was created with; None to take what is published.
-        middleware: Where samples come from.
-        node: The node it belongs to.
-        load: Finds types.
-        wake: Asks for an :meth:`update` soon.
     """
 
     def __init__(
-        self,
-        subscription: Subscription,
-        wanted: MessageType | str | None,
-        middleware: Middleware,
-        node: NodeName,
-        load: LoadType,
-        wake: Callable[[], None],
+        self, core: Core, subscription: Subscription, wanted: MessageType | str | None
     ) -> None:
         self.subscription = subscription
+        self._core = core
         self._discovers = wanted is None
         self._fixed = not (wanted is None or isinstance(wanted, str))
-        self._middleware, self._node, self._load, self._wake = middleware, node, load, wake
         self._lock = threading.Lock()
         self._reader: Handle | None = None
         self._type: MessageType | None = None
@@ -70,14 +52,19 @@ class Reading:
         self._failed: tuple[str, str] | None = None
         self._failure = ""
         self._strangers: set[str] = set()
+        subscription.on_close = self.close
+        if subscription.type is not None:
+            self.read(subscription.type)
+        core.add(self)
+        core.wake()
 
     def read(self, message_type: MessageType) -> None:
         """Receive samples of `message_type` from now on, instead of any before."""
         self._strangers.clear()
         self._type, self._hash = message_type, message_type.rihs01
         self.subscription.set_type(message_type)
-        reader = self._middleware.create_reader(
-            self._node,
+        reader = self._core.middleware.create_reader(
+            self._core.name,
             self.subscription.topic,
             message_type.name,
             self._hash,
@@ -93,13 +80,29 @@ class Reading:
         if self._reader is None:
             reader.close()
 
-    def update(self, publishers: Sequence[EndpointInfo], retry: bool) -> None:
-        """Follow a change of the graph.
+    def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - types may be added, too
+        """Follow the graph; now and then look again for a definition that was not found."""
+        topic = self.subscription.topic
+        try:
+            self._update(self._core.graph.endpoints(EndpointKind.PUBLISHER, topic), idle)
+        except NodeClosedError:
+            raise
+        except Error as error:
+            self.subscription.set_problem(str(error))
 
-        Args:
-            publishers: The topic's publishers.
-            retry: Whether to look again for a definition that was not found before.
-        """
+    def close(self) -> None:
+        """Stop receiving."""
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+            reader, self._reader = self._reader, None
+        self.subscription.close()
+        if reader is not None:
+            reader.close()
+        self._core.remove(self)
+
+    def _update(self, publishers: Sequence[EndpointInfo], retry: bool) -> None:
         if self._closed:
             return
         problems: list[str] = []
@@ -109,14 +112,6 @@ class Reading:
         if self._type is not None:
             problems += self._compare(self._type, publishers)
         self.subscription.set_problem("; ".join(problems))
-
-    def close(self) -> None:
-        """Stop receiving."""
-        with self._lock:
-            self._closed = True
-            reader, self._reader = self._reader, None
-        if reader is not None:
-            reader.close()
 
     def _name(self, publishers: Sequence[EndpointInfo], problems: list[str]) -> str:
         """Return the name of the type to receive, empty while that is open."""
@@ -142,7 +137,7 @@ class Reading:
         wanted = (name, hashes.pop() if len(hashes) == 1 else "")
         if wanted != self._failed or retry:
             try:
-                found = self._load(*wanted)
+                found = self._core.types.message(*wanted)
             except Error as error:
                 self._failed = wanted
                 who = _nodes([p for p in publishers if p.type == name])
@@ -174,7 +169,7 @@ class Reading:
             if conflict:
                 effect = (
                     "nothing is received from it"
-                    if self._middleware.matches_qos
+                    if self._core.middleware.matches_qos
                     else "it is received without that guarantee"
                 )
                 problems.append(
@@ -193,12 +188,17 @@ class Reading:
         deliver, wire = self.subscription.deliver, "cdr"
 
         def receive(
-            data: bytes, received: int, sent: int | None, gid: bytes, sequence: int, hash: str
+            data: bytes | memoryview,
+            received: int,
+            sent: int | None,
+            gid: bytes,
+            sequence: int,
+            hash: str,
         ) -> None:
             if hash not in ("", ours):
                 if hash not in strangers and len(strangers) < _MAX_STRANGERS:
                     strangers.add(hash)
-                    self._wake()
+                    self._core.wake()
             elif not repeats.seen(gid, sequence, sent):
                 stamp = None if sent is None else Time(sent)
                 deliver(Sample(data, wire, message_type, Time(received), stamp, gid, sequence))

@@ -21,7 +21,7 @@ from rosglass.comm import (
     Status,
 )
 from rosglass.errors import ConnectionLostError, NodeClosedError
-from rosglass.ros2.middleware import Middleware, OnSample, Writer
+from rosglass.ros2.middleware import Middleware, OnSample, Reader, Writer
 from rosglass.ros2.zenoh_config import close_session, reason, session_config
 from rosglass.ros2.zenoh_endpoints import (
     CHANNEL,
@@ -120,12 +120,14 @@ class ZenohMiddleware(Middleware):
         type_hash: str,
         qos: QoS,
         on_sample: OnSample,
-    ) -> Handle:
+    ) -> Reader:
         """Declare a subscriber to every definition of the type, and its token."""
         kind = EndpointKind.SUBSCRIPTION
         token = self._token(node, EndpointInfo(kind, topic, type_name, node, qos, type_hash))
         key = topic_key(self._options.domain, topic, type_name, "*")
-        return self._add(ZenohReader(self, token, key, qos, on_sample))
+        reader = ZenohReader(self, token, key, qos, on_sample)
+        self._add(reader)
+        return reader
 
     def poll(self) -> None:
         """Try again to open a client's session."""

@@ -16,7 +16,7 @@ import zenoh.ext
 
 from rosglass.comm import ConnectionState, Durability, Handle, History, Reliability
 from rosglass.errors import ConnectionLostError, NodeClosedError
-from rosglass.ros2.middleware import OnSample, Writer
+from rosglass.ros2.middleware import OnSample, Reader, Writer
 from rosglass.ros2.zenoh_keys import HUMBLE_HASH, NO_ATTACHMENT, Attachment, gid_of, topic_key
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ class Announcement(Declaration):
         return []
 
 
-class ZenohReader(Declaration):
+class ZenohReader(Declaration, Reader):
     """A subscriber and its token."""
 
     def __init__(self, owner: Owner, token: str, key: str, qos: QoS, on_sample: OnSample) -> None:

@@ -306,8 +306,10 @@ def test_the_graph(node, middleware):
 def test_graph_changes_are_told_and_merged(node, middleware, eventually):
     go_on, started = threading.Event(), threading.Event()
     calls = []
-    middleware.appear(PUBLISHER, "/first", STRING)
-    eventually(lambda: node._graph_moved is False)
+    settled = []
+    with node.on_graph_change(lambda: settled.append(1)):
+        middleware.appear(PUBLISHER, "/first", STRING)
+        eventually(lambda: settled)
     handle = node.on_graph_change(lambda: (calls.append(1), started.set(), go_on.wait(5)))
     middleware.appear(PUBLISHER, "/t", STRING)
     assert started.wait(5)

@@ -1,0 +1,293 @@
+"""Actions: long tasks with feedback that can be cancelled; asking for them, and offering them."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from enum import Enum
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rosglass.comm.node import Handle
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from concurrent.futures import Future
+
+    from rosglass.comm.node import Executor
+    from rosglass.comm.time import Time
+    from rosglass.messages import ActionType, Message
+
+__all__ = [
+    "ActionClient",
+    "ActionResult",
+    "ActionServer",
+    "CancelAnswer",
+    "ClientGoal",
+    "GoalStatus",
+    "ServerGoal",
+]
+
+
+class GoalStatus(Enum):
+    """What has become of a goal."""
+
+    PENDING = "pending"
+    REJECTED = "rejected"
+    ACCEPTED = "accepted"
+    EXECUTING = "executing"
+    CANCELING = "canceling"
+    SUCCEEDED = "succeeded"
+    CANCELED = "canceled"
+    ABORTED = "aborted"
+    #: The server went away, or never came: nobody knows.
+    LOST = "lost"
+
+    @property
+    def is_active(self) -> bool:
+        """Whether the goal has not ended."""
+        return self in _ACTIVE
+
+
+_ACTIVE = (GoalStatus.PENDING, GoalStatus.ACCEPTED, GoalStatus.EXECUTING, GoalStatus.CANCELING)
+
+
+class ActionResult(NamedTuple):
+    """How a goal ended.
+
+    Attributes:
+        status: SUCCEEDED, CANCELED or ABORTED.
+        result: What the server sent with it.
+    """
+
+    status: GoalStatus
+    result: Message
+
+
+class CancelAnswer(NamedTuple):
+    """What a server answers to a request to cancel.
+
+    Attributes:
+        accepted: Ids of the goals that are being cancelled.
+        reason: Why there are none, in words; empty when there are.
+    """
+
+    accepted: tuple[bytes, ...]
+    reason: str = ""
+
+
+class ClientGoal(Handle):
+    """A goal that was sent; the same object in every callback, for as long as it lives.
+
+    Attributes:
+        id: 16 bytes (a UUID) in ROS 2.
+        goal: What was asked for.
+    """
+
+    id: bytes
+    goal: Message
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.id_text} {self.status.value}>"
+
+    @property
+    @abstractmethod
+    def id_text(self) -> str:
+        """The id as ROS's own tools print it."""
+
+    @property
+    @abstractmethod
+    def status(self) -> GoalStatus:
+        """What has become of it, as last heard."""
+
+    @property
+    @abstractmethod
+    def accepted(self) -> Time | None:
+        """When the server accepted it, by the server's clock; None before."""
+
+    @property
+    @abstractmethod
+    def feedback(self) -> Message | None:
+        """The newest feedback; None before the first."""
+
+    @abstractmethod
+    def result(self, timeout: float | None = None) -> ActionResult:
+        """Wait for the end.
+
+        Args:
+            timeout: Seconds to wait, None for ever.
+
+        Raises:
+            TimeoutError: It has not ended within the time; it goes on.
+            GoalRejectedError: The server did not accept it.
+            ServiceUnavailableError: No server appeared within the time given to send_goal().
+            ConnectionLostError: The server went away before the end.
+            NodeClosedError: The client is closed, or gets closed meanwhile.
+        """
+
+    @property
+    @abstractmethod
+    def done(self) -> Future[ActionResult]:
+        """The end as a future: a result, or one of :meth:`result`'s errors."""
+
+    @abstractmethod
+    def cancel(self) -> Future[CancelAnswer]:
+        """Ask the server to cancel it; returns at once. A goal not sent yet is not sent at all."""
+
+    @abstractmethod
+    def on_feedback(
+        self, callback: Callable[[Message], None], executor: Executor | None = None
+    ) -> Handle:
+        """Call `callback` with each feedback."""
+
+    @abstractmethod
+    def on_status_change(
+        self, callback: Callable[[GoalStatus], None], executor: Executor | None = None
+    ) -> Handle:
+        """Call `callback` with each new status."""
+
+
+class ActionClient(Handle):
+    """Sends goals to an action; made by :meth:`Node.create_action_client`.
+
+    Attributes:
+        name: Absolute action name.
+        type: The action type.
+    """
+
+    name: str
+    type: ActionType
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.name} [{self.type.name}]>"
+
+    @property
+    @abstractmethod
+    def ready(self) -> bool:
+        """Whether a server is there."""
+
+    @property
+    @abstractmethod
+    def problem(self) -> str:
+        """Why goals cannot be sent, in words; empty when all is well."""
+
+    @property
+    @abstractmethod
+    def goals(self) -> Sequence[ClientGoal]:
+        """The goals of this client that have not ended, in order of sending."""
+
+    @abstractmethod
+    def wait_for_server(self, timeout: float | None = None) -> bool:
+        """Wait up to `timeout` seconds (None: for ever) for a server; return whether it is there.
+
+        Raises:
+            NodeClosedError: The client is closed, or gets closed meanwhile.
+        """
+
+    @abstractmethod
+    def send_goal(
+        self,
+        goal: Message | dict[str, Any] | None = None,
+        /,
+        *,
+        on_feedback: Callable[[Message], None] | None = None,
+        on_status_change: Callable[[GoalStatus], None] | None = None,
+        on_done: Callable[[ClientGoal], None] | None = None,
+        executor: Executor | None = None,
+        timeout: float | None = 10.0,
+    ) -> ClientGoal:
+        """Send a goal, as soon as a server is there, and return at once.
+
+        Args:
+            goal: A message or a dict of fields; missing fields, and None, get the defaults.
+            on_feedback: Called with each feedback.
+            on_status_change: Called with each new status.
+            on_done: Called with the goal when it has ended, one way or another.
+            executor: Where callbacks run; None for the node's own dispatcher thread.
+            timeout: Seconds for the server to appear and to accept or reject it; None for ever.
+
+        Raises:
+            ConversionError: A value does not fit its field; nothing is sent.
+            NodeClosedError: The client is closed.
+        """
+
+    @abstractmethod
+    def cancel_all(self) -> Future[CancelAnswer]:
+        """Ask the server to cancel all its goals, other clients' too; returns at once."""
+
+    @abstractmethod
+    def cancel_before(self, time: Time) -> Future[CancelAnswer]:
+        """Ask the server to cancel all goals that it accepted at or before `time`."""
+
+    @abstractmethod
+    def on_ready_change(
+        self, callback: Callable[[bool], None], executor: Executor | None = None
+    ) -> Handle:
+        """Call `callback` with :attr:`ready` whenever it changes."""
+
+
+class ServerGoal(Handle):
+    """A goal that a server was asked for.
+
+    Attributes:
+        id: 16 bytes (a UUID) in ROS 2.
+        goal: What is asked for.
+    """
+
+    id: bytes
+    goal: Message
+
+    @property
+    @abstractmethod
+    def status(self) -> GoalStatus:
+        """What has become of it."""
+
+    @property
+    @abstractmethod
+    def is_cancel_requested(self) -> bool:
+        """Whether it should end soon, with :meth:`canceled`."""
+
+    @abstractmethod
+    def wait_for_cancel(self, timeout: float) -> bool:
+        """Sleep up to `timeout` seconds; return early, with True, when it is to be cancelled."""
+
+    @abstractmethod
+    def publish_feedback(
+        self, feedback: Message | dict[str, Any] | None = None, /, **fields: Any
+    ) -> None:
+        """Send feedback; raises ConversionError."""
+
+    @abstractmethod
+    def succeed(self, result: Message | dict[str, Any] | None = None) -> None:
+        """End it as done; later ends are refused with an Error."""
+
+    @abstractmethod
+    def abort(self, result: Message | dict[str, Any] | None = None) -> None:
+        """End it as failed."""
+
+    @abstractmethod
+    def canceled(self, result: Message | dict[str, Any] | None = None) -> None:
+        """End it as cancelled, after a request to cancel."""
+
+
+class ActionServer(Handle):
+    """Offers an action; made by :meth:`Node.create_action_server`.
+
+    Attributes:
+        name: Absolute action name.
+        type: The action type.
+    """
+
+    name: str
+    type: ActionType
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.name} [{self.type.name}]>"
+
+    @property
+    @abstractmethod
+    def goals(self) -> Sequence[ServerGoal]:
+        """The goals that have not ended, in order of acceptance."""
+
+    @property
+    @abstractmethod
+    def problem(self) -> str:
+        """Why some clients cannot be served, in words; empty when all is well."""

@@ -1,0 +1,184 @@
+"""What everything created from one node shares: its middleware, graph, types and threads."""
+
+from __future__ import annotations
+
+import atexit
+import logging
+import os
+import threading
+from abc import abstractmethod
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from rosglass.comm import ConnectionState, Dispatcher, Handle, Listeners, Status, Worker
+from rosglass.errors import NodeClosedError
+from rosglass.ros2.graph import Graph
+from rosglass.ros2.names import expand
+from rosglass.ros2.types import Types
+
+if TYPE_CHECKING:
+    from rosglass.comm import NodeName
+    from rosglass.interfaces import Library
+    from rosglass.ros2.middleware import Middleware
+
+__all__ = ["Core", "Member"]
+
+_log = logging.getLogger("rosglass.ros2")
+#: Seconds between looks at what has no event: definitions added to the library, a client's router.
+_POLL = 1.0
+
+
+class Member(Handle):
+    """Something created from a node: it follows the graph, and ends with the node."""
+
+    @abstractmethod
+    def follow(self, moved: bool, idle: bool) -> None:
+        """Follow the graph; called on the node's own thread, and may take its time.
+
+        Args:
+            moved: Whether nodes or endpoints appeared or went since the last call.
+            idle: Whether this is the regular look, about once a second.
+        """
+
+
+class Core:
+    """Holds what a node consists of, and keeps its members informed.
+
+    Args:
+        name: The node's name.
+        url: What it was connected with, for people to read.
+        middleware: Opened and closed here.
+        library: Where definitions come from; None for the shared library.
+
+    Attributes:
+        graph: What is seen of the ROS graph.
+        types: Finds types.
+        dispatcher: Runs callbacks that bring no executor of their own.
+        graph_listeners: Told after each change of the graph.
+        status_listeners: Told each new status.
+
+    Raises:
+        ConnectionLostError: The middleware cannot start on this machine.
+    """
+
+    def __init__(
+        self, name: NodeName, url: str, middleware: Middleware, library: Library | None
+    ) -> None:
+        self.name, self.url, self.middleware = name, url, middleware
+        self.types = Types(library, url)
+        self.graph_listeners: Listeners[None] = Listeners(merge=True)
+        self.status_listeners: Listeners[Status] = Listeners()
+        self.dispatcher = Dispatcher(f"{name.name} callbacks")
+        self._lock = threading.Lock()
+        self._closed = False
+        self._process = os.getpid()
+        self._members: dict[Member, None] = {}
+        self._moved = True
+        self._told = middleware.status()
+        self.graph = Graph(self.wake)
+        self._worker = Worker(f"{name.name} graph", self._follow, _POLL)
+        try:
+            middleware.open(self.graph, self._worker.wake)
+            middleware.announce(name)
+        except BaseException:
+            self._worker.close()
+            middleware.close()
+            raise
+        # Threads that hand on samples must not meet an interpreter that is being taken down.
+        atexit.register(self.close)
+
+    @property
+    def closed(self) -> bool:
+        """Whether the node is closed."""
+        return self._closed
+
+    @property
+    def forked(self) -> bool:
+        """Whether this process is a fork of the one that the node belongs to."""
+        return self._process != os.getpid()
+
+    def resolve(self, name: str) -> str:
+        """Return the absolute name of a topic or service; raises InvalidNameError."""
+        return expand(name, self.name.name, self.name.namespace)
+
+    def check_open(self) -> None:
+        """Raise NodeClosedError when the node is closed, or was left behind by a fork."""
+        if self.forked:
+            raise NodeClosedError(
+                f"node {self.name} belongs to the process that made it, and does not work "
+                "after a fork; connect again in this process"
+            )
+        if self._closed:
+            raise NodeClosedError(f"node {self.name} is closed; connect again")
+
+    def add(self, member: Member) -> None:
+        """Let a member follow the graph from now on; raises NodeClosedError after closing it."""
+        with self._lock:
+            self._members[member] = None
+        if self._closed:
+            member.close()
+        self.check_open()
+
+    def remove(self, member: Member) -> None:
+        """Forget a member that was closed."""
+        with self._lock:
+            self._members.pop(member, None)
+
+    def wake(self) -> None:
+        """Let the members follow soon, as if the graph had changed."""
+        self._moved = True
+        self._worker.wake()
+
+    def status(self) -> Status:
+        """Return the state of the connection and what is being done about it."""
+        if self.forked:
+            return Status(ConnectionState.CLOSED, "left behind by a fork; connect again here")
+        return self.middleware.status()
+
+    def close(self) -> None:
+        """Close every member, leave the graph and end the threads; safe to call twice."""
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+            atexit.unregister(self.close)
+            if self.forked:
+                return  # the connection is the parent's, and its threads did not come along
+            members = list(self._members)
+        for member in reversed(members):
+            member.close()
+        self.middleware.close()
+        self._worker.close()
+        self.graph.clear()
+        self._tell_status()
+        self.graph_listeners.clear()
+        self.dispatcher.close()
+        self.status_listeners.clear()
+
+    def _follow(self, idle: bool) -> None:
+        self.middleware.poll()
+        self._tell_status()
+        moved, self._moved = self._moved, False
+        if not moved and not idle:
+            return
+        with self._lock:
+            members = list(self._members)
+        for member in members:
+            # Another thread may close the node, or this member, meanwhile.
+            with suppress(NodeClosedError):
+                try:
+                    member.follow(moved, idle)
+                except NodeClosedError:
+                    raise
+                except Exception:
+                    _log.exception("%s cannot follow the graph", member)
+        if moved:
+            self.graph_listeners.notify(None)
+
+    def _tell_status(self) -> None:
+        status = self.middleware.status()
+        if status != self._told:
+            self._told = status
+            if status.state is ConnectionState.LOST:
+                _log.warning("%s: %s", self.url, status.detail)
+            self.status_listeners.notify(status)

@@ -1,0 +1,84 @@
+"""Finding the types that a node's topics, services and actions have."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeVar
+
+from rosglass.errors import TypeNotFoundError, UnsupportedError
+
+if TYPE_CHECKING:
+    from rosglass.interfaces import Library
+    from rosglass.messages import ActionType, MessageType, ServiceType
+
+    _T = TypeVar("_T", MessageType, ServiceType, ActionType)
+
+__all__ = ["Types"]
+
+
+class Types:
+    """Finds types for one node, in its library.
+
+    Args:
+        library: Where definitions come from; None for the shared library.
+        url: The node's URL, for messages.
+    """
+
+    def __init__(self, library: Library | None, url: str) -> None:
+        self._library, self._url = library, url
+
+    @property
+    def library(self) -> Library:
+        """Where definitions come from."""
+        from rosglass.messages import default_library  # noqa: PLC0415 - numpy
+
+        return default_library() if self._library is None else self._library
+
+    def message(self, wanted: str | MessageType, hash: str = "") -> MessageType:
+        """Return a message type.
+
+        Args:
+            wanted: Its name, or the type itself.
+            hash: RIHS01 hash that a peer announced for it; picks the version that has it.
+
+        Raises:
+            TypeNotFoundError: Nobody has it, or it is not a message.
+            UnsupportedError: It is ROS 1's.
+            DefinitionConflictError: Nobody's definition has `hash`.
+        """
+        from rosglass.messages import MessageType  # noqa: PLC0415 - numpy
+
+        return self._find(wanted, MessageType, hash, "message", "std_msgs/msg/String")
+
+    def service(self, wanted: str | ServiceType, hash: str = "") -> ServiceType:
+        """Return a service type; arguments and errors as in :meth:`message`."""
+        from rosglass.messages import ServiceType  # noqa: PLC0415 - numpy
+
+        return self._find(wanted, ServiceType, hash, "service", "std_srvs/srv/Trigger")
+
+    def action(self, wanted: str | ActionType, hash: str = "") -> ActionType:
+        """Return an action type; arguments and errors as in :meth:`message`."""
+        from rosglass.messages import ActionType  # noqa: PLC0415 - numpy
+
+        example = "example_interfaces/action/Fibonacci"
+        return self._find(wanted, ActionType, hash, "action", example)
+
+    def _find(self, wanted: object, kind: type[_T], hash: str, word: str, example: str) -> _T:
+        from rosglass.messages import load  # noqa: PLC0415 - numpy
+
+        if not isinstance(wanted, str):
+            return self._check(wanted, kind, word, example)
+        found = load(wanted, ros=2, library=self._library, hash=hash)
+        return self._check(found, kind, word, example)
+
+    def _check(self, found: object, kind: type[_T], word: str, example: str) -> _T:
+        if not isinstance(found, kind):
+            raise TypeNotFoundError(
+                f"{found!r} is not a {word} type; give a name such as {example} "
+                f"or what rosglass.load() returns for a {word}"
+            )
+        if found.ros != 2:
+            raise UnsupportedError(
+                f"{found.name} is ROS 1's definition, and {self._url} is a ROS 2 graph; "
+                f"load it with rosglass.load({found.name!r}, ros=2)"
+            )
+        return found
