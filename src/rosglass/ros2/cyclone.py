@@ -1,0 +1,385 @@
+"""Cyclone DDS's own C interface, as much of it as ROS 2 needs, without the GIL while it works.
+
+The PyPI package `cyclonedds` brings the library; its Python layer is not used, as it holds the GIL
+while it copies samples, announces a type description that keeps plain ROS 2 endpoints from
+matching, and takes 0.2 s to import. Entities are the numbers that the library gives them. What is
+declared here follows the headers of Eclipse Cyclone DDS 11 (``dds/dds.h``, ``dds/ddsc/*.h``).
+
+Samples are in :mod:`rosglass.ros2.cyclone_samples`, profiles in :mod:`rosglass.ros2.cyclone_qos`,
+callbacks in :mod:`rosglass.ros2.cyclone_listener`, the discovered participants and endpoints in
+:mod:`rosglass.ros2.cyclone_builtin`.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+from ctypes import POINTER, c_bool, c_char_p, c_int32, c_int64, c_size_t, c_uint32, c_uint64
+from ctypes import c_void_p as pointer
+from functools import cache
+from importlib.metadata import PackageNotFoundError, distribution
+from typing import TYPE_CHECKING, Any
+
+from rosglass.errors import (
+    ConnectionLostError,
+    Error,
+    NodeClosedError,
+    TimeoutError,  # noqa: A004 - the field's own word
+    UnsupportedError,
+)
+
+if TYPE_CHECKING:
+    from rosglass.ros2.cyclone_listener import Listener
+    from rosglass.ros2.cyclone_qos import Qos
+
+__all__ = [
+    "INFINITY",
+    "VERSION",
+    "assert_liveliness",
+    "check",
+    "create_domain",
+    "create_participant",
+    "create_reader",
+    "create_topic",
+    "create_writer",
+    "delete",
+    "guid",
+    "instance_handle",
+    "keeping",
+    "library",
+    "matched_publications",
+    "matched_subscriptions",
+    "sertype",
+    "set_listener",
+    "wait_for_acks",
+]
+
+#: The version whose layouts are declared here.
+VERSION = "11.0.1"
+#: No limit, where a time span in nanoseconds is wanted.
+INFINITY = 2**63 - 1
+
+_entity, _entity_p = c_int32, POINTER(c_int32)
+_int_p, _long_p, _size_p = POINTER(c_int32), POINTER(c_int64), POINTER(c_size_t)
+#: Result and arguments of every function that is called.
+_PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
+    "dds_create_domain": (_entity, [c_uint32, c_char_p]),
+    "dds_create_participant": (_entity, [c_uint32, pointer, pointer]),
+    "dds_create_topic": (_entity, [_entity, pointer, c_char_p, pointer, pointer]),
+    "dds_create_reader": (_entity, [_entity, _entity, pointer, pointer]),
+    "dds_create_writer": (_entity, [_entity, _entity, pointer, pointer]),
+    "dds_delete": (c_int32, [_entity]),
+    "dds_get_guid": (c_int32, [_entity, pointer]),
+    "dds_get_instance_handle": (c_int32, [_entity, POINTER(c_uint64)]),
+    "dds_get_entity_sertype": (c_int32, [_entity, POINTER(pointer)]),
+    "dds_get_matched_publications": (c_int32, [_entity, pointer, c_size_t]),
+    "dds_get_matched_subscriptions": (c_int32, [_entity, pointer, c_size_t]),
+    "dds_get_matched_publication_data": (pointer, [_entity, c_uint64]),
+    "dds_get_matched_subscription_data": (pointer, [_entity, c_uint64]),
+    "dds_builtintopic_free_endpoint": (None, [pointer]),
+    "dds_assert_liveliness": (c_int32, [_entity]),
+    "dds_wait_for_acks": (c_int32, [_entity, c_int64]),
+    "dds_set_listener": (c_int32, [_entity, pointer]),
+    "dds_create_listener": (pointer, [pointer]),
+    "dds_delete_listener": (None, [pointer]),
+    "dds_create_waitset": (_entity, [_entity]),
+    "dds_create_readcondition": (_entity, [_entity, c_uint32]),
+    "dds_create_guardcondition": (_entity, [_entity]),
+    "dds_set_guardcondition": (c_int32, [_entity, c_bool]),
+    "dds_take_guardcondition": (c_int32, [_entity, POINTER(c_bool)]),
+    "dds_set_status_mask": (c_int32, [_entity, c_uint32]),
+    "dds_waitset_attach": (c_int32, [_entity, _entity, c_int64]),
+    "dds_waitset_detach": (c_int32, [_entity, _entity]),
+    "dds_waitset_wait": (c_int32, [_entity, pointer, c_size_t, c_int64]),
+    "dds_take": (c_int32, [_entity, pointer, pointer, c_size_t, c_uint32]),
+    "dds_return_loan": (c_int32, [_entity, pointer, c_int32]),
+    "dds_takecdr": (c_int32, [_entity, pointer, c_uint32, pointer, c_uint32]),
+    "dds_writecdr": (c_int32, [_entity, pointer]),
+    "ddsi_serdata_from_ser_iov": (pointer, [pointer, c_int32, c_size_t, pointer, c_size_t]),
+    "ddsi_serdata_size": (c_uint32, [pointer]),
+    "ddsi_serdata_ref": (pointer, [pointer]),
+    "ddsi_serdata_unref": (None, [pointer]),
+    "ddsi_serdata_to_ser": (None, [pointer, c_size_t, c_size_t, pointer]),
+    "ddsi_serdata_to_ser_ref": (pointer, [pointer, c_size_t, c_size_t, pointer]),
+    "ddsi_serdata_to_ser_unref": (None, [pointer, pointer]),
+    "dds_free": (None, [pointer]),
+    "dds_create_qos": (pointer, []),
+    "dds_delete_qos": (None, [pointer]),
+    "dds_qset_reliability": (None, [pointer, c_int32, c_int64]),
+    "dds_qset_durability": (None, [pointer, c_int32]),
+    "dds_qset_durability_service": (
+        None,
+        [pointer, c_int64, c_int32, c_int32, c_int32, c_int32, c_int32],
+    ),
+    "dds_qset_history": (None, [pointer, c_int32, c_int32]),
+    "dds_qset_resource_limits": (None, [pointer, c_int32, c_int32, c_int32]),
+    "dds_qset_deadline": (None, [pointer, c_int64]),
+    "dds_qset_lifespan": (None, [pointer, c_int64]),
+    "dds_qset_liveliness": (None, [pointer, c_int32, c_int64]),
+    "dds_qset_ignorelocal": (None, [pointer, c_int32]),
+    "dds_qset_userdata": (None, [pointer, c_char_p, c_size_t]),
+    "dds_qset_writer_data_lifecycle": (None, [pointer, c_bool]),
+    "dds_qset_data_representation": (None, [pointer, c_uint32, pointer]),
+    "dds_qset_entity_name": (None, [pointer, c_char_p]),
+    "dds_qget_reliability": (c_bool, [pointer, _int_p, _long_p]),
+    "dds_qget_durability": (c_bool, [pointer, _int_p]),
+    "dds_qget_history": (c_bool, [pointer, _int_p, _int_p]),
+    "dds_qget_deadline": (c_bool, [pointer, _long_p]),
+    "dds_qget_lifespan": (c_bool, [pointer, _long_p]),
+    "dds_qget_liveliness": (c_bool, [pointer, _int_p, _long_p]),
+    "dds_qget_userdata": (c_bool, [pointer, POINTER(pointer), _size_p]),
+    "dds_qget_prop": (c_bool, [pointer, c_char_p, POINTER(pointer)]),
+}
+#: Return codes (``dds/ddsrt/retcode.h``): words, and the error that a caller can handle.
+_CODES: dict[int, tuple[str, type[Error]]] = {
+    -2: ("it is not supported", UnsupportedError),
+    -3: ("a parameter is not accepted", UnsupportedError),
+    -4: ("a precondition is not met", ConnectionLostError),
+    -5: ("out of resources", ConnectionLostError),
+    -6: ("the entity is not enabled", ConnectionLostError),
+    -7: ("a policy cannot be changed any more", UnsupportedError),
+    -8: ("policies contradict each other", UnsupportedError),
+    -9: ("it was closed before", NodeClosedError),
+    -10: ("no answer in time", TimeoutError),
+    -12: ("the entity is of another kind", UnsupportedError),
+    -13: ("the security settings do not allow it", ConnectionLostError),
+}
+
+
+@cache
+def library() -> Any:
+    """Return the library, whose functions let other Python threads run meanwhile.
+
+    Raises:
+        UnsupportedError: The package is not installed, or is another version.
+    """
+    return _declare(ctypes.CDLL(_path()))
+
+
+@cache
+def keeping() -> Any:
+    """Return the library, whose functions keep the GIL: for short calls that take no lock.
+
+    Giving the GIL away costs more than such a call, and may cost a switch interval until it is
+    back. A function that waits for a lock which a thread of the library holds while it calls us
+    must not be called this way.
+    """
+    return _declare(ctypes.PyDLL(_path()))
+
+
+def check(result: int, call: str, place: str) -> int:
+    """Return `result` unless it is negative, which means that a call failed.
+
+    Args:
+        result: What the call returned.
+        call: The call, e.g. ``dds_create_reader``.
+        place: What it was made for, e.g. ``topic /scan``.
+
+    Raises:
+        NodeClosedError: The entity was deleted.
+        TimeoutError: It took too long.
+        UnsupportedError: The arguments or the library cannot do it.
+        ConnectionLostError: This machine cannot do it now.
+    """
+    if result >= 0:
+        return result
+    words, kind = _CODES.get(result, ("an error that it does not explain", ConnectionLostError))
+    raise kind(f"{place}: Cyclone DDS's {call} failed with code {result}: {words}")
+
+
+def create_domain(domain: int, config: str) -> int:
+    """Create a domain of this process, to be deleted after all that belongs to it.
+
+    Args:
+        domain: Its number.
+        config: Cyclone's configuration as XML, or as comma-separated XML and ``file://`` names;
+            CYCLONEDDS_URI is not looked at.
+
+    Raises:
+        ConnectionLostError: The process has the domain already, or the configuration is wrong.
+    """
+    result = library().dds_create_domain(domain, config.encode())
+    return check(result, "dds_create_domain", f"domain {domain}")
+
+
+def create_participant(domain: int, qos: Qos | None, listener: Listener | None = None) -> int:
+    """Join a domain; CYCLONEDDS_URI configures it unless :func:`create_domain` was called before.
+
+    Raises:
+        ConnectionLostError: This machine has no usable network interface, or no free port.
+    """
+    result = library().dds_create_participant(domain, _of(qos), _of(listener))
+    return check(result, "dds_create_participant", f"domain {domain}")
+
+
+def create_topic(participant: int, name: str, type_name: str) -> int:
+    """Create a topic whose payloads nobody looks into and whose type matches by its name alone.
+
+    It announces no type information, so endpoints that do so match it, too.
+
+    Args:
+        participant: The participant it belongs to.
+        name: Its DDS name, e.g. ``rt/chatter``.
+        type_name: The type's DDS name, e.g. ``std_msgs::msg::dds_::String_``.
+    """
+    descriptor = ctypes.addressof(_descriptor(type_name))
+    result = library().dds_create_topic(participant, descriptor, name.encode(), None, None)
+    return check(result, "dds_create_topic", f"topic {name} of type {type_name}")
+
+
+def create_reader(
+    participant: int, topic: int, qos: Qos | None, listener: Listener | None, place: str
+) -> int:
+    """Create a reader; `topic` may be one of the built-in topics, `place` is for errors."""
+    result = library().dds_create_reader(participant, topic, _of(qos), _of(listener))
+    return check(result, "dds_create_reader", place)
+
+
+def create_writer(
+    participant: int, topic: int, qos: Qos | None, listener: Listener | None, place: str
+) -> int:
+    """Create a writer; `place` is for errors."""
+    result = library().dds_create_writer(participant, topic, _of(qos), _of(listener))
+    return check(result, "dds_create_writer", place)
+
+
+def delete(entity: int) -> None:
+    """Delete an entity and what belongs to it; one that is gone is no error.
+
+    Waits for its callbacks to return, so it must not be called while holding what they need, nor
+    from one of them.
+    """
+    library().dds_delete(entity)
+
+
+def guid(entity: int) -> bytes:
+    """Return the 16 bytes that identify a participant, reader or writer in the domain."""
+    buffer = ctypes.create_string_buffer(16)
+    check(library().dds_get_guid(entity, buffer), "dds_get_guid", f"entity {entity}")
+    return buffer.raw
+
+
+def instance_handle(entity: int) -> int:
+    """Return the number that identifies an entity within this process."""
+    value = c_uint64()
+    result = library().dds_get_instance_handle(entity, ctypes.byref(value))
+    check(result, "dds_get_instance_handle", f"entity {entity}")
+    return value.value
+
+
+def sertype(entity: int) -> int:
+    """Return the address of the type of a reader's, writer's or topic's samples.
+
+    It lives as long as the entity does.
+    """
+    value = pointer()
+    result = library().dds_get_entity_sertype(entity, ctypes.byref(value))
+    check(result, "dds_get_entity_sertype", f"entity {entity}")
+    return value.value or 0
+
+
+def matched_publications(reader: int) -> list[int]:
+    """Return the handles of the writers that a reader is matched with."""
+    return _matched("dds_get_matched_publications", reader)
+
+
+def matched_subscriptions(writer: int) -> list[int]:
+    """Return the handles of the readers that a writer is matched with."""
+    return _matched("dds_get_matched_subscriptions", writer)
+
+
+def assert_liveliness(entity: int, place: str) -> None:
+    """Say that a participant or writer with manual liveliness is alive."""
+    check(library().dds_assert_liveliness(entity), "dds_assert_liveliness", place)
+
+
+def wait_for_acks(writer: int, timeout: float, place: str) -> None:
+    """Wait until every reliable reader has all samples; raises TimeoutError after `timeout` s."""
+    result = library().dds_wait_for_acks(writer, round(timeout * 1e9))
+    check(result, "dds_wait_for_acks", place)
+
+
+def set_listener(entity: int, listener: Listener | None, place: str) -> None:
+    """Replace an entity's callbacks.
+
+    Waits for callbacks that are under way to return; their listener can be let go of afterwards.
+    """
+    check(library().dds_set_listener(entity, _of(listener)), "dds_set_listener", place)
+
+
+class _Descriptor(ctypes.Structure):
+    """``dds_topic_descriptor_t`` (``dds/ddsc/dds_public_impl.h``)."""
+
+    _fields_ = (
+        ("size", c_uint32),
+        ("align", c_uint32),
+        ("flags", c_uint32),
+        ("key_count", c_uint32),
+        ("type_name", c_char_p),
+        ("keys", pointer),
+        ("op_count", c_uint32),
+        ("ops", pointer),
+        ("meta", c_char_p),
+        ("type_information", pointer),
+        ("type_information_size", c_size_t),
+        ("type_mapping", pointer),
+        ("type_mapping_size", c_size_t),
+        ("restrict_data_representation", c_uint32),
+    )
+
+
+#: One octet at offset 0, then the end (``dds/ddsc/dds_opcodes.h``): the library checks that a
+#: payload has it, and takes the rest of the payload as it is.
+_OPS = (c_uint32 * 3)(0x01010000, 0, 0)
+
+
+@cache
+def _descriptor(type_name: str) -> _Descriptor:
+    return _Descriptor(
+        size=1,
+        align=1,
+        type_name=type_name.encode(),
+        op_count=len(_OPS),
+        ops=ctypes.addressof(_OPS),
+        meta=b"",
+    )
+
+
+def _of(item: Qos | Listener | None) -> int | None:
+    return None if item is None else item.address
+
+
+def _matched(call: str, entity: int) -> list[int]:
+    function = getattr(library(), call)
+    room = 16
+    while True:
+        handles = (c_uint64 * room)()
+        count = check(function(entity, handles, room), call, f"entity {entity}")
+        if count <= room:
+            return handles[:count]
+        room = count
+
+
+def _path() -> str:
+    remedy = 'install it with: pip install "rosglass[dds]"'
+    try:
+        found = distribution("cyclonedds")
+    except PackageNotFoundError:
+        raise UnsupportedError(f"Cyclone DDS is not installed; {remedy}") from None
+    if found.version != VERSION:
+        raise UnsupportedError(
+            f"cyclonedds {found.version} is installed, but {VERSION} is needed; {remedy}"
+        )
+    if sys.maxsize < 2**32:
+        raise UnsupportedError("DDS needs a 64-bit Python")
+    for file in found.files or ():
+        if file.name.startswith(("libddsc", "ddsc")) and file.suffix != ".lib":
+            return str(file.locate())
+    raise UnsupportedError(f"the package cyclonedds {VERSION} has no library in it; {remedy}")
+
+
+def _declare(loaded: Any) -> Any:
+    for name, (result, arguments) in _PROTOTYPES.items():
+        function = getattr(loaded, name)
+        function.restype, function.argtypes = result, arguments
+    return loaded

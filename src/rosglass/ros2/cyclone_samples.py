@@ -1,0 +1,181 @@
+"""Payloads in and out of Cyclone DDS, as they are on the wire.
+
+The library keeps a sample in a counted block of memory of its own (`serdata`). Reading hands such
+references over; :func:`payload` turns one into bytes, or into a view that gives the reference back
+when the last user of the view is gone. The block outlives reader, participant and domain.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import struct
+from ctypes import byref, c_char_p, c_int, c_size_t, c_ssize_t, c_ubyte, c_void_p
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+from rosglass.errors import UnsupportedError
+from rosglass.ros2.cyclone import check, keeping, library
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+__all__ = ["COPIED", "Batch", "discard", "payload", "write"]
+
+#: Payloads up to this size in bytes are copied: a view costs more than that.
+COPIED = 16 * 1024
+
+_ANY_STATE = 0x7F
+_SDK_DATA = 2
+#: ``dds_sample_info_t``: valid_data, source_timestamp, publication_handle of its 64 bytes.
+_INFO = struct.Struct("=12x?3xq8xQ24x")
+
+
+class Batch:
+    """Room for the samples that one call takes from a reader; not for several threads at once.
+
+    Args:
+        size: Samples at most.
+    """
+
+    def __init__(self, size: int = 64) -> None:
+        self._size = size
+        self._serdata = (c_void_p * size)()
+        self._infos = (c_ubyte * (_INFO.size * size))()
+        self._addresses = memoryview(self._serdata).cast("B").cast("Q")
+        self._info_view = memoryview(self._infos).cast("B")
+        self._at = ctypes.addressof(self._serdata), ctypes.addressof(self._infos)
+
+    def take(self, reader: int, place: str) -> Iterable[tuple[int, tuple[bool, int, int]]]:
+        """Take what a reader (or read condition) holds, the oldest first.
+
+        Args:
+            reader: The reader.
+            place: What it is for, in errors.
+
+        Returns:
+            For each sample the address of its serdata, to be given to :func:`payload` or
+            :func:`discard`, and: whether it has data (it has none when it only tells that a writer
+            is gone), the writer's time stamp in nanoseconds since the Unix epoch, and the handle of
+            the writer. Empty when there is nothing.
+
+        Raises:
+            NodeClosedError: The reader was deleted.
+        """
+        serdata, infos = self._at
+        count = library().dds_takecdr(reader, serdata, self._size, infos, _ANY_STATE)
+        if count <= 0:
+            check(count, "dds_takecdr", place)
+            return ()
+        addresses: list[int] = self._addresses[:count].tolist()
+        told: Any = _INFO.iter_unpack(self._info_view[: count * _INFO.size])
+        return zip(addresses, told, strict=True)
+
+
+def payload(serdata: int) -> bytes | memoryview:
+    """Return a sample's payload with its encapsulation header, and take over the reference to it.
+
+    Returns:
+        Bytes when it is small, otherwise a read-only view of the library's own memory.
+    """
+    lib, part = keeping(), _Part()
+    size: int = lib.ddsi_serdata_size(serdata)
+    # From here on there are two references: the one handed over, and the one for the bytes.
+    lib.ddsi_serdata_to_ser_ref(serdata, 0, size, byref(part))
+    if size > COPIED:
+        lib.ddsi_serdata_unref(serdata)
+        block = _block(size).from_address(part.base)
+        block.serdata = serdata
+        return memoryview(block).cast("B").toreadonly()
+    data = ctypes.string_at(part.base, size)
+    lib.ddsi_serdata_to_ser_unref(serdata, byref(part))
+    lib.ddsi_serdata_unref(serdata)
+    return data
+
+
+def discard(serdata: int) -> None:
+    """Give the reference to a sample back."""
+    keeping().ddsi_serdata_unref(serdata)
+
+
+def write(
+    writer: int, sertype: int, parts: Sequence[bytes | bytearray | memoryview], place: str
+) -> None:
+    """Send a payload; waits, without the GIL, while a reliable writer's memory is full.
+
+    Args:
+        writer: The writer, which must not be deleted before this returns.
+        sertype: Its type, see :func:`rosglass.ros2.cyclone.sertype`.
+        parts: The payload in one piece or several; the first begins with the encapsulation header.
+        place: What it is for, in errors.
+
+    Raises:
+        NodeClosedError: The writer was deleted.
+        TimeoutError: It could not be sent in time.
+        UnsupportedError: The payload is not of the wire format.
+    """
+    pieces = (_Part * len(parts))()
+    total = 0
+    kept = []
+    for piece, part in zip(pieces, parts, strict=True):
+        held = _pin(part)
+        kept.append(held)
+        piece.base, piece.size = held.address, held.size
+        total += held.size
+    lib = library() if total > COPIED else keeping()
+    serdata = lib.ddsi_serdata_from_ser_iov(sertype, _SDK_DATA, len(parts), pieces, total)
+    if not serdata:
+        raise UnsupportedError(
+            f"{place}: Cyclone DDS refuses a payload of {total} bytes; it takes CDR, which begins "
+            "with 4 bytes of encapsulation header and has at least 1 byte after it"
+        )
+    # The call takes over the reference, whatever becomes of it.
+    check(library().dds_writecdr(writer, serdata), "dds_writecdr", place)
+
+
+class _Part(ctypes.Structure):
+    """``ddsrt_iovec_t``: a piece of memory."""
+
+    _fields_ = (("base", c_void_p), ("size", c_size_t))
+
+
+class _Block:
+    """Memory of the library's that gives its reference back when nobody looks at it any more."""
+
+    serdata: int
+
+    def __del__(self) -> None:
+        keeping().ddsi_serdata_unref(self.serdata)
+
+
+@lru_cache(maxsize=64)
+def _block(size: int) -> Any:
+    return type("Block", (_Block, c_ubyte * size), {})
+
+
+class _Buffer(ctypes.Structure):
+    """``Py_buffer``, as in CPython's stable ABI since 3.11 and the same before."""
+
+    _fields_ = (
+        ("address", c_void_p),
+        ("owner", ctypes.py_object),
+        ("size", c_ssize_t),
+        ("item", c_ssize_t),
+        ("readonly", c_int),
+        ("dimensions", c_int),
+        ("format", c_char_p),
+        ("shape", c_void_p),
+        ("strides", c_void_p),
+        ("offsets", c_void_p),
+        ("internal", c_void_p),
+    )
+
+    def __del__(self) -> None:
+        if self.address is not None:
+            ctypes.pythonapi.PyBuffer_Release(byref(self))
+
+
+def _pin(part: bytes | bytearray | memoryview) -> _Buffer:
+    """Return where `part` is; it stays there as long as the result lives."""
+    buffer = _Buffer()
+    ctypes.pythonapi.PyObject_GetBuffer(ctypes.py_object(part), byref(buffer), 0)
+    return buffer
