@@ -60,6 +60,9 @@ class OnSample(Protocol):
 class Writer(Handle):
     """Sends the samples of one publisher."""
 
+    #: Identity of the publisher, as readers are told it with samples; empty when unknown.
+    gid: bytes = b""
+
     @abstractmethod
     def write(self, data: bytes | bytearray) -> None:
         """Send a payload, which begins with its encapsulation header."""
@@ -70,6 +73,9 @@ class Writer(Handle):
         For middlewares that must address them one way or the other; called on every change of
         the graph, never on a thread of the middleware.
         """
+
+    def assert_liveliness(self) -> None:
+        """Show that the publisher is alive; nothing where the middleware has no word for it."""
 
 
 class Reader(Handle):
@@ -84,6 +90,17 @@ class Reader(Handle):
 
     def flush(self) -> None:
         """Hand on, in the calling thread, what waits to be handed on."""
+
+    def lost(self) -> int:
+        """Return how many samples the middleware knows to be lost, those without number only.
+
+        Gaps in the running numbers of samples that were handed on are counted by who takes them.
+        """
+        return 0
+
+    def alive(self) -> int | None:
+        """Return how many publishers asserted their liveliness in time; None where unknown."""
+        return None
 
 
 class OnReply(Protocol):
@@ -104,6 +121,9 @@ class Requester(Handle):
 
     #: Why some servers in the graph cannot be called, in words; empty when all can.
     problem: str = ""
+    #: Called, from any thread, when what :meth:`ready` returns may have changed; set by whoever
+    #: created it. Without such calls, a server is noticed up to a second late.
+    changed: Callable[[], None] | None = None
 
     @abstractmethod
     def ready(self) -> bool:
@@ -158,6 +178,9 @@ class Replier(Handle):
     @abstractmethod
     def reply(self, request: RequestId, data: bytes | bytearray) -> None:
         """Answer a request; a client that is gone is no error."""
+
+    def fail(self, request: RequestId, reason: str) -> None:
+        """Tell the client that no response will come, where the middleware can say so."""
 
 
 class Middleware(ABC):
