@@ -2,17 +2,33 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from rosglass.errors import TypeNotFoundError, UnsupportedError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from rosglass.comm import EndpointInfo
     from rosglass.interfaces import Library
     from rosglass.messages import ActionType, MessageType, ServiceType
 
     _T = TypeVar("_T", MessageType, ServiceType, ActionType)
 
-__all__ = ["Types"]
+__all__ = ["Fetcher", "Types"]
+
+
+class Fetcher(Protocol):
+    """Asks the robot for definitions; see :meth:`Types.request`."""
+
+    def __call__(
+        self,
+        name: str,
+        hash: str,
+        endpoints: Sequence[EndpointInfo],
+        on_done: Callable[[], None],
+    ) -> str:
+        """Start asking, unless that goes on already, and return at once."""
 
 
 class Types:
@@ -21,10 +37,14 @@ class Types:
     Args:
         library: Where definitions come from; None for the shared library.
         url: The node's URL, for messages.
+
+    Attributes:
+        fetcher: Asks the robot; None while nobody can.
     """
 
     def __init__(self, library: Library | None, url: str) -> None:
         self._library, self._url = library, url
+        self.fetcher: Fetcher | None = None
 
     @property
     def library(self) -> Library:
@@ -61,6 +81,31 @@ class Types:
 
         example = "example_interfaces/action/Fibonacci"
         return self._find(wanted, ActionType, hash, "action", example)
+
+    def request(
+        self,
+        name: str,
+        hash: str,
+        endpoints: Sequence[EndpointInfo],
+        on_done: Callable[[], None],
+    ) -> str:
+        """Ask the robot for a definition that the library does not have; returns at once.
+
+        Meant to be called again, with the same arguments, for as long as it is missing.
+
+        Args:
+            name: Full name of the message, service or action.
+            hash: RIHS01 hash that was announced for it; empty when none was.
+            endpoints: Who uses it, and may be asked.
+            on_done: Called, from any thread, when there is an answer: the library has the
+                definition then, or calling this again says why not.
+
+        Returns:
+            Why the definition cannot be had; empty while an answer is awaited.
+        """
+        if self.fetcher is None:
+            return "the robot cannot be asked for it"
+        return self.fetcher(name, hash, endpoints, on_done)
 
     def _find(self, wanted: object, kind: type[_T], hash: str, word: str, example: str) -> _T:
         from rosglass.messages import load  # noqa: PLC0415 - numpy
