@@ -1,4 +1,4 @@
-"""The ROS graph as seen from here: which nodes exist, and what they publish and subscribe to."""
+"""The ROS graph as seen from here: which nodes exist, and what they offer and use."""
 
 from __future__ import annotations
 
@@ -6,11 +6,15 @@ import threading
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointInfo, EndpointKind, NodeName
+from rosglass.ros2.names import action_of, hidden
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable
+    from collections.abc import Callable, Hashable, Iterable
 
 __all__ = ["Graph"]
+
+_TOPICS = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
+_SERVICES = (EndpointKind.SERVICE_SERVER, EndpointKind.SERVICE_CLIENT)
 
 
 class Graph:
@@ -28,6 +32,7 @@ class Graph:
         self._nodes: dict[Hashable, NodeName] = {}
         self._endpoints: dict[Hashable, EndpointInfo] = {}
         self._by_name: dict[str, dict[Hashable, EndpointInfo]] = {}
+        self._by_node: dict[NodeName, dict[Hashable, EndpointInfo]] = {}
 
     def put_node(self, key: Hashable, node: NodeName) -> None:
         """Add the node known as `key`."""
@@ -41,10 +46,11 @@ class Graph:
         """Add the endpoint known as `key`, or replace what was known about it."""
         with self._lock:
             known = self._endpoints.get(key)
-            if known is not None and known.name != endpoint.name:
-                self._forget_name(key, known)
+            if known is not None and (known.name, known.node) != (endpoint.name, endpoint.node):
+                self._forget(key, known)
             self._endpoints[key] = endpoint
             self._by_name.setdefault(endpoint.name, {})[key] = endpoint
+            self._by_node.setdefault(endpoint.node, {})[key] = endpoint
         if known != endpoint:
             self._changed()
 
@@ -54,25 +60,41 @@ class Graph:
             node = self._nodes.pop(key, None)
             endpoint = self._endpoints.pop(key, None)
             if endpoint is not None:
-                self._forget_name(key, endpoint)
+                self._forget(key, endpoint)
         if node is not None or endpoint is not None:
             self._changed()
 
     def nodes(self) -> list[NodeName]:
         """Return the names of all nodes, sorted; nodes that share a name appear once."""
         with self._lock:
-            names = set(self._nodes.values())
-            names.update(endpoint.node for endpoint in self._endpoints.values())
+            names = {*self._nodes.values(), *self._by_node}
         return sorted(names)
 
-    def topics(self) -> dict[str, list[str]]:
-        """Return every topic with the types announced for it, both sorted."""
-        topics: dict[str, set[str]] = {}
+    def topics(self, *, hidden: bool = True) -> dict[str, list[str]]:
+        """Return every topic with the types announced for it, both sorted.
+
+        Args:
+            hidden: Whether to include hidden topics; see :func:`rosglass.ros2.names.hidden`.
+        """
+        return self._names(_TOPICS, hidden)
+
+    def services(self, *, hidden: bool = True) -> dict[str, list[str]]:
+        """Return every service that is offered or called; arguments as for :meth:`topics`."""
+        return self._names(_SERVICES, hidden)
+
+    def actions(self) -> dict[str, list[str]]:
+        """Return every action with the types announced for it, both sorted.
+
+        An action shows by the names of its service ``send_goal`` and its topic ``feedback``.
+        """
         with self._lock:
-            for endpoint in self._endpoints.values():
-                if endpoint.kind in (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION):
-                    topics.setdefault(endpoint.name, set()).add(endpoint.type)
-        return {name: sorted(types) for name, types in sorted(topics.items())}
+            hits = [
+                action_of(endpoint.name, endpoint.type)
+                for name, endpoints in self._by_name.items()
+                if "/_action/" in name
+                for endpoint in endpoints.values()
+            ]
+        return _sorted(hit for hit in hits if hit is not None)
 
     def endpoints(self, kind: EndpointKind, name: str) -> list[EndpointInfo]:
         """Return the endpoints of a kind at a topic or service, in order of appearance."""
@@ -80,16 +102,43 @@ class Graph:
             found = self._by_name.get(name, {}).values()
             return [endpoint for endpoint in found if endpoint.kind is kind]
 
+    def endpoints_of(self, node: NodeName) -> list[EndpointInfo]:
+        """Return all endpoints of a node, in order of appearance."""
+        with self._lock:
+            return list(self._by_node.get(node, {}).values())
+
     def clear(self) -> None:
         """Forget everything: what cannot be seen any more must not look alive."""
         with self._lock:
             self._nodes.clear()
             self._endpoints.clear()
             self._by_name.clear()
+            self._by_node.clear()
         self._changed()
 
-    def _forget_name(self, key: Hashable, endpoint: EndpointInfo) -> None:
-        named = self._by_name[endpoint.name]
-        del named[key]
+    def _names(self, kinds: tuple[EndpointKind, ...], all_names: bool) -> dict[str, list[str]]:
+        with self._lock:
+            found = [
+                (name, endpoint.type)
+                for name, endpoints in self._by_name.items()
+                if all_names or not hidden(name)
+                for endpoint in endpoints.values()
+                if endpoint.kind in kinds
+            ]
+        return _sorted(found)
+
+    def _forget(self, key: Hashable, endpoint: EndpointInfo) -> None:
+        named, owned = self._by_name[endpoint.name], self._by_node[endpoint.node]
+        del named[key], owned[key]
         if not named:
             del self._by_name[endpoint.name]
+        if not owned:
+            del self._by_node[endpoint.node]
+
+
+def _sorted(pairs: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
+    """Return the second items of the pairs under their first ones."""
+    found: dict[str, set[str]] = {}
+    for name, type_name in pairs:
+        found.setdefault(name, set()).add(type_name)
+    return {name: sorted(types) for name, types in sorted(found.items())}

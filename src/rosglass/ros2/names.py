@@ -14,8 +14,10 @@ from rosglass.errors import InvalidNameError
 __all__ = [
     "MAX_NODE_NAME",
     "MAX_TOPIC_NAME",
+    "action_of",
     "demangle_type",
     "expand",
+    "hidden",
     "mangle_type",
     "validate_namespace",
     "validate_node_name",
@@ -34,6 +36,7 @@ _FORBIDDEN_IN_NODE = re.compile(r"[^A-Za-z0-9_]")
 _DIGIT_FIRST = re.compile(r"(?:^|/)([0-9])")
 _SUBSTITUTION = re.compile(r"\{([^{}]*)\}")
 _DDS_TYPE = re.compile(r"([A-Za-z]\w*)::(\w+)::dds_::(\w+)_\Z")
+_ACTION_PARTS = {"/_action/send_goal": "_SendGoal", "/_action/feedback": "_FeedbackMessage"}
 _ROS_TYPE = re.compile(r"([A-Za-z]\w*)/(\w+)/(\w+)\Z")
 
 
@@ -100,6 +103,25 @@ def expand(name: str, node: str, namespace: str) -> str:
         full = f"{prefix}/{full}"
     _validate_full(what, full, MAX_TOPIC_NAME, name)
     return full
+
+
+def hidden(name: str) -> bool:
+    """Return whether a topic, service or node is hidden: a part of its name begins with ``_``.
+
+    Listings for people leave such names out; an action's topics and services are among them.
+    """
+    return "/_" in f"/{name}"
+
+
+def action_of(name: str, type_name: str) -> tuple[str, str] | None:
+    """Return name and type of the action that a topic or service shows; None when it shows none.
+
+    Only ``<action>/_action/send_goal`` and ``<action>/_action/feedback`` tell the action's type.
+    """
+    for ending, suffix in _ACTION_PARTS.items():
+        if name.endswith(ending) and type_name.endswith(suffix):
+            return name.removesuffix(ending), type_name.removesuffix(suffix)
+    return None
 
 
 def mangle_type(type_name: str) -> str:

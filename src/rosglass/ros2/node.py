@@ -99,6 +99,28 @@ class Ros2Node(Node):
         """Return the subscriptions of a topic."""
         return self._core.graph.endpoints(EndpointKind.SUBSCRIPTION, self.resolve(topic))
 
+    def services(self) -> dict[str, list[str]]:
+        """Return every service that is offered or called, with the types announced for it."""
+        return self._core.graph.services()
+
+    def actions(self) -> dict[str, list[str]]:
+        """Return every action in the graph with the types announced for it."""
+        return self._core.graph.actions()
+
+    def service_servers(self, name: str) -> list[EndpointInfo]:
+        """Return the servers of a service."""
+        return self._core.graph.endpoints(EndpointKind.SERVICE_SERVER, self.resolve(name))
+
+    def service_clients(self, name: str) -> list[EndpointInfo]:
+        """Return the clients of a service."""
+        return self._core.graph.endpoints(EndpointKind.SERVICE_CLIENT, self.resolve(name))
+
+    def endpoints(self, node: str | NodeName) -> list[EndpointInfo]:
+        """Return what a node publishes, subscribes, serves and calls; none when it is unknown."""
+        full = node.full if isinstance(node, NodeName) else self.resolve(node)
+        namespace, _, name = full.rpartition("/")
+        return self._core.graph.endpoints_of(NodeName(namespace or "/", name))
+
     def on_graph_change(
         self, callback: Callable[[], None], executor: Executor | None = None
     ) -> Handle:

@@ -7,6 +7,7 @@ from rosglass.ros2 import Graph
 
 TALKER, LISTENER = NodeName("/", "talker"), NodeName("/arm", "listener")
 PUBLISHER, SUBSCRIPTION = EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION
+SERVER, CLIENT = EndpointKind.SERVICE_SERVER, EndpointKind.SERVICE_CLIENT
 
 
 def endpoint(kind, name="/t", type="p/msg/A", node=TALKER):
@@ -77,3 +78,46 @@ def test_clearing_forgets_everything(graph, changes):
     graph.clear()
     assert (graph.nodes(), graph.topics(), graph.endpoints(PUBLISHER, "/t")) == ([], {}, [])
     assert len(changes) == 3
+
+
+def test_services_are_apart_from_topics(graph):
+    graph.put_endpoint(1, endpoint(SERVER, "/add", "p/srv/Add"))
+    graph.put_endpoint(2, endpoint(CLIENT, "/sub", "p/srv/Sub", LISTENER))
+    graph.put_endpoint(3, endpoint(PUBLISHER, "/add", "p/msg/A"))
+    assert graph.services() == {"/add": ["p/srv/Add"], "/sub": ["p/srv/Sub"]}
+    assert graph.topics() == {"/add": ["p/msg/A"]}
+    assert [e.node for e in graph.endpoints(CLIENT, "/sub")] == [LISTENER]
+
+
+def test_actions_show_by_their_parts(graph):
+    graph.put_endpoint(1, endpoint(SERVER, "/arm/fib/_action/send_goal", "p/action/Fib_SendGoal"))
+    graph.put_endpoint(2, endpoint(SERVER, "/arm/fib/_action/get_result", "p/action/Fib_GetResult"))
+    graph.put_endpoint(
+        3, endpoint(PUBLISHER, "/turn/_action/feedback", "p/action/Turn_FeedbackMessage")
+    )
+    graph.put_endpoint(
+        4, endpoint(PUBLISHER, "/x/_action/status", "action_msgs/msg/GoalStatusArray")
+    )
+    graph.put_endpoint(5, endpoint(SERVER, "/y/_action/send_goal", "p/srv/Other"))
+    assert graph.actions() == {"/arm/fib": ["p/action/Fib"], "/turn": ["p/action/Turn"]}
+
+
+def test_hidden_names_are_there_unless_they_are_not_wanted(graph):
+    graph.put_endpoint(1, endpoint(PUBLISHER, "/fib/_action/status"))
+    graph.put_endpoint(2, endpoint(PUBLISHER, "/open_"))
+    graph.put_endpoint(3, endpoint(SERVER, "/_secret", "p/srv/S"))
+    assert list(graph.topics()) == ["/fib/_action/status", "/open_"]
+    assert list(graph.topics(hidden=False)) == ["/open_"]
+    assert (list(graph.services()), graph.services(hidden=False)) == (["/_secret"], {})
+
+
+def test_what_a_node_has(graph):
+    graph.put_endpoint(1, endpoint(PUBLISHER, "/a"))
+    graph.put_endpoint(2, endpoint(SERVER, "/s", "p/srv/S"))
+    graph.put_endpoint(3, endpoint(PUBLISHER, "/b", node=LISTENER))
+    assert [e.name for e in graph.endpoints_of(TALKER)] == ["/a", "/s"]
+    graph.put_endpoint(1, endpoint(PUBLISHER, "/a", node=LISTENER))
+    graph.remove(2)
+    assert graph.endpoints_of(TALKER) == []
+    assert [e.name for e in graph.endpoints_of(LISTENER)] == ["/b", "/a"]
+    assert graph.nodes() == [LISTENER]

@@ -4,8 +4,10 @@ import pytest
 
 from rosglass import InvalidNameError
 from rosglass.ros2.names import (
+    action_of,
     demangle_type,
     expand,
+    hidden,
     mangle_type,
     validate_namespace,
     validate_node_name,
@@ -132,3 +134,32 @@ def test_foreign_type_names_stay_as_they_are(foreign):
 def test_incomplete_type_names_are_refused(bad):
     with pytest.raises(InvalidNameError, match="package/msg/Type"):
         mangle_type(bad)
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("/fib/_action/status", True),
+        ("/_ros2cli_daemon", True),
+        ("_private", True),
+        ("/scan", False),
+        ("/a_b/c_", False),
+        ("/", False),
+    ],
+)
+def test_a_part_that_begins_with_an_underscore_hides_a_name(name, expected):
+    assert hidden(name) is expected
+
+
+@pytest.mark.parametrize(
+    ("name", "type_name", "expected"),
+    [
+        ("/x/_action/send_goal", "p/action/Go_SendGoal", ("/x", "p/action/Go")),
+        ("/a/x/_action/feedback", "p/action/Go_FeedbackMessage", ("/a/x", "p/action/Go")),
+        ("/x/_action/send_goal", "p/srv/Other", None),
+        ("/x/_action/get_result", "p/action/Go_GetResult", None),
+        ("/x/send_goal", "p/action/Go_SendGoal", None),
+    ],
+)
+def test_actions_are_known_by_their_parts(name, type_name, expected):
+    assert action_of(name, type_name) == expected

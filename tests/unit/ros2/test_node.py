@@ -457,3 +457,23 @@ def test_connect_says_what_is_not_installed(monkeypatch):
 def test_connect_wants_a_library():
     with pytest.raises(rosglass.ConversionError, match=r"library: expected a rosglass\.Library"):
         rosglass.connect("zenoh://127.0.0.1:7447", library=3)
+
+
+def test_services_actions_and_what_a_node_has(node, middleware):
+    server, client = EndpointKind.SERVICE_SERVER, EndpointKind.SERVICE_CLIENT
+    middleware.appear(server, "/arm/add", "p/srv/Add", node="adder")
+    middleware.appear(client, "/arm/add", "p/srv/Add")
+    middleware.appear(server, "/fib/_action/send_goal", "p/action/Fib_SendGoal")
+    assert node.services() == {
+        "/arm/add": ["p/srv/Add"],
+        "/fib/_action/send_goal": ["p/action/Fib_SendGoal"],
+    }
+    assert node.actions() == {"/fib": ["p/action/Fib"]}
+    assert [e.node.full for e in node.service_servers("add")] == ["/adder"]
+    assert [e.node.full for e in node.service_clients("/arm/add")] == ["/robot"]
+    names = ["/arm/add", "/fib/_action/send_goal"]
+    assert [e.name for e in node.endpoints("/robot")] == names
+    assert [e.name for e in node.endpoints(NodeName("/", "robot"))] == names
+    assert node.endpoints("/nobody") == []
+    with pytest.raises(rosglass.InvalidNameError):
+        node.endpoints("no body")
