@@ -8,9 +8,11 @@ from enum import IntEnum
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from rosglass.comm.node import Handle
+from rosglass.errors import UnsupportedError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
+    from os import PathLike
 
     from rosglass.comm.node import Executor
 
@@ -52,7 +54,7 @@ class Range(NamedTuple):
     Attributes:
         low: Smallest value.
         high: Greatest value.
-        step: Distance between allowed values from `low` on; 0 for any.
+        step: Distance between allowed values from `low` on; 0 for any. `high` is always allowed.
     """
 
     low: float
@@ -113,7 +115,14 @@ class ParameterEvent:
 
 
 class Parameters(Handle):
-    """The parameters of this node, which other nodes may read and set; :attr:`Node.parameters`."""
+    """The parameters of this node, which other nodes may read and set; :attr:`Node.parameters`.
+
+    A parameter keeps the type that it is declared with: neither 1 nor "1.0" can become the value
+    of one declared as 1.0. `dynamic_typing` in its descriptor lifts that.
+    """
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names()
 
     @abstractmethod
     def declare(
@@ -123,6 +132,12 @@ class Parameters(Handle):
         descriptor: ParameterDescriptor | None = None,
     ) -> ParameterValue:
         """Make a parameter known and return its value: an override from the start, or `default`.
+
+        Args:
+            name: Its name; dots group parameters, as in ``camera.exposure``.
+            default: Its value unless the program was started with another one.
+            descriptor: What else is to be known about it. Its type is the default's; without a
+                default, give the type here, or allow any with `dynamic_typing`.
 
         Raises:
             ParameterError: It is declared already, or the value breaks the descriptor's rules.
@@ -138,7 +153,10 @@ class Parameters(Handle):
 
     @abstractmethod
     def set(self, values: Mapping[str, ParameterValue]) -> None:
-        """Set parameters, all or none; raises ParameterError with the reason."""
+        """Set parameters, all or none; raises ParameterError with the reason.
+
+        An empty list keeps the parameter's type. None forgets a parameter with dynamic typing.
+        """
 
     @abstractmethod
     def describe(self, name: str) -> ParameterDescriptor:
@@ -152,7 +170,8 @@ class Parameters(Handle):
     def on_set(self, validate: Callable[[Mapping[str, ParameterValue]], str]) -> Handle:
         """Let `validate` say why values must not be set; an empty string lets them pass.
 
-        It runs in the thread that sets them, before anything changes.
+        It runs in the thread that sets them, before anything changes; for values that another
+        node sets, that is a thread of the node's own. An exception refuses the values, too.
         """
 
     @abstractmethod
@@ -161,13 +180,26 @@ class Parameters(Handle):
     ) -> Handle:
         """Call `callback` with each change."""
 
+    def load(self, path: str | PathLike[str]) -> None:
+        """Set, all or none, the declared parameters that a file has for this node.
+
+        Raises:
+            ParameterError: The file cannot be read, names a parameter that is not declared, or
+                has a value that is refused; the message says where.
+        """
+        raise UnsupportedError(f"{type(self).__name__} has no parameter files")
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the parameters to a file that can be loaded; raises ParameterError."""
+        raise UnsupportedError(f"{type(self).__name__} has no parameter files")
+
 
 class ParameterClient(Handle):
     """Reads and sets another node's parameters; made by :meth:`Node.create_parameter_client`.
 
-    Every method that asks the node takes `timeout`, seconds in all, and raises
-    ServiceUnavailableError when the node (or its parameters) cannot be reached, TimeoutError when
-    it does not answer, and NodeClosedError.
+    Every method that asks the node takes `timeout`, seconds in all (None waits for ever), and
+    raises ServiceUnavailableError when the node (or its parameters) cannot be reached,
+    TimeoutError when it does not answer, and NodeClosedError.
 
     Attributes:
         node: Full name of the other node.
@@ -203,28 +235,57 @@ class ParameterClient(Handle):
     def get(
         self, names: Iterable[str] | None = None, *, timeout: float | None = 10.0
     ) -> dict[str, ParameterValue]:
-        """Return the values of parameters, of all without `names`; None for those not set."""
+        """Return the values of parameters, of all without `names`.
+
+        Those that are not declared, or have no value, are None.
+        """
 
     @abstractmethod
     def describe(
         self, names: Iterable[str] | None = None, *, timeout: float | None = 10.0
     ) -> dict[str, ParameterDescriptor]:
-        """Return what is known about parameters, about all without `names`."""
+        """Return what is known about parameters, about all without `names`.
+
+        Those that are not declared have the type NOT_SET.
+        """
 
     @abstractmethod
     def set(
         self, values: Mapping[str, ParameterValue], *, timeout: float | None = 10.0
     ) -> dict[str, SetResult]:
-        """Set parameters one by one; return what the node says to each."""
+        """Set parameters one by one; return what the node says to each.
+
+        The type matters: a node refuses 1 for a parameter that is 1.0. For an empty list, the node
+        is asked for the type first.
+
+        Raises:
+            ParameterError: A value can be no parameter's; nothing is sent.
+        """
 
     @abstractmethod
     def set_atomically(
         self, values: Mapping[str, ParameterValue], *, timeout: float | None = 10.0
     ) -> SetResult:
-        """Set parameters, all or none; return what the node says."""
+        """Set parameters, all or none; return what the node says.
+
+        Types and errors as in :meth:`set`.
+        """
 
     @abstractmethod
     def watch(
         self, callback: Callable[[ParameterEvent], None], executor: Executor | None = None
     ) -> Handle:
         """Call `callback` with each change of the node's parameters."""
+
+    def load(self, path: str | PathLike[str], *, timeout: float | None = 10.0) -> list[str]:
+        """Set, one by one, the parameters that a file has for the node; return their names.
+
+        Raises:
+            ParameterError: The file cannot be read or has nothing for the node, or the node
+                refuses a value; the message lists all that it refused.
+        """
+        raise UnsupportedError(f"{type(self).__name__} has no parameter files")
+
+    def save(self, path: str | PathLike[str], *, timeout: float | None = 10.0) -> None:
+        """Write the node's parameters to a file that can be loaded; raises ParameterError."""
+        raise UnsupportedError(f"{type(self).__name__} has no parameter files")
