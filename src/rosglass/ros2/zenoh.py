@@ -21,7 +21,16 @@ from rosglass.comm import (
     Status,
 )
 from rosglass.errors import ConnectionLostError, NodeClosedError
-from rosglass.ros2.middleware import Middleware, OnSample, Reader, Writer
+from rosglass.ros2.middleware import (
+    Middleware,
+    OnReply,
+    OnRequest,
+    OnSample,
+    Reader,
+    Replier,
+    Requester,
+    Writer,
+)
 from rosglass.ros2.zenoh_config import close_session, reason, session_config
 from rosglass.ros2.zenoh_endpoints import (
     CHANNEL,
@@ -31,7 +40,8 @@ from rosglass.ros2.zenoh_endpoints import (
     ZenohReader,
     ZenohWriter,
 )
-from rosglass.ros2.zenoh_keys import Token, graph_key, topic_key
+from rosglass.ros2.zenoh_keys import Token, gid_of, graph_key, topic_key
+from rosglass.ros2.zenoh_services import ZenohReplier, ZenohRequester
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -129,10 +139,52 @@ class ZenohMiddleware(Middleware):
         self._add(reader)
         return reader
 
+    def create_requester(
+        self,
+        node: NodeName,
+        service: str,
+        type_name: str,
+        type_hash: str,
+        qos: QoS,
+        on_reply: OnReply,
+    ) -> Requester:
+        """Declare a client's token, and queriers that follow its servers."""
+        kind = EndpointKind.SERVICE_CLIENT
+        token = self._token(node, EndpointInfo(kind, service, type_name, node, qos, type_hash))
+        graph = self._opened_graph()
+        requester = ZenohRequester(
+            self, self._options, token, service, type_name, type_hash, graph, on_reply
+        )
+        self._add(requester)
+        return requester
+
+    def create_replier(
+        self,
+        node: NodeName,
+        service: str,
+        type_name: str,
+        type_hash: str,
+        qos: QoS,
+        on_request: OnRequest,
+    ) -> Replier:
+        """Declare a server's queryables, and its token."""
+        kind = EndpointKind.SERVICE_SERVER
+        token = self._token(node, EndpointInfo(kind, service, type_name, node, qos, type_hash))
+        graph = self._opened_graph()
+        replier = ZenohReplier(
+            self, self._options, token, service, type_name, type_hash, graph, on_request
+        )
+        self._add(replier)
+        return replier
+
     def poll(self) -> None:
-        """Try again to open a client's session."""
-        if self._refused and not self._closed:
+        """Try again to open a client's session, and end calls that get no reply any more."""
+        if self._closed:
+            return
+        if self._refused:
             self._open()
+        for requester in self._requesters():
+            requester.poll()
 
     def close(self) -> None:
         """Close the session; everything declared on it goes with it."""
@@ -233,5 +285,19 @@ class ZenohMiddleware(Middleware):
             self._graph.put_endpoint(key, token.endpoint)
 
     def _hide(self, key: str) -> None:
-        if self._graph is not None:
-            self._graph.remove(key)
+        if self._graph is None:
+            return
+        self._graph.remove(key)
+        if key.split("/", 6)[5:6] == ["SS"]:
+            for requester in self._requesters():
+                requester.server_left(gid_of(key))
+
+    def _requesters(self) -> list[ZenohRequester]:
+        with self._lock:
+            declared = list(self._declared.values())
+        return [one for one in declared if isinstance(one, ZenohRequester)]
+
+    def _opened_graph(self) -> Graph:
+        if self._graph is None:
+            raise NodeClosedError("the node is not open yet")
+        return self._graph

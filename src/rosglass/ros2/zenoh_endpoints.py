@@ -25,7 +25,16 @@ if TYPE_CHECKING:
     from rosglass.comm import EndpointInfo, QoS, Status
     from rosglass.ros2.zenoh_options import ZenohOptions
 
-__all__ = ["CHANNEL", "Announcement", "Declaration", "Pump", "ZenohReader", "ZenohWriter"]
+__all__ = [
+    "CHANNEL",
+    "Announcement",
+    "Declaration",
+    "Owner",
+    "Pump",
+    "ZenohReader",
+    "ZenohWriter",
+    "direct",
+]
 
 _log = logging.getLogger("rosglass.ros2")
 #: Seconds between the heartbeats that let subscriptions notice a lost last sample (rmw_zenoh's).
@@ -133,7 +142,7 @@ class ZenohReader(Declaration, Reader):
                 subscriber_detection=True,
             )
             return [Pump(subscriber, self._on_data, f"{self._key} samples")]
-        return [session.declare_subscriber(self._key, _direct(self._on_data))]
+        return [session.declare_subscriber(self._key, direct(self._on_data))]
 
     def _on_data(self, sample: zenoh.Sample) -> None:
         received = time.time_ns()
@@ -284,8 +293,8 @@ def _guarded(callback: Callable[[Any], None]) -> Callable[[Any], None]:
     return guarded
 
 
-def _direct(callback: Callable[[Any], None]) -> Any:
-    """Run `callback` on the thread that receives; only for the samples of plain subscribers."""
+def direct(callback: Callable[[Any], None]) -> Any:
+    """Run `callback` on the thread that receives; for plain subscribers and queryables only."""
     return zenoh.handlers.Callback(_guarded(callback), indirect=False)
 
 
