@@ -30,6 +30,8 @@ from rosglass.interfaces.parser import (
     parse_service,
 )
 from rosglass.interfaces.provider import MemoryProvider, Provider
+from rosglass.interfaces.type_descriptions import parse_type_description
+from rosglass.interfaces.type_sources import add_type_sources, type_sources
 
 __all__ = [
     "DISTRIBUTIONS",
@@ -50,6 +52,7 @@ __all__ = [
     "ServiceDefinition",
     "Source",
     "Value",
+    "add_type_sources",
     "full_text",
     "join_name",
     "md5",
@@ -58,10 +61,12 @@ __all__ = [
     "parse_idl",
     "parse_message",
     "parse_service",
+    "parse_type_description",
     "rihs01",
     "ros1_name",
     "service_event",
     "split_name",
     "type_description",
+    "type_sources",
     "workspace",
 ]

@@ -1,0 +1,63 @@
+"""Writing definitions as ``.msg`` text, for types that came without any."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rosglass.interfaces.names import split_name
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from rosglass.interfaces.definition import Definition, FieldType, Value
+
+__all__ = ["message_text"]
+
+_ESCAPES = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"}
+
+
+def message_text(definition: Definition) -> str:
+    """Return `definition` as a ROS 2 ``.msg`` file would say it, comments and constants included.
+
+    Parsing the text gives the same fields, defaults and constants.
+    """
+    lines: list[str] = []
+    if definition.comment:
+        lines += [*_comment(definition.comment), ""]
+    for constant in definition.constants:
+        lines += _comment(constant.comment)
+        lines.append(f"{constant.type} {constant.name}={_value(constant.value)}")
+    if definition.constants and definition.fields:
+        lines.append("")
+    for field in definition.fields:
+        lines += _comment(field.comment)
+        default = "" if field.default is None else f" {_value(field.default)}"
+        lines.append(f"{_type(field.type)} {field.name}{default}")
+    return "\n".join(lines)
+
+
+def _comment(text: str) -> Iterator[str]:
+    return (f"# {line}".rstrip() for line in text.splitlines())
+
+
+def _type(kind: FieldType) -> str:
+    if not kind.is_compound:
+        return str(kind)
+    package, folder, base = split_name(kind.name)
+    short = f"{package}/{base}" if folder == "msg" else kind.name
+    return str(kind).replace(kind.name, short, 1)
+
+
+def _value(value: Value) -> str:
+    if isinstance(value, tuple):
+        return f"[{', '.join(_value(element) for element in value)}]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if not isinstance(value, str):
+        return repr(value)
+    return f'"{"".join(_character(sign) for sign in value)}"'
+
+
+def _character(sign: str) -> str:
+    known = _ESCAPES.get(sign)
+    return known or (sign if sign.isprintable() else f"\\U{ord(sign):08x}")
