@@ -23,10 +23,12 @@ from rosglass.comm.parameters import (
     Range,
     SetResult,
 )
+from rosglass.comm.promise import Promise
 from rosglass.comm.qos import Durability, History, Liveliness, QoS, Reliability
 from rosglass.comm.service import Call, ServiceClient, ServiceServer
 from rosglass.comm.subscription import Sample, Statistics, Subscription
 from rosglass.comm.time import Duration, Time
+from rosglass.comm.timers import Timers
 from rosglass.comm.worker import Worker
 
 __all__ = [
@@ -58,6 +60,7 @@ __all__ = [
     "ParameterType",
     "ParameterValue",
     "Parameters",
+    "Promise",
     "Publisher",
     "QoS",
     "Range",
@@ -71,5 +74,6 @@ __all__ = [
     "Status",
     "Subscription",
     "Time",
+    "Timers",
     "Worker",
 ]

@@ -10,9 +10,9 @@ from rosglass.comm.node import Handle
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from concurrent.futures import Future
 
     from rosglass.comm.node import Executor
+    from rosglass.comm.promise import Promise
     from rosglass.comm.time import Time
     from rosglass.messages import ActionType, Message
 
@@ -55,7 +55,8 @@ class ActionResult(NamedTuple):
 
     Attributes:
         status: SUCCEEDED, CANCELED or ABORTED.
-        result: What the server sent with it.
+        result: What the server sent with it; the type's defaults for a goal that was cancelled
+            before it was sent.
     """
 
     status: GoalStatus
@@ -76,6 +77,8 @@ class CancelAnswer(NamedTuple):
 
 class ClientGoal(Handle):
     """A goal that was sent; the same object in every callback, for as long as it lives.
+
+    Closing it ends its callbacks and the waiting; the goal itself goes on at the server.
 
     Attributes:
         id: 16 bytes (a UUID) in ROS 2.
@@ -108,7 +111,16 @@ class ClientGoal(Handle):
     def feedback(self) -> Message | None:
         """The newest feedback; None before the first."""
 
+    @property
     @abstractmethod
+    def acceptance(self) -> Promise[bool]:
+        """The server's decision: whether it accepts the goal, or why it could not be asked."""
+
+    @property
+    @abstractmethod
+    def done(self) -> Promise[ActionResult]:
+        """The end: a result, or one of :meth:`result`'s errors. Cannot be cancelled itself."""
+
     def result(self, timeout: float | None = None) -> ActionResult:
         """Wait for the end.
 
@@ -116,53 +128,64 @@ class ClientGoal(Handle):
             timeout: Seconds to wait, None for ever.
 
         Raises:
-            TimeoutError: It has not ended within the time; it goes on.
+            TimeoutError: It has not ended within the time, and goes on; or the server did not
+                accept it within the time given to send_goal() (status LOST).
             GoalRejectedError: The server did not accept it.
             ServiceUnavailableError: No server appeared within the time given to send_goal().
+            ServiceError: The server's answer cannot be decoded.
             ConnectionLostError: The server went away before the end.
             NodeClosedError: The client is closed, or gets closed meanwhile.
         """
-
-    @property
-    @abstractmethod
-    def done(self) -> Future[ActionResult]:
-        """The end as a future: a result, or one of :meth:`result`'s errors."""
+        return self.done.result(timeout)
 
     @abstractmethod
-    def cancel(self) -> Future[CancelAnswer]:
-        """Ask the server to cancel it; returns at once. A goal not sent yet is not sent at all."""
+    def cancel(self, timeout: float | None = 10.0) -> Promise[CancelAnswer]:
+        """Ask the server to cancel it; returns at once. A goal not sent yet is not sent at all.
+
+        Args:
+            timeout: Seconds for the server to answer, None for ever; then a TimeoutError. Some
+                servers never answer.
+        """
 
     @abstractmethod
     def on_feedback(
         self, callback: Callable[[Message], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` with each feedback."""
+        """Call `callback` with each feedback from now on.
+
+        Args:
+            callback: Told the feedback; when it is slow, the newest ones only.
+            executor: Where it runs; None for the node's own dispatcher thread.
+        """
 
     @abstractmethod
     def on_status_change(
         self, callback: Callable[[GoalStatus], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` with each new status."""
+        """Call `callback` with each new status from now on; arguments as :meth:`on_feedback`."""
 
 
 class ActionClient(Handle):
     """Sends goals to an action; made by :meth:`Node.create_action_client`.
 
+    Closing it leaves its goals to the server: cancel them first if they must not go on.
+
     Attributes:
         name: Absolute action name.
-        type: The action type.
+        type: The action type; None while it is not discovered yet.
     """
 
     name: str
-    type: ActionType
+    type: ActionType | None
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} {self.name} [{self.type.name}]>"
+        kind = self.type.name if self.type is not None else "type not known yet"
+        return f"<{type(self).__name__} {self.name} [{kind}]>"
 
     @property
     @abstractmethod
     def ready(self) -> bool:
-        """Whether a server is there."""
+        """Whether a server is there that understands the goals."""
 
     @property
     @abstractmethod
@@ -196,6 +219,9 @@ class ActionClient(Handle):
     ) -> ClientGoal:
         """Send a goal, as soon as a server is there, and return at once.
 
+        A goal that the server does not answer within `timeout` is given up, and the server is
+        asked to cancel it, should it have accepted it: nothing runs that nobody watches.
+
         Args:
             goal: A message or a dict of fields; missing fields, and None, get the defaults.
             on_feedback: Called with each feedback.
@@ -206,34 +232,62 @@ class ActionClient(Handle):
 
         Raises:
             ConversionError: A value does not fit its field; nothing is sent.
+            ServiceUnavailableError: The client was created without a type, and no server is there
+                yet that tells it.
             NodeClosedError: The client is closed.
         """
 
     @abstractmethod
-    def cancel_all(self) -> Future[CancelAnswer]:
-        """Ask the server to cancel all its goals, other clients' too; returns at once."""
+    def cancel_all(self, timeout: float | None = 10.0) -> Promise[CancelAnswer]:
+        """Ask the server to cancel all its goals, other clients' too; returns at once.
+
+        Goals of this client that wait for a server are not sent any more.
+
+        Args:
+            timeout: Seconds for the server to appear and to answer, None for ever.
+        """
 
     @abstractmethod
-    def cancel_before(self, time: Time) -> Future[CancelAnswer]:
-        """Ask the server to cancel all goals that it accepted at or before `time`."""
+    def cancel_before(self, time: Time, timeout: float | None = 10.0) -> Promise[CancelAnswer]:
+        """Ask the server to cancel all goals that it accepted at or before `time`.
+
+        Args:
+            time: By the server's clock, e.g. :attr:`ClientGoal.accepted`.
+            timeout: As for :meth:`cancel_all`.
+
+        Raises:
+            ConversionError: It is no time after the epoch that a message can carry.
+        """
 
     @abstractmethod
     def on_ready_change(
         self, callback: Callable[[bool], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` with :attr:`ready` whenever it changes."""
+        """Call `callback` with :attr:`ready` whenever it changes, to and fro."""
 
 
 class ServerGoal(Handle):
-    """A goal that a server was asked for.
+    """A goal that a server accepted.
+
+    Closing it aborts it, unless it has ended: ``with goal:`` leaves no goal behind.
 
     Attributes:
         id: 16 bytes (a UUID) in ROS 2.
         goal: What is asked for.
+        accepted: When it was accepted.
     """
 
     id: bytes
     goal: Message
+    accepted: Time
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.id_text} {self.status.value}>"
+
+    @property
+    @abstractmethod
+    def id_text(self) -> str:
+        """The id as ROS's own tools print it."""
 
     @property
     @abstractmethod
@@ -243,33 +297,54 @@ class ServerGoal(Handle):
     @property
     @abstractmethod
     def is_cancel_requested(self) -> bool:
-        """Whether it should end soon, with :meth:`canceled`."""
+        """Whether it should end soon: with :meth:`canceled`, or because the server closes."""
 
     @abstractmethod
     def wait_for_cancel(self, timeout: float) -> bool:
-        """Sleep up to `timeout` seconds; return early, with True, when it is to be cancelled."""
+        """Sleep up to `timeout` seconds; return early, with True, when it should end."""
 
     @abstractmethod
     def publish_feedback(
         self, feedback: Message | dict[str, Any] | None = None, /, **fields: Any
     ) -> None:
-        """Send feedback; raises ConversionError."""
+        """Send feedback: a message, a dict of fields, or the fields as keyword arguments.
+
+        Raises:
+            ConversionError: A value does not fit its field; nothing is sent.
+            NodeClosedError: The server was closed.
+            Error: The goal has ended.
+        """
 
     @abstractmethod
     def succeed(self, result: Message | dict[str, Any] | None = None) -> None:
-        """End it as done; later ends are refused with an Error."""
+        """End it as done.
+
+        Args:
+            result: A message or a dict of fields; missing fields, and None, get the defaults.
+
+        Raises:
+            ConversionError: A value does not fit its field; the goal goes on.
+            NodeClosedError: The server was closed.
+            Error: The goal has ended already.
+        """
 
     @abstractmethod
     def abort(self, result: Message | dict[str, Any] | None = None) -> None:
-        """End it as failed."""
+        """End it as failed; arguments and errors as :meth:`succeed`."""
 
     @abstractmethod
     def canceled(self, result: Message | dict[str, Any] | None = None) -> None:
-        """End it as cancelled, after a request to cancel."""
+        """End it as cancelled, after a request to cancel; as :meth:`succeed`.
+
+        Raises:
+            Error: Nobody asked to cancel it: abort() is for ends of the server's own choice.
+        """
 
 
 class ActionServer(Handle):
     """Offers an action; made by :meth:`Node.create_action_server`.
+
+    Closing it aborts the goals that run, and tells their clients.
 
     Attributes:
         name: Absolute action name.

@@ -21,10 +21,11 @@ class Listeners(Generic[_T]):
     Args:
         merge: Whether a callback that has not run yet is only told the newest value, so that a
             burst of changes costs one call.
+        depth: How many values wait for a callback that is slow, the newest ones; None for all.
     """
 
-    def __init__(self, merge: bool = False) -> None:
-        self._merge = merge
+    def __init__(self, merge: bool = False, depth: int | None = None) -> None:
+        self._depth = 1 if merge else depth
         self._lock = threading.Lock()
         self._listeners: list[_Listener[_T]] = []
 
@@ -35,12 +36,16 @@ class Listeners(Generic[_T]):
             self._listeners.append(listener)
         return listener
 
-    def notify(self, value: _T) -> None:
-        """Tell everyone `value`; from any thread, without waiting."""
+    def notify(self, value: _T) -> bool:
+        """Tell everyone `value`; from any thread, without waiting.
+
+        Returns:
+            Whether everyone will be told all values; not so when one was dropped to make room.
+        """
         with self._lock:
             told = list(self._listeners)
-        for listener in told:
-            listener.tell(value, self._merge)
+        kept = [listener.tell(value, self._depth) for listener in told]
+        return all(kept)
 
     def clear(self) -> None:
         """Forget everyone."""
@@ -64,13 +69,15 @@ class _Listener(Handle, Generic[_T]):
         self._waiting: list[_T] = []
         self.closed = False
 
-    def tell(self, value: _T, merge: bool) -> None:
+    def tell(self, value: _T, depth: int | None) -> bool:
         with self._lock:
-            if merge and self._waiting:
-                self._waiting[-1] = value
-                return
             self._waiting.append(value)
+            if depth is not None and len(self._waiting) > depth:
+                # Its run is asked for already; it will find what is left.
+                del self._waiting[0]
+                return False
         self._executor.post(self._run)
+        return True
 
     def _run(self) -> None:
         with self._lock:

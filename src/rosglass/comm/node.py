@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, overload
 from rosglass.errors import UnsupportedError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Awaitable, Callable
     from concurrent.futures import Future
     from types import TracebackType
 
@@ -32,6 +32,8 @@ _H = TypeVar("_H", bound="Handle")
 Answer: TypeAlias = (
     "Message | dict[str, Any] | Future[Message] | Future[dict[str, Any] | None] | None"
 )
+#: What a goal ends with.
+Result: TypeAlias = "Message | dict[str, Any] | None"
 
 
 class Executor(ABC):
@@ -173,13 +175,13 @@ class Node(Handle):
 
         Args:
             name: Absolute, relative or private service name.
-            type: Type name or type; None takes the type that the server announces, and needs the
-                server to be there already.
+            type: Type name or type; None takes the type that the server announces, as soon as it is
+                there.
             qos: Profile of requests and replies; None for the usual one.
 
         Raises:
             InvalidNameError: The name breaks ROS's rules.
-            TypeNotFoundError: No definition of the type is known, or no server announces one.
+            TypeNotFoundError: No definition of the given type is known.
         """
         raise self._unsupported("service clients")
 
@@ -187,7 +189,7 @@ class Node(Handle):
         self,
         name: str,
         type: str | ServiceType,
-        callback: Callable[[Message], Answer],
+        callback: Callable[[Message], Answer | Awaitable[Answer]],
         qos: QoS | None = None,
         *,
         executor: Executor | None = None,
@@ -200,7 +202,8 @@ class Node(Handle):
             callback: Called with each request; returns the response as a message or a dict of
                 fields (None for an empty or all-default one), or a
                 :class:`concurrent.futures.Future` of it to answer later. An exception is logged
-                and, where the world can say so, told to the caller.
+                and, where the world can say so, told to the caller. A coroutine function runs in
+                the event loop in which the server is created.
             qos: Profile of requests and replies; None for the usual one.
             executor: Where `callback` runs; None for the node's own dispatcher thread.
 
@@ -218,7 +221,7 @@ class Node(Handle):
         self,
         name: str,
         type: str | ActionType,
-        execute: Callable[[ServerGoal], Message | dict[str, Any] | None],
+        execute: Callable[[ServerGoal], Result | Awaitable[Result]],
         *,
         accept: Callable[[Message], bool] | None = None,
         cancel: Callable[[ServerGoal], bool] | None = None,
@@ -232,9 +235,11 @@ class Node(Handle):
             execute: Called with each accepted goal, on a thread of the goal's own, or on
                 `executor`. What it returns is the result of a goal that succeeded, or was
                 cancelled when a request to cancel was accepted meanwhile; an exception aborts the
-                goal. It may also end the goal itself.
-            accept: Decides whether a goal is accepted; None accepts all.
-            cancel: Decides whether a request to cancel is accepted; None accepts all.
+                goal. It may also end the goal itself. A coroutine function runs in the event loop
+                in which the server is created.
+            accept: Told the goal; returns whether it is accepted. None accepts all.
+            cancel: Told the goal; returns whether a request to cancel it is accepted. None
+                accepts all, and so does a callback that fails.
             executor: Where `execute`, `accept` and `cancel` run; None for threads of the goals'
                 own and, for the latter two, the node's dispatcher.
 

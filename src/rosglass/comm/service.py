@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from concurrent.futures import Future
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.node import Executor, Handle
+from rosglass.comm.promise import Promise
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
+    from collections.abc import Callable
 
     from rosglass.comm.qos import QoS
     from rosglass.messages import Message, ServiceType
@@ -17,23 +17,13 @@ if TYPE_CHECKING:
 __all__ = ["Call", "ServiceClient", "ServiceServer"]
 
 
-class Call(Future["Message"]):
-    """A service call on its way.
+class Call(Promise["Message"]):
+    """A service call on its way: the promise of the response.
 
-    A :class:`concurrent.futures.Future`: ``result(timeout)`` waits for the response, ``cancel()``
-    gives the call up (the server is not told: ROS has no such message). It can be awaited in
-    asyncio, too. Its callbacks run in the thread that completes it; pass `executor` to
-    :meth:`on_done` for another.
+    ``result(timeout)`` waits for it, ``await call`` does in asyncio, :meth:`on_done` calls back.
+    ``cancel()`` gives the call up: a request that waits for a server is not sent any more, and
+    the response to one that was sent is dropped (the server is not told: ROS has no such message).
     """
-
-    def __await__(self) -> Generator[Any, None, Message]:
-        import asyncio  # noqa: PLC0415 - only for those who use it
-
-        return asyncio.wrap_future(self).__await__()
-
-    def on_done(self, callback: Callable[[Call], None], executor: Executor) -> None:
-        """Call `callback` with this call on `executor` once it has ended, one way or another."""
-        self.add_done_callback(lambda _: executor.post(lambda: callback(self)))
 
 
 class ServiceClient(Handle):
@@ -41,21 +31,22 @@ class ServiceClient(Handle):
 
     Attributes:
         name: Absolute service name.
-        type: The service type.
+        type: The service type; None while it is not discovered yet.
         qos: The quality of service of requests and replies.
     """
 
     name: str
-    type: ServiceType
+    type: ServiceType | None
     qos: QoS
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} {self.name} [{self.type.name}]>"
+        kind = self.type.name if self.type is not None else "type not known yet"
+        return f"<{type(self).__name__} {self.name} [{kind}]>"
 
     @property
     @abstractmethod
     def ready(self) -> bool:
-        """Whether a server is there."""
+        """Whether a server is there that understands the requests."""
 
     @property
     @abstractmethod
@@ -81,15 +72,20 @@ class ServiceClient(Handle):
     ) -> Message:
         """Call the service and wait for its response.
 
+        Callbacks may do this, too, as long as the server does not need their thread. Where
+        nothing may wait, as on a user interface's thread, take :meth:`call_async`.
+
         Args:
             request: A message or a dict of fields; missing fields, and None, get the defaults.
             timeout: Seconds to wait in all, for the server to appear and to answer; None for ever.
 
         Raises:
             ConversionError: A value does not fit its field; nothing is sent.
-            ServiceUnavailableError: No server appeared within the time.
-            TimeoutError: The server did not answer within the time.
-            ServiceError: The server says that it failed.
+            ServiceUnavailableError: No server appeared within the time; nothing was sent.
+            TimeoutError: The server did not answer within the time; it may still do what it was
+                asked to.
+            ServiceError: The server says that it failed, or its response cannot be decoded.
+            ConnectionLostError: The server went away before it answered.
             NodeClosedError: The client is closed, or gets closed meanwhile.
         """
 
@@ -100,14 +96,20 @@ class ServiceClient(Handle):
         """Call the service and return at once; the call carries the response or the error.
 
         A request for which there is no server yet waits for one, and is sent as soon as it is
-        there. Arguments and errors as in :meth:`call`; a ConversionError is raised here already.
+        there; requests are sent in the order of the calls. Arguments and errors as in
+        :meth:`call`; a ConversionError is raised here already, unless the type is not known yet.
         """
 
     @abstractmethod
     def on_ready_change(
         self, callback: Callable[[bool], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` with :attr:`ready` whenever it changes."""
+        """Call `callback` with :attr:`ready` whenever it changes, to and fro.
+
+        Args:
+            callback: Told the new value.
+            executor: Where it runs; None for the node's own dispatcher thread.
+        """
 
 
 class ServiceServer(Handle):

@@ -10,7 +10,7 @@ from abc import abstractmethod
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from rosglass.comm import ConnectionState, Dispatcher, Handle, Listeners, Status, Worker
+from rosglass.comm import ConnectionState, Dispatcher, Handle, Listeners, Status, Timers, Worker
 from rosglass.errors import NodeClosedError
 from rosglass.ros2.graph import Graph
 from rosglass.ros2.names import expand
@@ -54,6 +54,7 @@ class Core:
         graph: What is seen of the ROS graph.
         types: Finds types.
         dispatcher: Runs callbacks that bring no executor of their own.
+        timers: Runs short jobs later, and jobs that the middleware's threads must not wait for.
         graph_listeners: Told after each change of the graph.
         status_listeners: Told each new status.
 
@@ -69,6 +70,7 @@ class Core:
         self.graph_listeners: Listeners[None] = Listeners(merge=True)
         self.status_listeners: Listeners[Status] = Listeners()
         self.dispatcher = Dispatcher(f"{name.name} callbacks")
+        self.timers = Timers(f"{name.name} timers")
         self._lock = threading.Lock()
         self._closed = False
         self._process = os.getpid()
@@ -147,6 +149,7 @@ class Core:
             members = list(self._members)
         for member in reversed(members):
             member.close()
+        self.timers.close()
         self.middleware.close()
         self._worker.close()
         self.graph.clear()

@@ -1,0 +1,135 @@
+"""What comes later: a response, a goal's end, an answer; to wait for, to await, to be told."""
+
+from __future__ import annotations
+
+import math
+import time
+from concurrent.futures import CancelledError, Future, InvalidStateError
+from concurrent.futures import TimeoutError as _NotYet
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from rosglass.errors import ConversionError, TimeoutError  # noqa: A004 - the field's own word
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator
+
+    from rosglass.comm.node import Executor
+
+__all__ = ["Promise", "check_timeout"]
+
+_T = TypeVar("_T")
+#: Longest uninterrupted wait in seconds: on Windows a lock that is waited for holds up Ctrl-C.
+_SLICE = 0.2
+
+
+def check_timeout(timeout: float | None, where: str) -> float | None:
+    """Return a timeout in seconds, None for infinite ones; raises ConversionError."""
+    if timeout is None:
+        return None
+    if isinstance(timeout, bool) or not isinstance(timeout, (int, float)) or not timeout >= 0:
+        raise ConversionError("timeout", timeout, "seconds from 0 on, or None for ever", where)
+    return None if math.isinf(timeout) else float(timeout)
+
+
+class Promise(Future[_T]):
+    """Something that comes later, or the error that comes instead.
+
+    A :class:`concurrent.futures.Future` that can also be awaited in asyncio, and that Ctrl-C
+    interrupts on every system. Callbacks added with ``add_done_callback`` run in the thread that
+    completes it, often the middleware's: they must not wait for anything. :meth:`on_done` brings
+    them elsewhere.
+
+    Args:
+        what: What has not come when a wait is over, e.g. ``/add has not answered``.
+        executor: Where :meth:`on_done` calls back unless told otherwise; None for the thread that
+            completes it.
+        cancellable: Whether :meth:`cancel` gives it up. Otherwise it stays as it is, and only
+            the waiting ends, as when ``asyncio.wait_for`` has waited long enough.
+    """
+
+    def __init__(
+        self, what: str = "it has not come", executor: Executor | None = None, *, cancellable: bool
+    ) -> None:
+        super().__init__()
+        self._what, self._executor, self._cancellable = what, executor, cancellable
+        if cancellable:
+            self.add_done_callback(_tell_waiters)
+
+    def __await__(self) -> Generator[Any, None, _T]:
+        import asyncio  # noqa: PLC0415 - only for those who use it
+
+        return asyncio.wrap_future(self).__await__()
+
+    def result(self, timeout: float | None = None) -> _T:
+        """Wait for it and return it, or raise the error that came instead.
+
+        Args:
+            timeout: Seconds to wait, None for ever.
+
+        Raises:
+            TimeoutError: It has not come within the time; it may still come.
+            concurrent.futures.CancelledError: It was given up.
+        """
+        self._wait(timeout)
+        return super().result(0)
+
+    def exception(self, timeout: float | None = None) -> BaseException | None:
+        """Wait for it and return the error that came instead, None when there was none."""
+        self._wait(timeout)
+        return super().exception(0)
+
+    def cancel(self) -> bool:
+        """Give it up; returns whether that was still possible."""
+        return self._cancellable and super().cancel()
+
+    def on_done(self, callback: Callable[..., None], executor: Executor | None = None) -> None:
+        """Call `callback` with this object once it has come, failed or was given up.
+
+        Args:
+            callback: Told at once when that has happened already.
+            executor: Where it runs; None for the node's own dispatcher thread.
+        """
+        if not callable(callback):
+            raise ConversionError("callback", callback, "something that can be called", "on_done")
+        chosen = executor or self._executor
+        if chosen is None:
+            self.add_done_callback(callback)
+        else:
+            self.add_done_callback(lambda _: chosen.post(lambda: callback(self)))
+
+    def fulfil(self, value: _T) -> bool:
+        """Let it come, unless it is done already; returns whether. For worlds."""
+        try:
+            self.set_result(value)
+        except InvalidStateError:
+            return False
+        return True
+
+    def fail(self, error: BaseException) -> bool:
+        """Let an error come instead, unless it is done already; returns whether. For worlds."""
+        try:
+            self.set_exception(error)
+        except InvalidStateError:
+            return False
+        return True
+
+    def _wait(self, timeout: float | None) -> None:
+        timeout = check_timeout(timeout, "result()")
+        deadline = math.inf if timeout is None else time.monotonic() + timeout
+        while True:
+            left = deadline - time.monotonic()
+            try:
+                super().exception(max(0.0, min(left, _SLICE)))
+            except CancelledError:
+                return
+            except _NotYet:
+                if left <= 0:
+                    raise TimeoutError(f"{self._what} within {timeout:g} s") from None
+            else:
+                return
+
+
+def _tell_waiters(promise: Future[Any]) -> None:
+    """Let ``concurrent.futures.wait`` notice that a promise was given up."""
+    if promise.cancelled():
+        promise.set_running_or_notify_cancel()
