@@ -33,10 +33,12 @@ if TYPE_CHECKING:
     from rosglass.ros2.cyclone_qos import Qos
 
 __all__ = [
+    "GONE",
     "INFINITY",
     "VERSION",
     "assert_liveliness",
     "check",
+    "check_alive",
     "create_domain",
     "create_participant",
     "create_reader",
@@ -88,6 +90,11 @@ _PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
     "dds_set_guardcondition": (c_int32, [_entity, c_bool]),
     "dds_take_guardcondition": (c_int32, [_entity, POINTER(c_bool)]),
     "dds_set_status_mask": (c_int32, [_entity, c_uint32]),
+    "dds_get_status_changes": (c_int32, [_entity, POINTER(c_uint32)]),
+    "dds_get_subscription_matched_status": (c_int32, [_entity, pointer]),
+    "dds_get_publication_matched_status": (c_int32, [_entity, pointer]),
+    "dds_get_liveliness_changed_status": (c_int32, [_entity, pointer]),
+    "dds_get_sample_lost_status": (c_int32, [_entity, pointer]),
     "dds_waitset_attach": (c_int32, [_entity, _entity, c_int64]),
     "dds_waitset_detach": (c_int32, [_entity, _entity]),
     "dds_waitset_wait": (c_int32, [_entity, pointer, c_size_t, c_int64]),
@@ -130,6 +137,10 @@ _PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
     "dds_qget_userdata": (c_bool, [pointer, POINTER(pointer), _size_p]),
     "dds_qget_prop": (c_bool, [pointer, c_char_p, POINTER(pointer)]),
 }
+#: What a call returns for an entity that is being deleted.
+GONE = -9
+#: What it returns for an entity that was deleted, whose number means nothing, or something else.
+_WRONG_ENTITY = (-3, -12)
 #: Return codes (``dds/ddsrt/retcode.h``): words, and the error that a caller can handle.
 _CODES: dict[int, tuple[str, type[Error]]] = {
     -2: ("it is not supported", UnsupportedError),
@@ -165,6 +176,11 @@ def keeping() -> Any:
     must not be called this way.
     """
     return _declare(ctypes.PyDLL(_path()))
+
+
+def check_alive(result: int, call: str, place: str) -> int:
+    """Do as :func:`check` for a call that can only fail because its entity was deleted before."""
+    return check(GONE if result in _WRONG_ENTITY else result, call, place)
 
 
 def check(result: int, call: str, place: str) -> int:
@@ -290,7 +306,7 @@ def matched_subscriptions(writer: int) -> list[int]:
 
 def assert_liveliness(entity: int, place: str) -> None:
     """Say that a participant or writer with manual liveliness is alive."""
-    check(library().dds_assert_liveliness(entity), "dds_assert_liveliness", place)
+    check_alive(library().dds_assert_liveliness(entity), "dds_assert_liveliness", place)
 
 
 def wait_for_acks(writer: int, timeout: float, place: str) -> None:

@@ -5,15 +5,17 @@ from __future__ import annotations
 import ctypes
 import logging
 from ctypes import CFUNCTYPE, c_bool, c_int32, c_uint32, c_uint64, c_void_p
-from typing import TYPE_CHECKING, Any
+from enum import IntFlag
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rosglass.ros2 import cyclone
-from rosglass.ros2.cyclone import check, library
+from rosglass.ros2.cyclone import INFINITY, check, check_alive, library
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
 __all__ = [
+    "Event",
     "IncompatibleQos",
     "Listener",
     "LivelinessChanged",
@@ -21,11 +23,18 @@ __all__ = [
     "Missed",
     "Status",
     "Waitset",
+    "liveliness_changed",
+    "pending",
+    "publication_matched",
     "read_condition",
+    "sample_lost",
+    "set_events",
+    "subscription_matched",
 ]
 
 _log = logging.getLogger("rosglass.ros2")
 _ANY_STATE = 0x7F
+_S = TypeVar("_S", bound=ctypes.Structure)
 
 
 class Status(ctypes.Structure):
@@ -36,45 +45,63 @@ class Status(ctypes.Structure):
         change: How often since the last time this was told.
     """
 
-    _fields_: Any = (("total", c_uint32), ("change", c_int32))
+    _fields_ = (("total", c_uint32), ("change", c_int32))
     total: int
     change: int
 
 
-class Matched(Status):
+class Matched(ctypes.Structure):
     """Counterparts came or went.
 
     Attributes:
+        total: How often one came since the entity's creation.
+        change: How often since the last time this was told.
         current: How many there are.
         current_change: How many more than last time.
         handle: Which one it was last.
     """
 
-    _fields_: Any = (("current", c_uint32), ("current_change", c_int32), ("handle", c_uint64))
+    _fields_ = (
+        ("total", c_uint32),
+        ("change", c_int32),
+        ("current", c_uint32),
+        ("current_change", c_int32),
+        ("handle", c_uint64),
+    )
+    total: int
+    change: int
     current: int
     current_change: int
     handle: int
 
 
-class IncompatibleQos(Status):
+class IncompatibleQos(ctypes.Structure):
     """A counterpart's policies do not fit.
 
     Attributes:
+        total: How often since the entity's creation.
+        change: How often since the last time this was told.
         policy: Number of the policy that was last in the way (``dds_qos_policy_id_t``).
     """
 
-    _fields_: Any = (("policy", c_uint32),)
+    _fields_ = (("total", c_uint32), ("change", c_int32), ("policy", c_uint32))
+    total: int
+    change: int
     policy: int
 
 
-class Missed(Status):
+class Missed(ctypes.Structure):
     """A deadline was missed.
 
     Attributes:
+        total: How often since the entity's creation.
+        change: How often since the last time this was told.
         handle: Of which instance.
     """
 
-    _fields_: Any = (("handle", c_uint64),)
+    _fields_ = (("total", c_uint32), ("change", c_int32), ("handle", c_uint64))
+    total: int
+    change: int
     handle: int
 
 
@@ -89,7 +116,7 @@ class LivelinessChanged(ctypes.Structure):
         handle: Which one it was last.
     """
 
-    _fields_: Any = (
+    _fields_ = (
         ("alive", c_uint32),
         ("not_alive", c_uint32),
         ("alive_change", c_int32),
@@ -101,6 +128,22 @@ class LivelinessChanged(ctypes.Structure):
     alive_change: int
     not_alive_change: int
     handle: int
+
+
+class Event(IntFlag):
+    """What can happen to a reader or writer (``dds_status_id_t``)."""
+
+    NONE = 0
+    OFFERED_DEADLINE_MISSED = 1 << 1
+    REQUESTED_DEADLINE_MISSED = 1 << 2
+    OFFERED_INCOMPATIBLE_QOS = 1 << 3
+    REQUESTED_INCOMPATIBLE_QOS = 1 << 4
+    SAMPLE_LOST = 1 << 5
+    DATA_AVAILABLE = 1 << 8
+    LIVELINESS_LOST = 1 << 9
+    LIVELINESS_CHANGED = 1 << 10
+    PUBLICATION_MATCHED = 1 << 11
+    SUBSCRIPTION_MATCHED = 1 << 12
 
 
 #: What can be listened to, and what is told then; nothing is told about data.
@@ -116,6 +159,46 @@ _EVENTS: dict[str, Any] = {
     "liveliness_lost": Status,
     "sample_lost": Status,
 }
+
+
+def set_events(entity: int, events: Event) -> None:
+    """Let a waitset that an entity is attached to be woken by these events, and no others."""
+    result = library().dds_set_status_mask(entity, events)
+    check_alive(result, "dds_set_status_mask", f"entity {entity}")
+
+
+def pending(entity: int) -> Event:
+    """Return which of the events that an entity was set to have happened."""
+    value = c_uint32()
+    result = library().dds_get_status_changes(entity, ctypes.byref(value))
+    check_alive(result, "dds_get_status_changes", f"entity {entity}")
+    return Event(value.value)
+
+
+def subscription_matched(reader: int) -> Matched:
+    """Return how a reader is matched; its event is over with it."""
+    return _status(reader, "subscription_matched", Matched())
+
+
+def publication_matched(writer: int) -> Matched:
+    """Return how a writer is matched; its event is over with it."""
+    return _status(writer, "publication_matched", Matched())
+
+
+def liveliness_changed(reader: int) -> LivelinessChanged:
+    """Return how many of a reader's writers are alive; its event is over with it."""
+    return _status(reader, "liveliness_changed", LivelinessChanged())
+
+
+def sample_lost(reader: int) -> Status:
+    """Return how many samples a reader knows that it did not get; its event is over with it."""
+    return _status(reader, "sample_lost", Status())
+
+
+def _status(entity: int, what: str, into: _S) -> _S:
+    call = f"dds_get_{what}_status"
+    check_alive(getattr(library(), call)(entity, ctypes.byref(into)), call, f"entity {entity}")
+    return into
 
 
 class Listener:
@@ -178,10 +261,11 @@ class Waitset:
         """Be woken by it no more."""
         library().dds_waitset_detach(self._entity, entity)
 
-    def wait(self, timeout: float) -> list[int]:
+    def wait(self, timeout: float | None) -> list[int]:
         """Return the keys of what holds, empty after `timeout` seconds or :meth:`wake`."""
         lib, keys = library(), self._keys
-        count = lib.dds_waitset_wait(self._entity, keys, len(keys), round(timeout * 1e9))
+        span = INFINITY if timeout is None else round(timeout * 1e9)
+        count = lib.dds_waitset_wait(self._entity, keys, len(keys), span)
         found = keys[: min(check(count, "dds_waitset_wait", "waitset"), len(keys))]
         if 0 in found:
             lib.dds_take_guardcondition(self._guard, ctypes.byref(c_bool()))

@@ -13,8 +13,8 @@ from ctypes import byref, c_char_p, c_int, c_size_t, c_ssize_t, c_ubyte, c_void_
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from rosglass.errors import UnsupportedError
-from rosglass.ros2.cyclone import check, keeping, library
+from rosglass.errors import NodeClosedError, UnsupportedError
+from rosglass.ros2.cyclone import check_alive, keeping, library
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -62,9 +62,10 @@ class Batch:
             NodeClosedError: The reader was deleted.
         """
         serdata, infos = self._at
-        count = library().dds_takecdr(reader, serdata, self._size, infos, _ANY_STATE)
+        # Its lock is held by no thread that calls us, and for no longer than this takes.
+        count = keeping().dds_takecdr(reader, serdata, self._size, infos, _ANY_STATE)
         if count <= 0:
-            check(count, "dds_takecdr", place)
+            check_alive(count, "dds_takecdr", place)
             return ()
         addresses: list[int] = self._addresses[:count].tolist()
         told: Any = _INFO.iter_unpack(self._info_view[: count * _INFO.size])
@@ -128,8 +129,13 @@ def write(
             f"{place}: Cyclone DDS refuses a payload of {total} bytes; it takes CDR, which begins "
             "with 4 bytes of encapsulation header and has at least 1 byte after it"
         )
-    # The call takes over the reference, whatever becomes of it.
-    check(library().dds_writecdr(writer, serdata), "dds_writecdr", place)
+    result = library().dds_writecdr(writer, serdata)
+    try:
+        check_alive(result, "dds_writecdr", place)
+    except NodeClosedError:
+        # Only then did the call not take the reference over.
+        discard(serdata)
+        raise
 
 
 class _Part(ctypes.Structure):

@@ -1,0 +1,106 @@
+"""ROS 2 over DDS, by Cyclone DDS: speaks with every rmw implementation that speaks DDS."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING
+
+from rosglass.comm import ConnectionState, Handle, Status
+from rosglass.errors import NodeClosedError
+from rosglass.ros2.dds_endpoints import DdsReader, DdsWriter
+from rosglass.ros2.dds_participant import Participant
+from rosglass.ros2.middleware import Middleware, Reader, Writer
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rosglass.comm import NodeName, QoS
+    from rosglass.ros2.dds_options import DdsOptions
+    from rosglass.ros2.graph import Graph
+    from rosglass.ros2.middleware import OnSample
+
+__all__ = ["DdsMiddleware"]
+
+
+class DdsMiddleware(Middleware):
+    """A participant in a DDS domain."""
+
+    matches_qos = True
+
+    def __init__(self, options: DdsOptions) -> None:
+        self._options = options
+        self._lock = threading.Lock()
+        self._participant: Participant | None = None
+        self._closed = False
+        self._changed: Callable[[], None] = lambda: None
+
+    def open(self, graph: Graph, changed: Callable[[], None]) -> None:  # noqa: ARG002
+        """Join the domain."""
+        self._changed = changed
+        self._participant = Participant(self._options)
+        changed()
+
+    def status(self) -> Status:
+        """Return whether the domain was joined; DDS has no server to lose."""
+        if self._closed:
+            return Status(ConnectionState.CLOSED, "closed")
+        where = f"domain {self._options.domain}"
+        if self._participant is None:
+            return Status(ConnectionState.CONNECTING, f"joining {where}")
+        return Status(ConnectionState.CONNECTED, where)
+
+    def announce(self, node: NodeName) -> Handle:
+        """Show a node in the graph until the handle is closed."""
+        return _Announcement(self._joined(), node)
+
+    def create_writer(
+        self, node: NodeName, topic: str, type_name: str, type_hash: str, qos: QoS
+    ) -> Writer:
+        """Create a DDS writer."""
+        return DdsWriter(self._joined(), node, topic, type_name, type_hash, qos)
+
+    def create_reader(
+        self,
+        node: NodeName,
+        topic: str,
+        type_name: str,
+        type_hash: str,
+        qos: QoS,
+        on_sample: OnSample,
+    ) -> Reader:
+        """Create a DDS reader."""
+        return DdsReader(self._joined(), node, topic, type_name, type_hash, qos, on_sample)
+
+    def poll(self) -> None:
+        """Do nothing: everything has events."""
+
+    def close(self) -> None:
+        """Leave the domain with everything created here."""
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+            participant = self._participant
+        if participant is not None:
+            participant.close()
+        self._changed()
+
+    def _joined(self) -> Participant:
+        if self._participant is None or self._closed:
+            raise NodeClosedError("the node is closed; connect again")
+        return self._participant
+
+
+class _Announcement(Handle):
+    """A node in the graph."""
+
+    def __init__(self, participant: Participant, node: NodeName) -> None:
+        self._participant, self._node = participant, node
+        self._closed = False
+        participant.add_node(node)
+
+    def close(self) -> None:
+        """Take it out of the graph."""
+        if not self._closed:
+            self._closed = True
+            self._participant.remove_node(self._node)

@@ -1,0 +1,349 @@
+"""Writers and readers of a DDS participant: the sending and receiving ends of ROS 2's topics."""
+
+from __future__ import annotations
+
+import threading
+import time
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from rosglass.comm import History
+from rosglass.errors import NodeClosedError
+from rosglass.ros2 import cyclone, cyclone_builtin
+from rosglass.ros2.cyclone_listener import (
+    Event,
+    liveliness_changed,
+    sample_lost,
+    set_events,
+)
+from rosglass.ros2.cyclone_qos import qos_of
+from rosglass.ros2.cyclone_samples import Batch, discard, payload, write
+from rosglass.ros2.dds_discovery_info import format_user_data, hash_of
+from rosglass.ros2.middleware import Reader, Writer
+from rosglass.ros2.names import mangle_type
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from rosglass.comm import NodeName, QoS
+    from rosglass.ros2.dds_participant import Participant
+    from rosglass.ros2.middleware import OnSample
+
+__all__ = ["DdsReader", "DdsWriter", "SampleReader", "SampleWriter", "Taken", "topic_name"]
+
+#: Samples that a reader holds at least until they are handed on, so that it is the subscription's
+#: inbox that drops what is too much, where it is counted.
+_MIN_DEPTH = 64
+#: Samples that a reader holds at most; a reliable writer sends more when some were handed on.
+_MAX_KEPT = 4096
+#: Samples that are taken at once.
+_BATCH = 64
+#: Seconds that the pump waits for a thread that is handing samples on.
+_SOON = 0.001
+#: Writers that a reader remembers; more come only from a robot that restarts for days.
+_MAX_WRITERS = 1024
+
+#: Payload, time stamp of the writer, handle of the writer, address that its serdata had.
+Taken = tuple["bytes | memoryview", int, int, int]
+
+
+def topic_name(name: str) -> str:
+    """Return the DDS topic that carries a ROS 2 topic (absolute name)."""
+    return f"rt{name}"
+
+
+class SampleWriter:
+    """A DDS writer of payloads.
+
+    Args:
+        participant: Who it belongs to.
+        topic: Its DDS topic.
+        dds_type: Its DDS type.
+        qos: Its profile.
+        user_data: What everyone sees who discovers it.
+        place: What it is for, in errors.
+
+    Attributes:
+        entity: Cyclone's number for it.
+        guid: Its 16 bytes of identity.
+
+    Raises:
+        UnsupportedError: The profile is not possible.
+    """
+
+    def __init__(
+        self,
+        participant: Participant,
+        topic: str,
+        dds_type: str,
+        qos: QoS,
+        user_data: bytes,
+        place: str,
+    ) -> None:
+        self._place = place
+        self._lock = threading.Lock()
+        self._closed = False
+        self._topic = cyclone.create_topic(participant.entity, topic, dds_type)
+        try:
+            policies = qos_of(qos, writer=True, user_data=user_data)
+            self.entity = cyclone.create_writer(
+                participant.entity, self._topic, policies, None, place
+            )
+        except BaseException:
+            cyclone.delete(self._topic)
+            raise
+        self.guid = cyclone.guid(self.entity)
+        self._type = cyclone.sertype(self.entity)
+
+    def write(self, parts: Sequence[bytes | bytearray | memoryview]) -> None:
+        """Send a payload that comes in one part or several.
+
+        Raises:
+            NodeClosedError: The writer was closed.
+            TimeoutError: A reliable reader took nothing for too long.
+        """
+        with self._lock:
+            if self._closed:
+                raise NodeClosedError(f"{self._place}: the publisher is closed")
+            write(self.entity, self._type, parts, self._place)
+
+    def close(self) -> None:
+        """Delete it; a write that waits in another thread ends with an error."""
+        if self._closed:
+            return
+        self._closed = True
+        cyclone.delete(self.entity)
+        # The topic keeps the type alive that a write in another thread may be using.
+        with self._lock:
+            cyclone.delete(self._topic)
+
+
+class SampleReader:
+    """A DDS reader of payloads, which hands them on from the participant's pump.
+
+    Args:
+        participant: Who it belongs to.
+        topic: Its DDS topic.
+        dds_type: Its DDS type.
+        qos: Its profile; it holds more samples than that says, until they are handed on.
+        user_data: What everyone sees who discovers it.
+        place: What it is for, in errors.
+        on_taken: Takes the samples, some at a time and in order, and must return at once.
+        prepare: Called with the reader's number before samples are taken.
+
+    Attributes:
+        entity: Cyclone's number for it.
+        guid: Its 16 bytes of identity.
+
+    Raises:
+        UnsupportedError: The profile is not possible.
+    """
+
+    def __init__(
+        self,
+        participant: Participant,
+        topic: str,
+        dds_type: str,
+        qos: QoS,
+        user_data: bytes,
+        place: str,
+        on_taken: Callable[[list[Taken]], None],
+        prepare: Callable[[int], None] | None = None,
+    ) -> None:
+        self._participant, self._place, self._on_taken = participant, place, on_taken
+        self._closed = False
+        self._eager = True
+        self._lost = 0
+        self._busy = threading.Lock()
+        self._batch = Batch(_BATCH)
+        policies = qos_of(qos, writer=False, user_data=user_data)
+        if qos.history is History.KEEP_ALL:
+            policies.limit(_MAX_KEPT)
+        else:
+            policies.set_history(max(qos.depth, _MIN_DEPTH))
+        self._topic = cyclone.create_topic(participant.entity, topic, dds_type)
+        try:
+            self.entity = cyclone.create_reader(
+                participant.entity, self._topic, policies, None, place
+            )
+            if prepare is not None:
+                prepare(self.entity)
+            self.guid = cyclone.guid(self.entity)
+            participant.pump.watch(self.entity, Event.DATA_AVAILABLE, self._serve)
+        except BaseException:
+            cyclone.delete(self._topic)
+            raise
+
+    def set_eager(self, eager: bool) -> None:
+        """Say whether samples are handed on as they come, or some thirty times a second."""
+        if eager == self._eager or self._closed:
+            return
+        self._eager = eager
+        with suppress(NodeClosedError):
+            set_events(self.entity, Event.DATA_AVAILABLE if eager else Event.NONE)
+            self._participant.pump.visit(self.entity, None if eager else self.flush)
+
+    def flush(self) -> None:
+        """Hand on what waits, unless another thread is about to."""
+        if self._busy.acquire(blocking=False):
+            try:
+                self._hand_on(_MAX_KEPT // _BATCH)
+            finally:
+                self._busy.release()
+
+    def lost(self) -> int:
+        """Return how many samples were announced but never came."""
+        with suppress(NodeClosedError):
+            self._lost = sample_lost(self.entity).total
+        return self._lost
+
+    def alive(self) -> int:
+        """Return how many of the writers it is matched with are alive."""
+        with suppress(NodeClosedError):
+            return liveliness_changed(self.entity).alive
+        return 0
+
+    def close(self) -> None:
+        """Delete it; nothing more is taken."""
+        if self._closed:
+            return
+        self._closed = True
+        cyclone.delete(self.entity)
+        self._participant.pump.forget(self.entity)
+        cyclone.delete(self._topic)
+
+    def _serve(self) -> None:
+        if not self._busy.acquire(timeout=_SOON):
+            return  # the event still holds, so this is called again at once
+        try:
+            self._hand_on(1)
+        finally:
+            self._busy.release()
+
+    def _hand_on(self, batches: int) -> None:
+        for _ in range(batches):
+            if self._closed:
+                break
+            taken = self._take()
+            if taken:
+                self._on_taken(taken)
+            if len(taken) < _BATCH:
+                break
+
+    def _take(self) -> list[Taken]:
+        try:
+            found = self._batch.take(self.entity, self._place)
+        except NodeClosedError:
+            return []
+        taken: list[Taken] = []
+        for serdata, (valid, sent, writer) in found:
+            if valid:
+                taken.append((payload(serdata), sent, writer, serdata))
+            else:
+                discard(serdata)
+        return taken
+
+
+class DdsWriter(Writer):
+    """The sending end of a publisher."""
+
+    def __init__(
+        self,
+        participant: Participant,
+        node: NodeName,
+        topic: str,
+        type_name: str,
+        type_hash: str,
+        qos: QoS,
+    ) -> None:
+        self._participant = participant
+        self._place = f"topic {topic}"
+        self._writer = SampleWriter(
+            participant,
+            topic_name(topic),
+            mangle_type(type_name),
+            qos,
+            format_user_data({"typehash": type_hash}),
+            self._place,
+        )
+        self.gid = self._writer.guid
+        participant.add_endpoint(node, self.gid, writer=True)
+
+    def write(self, data: bytes | bytearray) -> None:
+        """Send a payload; a reliable writer that keeps all waits for slow readers."""
+        self._writer.write((data,))
+
+    def assert_liveliness(self) -> None:
+        """Show that the publisher is alive."""
+        cyclone.assert_liveliness(self._writer.entity, self._place)
+
+    def close(self) -> None:
+        """Take it out of the graph and delete it."""
+        self._participant.remove_endpoint(self.gid)
+        self._writer.close()
+
+
+class DdsReader(Reader):
+    """The receiving end of a subscription."""
+
+    def __init__(
+        self,
+        participant: Participant,
+        node: NodeName,
+        topic: str,
+        type_name: str,
+        type_hash: str,
+        qos: QoS,
+        on_sample: OnSample,
+    ) -> None:
+        self._participant, self._on_sample = participant, on_sample
+        self._writers: dict[int, tuple[bytes, str]] = {}
+        self._reader = SampleReader(
+            participant,
+            topic_name(topic),
+            mangle_type(type_name),
+            qos,
+            format_user_data({"typehash": type_hash}),
+            f"topic {topic}",
+            self._hand_on,
+        )
+        participant.add_endpoint(node, self._reader.guid, writer=False)
+
+    def set_eager(self, eager: bool) -> None:
+        """Hand samples on as they come, or now and then."""
+        self._reader.set_eager(eager)
+
+    def flush(self) -> None:
+        """Hand on what waits."""
+        self._reader.flush()
+
+    def lost(self) -> int:
+        """Return how many samples were announced but never came."""
+        return self._reader.lost()
+
+    def alive(self) -> int:
+        """Return how many publishers asserted their liveliness in time."""
+        return self._reader.alive()
+
+    def close(self) -> None:
+        """Take it out of the graph and delete it."""
+        self._participant.remove_endpoint(self._reader.guid)
+        self._reader.close()
+
+    def _hand_on(self, taken: list[Taken]) -> None:
+        received, on_sample, writers = time.time_ns(), self._on_sample, self._writers
+        for data, sent, handle, _ in taken:
+            writer = writers.get(handle)
+            if writer is None:
+                writer = self._identify(handle)
+            on_sample(data, received, sent, writer[0], -1, writer[1])
+
+    def _identify(self, handle: int) -> tuple[bytes, str]:
+        """Return a writer's identity and type hash; both empty when it is gone already."""
+        found = cyclone_builtin.matched_publication(self._reader.entity, handle)
+        if found is None:
+            return b"", ""
+        if len(self._writers) >= _MAX_WRITERS:
+            self._writers.clear()
+        writer = self._writers[handle] = found.guid, hash_of(found.user_data)
+        return writer
