@@ -1,0 +1,384 @@
+"""Parameter files: YAML as ``ros2 param dump``, ``ros2 param load`` and ``--params-file`` have it.
+
+Rules: ``rcl_yaml_param_parser`` (which nodes read such files with), whose idea of a scalar is not
+quite YAML's; rclcpp's ``parameter_map`` (wildcards in node names); ros2cli's ``ros2 param dump``
+(what is written); design article "ROS Command Line Arguments" (which value wins).
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import math
+import os
+import re
+import tempfile
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+from rosglass.errors import InvalidNameError, ParameterError
+from rosglass.ros2.names import validate_node_name
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from rosglass.comm import ParameterValue
+
+__all__ = ["ParameterFile", "dump", "parse", "parse_value", "read", "write"]
+
+_KEY = "ros__parameters"
+#: Nested mappings in a file; more would only be an attack on the stack.
+_MAX_DEPTH = 64
+#: Bytes of a file; the biggest seen in the wild have some 100 kB.
+_MAX_SIZE = 16 * 1024 * 1024
+_TRUE = frozenset(["Y", "y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"])
+_FALSE = frozenset(["N", "n", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"])
+_NULL = frozenset(["null", "Null", "NULL", "~"])
+#: What C's strtoll takes with base 0, and strtod; infinity and NaN also as YAML writes them.
+_INTEGER = re.compile(r"([+-]?)(?:0[xX]([0-9a-fA-F]+)|(0[0-7]*)|([1-9][0-9]*))\Z")
+_DOUBLE = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?\Z")
+_HEX_DOUBLE = re.compile(
+    r"[+-]?0[xX](?:[0-9a-fA-F]+\.?[0-9a-fA-F]*|\.[0-9a-fA-F]+)(?:[pP][+-]?[0-9]+)?\Z"
+)
+_INFINITE = re.compile(r"([+-]?)(?:\.(?:inf|Inf|INF)|(?i:inf|infinity))\Z")
+_NAN = re.compile(r"(?:\.(?:nan|NaN|NAN)|[+-]?(?i:nan))\Z")
+_STR_TAG, _BINARY_TAG = "tag:yaml.org,2002:str", "tag:yaml.org,2002:binary"
+
+
+@dataclass(frozen=True)
+class ParameterFile:
+    """What a parameter file says.
+
+    Attributes:
+        label: Where it came from, for messages.
+        entries: Pairs of a node's full name, which may have wildcards, and its parameters by
+            dotted name, in the file's order.
+    """
+
+    label: str
+    entries: tuple[tuple[str, Mapping[str, ParameterValue]], ...]
+
+    def for_node(self, node: str) -> dict[str, ParameterValue]:
+        """Return the parameters for the node with the full name `node`.
+
+        What is said of the node itself wins over what wildcards say; otherwise the last wins.
+        """
+        values: dict[str, ParameterValue] = {}
+        for exact in (False, True):
+            for pattern, parameters in self.entries:
+                if exact is ("*" not in pattern) and matches(pattern, node):
+                    values.update(parameters)
+        return values
+
+
+def matches(pattern: str, node: str) -> bool:
+    """Return whether a node's full name is meant by `pattern`.
+
+    ``/*`` stands for one part of a name, ``/**`` for any number of parts, none included.
+    """
+    regex = "".join(
+        {"/**": r"(/\w+)*", "/*": r"/\w+"}.get(part, re.escape(part))
+        for part in re.split(r"(/\*\*|/\*)(?=/|\Z)", pattern)
+    )
+    return re.fullmatch(regex, node, re.ASCII) is not None
+
+
+def read(path: str | os.PathLike[str]) -> ParameterFile:
+    """Read a parameter file; raises ParameterError with file, line and column."""
+    label = os.fspath(path)
+    try:
+        size = Path(label).stat().st_size
+        if size > _MAX_SIZE:
+            raise ParameterError(f"{label} has {size} bytes, too many for a parameter file")
+        text = Path(label).read_text(encoding="utf-8")
+    except OSError as error:
+        raise ParameterError(f"{label} cannot be read: {error.strerror or error}") from None
+    except UnicodeDecodeError as error:
+        raise ParameterError(f"{label} is not UTF-8 text (byte {error.start})") from None
+    return parse(text, label)
+
+
+def parse(text: str, label: str = "<text>") -> ParameterFile:
+    """Read the text of a parameter file.
+
+    Args:
+        text: The text.
+        label: Where it came from, for messages.
+
+    Raises:
+        ParameterError: It is no parameter file; the message has file, line and column.
+    """
+    return ParameterFile(label, tuple(_Reader(text, label).nodes()))
+
+
+def parse_value(text: str, label: str) -> ParameterValue:
+    """Return the value that `text` has as YAML, by the rules for parameter files.
+
+    Raises:
+        ParameterError: It is no value of a parameter.
+    """
+    return _Reader(text, label).value()
+
+
+def dump(nodes: Mapping[str, Mapping[str, ParameterValue]]) -> str:
+    """Return a parameter file's text, laid out as ``ros2 param dump`` does.
+
+    Texts that nodes would take for something else (``1e5``, ``nan``) are quoted, which that tool
+    forgets.
+
+    Args:
+        nodes: Parameters by dotted name, by the node's full name.
+    """
+    document = {node: {_KEY: _nested(parameters)} for node, parameters in nodes.items()}
+    return yaml.dump(document, Dumper=_Dumper, default_flow_style=False)
+
+
+def write(path: str | os.PathLike[str], nodes: Mapping[str, Mapping[str, ParameterValue]]) -> None:
+    """Write a parameter file, in one go; raises ParameterError when that is not possible."""
+    target = Path(path)
+    try:
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8") as file:
+                file.write(dump(nodes))
+            mask = os.umask(0)
+            os.umask(mask)
+            Path(name).chmod(0o666 & ~mask)
+            Path(name).replace(target)
+        except BaseException:
+            with suppress(OSError):
+                Path(name).unlink()
+            raise
+    except OSError as error:
+        raise ParameterError(f"{target} cannot be written: {error.strerror or error}") from None
+
+
+class _Reader:
+    """Reads YAML events: tags and quotes matter, and PyYAML's own types are not ROS's."""
+
+    def __init__(self, text: str, label: str) -> None:
+        self._label = label
+        self._events: Iterator[Any] = yaml.parse(text, Loader=yaml.SafeLoader)
+
+    def nodes(self) -> Iterator[tuple[str, dict[str, ParameterValue]]]:
+        while not isinstance(event := self._next(), yaml.StreamEndEvent):
+            if isinstance(event, yaml.MappingStartEvent):
+                yield from self._node("", event, 0)
+            elif isinstance(event, (yaml.ScalarEvent, yaml.SequenceStartEvent)):
+                raise self._error(event, f"expected node names with {_KEY!r} below them")
+
+    def value(self) -> ParameterValue:
+        found: ParameterValue = None
+        while not isinstance(event := self._next(), yaml.StreamEndEvent):
+            if isinstance(event, yaml.ScalarEvent):
+                found = self._scalar(event)
+            elif isinstance(event, yaml.SequenceStartEvent):
+                found = self._sequence()
+            elif isinstance(event, yaml.MappingStartEvent):
+                raise self._error(event, "a parameter's value is a scalar or a list, not a mapping")
+        return found
+
+    def _next(self) -> Any:
+        """Return the next event; aliases are refused, as nodes do."""
+        try:
+            event = next(self._events)
+        except yaml.YAMLError as error:
+            mark = getattr(error, "problem_mark", None)
+            where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
+            problem = getattr(error, "problem", None) or str(error).partition("\n")[0]
+            raise ParameterError(f"{self._label}{where}: this is not YAML: {problem}") from None
+        if isinstance(event, yaml.AliasEvent):
+            raise self._error(
+                event,
+                f"aliases (*{event.anchor}) are not part of parameter files; repeat the value",
+            )
+        return event
+
+    def _error(self, event: Any, problem: str) -> ParameterError:
+        mark = event.start_mark
+        return ParameterError(f"{self._label}:{mark.line + 1}:{mark.column + 1}: {problem}")
+
+    def _pairs(self) -> Iterator[tuple[Any, str, Any]]:
+        """Read a mapping's keys, each with the event that begins its value."""
+        while not isinstance(key := self._next(), yaml.MappingEndEvent):
+            if not isinstance(key, yaml.ScalarEvent):
+                raise self._error(key, "a key must be a name, not a list or a mapping")
+            if not key.value:
+                raise self._error(key, "a key is empty")
+            yield key, key.value, self._next()
+
+    def _node(
+        self, namespace: str, start: Any, depth: int
+    ) -> Iterator[tuple[str, dict[str, ParameterValue]]]:
+        if depth > _MAX_DEPTH:
+            raise self._error(start, "too deeply nested")
+        for key, name, begin in self._pairs():
+            if name == _KEY:
+                if not namespace:
+                    raise self._error(key, f"{_KEY!r} needs the name of a node above it")
+                if not isinstance(begin, yaml.MappingStartEvent):
+                    raise self._error(begin, f"expected names of parameters below {_KEY!r}")
+                yield self._full(key, namespace), dict(self._parameters("", begin, 0))
+            elif isinstance(begin, yaml.MappingStartEvent):
+                yield from self._node(
+                    f"{namespace}/{name}" if namespace else name, begin, depth + 1
+                )
+            else:
+                hint = f"; it is spelled {_KEY!r}" if name.startswith("ros_") else ""
+                raise self._error(
+                    key,
+                    f"{name!r} has a value, but stands above {_KEY!r}, where only names of "
+                    f"namespaces and nodes can be{hint}",
+                )
+
+    def _full(self, key: Any, name: str) -> str:
+        full = "/" + name.lstrip("/")
+        for part in re.sub("/{2,}", "/", full)[1:].split("/"):
+            if part in ("*", "**"):
+                continue
+            try:
+                validate_node_name(part)
+            except InvalidNameError as error:
+                hint = "; a wildcard stands for whole parts: '*' or '**'" if "*" in part else ""
+                raise self._error(key, f"{full!r} is no name of a node: {error}{hint}") from None
+        return re.sub("/{2,}", "/", full)
+
+    def _parameters(
+        self, prefix: str, start: Any, depth: int
+    ) -> Iterator[tuple[str, ParameterValue]]:
+        if depth > _MAX_DEPTH:
+            raise self._error(start, "too deeply nested")
+        for _key, name, begin in self._pairs():
+            full = f"{prefix}.{name}" if prefix else name
+            if isinstance(begin, yaml.MappingStartEvent):
+                yield from self._parameters(full, begin, depth + 1)
+            elif isinstance(begin, yaml.SequenceStartEvent):
+                yield full, self._sequence()
+            else:
+                yield full, self._scalar(begin)
+
+    def _sequence(self) -> ParameterValue:
+        items: list[Any] = []
+        while not isinstance(event := self._next(), yaml.SequenceEndEvent):
+            if not isinstance(event, yaml.ScalarEvent):
+                raise self._error(event, "a list in a list is no parameter's value")
+            item = self._scalar(event)
+            if item is None:
+                raise self._error(event, "a list cannot hold null")
+            if items and type(item) is not type(items[0]):
+                names = f"{_name_of(items[0])} before, {_name_of(item)} here"
+                advice = "; write whole numbers as 1.0" if "a float" in names else ""
+                raise self._error(
+                    event, f"the items of a list must be of one type: {names}{advice}"
+                )
+            items.append(item)
+        if items and isinstance(items[0], bytes):
+            return b"".join(items)
+        return items
+
+    def _scalar(self, event: Any) -> Any:
+        tag, text = event.tag, event.value
+        if tag not in (None, "!", _STR_TAG, _BINARY_TAG):
+            raise self._error(
+                event, f"nodes take no notice of the tag {tag!r}; write the value as what it is"
+            )
+        if tag == _BINARY_TAG:
+            try:
+                return base64.b64decode("".join(text.split()), validate=True)
+            except (ValueError, binascii.Error) as error:
+                raise self._error(event, f"this is not base64: {error}") from None
+        if tag in (_STR_TAG, "!") or event.style in ("'", '"'):
+            return text
+        if not text:
+            raise self._error(event, "there is no value; an empty text is written ''")
+        return self._plain(event, text)
+
+    def _plain(self, event: Any, text: str) -> Any:
+        if text in _TRUE or text in _FALSE:
+            return text in _TRUE
+        if text in _NULL:
+            return None
+        try:
+            return _number(text)
+        except OverflowError as error:
+            raise self._error(event, str(error)) from None
+
+
+def _number(text: str) -> int | float | str:
+    """Return the number that C's strtoll and strtod read in all of `text`, or `text`."""
+    match = _INTEGER.match(text)
+    if match:
+        sign, hexadecimal, octal, decimal = match.groups()
+        digits = hexadecimal or octal or decimal
+        value = (
+            int(digits, 16 if hexadecimal else 8 if octal else 10) if len(digits) < 99 else 2**64
+        )
+        value = -value if sign == "-" else value
+        if not -(2**63) <= value < 2**63:
+            raise OverflowError(
+                f"{text} is beyond the 64 bits of an integer; write {text}.0 for a float"
+            )
+        return value
+    infinite = _INFINITE.match(text)
+    if infinite:
+        return -math.inf if infinite[1] == "-" else math.inf
+    if _NAN.match(text):
+        return math.nan
+    if _DOUBLE.match(text) or _HEX_DOUBLE.match(text):
+        try:
+            number = float.fromhex(text) if _HEX_DOUBLE.match(text) else float(text)
+        except OverflowError:
+            number = math.inf
+        nonzero = re.search("[1-9a-f]", re.split("p|e(?=[+-]?[0-9]+$)", text.lower())[0])
+        if math.isinf(number) or (number == 0 and nonzero):
+            raise OverflowError(f"{text} is beyond the range of a double")
+        return number
+    return text
+
+
+def _name_of(value: object) -> str:
+    names = {bool: "a boolean", int: "an integer", float: "a float", str: "a text", bytes: "bytes"}
+    return names[type(value)]
+
+
+def _nested(parameters: Mapping[str, ParameterValue]) -> dict[str, Any]:
+    """Return parameters as nested dicts, cut at the dots of their names."""
+    root: dict[str, Any] = {}
+    for name, value in sorted(parameters.items()):
+        place, rest = root, name
+        while "." in rest:
+            first, _, tail = rest.partition(".")
+            # A parameter beside a group of the same name: what is in the group keeps its dots.
+            if not first or not tail or not isinstance(place.get(first, {}), dict):
+                break
+            place, rest = place.setdefault(first, {}), tail
+        place[rest] = [bytes([byte]) for byte in value] if isinstance(value, bytes) else value
+    return root
+
+
+class _Dumper(yaml.SafeDumper):
+    """Writes texts such that nodes read them as texts, and lists as often as they come."""
+
+    def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 - PyYAML's
+        """Write equal values anew: nodes refuse aliases."""
+        return True
+
+    def text(self, data: str) -> yaml.ScalarNode:
+        """Quote what is not a text for ``rcl_yaml_param_parser``, though it is for YAML."""
+        ambiguous = data in _TRUE or data in _FALSE or _looks_like_number(data)
+        style = "'" if ambiguous else None
+        return self.represent_scalar(_STR_TAG, data, style=style)
+
+
+def _looks_like_number(text: str) -> bool:
+    try:
+        return not isinstance(_number(text), str)
+    except OverflowError:
+        return True
+
+
+_Dumper.add_representer(str, lambda dumper, data: dumper.text(data))

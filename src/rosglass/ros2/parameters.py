@@ -1,0 +1,411 @@
+"""The parameters of our own node, by ROS's rules.
+
+Rules: rclcpp's documentation of ``Node::declare_parameter`` and its relatives, and the design
+article "ROS 2 Parameter API": parameters are declared before they are used, and keep their type.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import threading
+from collections import deque
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rosglass.comm import (
+    Handle,
+    Listeners,
+    ParameterDescriptor,
+    Parameters,
+    ParameterType,
+    Range,
+)
+from rosglass.comm import ParameterEvent as Event
+from rosglass.errors import ParameterError
+from rosglass.ros2 import parameter_files
+from rosglass.ros2.parameter_values import TYPE_NAMES, TypedValue, check_name, in_range, typed
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+    from os import PathLike
+
+    from rosglass.comm import Executor, ParameterValue
+
+__all__ = ["USE_SIM_TIME", "Change", "Ros2Parameters"]
+
+_log = logging.getLogger("rosglass.ros2")
+#: The parameter that every node has: whether its clock follows ``/clock``.
+USE_SIM_TIME = "use_sim_time"
+_UNSET = TypedValue(ParameterType.NOT_SET, None)
+_NUMBERS = (ParameterType.INTEGER, ParameterType.DOUBLE)
+_INT_LIMITS = (-(2**63), 2**63 - 1)
+
+
+@dataclass(slots=True)
+class _Entry:
+    value: TypedValue
+    descriptor: ParameterDescriptor
+
+
+class Change(NamedTuple):
+    """Parameters that changed together, with their types; ``deleted`` are names."""
+
+    new: Mapping[str, TypedValue]
+    changed: Mapping[str, TypedValue]
+    deleted: tuple[str, ...]
+
+
+class Ros2Parameters(Parameters):
+    """A node's own parameters.
+
+    Args:
+        node: The node's full name.
+        executor: Where callbacks run that bring no executor of their own.
+        overrides: Values that the program was started with.
+    """
+
+    def __init__(
+        self, node: str, executor: Executor, overrides: Mapping[str, ParameterValue] | None = None
+    ) -> None:
+        self.node = node
+        #: Told each change as it is made, types included.
+        self.changes: Listeners[Change] = Listeners()
+        self._executor = executor
+        self._overrides = dict(overrides or {})
+        self._lock = threading.Lock()
+        self._entries: dict[str, _Entry] = {}
+        self._version = 0
+        self._validators: list[_Validator] = []
+        self._waiting: deque[Change] = deque()
+        self._telling = False
+        self._closed = False
+        self.declare(
+            USE_SIM_TIME, False, ParameterDescriptor(description="Follow the time on /clock.")
+        )
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {self.node}>"
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._entries
+
+    @property
+    def overrides(self) -> Mapping[str, ParameterValue]:
+        """Values that the program was started with, for parameters declared or not."""
+        return dict(self._overrides)
+
+    def declare(
+        self,
+        name: str,
+        default: ParameterValue = None,
+        descriptor: ParameterDescriptor | None = None,
+    ) -> ParameterValue:
+        """Make a parameter known; see :meth:`rosglass.comm.Parameters.declare`."""
+        check_name(name)
+        descriptor = ParameterDescriptor() if descriptor is None else descriptor
+        initial = typed(name, default, descriptor.type)
+        descriptor = _complete(name, initial, descriptor)
+        override = self._overrides.get(name)
+        if override is not None:
+            try:
+                value = typed(name, override, descriptor.type)
+                _check_value(descriptor, value)
+            except ParameterError as error:
+                raise ParameterError(f"{error} (the program was started with that value)") from None
+        else:
+            value = initial
+            if value.type is not ParameterType.NOT_SET:
+                _check_value(descriptor, value)
+        problem = self._validate({name: value.copy()})
+        if problem:
+            raise ParameterError(
+                f"{self.node}: parameter {name!r} cannot be {value.value!r}: {problem}"
+            )
+        with self._lock:
+            if name in self._entries:
+                raise ParameterError(f"{self.node}: parameter {name!r} is declared already")
+            self._entries[name] = _Entry(value, descriptor)
+            self._version += 1
+            self._waiting.append(Change({name: value}, {}, ()))
+        self._tell()
+        return value.copy()
+
+    def undeclare(self, name: str) -> None:
+        """Forget a parameter; raises ParameterError."""
+        with self._lock:
+            entry = self._entry(name)
+            if entry.descriptor.read_only:
+                raise ParameterError(
+                    f"{self.node}: parameter {name!r} is read-only and cannot be undeclared"
+                )
+            del self._entries[name]
+            self._version += 1
+            self._waiting.append(Change({}, {}, (name,)))
+        self._tell()
+
+    def get(self, name: str) -> ParameterValue:
+        """Return its value, None when it has none; raises ParameterError when not declared."""
+        with self._lock:
+            return self._entry(name).value.copy()
+
+    def set(self, values: Mapping[str, ParameterValue]) -> None:
+        """Set parameters, all or none; see :meth:`rosglass.comm.Parameters.set`."""
+        with self._lock:
+            known = {name: self._entry(name).descriptor.type for name in values}
+        reason = self.try_set({name: typed(name, values[name], known[name]) for name in values})
+        if reason:
+            raise ParameterError(f"{self.node}: {reason}")
+
+    def describe(self, name: str) -> ParameterDescriptor:
+        """Return what is known about it; raises ParameterError when not declared."""
+        with self._lock:
+            return self._entry(name).descriptor
+
+    def names(self) -> list[str]:
+        """Return the declared names, sorted."""
+        return sorted(self._entries)
+
+    def find(self, prefixes: Iterable[str] = (), depth: int = 0) -> list[str]:
+        """Return the names below `prefixes` (all without), up to `depth` levels (0: all)."""
+        prefixes = list(prefixes)
+        if not prefixes:
+            return [n for n in self.names() if not depth or n.count(".") < depth]
+        return [n for n in self.names() if any(_below(n, p, depth) for p in prefixes)]
+
+    def typed_value(self, name: str) -> TypedValue:
+        """Return the value with its type; type NOT_SET for what is not declared or has no value."""
+        entry = self._entries.get(name)
+        return _UNSET if entry is None else entry.value
+
+    def snapshot(self) -> dict[str, TypedValue]:
+        """Return all values with their types, by name."""
+        with self._lock:
+            return {name: entry.value for name, entry in sorted(self._entries.items())}
+
+    def try_set(self, values: Mapping[str, TypedValue]) -> str:
+        """Set parameters, all or none.
+
+        Returns:
+            Why they were not set, in words; empty when they were.
+        """
+        while True:
+            with self._lock:
+                version = self._version
+                problem = self._problem(values)
+            problem = problem or self._validate({n: value.copy() for n, value in values.items()})
+            if problem:
+                return problem
+            # Validators run unlocked; should others have set something meanwhile, ask them again.
+            with self._lock:
+                if self._version != version:
+                    continue
+                self._apply(values)
+            self._tell()
+            return ""
+
+    def on_set(self, validate: Callable[[Mapping[str, ParameterValue]], str]) -> Handle:
+        """Let `validate` refuse values; see :meth:`rosglass.comm.Parameters.on_set`."""
+        if not callable(validate):
+            raise ParameterError(f"on_set() needs something that can be called, got {validate!r}")
+        validator = _Validator(self, validate)
+        with self._lock:
+            self._validators.append(validator)
+        return validator
+
+    def on_change(
+        self, callback: Callable[[Event], None], executor: Executor | None = None
+    ) -> Handle:
+        """Call `callback` with each change."""
+        if not callable(callback):
+            raise ParameterError(
+                f"on_change() needs something that can be called, got {callback!r}"
+            )
+
+        def told(change: Change) -> None:
+            new = {name: value.copy() for name, value in change.new.items()}
+            changed = {name: value.copy() for name, value in change.changed.items()}
+            callback(Event(self.node, new, changed, change.deleted))
+
+        return self.changes.add(told, executor or self._executor)
+
+    def load(self, path: str | PathLike[str]) -> None:
+        """Set the parameters that a file has for this node; see the base class."""
+        values = parameter_files.read(path).for_node(self.node)
+        if not values:
+            raise ParameterError(f"{path} has no parameters for {self.node}")
+        try:
+            self.set({name: value for name, value in values.items() if value is not None})
+        except ParameterError as error:
+            raise ParameterError(f"{path}: {error}") from None
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the parameters to a file that can be loaded; raises ParameterError."""
+        values = {name: value.value for name, value in self.snapshot().items()}
+        parameter_files.write(path, {self.node: values})
+
+    def close(self) -> None:
+        """Call nobody back any more; safe to call twice."""
+        with self._lock:
+            self._closed = True
+            self._validators.clear()
+        self.changes.clear()
+
+    def remove(self, validator: _Validator) -> None:
+        """Ask a validator no more; for its handle."""
+        with self._lock:
+            if validator in self._validators:
+                self._validators.remove(validator)
+
+    def _entry(self, name: str) -> _Entry:
+        entry = self._entries.get(name)
+        if entry is None:
+            close = [known for known in self._entries if known.lower() == str(name).lower()]
+            hint = f"; did you mean {close[0]!r}?" if close else "; declare() it first"
+            raise ParameterError(f"{self.node}: parameter {name!r} is not declared{hint}")
+        return entry
+
+    def _problem(self, values: Mapping[str, TypedValue]) -> str:
+        for name, value in values.items():
+            entry = self._entries.get(name)
+            if entry is None:
+                return f"parameter {name!r} is not declared"
+            descriptor = entry.descriptor
+            if descriptor.read_only:
+                return f"parameter {name!r} is read-only"
+            if value.type is ParameterType.NOT_SET and descriptor.dynamic_typing:
+                continue
+            try:
+                _check_value(descriptor, value)
+            except ParameterError as error:
+                return str(error)
+        return ""
+
+    def _validate(self, values: Mapping[str, ParameterValue]) -> str:
+        with self._lock:
+            validators = list(self._validators)
+        for validator in validators:
+            problem = validator.ask(values)
+            if problem:
+                return problem
+        return ""
+
+    def _apply(self, values: Mapping[str, TypedValue]) -> None:
+        changed: dict[str, TypedValue] = {}
+        deleted = []
+        for name, value in values.items():
+            entry = self._entries[name]
+            if value.type is ParameterType.NOT_SET:
+                del self._entries[name]
+                deleted.append(name)
+                continue
+            entry.value = TypedValue(value.type, value.copy())
+            if entry.descriptor.type is not value.type:
+                entry.descriptor = replace(entry.descriptor, type=value.type)
+            changed[name] = entry.value
+        self._version += 1
+        self._waiting.append(Change({}, changed, tuple(deleted)))
+
+    def _tell(self) -> None:
+        """Tell changes in the order they were made, without holding a lock."""
+        with self._lock:
+            if self._telling:
+                return
+            self._telling = True
+        while True:
+            with self._lock:
+                if not self._waiting or self._closed:
+                    self._telling = False
+                    return
+                change = self._waiting.popleft()
+            self.changes.notify(change)
+
+
+class _Validator(Handle):
+    def __init__(
+        self, owner: Ros2Parameters, validate: Callable[[Mapping[str, ParameterValue]], str]
+    ) -> None:
+        self._owner, self._validate = owner, validate
+
+    def ask(self, values: Mapping[str, ParameterValue]) -> str:
+        try:
+            reason = self._validate(values)
+        except Exception as error:
+            _log.exception("%s: a callback of on_set() failed", self._owner.node)
+            return f"it was refused with {type(error).__name__}: {error}"
+        if isinstance(reason, str):
+            return reason
+        if reason is None:
+            return ""
+        return f"a callback of on_set() returned {reason!r} instead of a text"
+
+    def close(self) -> None:
+        self._owner.remove(self)
+
+
+def _complete(
+    name: str, initial: TypedValue, descriptor: ParameterDescriptor
+) -> ParameterDescriptor:
+    """Return the descriptor with name and type filled in; raises ParameterError."""
+    if not isinstance(descriptor, ParameterDescriptor):
+        raise ParameterError(f"parameter {name!r}: {descriptor!r} is not a ParameterDescriptor")
+    kind = descriptor.type
+    if kind is ParameterType.NOT_SET:
+        kind = initial.type
+    if kind is ParameterType.NOT_SET and not descriptor.dynamic_typing:
+        raise ParameterError(
+            f"parameter {name!r} has neither a default nor a type; give one, or allow any type "
+            "with ParameterDescriptor(dynamic_typing=True)"
+        )
+    if descriptor.range is not None:
+        _check_range(name, kind, descriptor.range)
+    return replace(descriptor, name=name, type=kind)
+
+
+def _check_range(name: str, kind: ParameterType, allowed: Any) -> None:
+    what = f"parameter {name!r}: its range {tuple(allowed)!r}"
+    if kind not in _NUMBERS:
+        raise ParameterError(f"{what} does not go with the type {TYPE_NAMES[kind]}")
+    low, high, step = Range(*allowed)
+    if not (low <= high and step >= 0):
+        raise ParameterError(f"{what} is empty; give (low, high, step) with low <= high, step >= 0")
+    if step and not math.isfinite(low):
+        raise ParameterError(f"{what} counts steps from an infinite end; leave the step out")
+    if kind is ParameterType.INTEGER and not all(
+        isinstance(limit, int) and _INT_LIMITS[0] <= limit <= _INT_LIMITS[1]
+        for limit in (low, high, step)
+    ):
+        raise ParameterError(f"{what} must be of whole numbers of 64 bits, as the parameter is")
+
+
+def _check_value(descriptor: ParameterDescriptor, value: TypedValue) -> None:
+    name, kind = descriptor.name, descriptor.type
+    if value.type is not kind and not descriptor.dynamic_typing:
+        advice = "; write 1.0 instead of 1" if _is_whole(kind, value) else ""
+        raise ParameterError(
+            f"parameter {name!r} is of type {TYPE_NAMES[kind]}, and cannot be set to "
+            f"{_shown(value.value)} of type {TYPE_NAMES[value.type]}{advice}"
+        )
+    if descriptor.range is not None and value.type in _NUMBERS:
+        problem = in_range(descriptor.range, value.value)  # type: ignore[arg-type]
+        if problem:
+            raise ParameterError(f"parameter {name!r}: {problem}")
+
+
+def _is_whole(kind: ParameterType, value: TypedValue) -> bool:
+    return (kind, value.type) in (
+        (ParameterType.DOUBLE, ParameterType.INTEGER),
+        (ParameterType.DOUBLE_ARRAY, ParameterType.INTEGER_ARRAY),
+    )
+
+
+def _shown(value: object) -> str:
+    shown = repr(value)
+    return f"{shown[:77]}..." if len(shown) > 80 else shown
+
+
+def _below(name: str, prefix: str, depth: int) -> bool:
+    if name == prefix:
+        return True
+    rest = name[len(prefix) + 1 :] if name.startswith(f"{prefix}.") else ""
+    return bool(rest) and (not depth or rest.count(".") < depth)
