@@ -24,7 +24,7 @@ from rosglass.comm.parameters import (
     SetResult,
 )
 from rosglass.comm.promise import Promise
-from rosglass.comm.qos import Durability, History, Liveliness, QoS, Reliability
+from rosglass.comm.qos import BEST_AVAILABLE, Durability, History, Liveliness, QoS, Reliability
 from rosglass.comm.service import Call, ServiceClient, ServiceServer
 from rosglass.comm.subscription import Sample, Statistics, Subscription
 from rosglass.comm.time import Duration, Time
@@ -32,6 +32,7 @@ from rosglass.comm.timers import Timers
 from rosglass.comm.worker import Worker
 
 __all__ = [
+    "BEST_AVAILABLE",
     "IMMEDIATE",
     "ActionClient",
     "ActionResult",

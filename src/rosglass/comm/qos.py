@@ -1,22 +1,27 @@
 """Quality of service: what a publisher offers and a subscription requests.
 
 Policies and presets follow ROS 2's (design article "ROS 2 Quality of Service policies", rmw's
-``qos_profiles.h``). ROS 1 maps them: transient local is latching, depth is the queue size.
+``types.h`` and ``qos_profiles.h``). ROS 1: transient local is latching, depth is the queue size.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import TYPE_CHECKING
 
 from rosglass.comm.time import Duration
 from rosglass.errors import UnsupportedError
 
-__all__ = ["Durability", "History", "Liveliness", "QoS", "Reliability"]
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection
 
+__all__ = ["BEST_AVAILABLE", "Durability", "History", "Liveliness", "QoS", "Reliability"]
 
 #: What rmw's profile can carry (a signed 32-bit integer in every middleware).
 _MAX_DEPTH = 2**31 - 1
+#: A deadline or lease duration as strict as all peers allow (rmw's ``..._BEST_AVAILABLE``).
+BEST_AVAILABLE = Duration(2**63 - 2)
 
 
 class Reliability(Enum):
@@ -24,6 +29,10 @@ class Reliability(Enum):
 
     RELIABLE = "reliable"
     BEST_EFFORT = "best_effort"
+    #: What the middleware would do by itself; reliable everywhere in rosglass.
+    SYSTEM_DEFAULT = "system_default"
+    #: Reliable if that matches everybody on the topic.
+    BEST_AVAILABLE = "best_available"
 
 
 class Durability(Enum):
@@ -31,6 +40,10 @@ class Durability(Enum):
 
     VOLATILE = "volatile"
     TRANSIENT_LOCAL = "transient_local"
+    #: What the middleware would do by itself; volatile everywhere in rosglass.
+    SYSTEM_DEFAULT = "system_default"
+    #: Transient local if that matches everybody on the topic.
+    BEST_AVAILABLE = "best_available"
 
 
 class History(Enum):
@@ -38,6 +51,8 @@ class History(Enum):
 
     KEEP_LAST = "keep_last"
     KEEP_ALL = "keep_all"
+    #: What the middleware would do by itself; keep last everywhere in rosglass.
+    SYSTEM_DEFAULT = "system_default"
 
 
 class Liveliness(Enum):
@@ -45,6 +60,10 @@ class Liveliness(Enum):
 
     AUTOMATIC = "automatic"
     MANUAL_BY_TOPIC = "manual_by_topic"
+    #: What the middleware would do by itself; automatic everywhere in rosglass.
+    SYSTEM_DEFAULT = "system_default"
+    #: Manual by topic if everybody on the topic does that, or asks for it.
+    BEST_AVAILABLE = "best_available"
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +79,8 @@ class QoS:
         lifespan: Age at which a sample is worthless, None for no limit.
         liveliness: How a publisher's liveliness is asserted.
         lease_duration: Time without assertion after which it counts as dead, None for no limit.
+
+    The constant :data:`BEST_AVAILABLE` may stand for a deadline or a lease duration.
 
     Raises:
         UnsupportedError: A policy has a value that it cannot have.
@@ -92,10 +113,17 @@ class QoS:
                 raise UnsupportedError(f"QoS {name} must be {choices}, got {value!r}")
         for name in ("deadline", "lifespan", "lease_duration"):
             value = getattr(self, name)
-            if value is not None and not (isinstance(value, Duration) and value > Duration()):
+            if value is None:
+                continue
+            if not (isinstance(value, Duration) and Duration() < value <= BEST_AVAILABLE):
                 raise UnsupportedError(
-                    f"QoS {name} must be a Duration above zero, e.g. "
+                    f"QoS {name} must be a Duration above zero and below 292 years, e.g. "
                     f"Duration.from_seconds(0.5), or None for no limit; got {value!r}"
+                )
+            if name == "lifespan" and value == BEST_AVAILABLE:
+                raise UnsupportedError(
+                    "QoS lifespan cannot be BEST_AVAILABLE: it is the publisher's alone; give a "
+                    "Duration, or None for no limit"
                 )
 
     @classmethod
@@ -114,44 +142,221 @@ class QoS:
         return cls()
 
     @classmethod
+    def parameters(cls) -> QoS:
+        """Reliable, volatile, the newest 1000: a node's parameter services."""
+        return cls(depth=1000)
+
+    @classmethod
+    def parameter_events(cls) -> QoS:
+        """Reliable, volatile, the newest 1000: ``/parameter_events``."""
+        return cls(depth=1000)
+
+    @classmethod
+    def rosout(cls) -> QoS:
+        """Reliable and transient local, the newest 1000 of the last 10 s: ``/rosout``."""
+        return cls(1000, durability=Durability.TRANSIENT_LOCAL, lifespan=Duration(10_000_000_000))
+
+    @classmethod
+    def action_status(cls) -> QoS:
+        """Reliable and transient local, only the newest: an action's list of goals."""
+        return cls(depth=1, durability=Durability.TRANSIENT_LOCAL)
+
+    @classmethod
     def clock(cls) -> QoS:
         """Best effort, only the newest: ``/clock``."""
         return cls(depth=1, reliability=Reliability.BEST_EFFORT)
+
+    @classmethod
+    def system_default(cls) -> QoS:
+        """Whatever the middleware does by itself: reliable, volatile, the newest 10."""
+        return cls(
+            reliability=Reliability.SYSTEM_DEFAULT,
+            durability=Durability.SYSTEM_DEFAULT,
+            history=History.SYSTEM_DEFAULT,
+            liveliness=Liveliness.SYSTEM_DEFAULT,
+        )
+
+    @classmethod
+    def best_available(cls, depth: int = 10) -> QoS:
+        """The strongest that matches everybody on the topic: for tools that look at any topic."""
+        return cls(
+            depth=depth,
+            reliability=Reliability.BEST_AVAILABLE,
+            durability=Durability.BEST_AVAILABLE,
+            liveliness=Liveliness.BEST_AVAILABLE,
+            deadline=BEST_AVAILABLE,
+            lease_duration=BEST_AVAILABLE,
+        )
+
+    @classmethod
+    def preset(cls, name: str) -> QoS:
+        """Return the preset that is called `name`, e.g. ``sensor_data``.
+
+        Raises:
+            UnsupportedError: There is none of that name; the message lists them.
+        """
+        if not isinstance(name, str) or name not in _PRESETS:
+            known = ", ".join(_PRESETS)
+            raise UnsupportedError(f"there is no QoS preset {name!r}; there are: {known}")
+        return _PRESETS[name]()
 
     def with_depth(self, depth: int) -> QoS:
         """Return a copy with another depth."""
         return replace(self, depth=depth)
 
-    def incompatibility(self, offered: QoS) -> str:
+    @property
+    def is_decided(self) -> bool:
+        """Whether no policy is left to the middleware or to what is available."""
+        return (
+            self.reliability in (Reliability.RELIABLE, Reliability.BEST_EFFORT)
+            and self.durability in (Durability.VOLATILE, Durability.TRANSIENT_LOCAL)
+            and self.history is not History.SYSTEM_DEFAULT
+            and self.liveliness in (Liveliness.AUTOMATIC, Liveliness.MANUAL_BY_TOPIC)
+            and BEST_AVAILABLE not in (self.deadline, self.lease_duration)
+        )
+
+    def for_subscription(self, offered: Collection[QoS] = ()) -> QoS:
+        """Return this profile with nothing left open, for a subscription.
+
+        Args:
+            offered: Profiles of the topic's publishers. What is best available becomes the
+                strongest that all of them match; without any, reliable and transient local.
+        """
+        if self.is_decided:
+            return self
+        return self._decided(
+            reliable=all(o.reliability is not Reliability.BEST_EFFORT for o in offered),
+            latched=all(
+                o.durability in (Durability.TRANSIENT_LOCAL, Durability.BEST_AVAILABLE)
+                for o in offered
+            ),
+            manual=bool(offered)
+            and all(o.liveliness is Liveliness.MANUAL_BY_TOPIC for o in offered),
+            # A publisher without limit matches none.
+            deadline=_limit([o.deadline for o in offered], max, weakest=True),
+            lease_duration=_limit([o.lease_duration for o in offered], max, weakest=True),
+        )
+
+    def for_publisher(self, requested: Collection[QoS] = ()) -> QoS:
+        """Return this profile with nothing left open, for a publisher.
+
+        Args:
+            requested: Profiles of the topic's subscriptions. What is best available becomes what
+                all of them match: reliable and transient local always do.
+        """
+        if self.is_decided:
+            return self
+        return self._decided(
+            reliable=True,
+            latched=True,
+            manual=any(r.liveliness is Liveliness.MANUAL_BY_TOPIC for r in requested),
+            deadline=_limit([r.deadline for r in requested], min),
+            lease_duration=_limit([r.lease_duration for r in requested], min),
+        )
+
+    def _decided(
+        self,
+        reliable: bool,
+        latched: bool,
+        manual: bool,
+        deadline: Duration | None,
+        lease_duration: Duration | None,
+    ) -> QoS:
+        """Fill in the system's defaults, and for what is best available the values given."""
+        reliability, durability = self.reliability, self.durability
+        history, liveliness = self.history, self.liveliness
+        if reliability is Reliability.BEST_AVAILABLE:
+            reliability = Reliability.RELIABLE if reliable else Reliability.BEST_EFFORT
+        elif reliability is Reliability.SYSTEM_DEFAULT:
+            reliability = Reliability.RELIABLE
+        if durability is Durability.BEST_AVAILABLE:
+            durability = Durability.TRANSIENT_LOCAL if latched else Durability.VOLATILE
+        elif durability is Durability.SYSTEM_DEFAULT:
+            durability = Durability.VOLATILE
+        if history is History.SYSTEM_DEFAULT:
+            history = History.KEEP_LAST
+        if liveliness is Liveliness.BEST_AVAILABLE:
+            liveliness = Liveliness.MANUAL_BY_TOPIC if manual else Liveliness.AUTOMATIC
+        elif liveliness is Liveliness.SYSTEM_DEFAULT:
+            liveliness = Liveliness.AUTOMATIC
+        return replace(
+            self,
+            reliability=reliability,
+            durability=durability,
+            history=history,
+            liveliness=liveliness,
+            deadline=deadline if self.deadline == BEST_AVAILABLE else self.deadline,
+            lease_duration=(
+                lease_duration if self.lease_duration == BEST_AVAILABLE else self.lease_duration
+            ),
+        )
+
+    def conflicts(self, offered: QoS) -> dict[str, str]:
         """Say why a subscription asking for this profile cannot match a publisher's `offered` one.
 
         Returns:
-            The policies in conflict, in words; empty when the two match. The rules are DDS's
-            request/offer rules (OMG DDS 1.4, section 2.2.3).
+            The conflict in words for each policy that does not match, e.g. ``{"reliability":
+            "reliable requested, best effort offered"}``; empty when the two match. The rules are
+            DDS's request/offer rules (OMG DDS 1.4, section 2.2.3).
         """
-        problems = []
-        if (self.reliability, offered.reliability) == (
+        offered = offered.for_publisher((self,))
+        ours = self.for_subscription((offered,))
+        found = {}
+        if (ours.reliability, offered.reliability) == (
             Reliability.RELIABLE,
             Reliability.BEST_EFFORT,
         ):
-            problems.append("reliability: reliable requested, best effort offered")
-        if (self.durability, offered.durability) == (
+            found["reliability"] = "reliable requested, best effort offered"
+        if (ours.durability, offered.durability) == (
             Durability.TRANSIENT_LOCAL,
             Durability.VOLATILE,
         ):
-            problems.append("durability: transient local requested, volatile offered")
-        problems += _too_long("deadline", self.deadline, offered.deadline)
-        if (self.liveliness, offered.liveliness) == (
+            found["durability"] = "transient local requested, volatile offered"
+        if told := _too_long(ours.deadline, offered.deadline):
+            found["deadline"] = told
+        if (ours.liveliness, offered.liveliness) == (
             Liveliness.MANUAL_BY_TOPIC,
             Liveliness.AUTOMATIC,
         ):
-            problems.append("liveliness: manual by topic requested, automatic offered")
-        problems += _too_long("lease duration", self.lease_duration, offered.lease_duration)
-        return "; ".join(problems)
+            found["liveliness"] = "manual by topic requested, automatic offered"
+        if told := _too_long(ours.lease_duration, offered.lease_duration):
+            found["lease duration"] = told
+        return found
+
+    def incompatibility(self, offered: QoS) -> str:
+        """Return :meth:`conflicts` as one line; empty when the two profiles match."""
+        return "; ".join(f"{policy}: {told}" for policy, told in self.conflicts(offered).items())
 
 
-def _too_long(what: str, requested: Duration | None, offered: Duration | None) -> list[str]:
+_PRESETS: dict[str, Callable[[], QoS]] = {
+    "default": QoS,
+    "sensor_data": QoS.sensor_data,
+    "latched": QoS.latched,
+    "services": QoS.services,
+    "parameters": QoS.parameters,
+    "parameter_events": QoS.parameter_events,
+    "rosout": QoS.rosout,
+    "action_status": QoS.action_status,
+    "clock": QoS.clock,
+    "system_default": QoS.system_default,
+    "best_available": QoS.best_available,
+}
+
+
+def _limit(
+    limits: list[Duration | None],
+    choose: Callable[[list[Duration]], Duration],
+    weakest: bool = False,
+) -> Duration | None:
+    """Choose among the limits that are given; with `weakest`, who gives none wins."""
+    given = [limit for limit in limits if limit is not None and limit != BEST_AVAILABLE]
+    if not given or (weakest and len(given) < len(limits)):
+        return None
+    return choose(given)
+
+
+def _too_long(requested: Duration | None, offered: Duration | None) -> str:
     if requested is None or (offered is not None and offered <= requested):
-        return []
+        return ""
     told = "none" if offered is None else f"{offered.seconds} s"
-    return [f"{what}: {requested.seconds} s requested, {told} offered"]
+    return f"{requested.seconds} s requested, {told} offered"

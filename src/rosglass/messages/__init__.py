@@ -2,6 +2,7 @@
 
 from rosglass.messages.loading import ActionType, ServiceType, default_library, load
 from rosglass.messages.message import Message, type_of
+from rosglass.messages.opaque import OpaqueType
 from rosglass.messages.sequences import MessageSequence
 from rosglass.messages.types import Constants, MessageType
 
@@ -11,6 +12,7 @@ __all__ = [
     "Message",
     "MessageSequence",
     "MessageType",
+    "OpaqueType",
     "ServiceType",
     "default_library",
     "load",

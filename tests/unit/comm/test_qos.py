@@ -1,9 +1,11 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from rosglass import Duration, QoS, UnsupportedError
-from rosglass.comm import Durability, Liveliness, Reliability
+from rosglass.comm import BEST_AVAILABLE, Durability, Liveliness, Reliability
 
 SECOND = Duration.from_seconds(1)
 BEST_EFFORT = QoS(reliability=Reliability.BEST_EFFORT)
@@ -57,6 +59,9 @@ def test_presets_are_ros_2s():
     assert QoS.latched(3) == QoS(depth=3, durability=Durability.TRANSIENT_LOCAL)
     assert QoS.clock().depth == 1
     assert QoS.services() == QoS(depth=10)
+    assert QoS.parameters() == QoS.parameter_events() == QoS(depth=1000)
+    assert QoS.action_status() == QoS.latched(1)
+    assert QoS.rosout() == replace(QoS.latched(1000), lifespan=Duration.from_seconds(10))
     assert QoS().with_depth(3) == QoS(depth=3)
 
 
@@ -75,3 +80,101 @@ def test_presets_are_ros_2s():
 def test_policies_are_checked_where_they_are_written(policy, value, told):
     with pytest.raises(UnsupportedError, match=f"QoS {policy} must be .*{told}"):
         QoS(**{policy: value})
+
+
+def test_a_limit_must_fit_into_64_bits_and_a_lifespan_is_the_publishers_alone():
+    with pytest.raises(UnsupportedError, match="below 292 years"):
+        QoS(deadline=Duration(2**63 - 1))
+    with pytest.raises(UnsupportedError, match="lifespan cannot be BEST_AVAILABLE"):
+        QoS(lifespan=BEST_AVAILABLE)
+
+
+def test_presets_by_name():
+    assert QoS.preset("sensor_data") == QoS.sensor_data()
+    assert QoS.preset("default") == QoS()
+    for name in ("sensor", None):
+        with pytest.raises(UnsupportedError, match="there are: default, sensor_data, latched"):
+            QoS.preset(name)
+
+
+# -- what is left open ---------------------------------------------------------------------------
+
+BEST = QoS.best_available()
+MANUAL = QoS(liveliness=Liveliness.MANUAL_BY_TOPIC)
+
+
+def test_what_is_decided_stays_as_it_is():
+    for profile in (QoS(), LATCHED, BEST_EFFORT, MANUAL):
+        assert profile.is_decided
+        assert profile.for_subscription([BEST_EFFORT]) is profile
+        assert profile.for_publisher([LATCHED]) is profile
+
+
+def test_the_systems_default_is_reliable_volatile_and_keeps_the_last():
+    assert not QoS.system_default().is_decided
+    assert QoS.system_default().for_subscription([BEST_EFFORT]) == QoS()
+    assert QoS.system_default().for_publisher() == QoS()
+
+
+@pytest.mark.parametrize(
+    ("offered", "expected"),
+    [
+        ([], QoS.latched(10)),
+        ([QoS()], QoS()),
+        ([LATCHED, LATCHED], QoS.latched(10)),
+        ([LATCHED, QoS()], QoS()),
+        ([LATCHED, BEST_EFFORT], QoS(reliability=Reliability.BEST_EFFORT)),
+        ([MANUAL], MANUAL),
+        ([MANUAL, QoS()], QoS()),
+        ([QoS(deadline=SECOND)], QoS(deadline=SECOND)),
+        (
+            [QoS(deadline=SECOND), QoS(deadline=Duration.from_seconds(2))],
+            QoS(deadline=Duration.from_seconds(2)),
+        ),
+        ([QoS(deadline=SECOND), QoS()], QoS()),
+        ([QoS(lease_duration=SECOND)], QoS(lease_duration=SECOND)),
+    ],
+)
+def test_a_subscription_takes_the_strongest_that_matches_all_publishers(offered, expected):
+    decided = BEST.for_subscription(offered)
+    assert decided == expected
+    assert decided.is_decided
+    assert [decided.incompatibility(one) for one in offered] == [""] * len(offered)
+
+
+@pytest.mark.parametrize(
+    ("requested", "expected"),
+    [
+        ([], QoS.latched(10)),
+        ([BEST_EFFORT, QoS()], QoS.latched(10)),
+        ([MANUAL, QoS()], replace(QoS.latched(10), liveliness=Liveliness.MANUAL_BY_TOPIC)),
+        (
+            [QoS(deadline=SECOND), QoS(deadline=Duration.from_seconds(2)), QoS()],
+            replace(QoS.latched(10), deadline=SECOND),
+        ),
+        ([QoS(lease_duration=SECOND)], replace(QoS.latched(10), lease_duration=SECOND)),
+    ],
+)
+def test_a_publisher_offers_what_matches_all_subscriptions(requested, expected):
+    decided = BEST.for_publisher(requested)
+    assert decided == expected
+    assert [one.incompatibility(decided) for one in requested] == [""] * len(requested)
+
+
+def test_single_policies_can_be_left_open():
+    open_one = replace(LATCHED, reliability=Reliability.BEST_AVAILABLE)
+    assert open_one.for_subscription([BEST_EFFORT]).reliability is Reliability.BEST_EFFORT
+    assert open_one.for_subscription([BEST_EFFORT]).durability is Durability.TRANSIENT_LOCAL
+
+
+@pytest.mark.parametrize("other", [QoS(), LATCHED, BEST_EFFORT, MANUAL, QoS(deadline=SECOND), BEST])
+def test_what_is_available_conflicts_with_nobody(other):
+    assert BEST.conflicts(other) == {}
+    assert other.conflicts(BEST) == {}
+
+
+def test_conflicts_by_policy():
+    assert LATCHED.conflicts(BEST_EFFORT) == {
+        "reliability": "reliable requested, best effort offered",
+        "durability": "transient local requested, volatile offered",
+    }
