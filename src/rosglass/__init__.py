@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         NodeClosedError,
         ParameterError,
         QmlError,
+        RosArgumentError,
         ServiceError,
         ServiceUnavailableError,
         TimeoutError,  # noqa: A004 - also a builtin TimeoutError
@@ -58,6 +59,7 @@ __all__ = [
     "ParameterError",
     "QmlError",
     "QoS",
+    "RosArgumentError",
     "ServiceError",
     "ServiceType",
     "ServiceUnavailableError",

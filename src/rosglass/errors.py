@@ -21,6 +21,7 @@ __all__ = [
     "NodeClosedError",
     "ParameterError",
     "QmlError",
+    "RosArgumentError",
     "ServiceError",
     "ServiceUnavailableError",
     "TimeoutError",
@@ -131,6 +132,10 @@ class GoalRejectedError(Error):
 
 class ParameterError(Error):
     """A parameter does not exist, has another type, or its node refuses the value."""
+
+
+class RosArgumentError(Error, ValueError):
+    """What a program was told with ``--ros-args`` is not valid."""
 
 
 class QmlError(Error):
