@@ -15,6 +15,7 @@ __all__ = [
     "MAX_NODE_NAME",
     "MAX_TOPIC_NAME",
     "action_of",
+    "demangle_topic",
     "demangle_type",
     "expand",
     "hidden",
@@ -37,6 +38,8 @@ _DIGIT_FIRST = re.compile(r"(?:^|/)([0-9])")
 _SUBSTITUTION = re.compile(r"\{([^{}]*)\}")
 _DDS_TYPE = re.compile(r"([A-Za-z]\w*)::(\w+)::dds_::(\w+)_\Z")
 _ACTION_PARTS = {"/_action/send_goal": "_SendGoal", "/_action/feedback": "_FeedbackMessage"}
+#: What a DDS topic of ROS 2 begins and ends with.
+_DDS_TOPICS = {"rt/": "", "rq/": "Request", "rr/": "Reply"}
 _ROS_TYPE = re.compile(r"([A-Za-z]\w*)/(\w+)/(\w+)\Z")
 
 
@@ -138,6 +141,19 @@ def demangle_type(dds_type: str) -> str:
     """Return ``pkg/msg/T`` for ``pkg::msg::dds_::T_``; foreign spellings are returned unchanged."""
     match = _DDS_TYPE.match(dds_type)
     return "/".join(match.groups()) if match else dds_type
+
+
+def demangle_topic(dds_topic: str) -> tuple[str, str] | None:
+    """Return what a DDS topic carries: ``rt`` and a topic, or ``rq`` or ``rr`` and a service.
+
+    ``rt`` is a topic's messages, ``rq`` a service's requests, ``rr`` its replies; None is no topic
+    of ROS 2.
+    """
+    ending = _DDS_TOPICS.get(dds_topic[:3])
+    name = dds_topic[2:]
+    if ending is None or not name.endswith(ending) or len(name) - len(ending) < 2:
+        return None
+    return dds_topic[:2], name.removesuffix(ending)
 
 
 def _substitute(match: re.Match[str], name: str, node: str, namespace: str) -> str:

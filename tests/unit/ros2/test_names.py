@@ -5,6 +5,7 @@ import pytest
 from rosglass import InvalidNameError
 from rosglass.ros2.names import (
     action_of,
+    demangle_topic,
     demangle_type,
     expand,
     hidden,
@@ -163,3 +164,26 @@ def test_a_part_that_begins_with_an_underscore_hides_a_name(name, expected):
 )
 def test_actions_are_known_by_their_parts(name, type_name, expected):
     assert action_of(name, type_name) == expected
+
+
+@pytest.mark.parametrize(
+    ("dds_topic", "expected"),
+    [
+        ("rt/chatter", ("rt", "/chatter")),
+        ("rt/a/b", ("rt", "/a/b")),
+        ("rq/addRequest", ("rq", "/add")),
+        ("rr/arm/addReply", ("rr", "/arm/add")),
+        ("rq/x/_action/send_goalRequest", ("rq", "/x/_action/send_goal")),
+        ("rq/Request", None),
+        ("rq/add", None),
+        ("rr/addRequest", None),
+        ("rt/", None),
+        ("rt", None),
+        ("rtx/chatter", None),
+        ("ros_discovery_info", None),
+        ("HelloWorldData_Msg", None),
+        ("", None),
+    ],
+)
+def test_dds_topics_are_told_apart(dds_topic, expected):
+    assert demangle_topic(dds_topic) == expected
