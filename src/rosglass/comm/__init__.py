@@ -9,6 +9,7 @@ from rosglass.comm.action import (
     GoalStatus,
     ServerGoal,
 )
+from rosglass.comm.clock import Clock, ClockChange, Jump, Timer
 from rosglass.comm.executor import IMMEDIATE, Dispatcher
 from rosglass.comm.graph import ConnectionState, EndpointInfo, EndpointKind, NodeName, Status
 from rosglass.comm.listeners import Listeners
@@ -41,6 +42,8 @@ __all__ = [
     "Call",
     "CancelAnswer",
     "ClientGoal",
+    "Clock",
+    "ClockChange",
     "ConnectionState",
     "Dispatcher",
     "Durability",
@@ -51,6 +54,7 @@ __all__ = [
     "GoalStatus",
     "Handle",
     "History",
+    "Jump",
     "Listeners",
     "Liveliness",
     "Node",
@@ -75,6 +79,7 @@ __all__ = [
     "Status",
     "Subscription",
     "Time",
+    "Timer",
     "Timers",
     "Worker",
 ]

@@ -1,0 +1,323 @@
+"""The clock of a node: the system's time, or a simulation's.
+
+Behaviour: design article "Clock and Time", and rclcpp's ``Clock`` and ``TimeSource``: a node whose
+time is simulated but was not told yet lives at time zero.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import logging
+import threading
+import time
+from contextlib import suppress
+from enum import Enum
+from typing import TYPE_CHECKING, NamedTuple
+
+from rosglass.comm.listeners import Listeners
+from rosglass.comm.node import Handle
+from rosglass.comm.time import Duration, Time
+from rosglass.errors import ConversionError, NodeClosedError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rosglass.comm.node import Executor
+
+__all__ = ["Clock", "ClockChange", "Jump", "Timer"]
+
+_log = logging.getLogger("rosglass.comm")
+#: Longest pause of the timers' thread in seconds.
+_IDLE = 3600.0
+
+
+class ClockChange(Enum):
+    """What happened to the source of a clock's time when it jumped."""
+
+    NONE = "none"
+    TO_SIMULATED = "to simulated"
+    TO_SYSTEM = "to system"
+
+
+class Jump(NamedTuple):
+    """A clock that did not just move on.
+
+    Attributes:
+        delta: The new time less the old one; negative for a jump backwards.
+        change: Whether the source of the time changed, too.
+    """
+
+    delta: Duration
+    change: ClockChange
+
+
+class Clock:
+    """What time it is for a node.
+
+    Args:
+        name: Of the node, for threads and messages.
+        executor: Where callbacks run that bring no executor of their own.
+    """
+
+    def __init__(self, name: str, executor: Executor) -> None:
+        self._name, self._executor = name, executor
+        self._changed = threading.Condition()
+        self._simulated = False
+        self._time = 0
+        self._switches = 0
+        self._closed = False
+        self._watchers: list[_Watcher] = []
+        self._heap: list[tuple[int, int, Timer]] = []
+        self._numbers = itertools.count()
+        self._thread: threading.Thread | None = None
+
+    def __repr__(self) -> str:
+        kind = "simulated" if self._simulated else "system"
+        return f"<Clock of {self._name}: {kind} time {self.now().seconds:.3f}>"
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether the time comes from a simulation (``/clock``) instead of the system."""
+        return self._simulated
+
+    def now(self) -> Time:
+        """Return the time; zero while a simulated clock was not told any yet."""
+        return Time(self._time) if self._simulated else Time(time.time_ns())
+
+    def sleep(self, duration: Duration | float) -> bool:
+        """Wait until `duration` (seconds, or a Duration) has passed on this clock.
+
+        A simulation that stands still is waited for; one that jumps back is waited for again.
+
+        Returns:
+            True; False when the clock changed between system and simulated time meanwhile.
+
+        Raises:
+            NodeClosedError: The node is closed, or gets closed meanwhile.
+        """
+        length = duration if isinstance(duration, Duration) else _seconds("duration", duration)
+        with self._changed:
+            end = self._tick() + length.nanoseconds
+            return self._sleep(end, self._tick)
+
+    def sleep_until(self, when: Time) -> bool:
+        """Wait until the clock shows `when`; results and errors as for :meth:`sleep`."""
+        if not isinstance(when, Time):
+            raise ConversionError("when", when, "a rosglass.Time")
+        with self._changed:
+            return self._sleep(when.nanoseconds, lambda: self.now().nanoseconds)
+
+    def on_jump(
+        self,
+        callback: Callable[[Jump], None],
+        *,
+        forward: Duration | None = None,
+        executor: Executor | None = None,
+    ) -> Handle:
+        """Call `callback` when the clock jumps back, or changes its source.
+
+        Args:
+            callback: Called with the :class:`Jump`.
+            forward: Tell jumps forward of at least this much, too; simulated time only.
+            executor: Where `callback` runs; None for the node's own dispatcher thread.
+        """
+        if not callable(callback):
+            raise ConversionError("callback", callback, "something that can be called")
+
+        watcher = _Watcher(self._watchers, forward)
+        watcher.listeners.add(callback, executor or self._executor)
+        self._watchers.append(watcher)
+        return watcher
+
+    def create_timer(
+        self,
+        period: Duration | float,
+        callback: Callable[[], None],
+        executor: Executor | None = None,
+    ) -> Timer:
+        """Call `callback` every `period` (seconds, or a Duration) of this clock.
+
+        A callback that is still running or waiting when its time comes again misses that turn.
+
+        Raises:
+            ConversionError: The period is not above zero.
+            NodeClosedError: The node is closed.
+        """
+        length = period if isinstance(period, Duration) else _seconds("period", period)
+        if length <= Duration():
+            raise ConversionError("period", period, "a time above zero")
+        if not callable(callback):
+            raise ConversionError("callback", callback, "something that can be called")
+        timer = Timer(self, length, callback, executor or self._executor)
+        with self._changed:
+            if self._closed:
+                raise NodeClosedError(f"node {self._name} is closed; connect again")
+            self._put(timer, self._tick() + length.nanoseconds)
+            if self._thread is None:
+                self._thread = threading.Thread(
+                    target=self._work, name=f"{self._name} timers", daemon=True
+                )
+                self._thread.start()
+            self._changed.notify_all()
+        return timer
+
+    def simulate(self, simulated: bool) -> None:
+        """Take the time from a simulation, or from the system; for worlds."""
+        with self._changed:
+            if simulated == self._simulated or self._closed:
+                return
+            before = self.now()
+            self._simulated = simulated
+            self._time = 0
+            self._switches += 1
+            delta = self.now() - before
+            self._restart()
+        change = ClockChange.TO_SIMULATED if simulated else ClockChange.TO_SYSTEM
+        self._tell(Jump(delta, change))
+
+    def advance(self, now: Time) -> None:
+        """Set the simulated time; for worlds. Without effect while the system's time is used."""
+        with self._changed:
+            if not self._simulated or self._closed:
+                return
+            delta = now.nanoseconds - self._time
+            self._time = now.nanoseconds
+            if delta < 0:
+                self._restart()
+            self._changed.notify_all()
+        if self._watchers:
+            self._tell(Jump(Duration(delta), ClockChange.NONE))
+
+    def close(self) -> None:
+        """End timers and sleeps; safe to call twice."""
+        with self._changed:
+            self._closed = True
+            self._heap.clear()
+            thread = self._thread
+            self._changed.notify_all()
+        for watcher in list(self._watchers):
+            watcher.close()
+        if thread is not None and thread is not threading.current_thread():
+            thread.join(2.0)
+
+    def forget(self, timer: Timer) -> None:
+        """Let go of a timer that was closed; for :class:`Timer`."""
+        with self._changed:
+            self._heap = [entry for entry in self._heap if entry[2] is not timer]
+            heapq.heapify(self._heap)
+
+    def _tell(self, jump: Jump) -> None:
+        for watcher in list(self._watchers):
+            watcher.tell(jump)
+
+    def _tick(self) -> int:
+        """Return what intervals are measured with: a system clock that is set does not count."""
+        return self._time if self._simulated else time.monotonic_ns()
+
+    def _sleep(self, end: int, read: Callable[[], int]) -> bool:
+        switches = self._switches
+        while True:
+            if self._closed:
+                raise NodeClosedError(
+                    f"node {self._name} was closed while its clock was waited for"
+                )
+            if self._switches != switches:
+                return False
+            rest = end - read()
+            if rest <= 0:
+                return True
+            self._changed.wait(None if self._simulated else min(rest / 1e9, _IDLE))
+
+    def _restart(self) -> None:
+        """Count the timers' periods from now on: the old times mean nothing any more."""
+        now = self._tick()
+        timers = [timer for _, _, timer in self._heap]
+        self._heap = []
+        for timer in timers:
+            self._put(timer, now + timer.period.nanoseconds)
+        self._changed.notify_all()
+
+    def _put(self, timer: Timer, due: int) -> None:
+        heapq.heappush(self._heap, (due, next(self._numbers), timer))
+
+    def _work(self) -> None:
+        while True:
+            with self._changed:
+                while not self._closed and (not self._heap or self._heap[0][0] > self._tick()):
+                    self._changed.wait(self._pause())
+                if self._closed:
+                    return
+                due, _, timer = heapq.heappop(self._heap)
+                period = timer.period.nanoseconds
+                # Turns that were missed are not made up for.
+                self._put(timer, due + period * max(1, (self._tick() - due) // period + 1))
+            timer.fire()
+
+    def _pause(self) -> float | None:
+        if self._simulated or not self._heap:
+            return None
+        return min(max(0.0, (self._heap[0][0] - self._tick()) / 1e9), _IDLE)
+
+
+class _Watcher(Handle):
+    """Passes on the jumps that one callback wants to know of."""
+
+    def __init__(self, watchers: list[_Watcher], forward: Duration | None) -> None:
+        self.listeners: Listeners[Jump] = Listeners()
+        self._watchers, self._forward = watchers, forward
+
+    def tell(self, jump: Jump) -> None:
+        wanted = jump.delta < Duration() or jump.change is not ClockChange.NONE
+        if wanted or (self._forward is not None and jump.delta >= self._forward):
+            self.listeners.notify(jump)
+
+    def close(self) -> None:
+        with suppress(ValueError):
+            self._watchers.remove(self)
+        self.listeners.clear()
+
+
+class Timer(Handle):
+    """Calls back again and again; made by :meth:`Node.create_timer`.
+
+    Attributes:
+        period: Time between two calls.
+    """
+
+    def __init__(
+        self, clock: Clock, period: Duration, callback: Callable[[], None], executor: Executor
+    ) -> None:
+        self.period = period
+        self._clock, self._callback, self._executor = clock, callback, executor
+        self._waiting = threading.Lock()
+        self._closed = False
+
+    def __repr__(self) -> str:
+        return f"<Timer every {self.period.seconds} s{' closed' * self._closed}>"
+
+    def fire(self) -> None:
+        """Post the callback, unless it is still waiting or running from the last time."""
+        if self._waiting.acquire(blocking=False):
+            self._executor.post(self._run)
+
+    def close(self) -> None:
+        """Call back no more; safe to call twice, from any thread and from the callback."""
+        if not self._closed:
+            self._closed = True
+            self._clock.forget(self)
+
+    def _run(self) -> None:
+        try:
+            if not self._closed:
+                self._callback()
+        except Exception:
+            _log.exception("the callback of %s failed", self)
+        finally:
+            self._waiting.release()
+
+
+def _seconds(what: str, value: object) -> Duration:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < 1e9:
+        raise ConversionError(what, value, "seconds or a rosglass.Duration")
+    return Duration.from_seconds(value)
