@@ -24,6 +24,7 @@ __all__ = [
     "ServiceDefinition",
     "Source",
     "Value",
+    "parts_of",
 ]
 
 #: A constant's or default's value; lists only as defaults of array fields.
@@ -186,3 +187,12 @@ class ActionDefinition:
 
 
 InterfaceDefinition = Definition | ServiceDefinition | ActionDefinition
+
+
+def parts_of(definition: InterfaceDefinition) -> tuple[Definition, ...]:
+    """Return the messages that an interface consists of: one, two (services) or three (actions)."""
+    if isinstance(definition, ServiceDefinition):
+        return definition.request, definition.response
+    if isinstance(definition, ActionDefinition):
+        return definition.goal, definition.result, definition.feedback
+    return (definition,)

@@ -16,7 +16,7 @@ from rosglass.errors import (
     TypeNotFoundError,
     UnsupportedError,
 )
-from rosglass.interfaces.definition import ActionDefinition, Definition, ServiceDefinition
+from rosglass.interfaces.definition import Definition, parts_of
 from rosglass.interfaces.derived import derive, derived_from
 from rosglass.interfaces.distributions import Distributions
 from rosglass.interfaces.folders import Folders, workspace
@@ -26,6 +26,7 @@ from rosglass.interfaces.names import KINDS, join_name, split_name
 from rosglass.interfaces.parser import parse
 from rosglass.interfaces.provider import MemoryProvider, Provider, difference
 from rosglass.interfaces.resolver import Resolver
+from rosglass.interfaces.versions import Versions
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -47,7 +48,8 @@ class Library:
 
     A type is looked for in definitions received from peers, the sourced workspace, folders added by
     the user, and the distributions' standard sets, in this order. When two of them define a type
-    differently neither is used, unless one is preferred.
+    differently neither is used, unless one is preferred. Versions that peers sent on request come
+    last, and where their hash is asked for.
 
     Args:
         providers: Replaces the workspace, the folders and the standard sets.
@@ -71,6 +73,7 @@ class Library:
         self._lock = threading.RLock()
         self._loaded: dict[tuple[int, str, str], InterfaceDefinition] = {}
         self._resolvers: dict[int, Resolver] = {}
+        self._versions = Versions(lambda name: self._find(name, 2, self._chain, check=False))
         self._preferred: list[str] = []
         if prefer:
             self.prefer(*((prefer,) if isinstance(prefer, str) else prefer))
@@ -113,7 +116,12 @@ class Library:
                 if hash not in ("", ANY_HASH):
                     loaded = self._matching(name, ros, hash)
                 else:
-                    loaded = self._load(name, ros, self._resolver(ros), self._chain)
+                    loaded = self._search(name, ros, self._resolver(ros), self._chain)
+                    if loaded is None:
+                        sent = self._version(name, ros)
+                        if sent is None:
+                            raise self._unknown(name, ros)
+                        return sent  # not kept: another one may come
                     # All spellings of a name share one object.
                     loaded = self._loaded.setdefault((ros, loaded.name, ""), loaded)
                 self._loaded[ros, name, hash] = loaded
@@ -138,6 +146,7 @@ class Library:
             raise UnsupportedError(f"kind must be one of {', '.join(KINDS)}, got {kind!r}")
         with self._lock:
             names = {name for provider in self._chain for name in provider.names(ros)}
+            names.update(self._versions.names() if ros == 2 else ())
         return sorted(name for name in names if kind is None or name.split("/")[1] == kind)
 
     def add_path(self, folder: str | os.PathLike[str]) -> None:
@@ -205,6 +214,26 @@ class Library:
                 self._add_one(nested)
             self._add_one(definition)
 
+    def add_version(self, definition: InterfaceDefinition) -> str:
+        """Add a ROS 2 definition that a peer sent, to be found under its hash.
+
+        Unlike with :meth:`add`, other definitions of the type are no conflict: this one is used
+        where its hash is asked for and, when nobody else knows the type, for its name alone (the
+        version added last, if there are several).
+
+        Args:
+            definition: With everything that it needs in ``nested``.
+
+        Returns:
+            Its RIHS01 hash.
+
+        Raises:
+            UnsupportedError: It is a ROS 1 definition, or none.
+            DefinitionError: Something that it needs is missing.
+        """
+        with self._lock:
+            return self._versions.add(definition)
+
     def prefer(self, *providers: str) -> None:
         """Let these providers' definitions win over differing ones, instead of an error.
 
@@ -248,12 +277,30 @@ class Library:
     def _load(
         self, name: str, ros: int, resolver: Resolver, chain: list[Provider], *, check: bool = True
     ) -> InterfaceDefinition:
-        package, kind, base = split_name(name)
-        for candidate in (kind,) if kind else KINDS:
-            found = self._find(f"{package}/{candidate}/{base}", ros, chain, check=check)
+        found = self._search(name, ros, resolver, chain, check=check)
+        if found is None:
+            raise self._unknown(name, ros)
+        return found
+
+    def _search(
+        self, name: str, ros: int, resolver: Resolver, chain: list[Provider], *, check: bool = True
+    ) -> InterfaceDefinition | None:
+        for full in _full_names(name):
+            found = self._find(full, ros, chain, check=check)
             if found is not None:
                 return resolver.resolve(found)
-        raise TypeNotFoundError(
+        return None
+
+    def _version(self, name: str, ros: int, wanted: str = "") -> InterfaceDefinition | None:
+        """Return what a peer sent, that with a given hash or the last."""
+        for full in _full_names(name) if ros == 2 else ():
+            found = self._versions.find(full, wanted)
+            if found is not None:
+                return found
+        return None
+
+    def _unknown(self, name: str, ros: int) -> TypeNotFoundError:
+        return TypeNotFoundError(
             f"no definition of {name} (ROS {ros}) was found: {self._not_found(name, ros)}"
         )
 
@@ -307,6 +354,9 @@ class Library:
 
     def _matching(self, name: str, ros: int, wanted: str) -> InterfaceDefinition:
         """Return the definition with a given hash, of whichever provider or distribution."""
+        sent = self._version(name, ros, wanted)
+        if sent is not None:
+            return sent
         tried: dict[str, str] = {}
         problem: Error | None = None
         for resolver, chain, check in self._views(ros):
@@ -376,6 +426,11 @@ class Library:
         return f"{text} Source its workspace, or add its folder with Library.add_path()"
 
 
+def _full_names(name: str) -> list[str]:
+    package, kind, base = split_name(name)
+    return [f"{package}/{candidate}/{base}" for candidate in ((kind,) if kind else KINDS)]
+
+
 def _check_world(ros: int) -> None:
     if ros not in (1, 2):
         raise UnsupportedError(f"ros must be 1 or 2, got {ros!r}")
@@ -390,9 +445,4 @@ def _place(provider: Provider | None, definition: InterfaceDefinition) -> str:
 
 
 def _nested(definition: InterfaceDefinition) -> dict[str, Definition]:
-    if isinstance(definition, ServiceDefinition):
-        return {**definition.request.nested, **definition.response.nested}
-    if isinstance(definition, ActionDefinition):
-        parts = (definition.goal, definition.result, definition.feedback)
-        return {name: nested for part in parts for name, nested in part.nested.items()}
-    return dict(definition.nested)
+    return {name: inner for part in parts_of(definition) for name, inner in part.nested.items()}

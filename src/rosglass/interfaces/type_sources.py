@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
 from rosglass.interfaces.definition import (
-    ActionDefinition,
     Definition,
     Field,
     FieldType,
     ServiceDefinition,
+    parts_of,
 )
 from rosglass.interfaces.hashes import type_description
 from rosglass.interfaces.idl import parse_idl
@@ -53,20 +53,14 @@ def type_sources(definition: InterfaceDefinition) -> list[dict[str, str]]:
     """
     described = type_description(definition)
     names = [part["type_name"] for part in described["referenced_type_descriptions"]]
-    messages = {name: nested for part in _parts(definition) for name, nested in part.nested.items()}
+    messages = {
+        name: nested for part in parts_of(definition) for name, nested in part.nested.items()
+    }
     sources = [_source(definition)]
     for name in names:
         message = messages.get(name)
         sources.append(_record(name, _IMPLICIT, "") if message is None else _source(message))
     return sources
-
-
-def _parts(definition: InterfaceDefinition) -> tuple[Definition, ...]:
-    if isinstance(definition, ServiceDefinition):
-        return definition.request, definition.response
-    if isinstance(definition, ActionDefinition):
-        return definition.goal, definition.result, definition.feedback
-    return (definition,)
 
 
 def _source(definition: InterfaceDefinition) -> dict[str, str]:
@@ -87,7 +81,7 @@ def _record(name: str, encoding: str, text: str) -> dict[str, str]:
 
 
 def _fields(definition: InterfaceDefinition) -> list[tuple[Field, ...]]:
-    return [part.fields for part in _parts(definition)]
+    return [part.fields for part in parts_of(definition)]
 
 
 def _parse(name: str, encoding: str, text: str, provider: str = "text") -> InterfaceDefinition:
@@ -116,9 +110,9 @@ def add_type_sources(
             the end as that adds (seen in Iron to Kilted); this is undone.
     """
     texts = _Texts(definition.source.provider, sources, verbatim)
-    parts = _parts(definition)
+    parts = parts_of(definition)
     found, whole = texts.interface(definition.name)
-    written = _parts(found) if type(found) is type(definition) and found else (None,) * len(parts)
+    written = parts_of(found) if type(found) is type(definition) and found else (None,) * len(parts)
     merged = {
         part.name: _merged(part, text, whole) for part, text in zip(parts, written, strict=True)
     }

@@ -149,9 +149,9 @@ def load(
     source = default_library() if library is None else library
     with _lock:
         types = _libraries.setdefault(source, {})
+        definition = source.definition(name, ros=ros, hash=hash)
         found = types.get((name, ros, hash))
-        if found is None:
-            definition = source.definition(name, ros=ros, hash=hash)
+        if found is None or found.definition is not definition:
             # The usual version, when it is the one that was asked for, stays one object.
             usual = types.get((name, ros, ""))
             same = usual is not None and usual.definition is definition
