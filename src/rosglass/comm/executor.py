@@ -63,6 +63,11 @@ class Dispatcher(Executor):
         if not self._closed:
             self._jobs.put(job)
 
+    @property
+    def is_current(self) -> bool:
+        """Whether this is the dispatcher's own thread."""
+        return self._thread is threading.current_thread()
+
     def close(self) -> None:
         """End the thread after the job that runs now; waiting jobs are forgotten.
 

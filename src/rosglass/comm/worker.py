@@ -36,6 +36,11 @@ class Worker:
         """Ask for a run soon; from any thread, without waiting."""
         self._wanted.set()
 
+    @property
+    def is_current(self) -> bool:
+        """Whether this is the worker's own thread."""
+        return self._thread is threading.current_thread()
+
     def close(self) -> None:
         """End the thread after the run in progress and wait for it; safe to call twice.
 
