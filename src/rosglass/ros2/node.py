@@ -9,13 +9,25 @@ from rosglass.ros2.core import Core
 from rosglass.ros2.names import validate_namespace, validate_node_name
 from rosglass.ros2.publisher import Ros2Publisher
 from rosglass.ros2.reading import Reading
+from rosglass.ros2.service_client import Ros2ServiceClient
+from rosglass.ros2.service_server import Ros2ServiceServer
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Awaitable, Callable
 
-    from rosglass.comm import EndpointInfo, Executor, Handle, Publisher, Sample, Status
+    from rosglass.comm import (
+        Answer,
+        EndpointInfo,
+        Executor,
+        Handle,
+        Publisher,
+        Sample,
+        ServiceClient,
+        ServiceServer,
+        Status,
+    )
     from rosglass.interfaces import Library
-    from rosglass.messages import Message, MessageType
+    from rosglass.messages import Message, MessageType, ServiceType
     from rosglass.ros2.middleware import Middleware
 
 __all__ = ["Ros2Node"]
@@ -82,6 +94,29 @@ class Ros2Node(Node):
         )
         Reading(self._core, subscription, type)
         return subscription
+
+    def create_service_client(
+        self, name: str, type: str | ServiceType | None = None, qos: QoS | None = None
+    ) -> ServiceClient:
+        """Return a client; see :meth:`rosglass.comm.Node.create_service_client`."""
+        self._core.check_open()
+        profile = QoS.services() if qos is None else _profile(qos)
+        return Ros2ServiceClient(self._core, self.resolve(name), type, profile)
+
+    def create_service_server(
+        self,
+        name: str,
+        type: str | ServiceType,
+        callback: Callable[[Message], Answer | Awaitable[Answer]],
+        qos: QoS | None = None,
+        *,
+        executor: Executor | None = None,
+    ) -> ServiceServer:
+        """Offer a service; see :meth:`rosglass.comm.Node.create_service_server`."""
+        self._core.check_open()
+        profile = QoS.services() if qos is None else _profile(qos)
+        full = self.resolve(name)
+        return Ros2ServiceServer(self._core, full, type, callback, profile, executor)
 
     def topics(self) -> dict[str, list[str]]:
         """Return every topic in the graph with the types announced for it."""

@@ -1,0 +1,79 @@
+"""Callbacks that are coroutine functions: they run in an asyncio event loop."""
+
+from __future__ import annotations
+
+import inspect
+import logging
+from typing import TYPE_CHECKING, Any
+
+from rosglass.comm.node import Executor
+from rosglass.errors import ConversionError
+
+if TYPE_CHECKING:
+    import asyncio
+    from collections.abc import Callable, Coroutine
+    from concurrent.futures import Future
+
+__all__ = ["LoopExecutor", "executor_for"]
+
+_log = logging.getLogger("rosglass.comm")
+
+
+class LoopExecutor(Executor):
+    """Runs callbacks in an asyncio event loop, and coroutines.
+
+    Args:
+        loop: The loop; callbacks that come after its end are dropped, with one warning.
+    """
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self._loop = loop
+        self._told = False
+
+    @classmethod
+    def running(cls, where: str) -> LoopExecutor:
+        """Return one for the event loop that runs in this thread; raises ConversionError."""
+        import asyncio  # noqa: PLC0415 - only for those who use it
+
+        try:
+            return cls(asyncio.get_running_loop())
+        except RuntimeError:
+            raise ConversionError(
+                "callback",
+                "a coroutine function",
+                "a plain function, or to be created inside a running event loop, as in "
+                "`async def main()`, where coroutine functions are run",
+                where,
+            ) from None
+
+    def post(self, job: Callable[[], None]) -> None:
+        """Run `job` in the loop soon."""
+        try:
+            self._loop.call_soon_threadsafe(job)
+        except RuntimeError:
+            if not self._told:
+                self._told = True
+                _log.warning("the event loop of callbacks is closed: they are not called any more")
+
+    def run(self, coroutine: Coroutine[Any, Any, Any]) -> Future[Any]:
+        """Run a coroutine in the loop; the future has what it returns."""
+        import asyncio  # noqa: PLC0415 - only for those who use it
+
+        return asyncio.run_coroutine_threadsafe(coroutine, self._loop)
+
+
+def executor_for(
+    callback: Any, executor: Executor | None, default: Executor, where: str
+) -> Executor:
+    """Return where a callback runs; raises ConversionError when it cannot run."""
+    if not callable(callback):
+        raise ConversionError("callback", callback, "something that can be called", where)
+    if executor is not None and not isinstance(executor, Executor):
+        raise ConversionError("executor", executor, "a rosglass.comm.Executor", where)
+    call = getattr(callback, "__call__", None)  # noqa: B004 - objects may be callable, too
+    if not (inspect.iscoroutinefunction(callback) or inspect.iscoroutinefunction(call)):
+        return executor or default
+    if executor is not None:
+        told = "no executor beside a coroutine function, which runs in its event loop"
+        raise ConversionError("executor", executor, told, where)
+    return LoopExecutor.running(where)

@@ -1,0 +1,158 @@
+"""Taking the type, and the version of it, that the other side of a service or action announces."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
+
+from rosglass.errors import Error
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from rosglass.comm import EndpointInfo
+
+__all__ = ["Announced", "choose", "identity", "mismatches", "nodes_of", "similar"]
+
+
+class _Type(Protocol):
+    name: str
+
+    @property
+    def rihs01(self) -> str: ...
+
+
+_T = TypeVar("_T", bound=_Type)
+
+
+class Announced(Generic[_T]):
+    """One type, in the version that peers announce by its hash, if the library has it.
+
+    Args:
+        load: Returns the type of a name and hash; raises an Error when there is none.
+        given: The type that was given; None when only peers can tell it.
+        fixed: Whether it stays as given whatever peers announce.
+
+    Attributes:
+        type: The type; None while nobody has told it.
+        hash: Its hash, empty without type.
+        failure: Why the announced version cannot be had, in words; empty when all is well.
+    """
+
+    def __init__(self, load: Callable[[str, str], _T], given: _T | None, fixed: bool) -> None:
+        self._load, self._fixed = load, fixed
+        self._failed: tuple[str, str] | None = None
+        self.type: _T | None = None
+        self.hash = ""
+        self.failure = ""
+        if given is not None:
+            self._take(given)
+
+    def follow(self, name: str, peers: Sequence[EndpointInfo], retry: bool) -> bool:
+        """Take the version of the type `name` that `peers` announce.
+
+        Args:
+            name: The type's name, as peers spell it.
+            peers: Those with another type are ignored.
+            retry: Whether to look again for a definition that was not found before.
+
+        Returns:
+            Whether the type is another one now.
+        """
+        if self._fixed:
+            return False
+        hashes = {peer.type_hash for peer in peers if peer.type == name and peer.type_hash}
+        current = self.type if self.type is not None and self.type.name == name else None
+        if current is not None and (len(hashes) != 1 or self.hash in hashes):
+            self._failed, self.failure = None, ""
+            return False
+        wanted = (name, hashes.pop() if len(hashes) == 1 else "")
+        if wanted == self._failed and not retry:
+            return False
+        try:
+            found = self._load(*wanted)
+        except Error as error:
+            self._failed = wanted
+            who = nodes_of(peer for peer in peers if peer.type == name)
+            self.failure = (
+                f"{who} has {name}, which cannot be used: {error}; this is tried again until a "
+                "definition is found"
+            )
+            return False
+        self._failed, self.failure = None, ""
+        self._take(found)
+        return True
+
+    def fits(self, peer: EndpointInfo) -> bool:
+        """Return whether a peer has this type in this version, as far as it says."""
+        return (
+            self.type is not None
+            and peer.type == self.type.name
+            and peer.type_hash in ("", self.hash)
+        )
+
+    def _take(self, found: _T) -> None:
+        self.type, self.hash = found, found.rihs01
+
+
+def choose(names: Iterable[str], current: str, example: str) -> tuple[str, str]:
+    """Return the type's name to go with, and what is wrong when there are several.
+
+    Args:
+        names: What peers announce.
+        current: The name in use, empty when there is none.
+        example: A call that gives the type, with ``{}`` for its name.
+    """
+    found = sorted(set(names))
+    if current in found or not found:
+        return current, ""
+    if len(found) == 1:
+        return found[0], ""
+    told = example.format(repr(found[0]))
+    return current, f"offered with several types ({', '.join(found)}); choose one, e.g. {told}"
+
+
+def mismatches(
+    announced: Announced[_T], peers: Sequence[EndpointInfo], verb: str, effect: str
+) -> list[str]:
+    """Say which peers do not fit the type, and what follows.
+
+    Args:
+        announced: Our type.
+        peers: Servers or clients.
+        verb: What they do: ``offers`` or ``calls``.
+        effect: What follows, e.g. ``it cannot be called``.
+    """
+    problems: dict[str, None] = {}
+    if announced.type is None:
+        return []
+    name = announced.type.name
+    for peer in peers:
+        if peer.type != name:
+            problems[f"{peer.node} {verb} {peer.type} here, not {name}: {effect}"] = None
+        elif not announced.fits(peer):
+            problems[
+                f"{peer.node} has another definition of {name} ({peer.type_hash}, ours is "
+                f"{announced.hash}): {effect}; add the robot's definition to the library"
+            ] = None
+    return list(problems)
+
+
+def identity(peer: EndpointInfo) -> bytes | str:
+    """Return what tells a peer from another one that takes its place."""
+    return peer.gid or peer.node.full
+
+
+def nodes_of(peers: Iterable[EndpointInfo]) -> str:
+    """Return the names of the nodes that peers belong to, for people."""
+    return ", ".join(sorted({peer.node.full for peer in peers}))
+
+
+def similar(name: str, known: Iterable[str]) -> str:
+    """Return a hint at a known name that `name` may stand for, empty when there is none."""
+    import difflib  # noqa: PLC0415 - only needed to explain an error
+
+    names = [other for other in known if other != name]
+    base = name.rpartition("/")[2]
+    near = [other for other in names if other.rpartition("/")[2] == base]
+    near += difflib.get_close_matches(name, names, 2, 0.8)
+    return f"; did you mean {' or '.join(dict.fromkeys(near[:2]))}?" if near else ""

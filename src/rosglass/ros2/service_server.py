@@ -1,0 +1,228 @@
+"""Offering ROS 2 services."""
+
+from __future__ import annotations
+
+import inspect
+import logging
+import threading
+from concurrent.futures import CancelledError, Future
+from typing import TYPE_CHECKING, Any
+
+from rosglass.comm import EndpointKind, QoS, ServiceServer
+from rosglass.comm.loop import LoopExecutor, executor_for
+from rosglass.errors import DecodeError, Error, NodeClosedError
+from rosglass.ros2.announced import Announced, mismatches, nodes_of
+from rosglass.ros2.core import Member
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable
+
+    from rosglass.comm import Answer, Executor
+    from rosglass.messages import Message, ServiceType
+    from rosglass.ros2.core import Core
+    from rosglass.ros2.middleware import RequestId
+
+__all__ = ["Ros2ServiceServer"]
+
+_log = logging.getLogger("rosglass.ros2")
+#: Requests that wait for the callback; more come only from a client gone wild.
+_MAX_WAITING = 1000
+#: Clients whose rubbish is logged.
+_MAX_NAMED = 100
+
+
+class Ros2ServiceServer(ServiceServer, Member):
+    """A service server; made by :meth:`Node.create_service_server`.
+
+    Args:
+        core: The node it belongs to.
+        name: Absolute service name.
+        type: The type, or its name.
+        callback: Called with each request; see :meth:`Node.create_service_server`.
+        qos: Profile of requests and replies; None for the usual one.
+        executor: Where `callback` runs; None for the node's dispatcher, or for the running event
+            loop when `callback` is a coroutine function.
+    """
+
+    def __init__(
+        self,
+        core: Core,
+        name: str,
+        type: ServiceType | str,
+        callback: Callable[[Message], Answer | Awaitable[Answer]],
+        qos: QoS | None = None,
+        executor: Executor | None = None,
+    ) -> None:
+        self.name, self.qos = name, qos or QoS.services()
+        self.type = core.types.service(type)
+        self._core, self._callback = core, callback
+        self._executor = executor_for(callback, executor, core.dispatcher, name)
+        self._announced = Announced(core.types.service, self.type, fixed=True)
+        self._lock = threading.Lock()
+        self._closed = False
+        self._waiting = 0
+        self._running: set[Future[Any]] = set()
+        self._named: set[bytes] = set()
+        self._warned = ""
+        self._replier = core.middleware.create_replier(
+            core.name, name, self.type.name, self._announced.hash, self.qos, self._on_request
+        )
+        core.add(self)
+        core.wake()
+
+    @property
+    def problem(self) -> str:
+        """Why some clients cannot be served, in words; empty when all is well."""
+        if self._closed:
+            return "the server is closed"
+        graph = self._core.graph
+        clients = graph.endpoints(EndpointKind.SERVICE_CLIENT, self.name)
+        problems = mismatches(self._announced, clients, "calls", "it is not served")
+        if not problems and self._replier.problem:
+            problems.append(self._replier.problem)
+        servers = graph.endpoints(EndpointKind.SERVICE_SERVER, self.name)
+        others = [server for server in servers if server.node != self._core.name]
+        if others:
+            problems.append(
+                f"{nodes_of(others)} offers {self.name}, too: clients get whichever answer comes "
+                "first; end one of the two"
+            )
+        return "; ".join(problems)
+
+    def serves(self, service: str, executor: Executor) -> bool:
+        """Return whether it answers `service` on `executor`."""
+        return service == self.name and executor is self._executor
+
+    def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - the graph alone matters
+        """Follow a change of the graph: log what is wrong, once."""
+        if not moved or self._closed:
+            return
+        problem = self.problem
+        if problem and problem != self._warned:
+            _log.warning("%s: %s", self.name, problem)
+        self._warned = problem
+
+    def close(self) -> None:
+        """Withdraw the service; requests without response end unanswered. Safe to call twice."""
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+            running, self._running = self._running, set()
+        if self._core.forked:
+            return
+        self._replier.close()
+        self._core.remove(self)
+        for future in running:
+            future.cancel()
+
+    # -- answering -------------------------------------------------------------------------------
+
+    def _on_request(self, request: RequestId, data: bytes | memoryview) -> None:
+        with self._lock:
+            full = self._waiting >= _MAX_WAITING
+            if self._closed:
+                return
+            if not full:
+                self._waiting += 1
+        try:
+            if full:
+                self._refuse(request, f"{_MAX_WAITING} requests wait for the callback already")
+            else:
+                self._executor.post(lambda: self._serve(request, data))
+        except Exception:
+            _log.exception("%s: a request of %s is lost", self.name, self._origin(request))
+
+    def _serve(self, request: RequestId, data: bytes | memoryview) -> None:
+        with self._lock:
+            self._waiting -= 1
+            if self._closed:
+                return
+        kind = self.type.request
+        try:
+            if kind.fields:
+                kind.validate(data)
+            message = kind.decode(data)
+        except DecodeError as error:
+            self._refuse(request, f"the request is no {kind.name}: {error}")
+            return
+        try:
+            answer = self._callback(message)
+        except Exception as error:
+            self._failed(request, error)
+            return
+        if inspect.iscoroutine(answer):
+            if not isinstance(self._executor, LoopExecutor):
+                answer.close()
+                self._failed(request, TypeError("the callback must be an async def to be awaited"))
+                return
+            answer = self._executor.run(answer)
+            with self._lock:
+                self._running.add(answer)
+        if isinstance(answer, Future):
+            answer.add_done_callback(lambda future: self._finish(request, future))
+        else:
+            self._respond(request, answer)
+
+    def _finish(self, request: RequestId, future: Future[Any]) -> None:
+        """Answer a request whose response was promised."""
+        with self._lock:
+            self._running.discard(future)
+        if self._closed:
+            return
+        try:
+            answer = future.result(0)
+        except CancelledError:
+            self._refuse(request, "the callback's future was cancelled")
+        except Exception as error:
+            self._failed(request, error)
+        else:
+            self._respond(request, answer)
+
+    def _respond(self, request: RequestId, answer: Any) -> None:
+        kind = self.type.response
+        try:
+            data = kind.encode(answer)
+        except Error as error:
+            _log.error(
+                "%s: the callback's response to %s does not fit: %s; nothing was sent",
+                self.name,
+                self._origin(request),
+                error,
+            )
+            self._replier.fail(request, f"the server made no valid response: {error}")
+            return
+        try:
+            self._replier.reply(request, data)
+        except NodeClosedError:
+            pass  # closed meanwhile
+        except Error as error:
+            _log.error("%s: cannot answer %s: %s", self.name, self._origin(request), error)
+
+    def _failed(self, request: RequestId, error: Exception) -> None:
+        _log.error(
+            "%s: the callback failed on a request of %s; it gets no response",
+            self.name,
+            self._origin(request),
+            exc_info=error,
+        )
+        self._replier.fail(request, f"{type(error).__name__}: {error}")
+
+    def _refuse(self, request: RequestId, reason: str) -> None:
+        """Turn a client's fault down, and name it in the log once."""
+        with self._lock:
+            fresh = request.client not in self._named and len(self._named) < _MAX_NAMED
+            if fresh:
+                self._named.add(request.client)
+        if fresh:
+            who = self._origin(request)
+            _log.warning("%s: refusing requests of %s: %s", self.name, who, reason)
+        self._replier.fail(request, reason)
+
+    def _origin(self, request: RequestId) -> str:
+        """Return who sent a request, for people."""
+        clients = self._core.graph.endpoints(EndpointKind.SERVICE_CLIENT, self.name)
+        known = [client for client in clients if client.gid and client.gid == request.client]
+        if known or len(clients) == 1:
+            return nodes_of(known or clients)
+        return f"client {request.client.hex()}"
