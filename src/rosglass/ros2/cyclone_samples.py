@@ -35,10 +35,15 @@ class Batch:
 
     Args:
         size: Samples at most.
+
+    Attributes:
+        full: Whether the last call filled all of it, so that there may be more: nothing tells of
+            samples that were left.
     """
 
     def __init__(self, size: int = 64) -> None:
         self._size = size
+        self.full = False
         self._serdata = (c_void_p * size)()
         self._infos = (c_ubyte * (_INFO.size * size))()
         self._addresses = memoryview(self._serdata).cast("B").cast("Q")
@@ -64,6 +69,7 @@ class Batch:
         serdata, infos = self._at
         # Its lock is held by no thread that calls us, and for no longer than this takes.
         count = keeping().dds_takecdr(reader, serdata, self._size, infos, _ANY_STATE)
+        self.full = count == self._size
         if count <= 0:
             check_alive(count, "dds_takecdr", place)
             return ()

@@ -212,23 +212,25 @@ class SampleReader:
         self._participant.pump.forget(self.entity)
         cyclone.delete(self._topic)
 
-    def _serve(self) -> None:
+    def _serve(self) -> bool:
         if not self._busy.acquire(timeout=_SOON):
-            return  # the event still holds, so this is called again at once
+            return True
         try:
-            self._hand_on(1)
+            return self._hand_on(1)
         finally:
             self._busy.release()
 
-    def _hand_on(self, batches: int) -> None:
+    def _hand_on(self, batches: int) -> bool:
+        """Hand on so many batches at most; return whether there may be more."""
         for _ in range(batches):
             if self._closed:
-                break
+                return False
             taken = self._take()
             if taken:
                 self._on_taken(taken)
-            if len(taken) < _BATCH:
-                break
+            if not self._batch.full:
+                return False
+        return True
 
     def _take(self) -> list[Taken]:
         try:
@@ -307,7 +309,8 @@ class DdsReader(Reader):
             f"topic {topic}",
             self._hand_on,
         )
-        participant.add_endpoint(node, self._reader.guid, writer=False)
+        self.gid = self._reader.guid
+        participant.add_endpoint(node, self.gid, writer=False)
 
     def set_eager(self, eager: bool) -> None:
         """Hand samples on as they come, or now and then."""
@@ -327,7 +330,7 @@ class DdsReader(Reader):
 
     def close(self) -> None:
         """Take it out of the graph and delete it."""
-        self._participant.remove_endpoint(self._reader.guid)
+        self._participant.remove_endpoint(self.gid)
         self._reader.close()
 
     def _hand_on(self, taken: list[Taken]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from collections import deque
 from typing import TYPE_CHECKING
 
 from rosglass.ros2.cyclone_listener import Event, Waitset, set_events
@@ -36,27 +37,33 @@ class Pump:
 
     def __init__(self, participant: int, name: str) -> None:
         self._waitset = Waitset(participant)
-        self._acts: dict[int, Callable[[], None]] = {}
-        self._idle: dict[int, Callable[[], None]] = {}
+        self._acts: dict[int, Callable[[], bool | None]] = {}
+        self._again: deque[int] = deque()
+        self._idle: dict[int, Callable[[], object]] = {}
         self._closed = False
         self._due = 0.0
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
-    def watch(self, entity: int, events: Event, act: Callable[[], None]) -> None:
-        """Call `act`, on the pump's thread, while one of `events` holds for an entity.
+    def watch(self, entity: int, events: Event, act: Callable[[], bool | None]) -> None:
+        """Call `act`, on the pump's thread, when one of `events` happens to an entity.
 
-        It is called again and again until the event is over: data taken, a status read. Deleting
-        the entity ends it; :meth:`forget` lets go of `act`.
+        New data is told once, and then only after some was taken: `act` returns whether there may
+        be more, which it is asked for after the others had their turn. A status is told until it is
+        read. Deleting the entity ends it; :meth:`forget` lets go of `act`.
         """
         set_events(entity, events)
         self._acts[entity] = act
         self._waitset.attach(entity, entity)
 
-    def visit(self, entity: int, act: Callable[[], None] | None) -> None:
-        """Call `act` some thirty times a second, whatever happens; None ends that."""
+    def visit(self, entity: int, act: Callable[[], object] | None) -> None:
+        """Call `act` some thirty times a second, whatever happens.
+
+        None ends that, and lets what :meth:`watch` was given look for data at once.
+        """
         if act is None:
             self._idle.pop(entity, None)
+            self._again.append(entity)
         else:
             self._idle[entity] = act
         self._waitset.wake()
@@ -85,19 +92,24 @@ class Pump:
             self._do(self._turn)
 
     def _turn(self) -> None:
-        for entity in self._waitset.wait(_IDLE_INTERVAL if self._idle else None):
-            self._do(self._acts.get(entity))
+        again = [self._again.popleft() for _ in range(len(self._again))]
+        woken = self._waitset.wait(0.0 if again else _IDLE_INTERVAL if self._idle else None)
+        for entity in dict.fromkeys((*woken, *again)) if again else woken:
+            act = self._acts.get(entity)
+            if act is not None and self._do(act):
+                self._again.append(entity)
         if self._idle and (now := time.monotonic()) >= self._due:
             self._due = now + _IDLE_INTERVAL
-            for act in list(self._idle.values()):
-                self._do(act)
+            for visit in list(self._idle.values()):
+                self._do(visit)
 
-    def _do(self, act: Callable[[], None] | None) -> None:
-        if act is None or self._closed:
-            return
+    def _do(self, act: Callable[[], object]) -> object:
+        if self._closed:
+            return None
         try:
-            act()
+            return act()
         except Exception:
             if not self._closed:
                 _log.exception("%s: what arrived cannot be handed on", self._thread.name)
                 time.sleep(_BACKOFF)
+            return None
