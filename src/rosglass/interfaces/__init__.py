@@ -17,7 +17,7 @@ from rosglass.interfaces.definition import (
 from rosglass.interfaces.derived import service_event
 from rosglass.interfaces.distributions import DISTRIBUTIONS, Distributions
 from rosglass.interfaces.folders import Folders, workspace
-from rosglass.interfaces.hashes import full_text, md5, rihs01, type_description
+from rosglass.interfaces.hashes import announced_hashes, full_text, md5, rihs01, type_description
 from rosglass.interfaces.idl import parse_idl
 from rosglass.interfaces.library import Library
 from rosglass.interfaces.literals import INTEGER_RANGES
@@ -30,6 +30,7 @@ from rosglass.interfaces.parser import (
     parse_service,
 )
 from rosglass.interfaces.provider import MemoryProvider, Provider
+from rosglass.interfaces.type_cache import TypeCache, cache_folder
 from rosglass.interfaces.type_descriptions import parse_type_description
 from rosglass.interfaces.type_sources import add_type_sources, type_sources
 
@@ -51,8 +52,11 @@ __all__ = [
     "Provider",
     "ServiceDefinition",
     "Source",
+    "TypeCache",
     "Value",
     "add_type_sources",
+    "announced_hashes",
+    "cache_folder",
     "full_text",
     "join_name",
     "md5",

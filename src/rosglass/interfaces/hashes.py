@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from rosglass.interfaces.definition import Field, InterfaceDefinition
 
-__all__ = ["full_text", "md5", "rihs01", "type_description"]
+__all__ = ["announced_hashes", "full_text", "md5", "rihs01", "type_description"]
 
 # type_description_interfaces/msg/FieldType's constants. rosidl turns a .msg file's char into IDL's
 # uint8, so its id is 3 and not FIELD_TYPE_CHAR (AddTwoInts' official hash depends on it).
@@ -142,6 +142,22 @@ def rihs01(definition: InterfaceDefinition) -> str:
             del field["default_value"]
     text = json.dumps(description, separators=(", ", ": "))
     return f"RIHS01_{hashlib.sha256(text.encode()).hexdigest()}"
+
+
+def announced_hashes(definition: InterfaceDefinition) -> tuple[str, ...]:
+    """Return the hashes by which peers announce a type, its own first.
+
+    For a service, ROS 2 nodes over Zenoh announce the service's own hash. Those over DDS announce
+    that of its request (and, with replies, of its response): rmw_fastrtps's ``rmw_service.cpp``.
+
+    Raises:
+        UnsupportedError: `definition` is a ROS 1 one, or no definition.
+        DefinitionError: `definition` is not resolved.
+    """
+    own = rihs01(definition)
+    if isinstance(definition, ServiceDefinition):
+        return own, rihs01(definition.request), rihs01(definition.response)
+    return (own,)
 
 
 def type_description(definition: InterfaceDefinition) -> dict[str, Any]:

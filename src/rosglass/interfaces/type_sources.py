@@ -20,6 +20,7 @@ from rosglass.interfaces.definition import (
     ServiceDefinition,
     parts_of,
 )
+from rosglass.interfaces.derived import derive, derived_from
 from rosglass.interfaces.hashes import type_description
 from rosglass.interfaces.idl import parse_idl
 from rosglass.interfaces.parser import MAX_TEXT, parse
@@ -170,7 +171,21 @@ class _Texts:
                 self._known.setdefault(name, (encoding, text))
 
     def interface(self, name: str) -> tuple[InterfaceDefinition | None, bool]:
-        """Return what the text of a type says, and whether that is all of it."""
+        """Return what the text of a type says, and whether that is all of it.
+
+        A request, goal or the like is part of the text of its service or action, where that came
+        along.
+        """
+        found, whole = self._read(name)
+        if found is None:
+            for owner, suffix in derived_from(name, 2):
+                outer, whole = self._read(owner)
+                found = None if outer is None else derive(outer, suffix)
+                if found is not None:
+                    break
+        return found, whole
+
+    def _read(self, name: str) -> tuple[InterfaceDefinition | None, bool]:
         encoding, text = self._known.get(name, ("", ""))
         text = text.rstrip("\0")
         if not encoding:

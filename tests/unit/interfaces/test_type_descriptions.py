@@ -109,6 +109,20 @@ def test_what_an_action_implies(suffix: str) -> None:
     assert rihs01(add_type_sources(described, type_sources(definition))) == rihs01(definition)
 
 
+def test_goals_have_the_constants_of_their_action() -> None:
+    library = Library()
+    text = "uint8 FAST=1 # m/s\nuint8 speed\n---\nuint8 DONE=2\nuint8 state\n---\nfloat32 left"
+    library.add_text("my_msgs/action/Go", text, source="test")
+    (whole,) = (s for s in type_sources(library.definition("my_msgs/action/Go"))[:1])
+    asked = library.definition("my_msgs/action/Go_SendGoal")
+    found = add_type_sources(
+        parse_type_description(sent(asked)), [*type_sources(asked), whole], verbatim=True
+    )
+    assert isinstance(found, ServiceDefinition)
+    goal = found.request.nested["my_msgs/action/Go_Goal"]
+    assert [(c.name, c.comment) for c in goal.constants] == [("FAST", "m/s")]
+
+
 def test_every_kind_of_field() -> None:
     definition = odd()
     described = parse_type_description(sent(definition))
