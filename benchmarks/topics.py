@@ -92,7 +92,7 @@ def subscriber(plan: dict[str, Any]) -> None:
 
             def raw(sample: Any) -> None:
                 got.append(time.time_ns())
-                sent.append(sample.sent.nanoseconds)
+                sent.append(sample.sent_ns)
 
             arguments = {"raw_callback": raw, "executor": IMMEDIATE}
         elif plan["how"] == "message":

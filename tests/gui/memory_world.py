@@ -82,7 +82,7 @@ class MemoryPublisher(Publisher):
     def send(self, subscription: Subscription, data: bytes, sequence: int) -> None:
         if subscription.type is None:
             subscription.set_type(self.type)
-        now = Time.now()
+        now = Time.now().nanoseconds
         subscription.deliver(Sample(data, "cdr", self.type, now, now, b"me", sequence))
 
     def subscription_count(self) -> int:

@@ -201,7 +201,7 @@ def test_an_element_may_destroy_itself_in_its_handler(running: Any, chat: Any, w
 def test_a_destroyed_element_is_left_alone_and_holds_nothing(
     running: Any, chat: Any, wait: Any, caplog: Any, capfd: Any
 ) -> None:
-    from rosglass.comm.subscription import Sample
+    from rosglass.comm.sample import Sample
 
     root = running.load(
         """QtObject {

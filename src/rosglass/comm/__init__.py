@@ -10,9 +10,21 @@ from rosglass.comm.action import (
     ServerGoal,
 )
 from rosglass.comm.clock import Clock, ClockChange, Jump, Timer
+from rosglass.comm.events import (
+    DeadlineMissed,
+    IncompatibleQoS,
+    LivelinessChanged,
+    LivelinessLost,
+    Matched,
+    PublisherEvents,
+    SamplesLost,
+    SubscriptionEvents,
+)
 from rosglass.comm.executor import IMMEDIATE, Dispatcher
 from rosglass.comm.graph import ConnectionState, EndpointInfo, EndpointKind, NodeName, Status
+from rosglass.comm.inbox import INBOX_LIMIT
 from rosglass.comm.listeners import Listeners
+from rosglass.comm.loop import LoopExecutor, executor_for
 from rosglass.comm.node import Answer, Executor, Handle, Node, Publisher
 from rosglass.comm.parameters import (
     ParameterClient,
@@ -26,8 +38,11 @@ from rosglass.comm.parameters import (
 )
 from rosglass.comm.promise import Promise
 from rosglass.comm.qos import BEST_AVAILABLE, Durability, History, Liveliness, QoS, Reliability
+from rosglass.comm.sample import Sample
 from rosglass.comm.service import Call, ServiceClient, ServiceServer
-from rosglass.comm.subscription import Sample, Statistics, Subscription
+from rosglass.comm.source import Source
+from rosglass.comm.statistics import Statistics
+from rosglass.comm.subscription import Subscription
 from rosglass.comm.time import Duration, Time
 from rosglass.comm.timers import Timers
 from rosglass.comm.worker import Worker
@@ -35,6 +50,7 @@ from rosglass.comm.worker import Worker
 __all__ = [
     "BEST_AVAILABLE",
     "IMMEDIATE",
+    "INBOX_LIMIT",
     "ActionClient",
     "ActionResult",
     "ActionServer",
@@ -45,6 +61,7 @@ __all__ = [
     "Clock",
     "ClockChange",
     "ConnectionState",
+    "DeadlineMissed",
     "Dispatcher",
     "Durability",
     "Duration",
@@ -54,9 +71,14 @@ __all__ = [
     "GoalStatus",
     "Handle",
     "History",
+    "IncompatibleQoS",
     "Jump",
     "Listeners",
     "Liveliness",
+    "LivelinessChanged",
+    "LivelinessLost",
+    "LoopExecutor",
+    "Matched",
     "Node",
     "NodeName",
     "ParameterClient",
@@ -67,19 +89,24 @@ __all__ = [
     "Parameters",
     "Promise",
     "Publisher",
+    "PublisherEvents",
     "QoS",
     "Range",
     "Reliability",
     "Sample",
+    "SamplesLost",
     "ServerGoal",
     "ServiceClient",
     "ServiceServer",
     "SetResult",
+    "Source",
     "Statistics",
     "Status",
     "Subscription",
+    "SubscriptionEvents",
     "Time",
     "Timer",
     "Timers",
     "Worker",
+    "executor_for",
 ]

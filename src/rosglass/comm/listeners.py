@@ -6,17 +6,18 @@ import threading
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from rosglass.comm.node import Executor, Handle
+from rosglass.errors import ConversionError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-__all__ = ["Listeners"]
+__all__ = ["Listener", "Listeners"]
 
 _T = TypeVar("_T")
 
 
 class Listeners(Generic[_T]):
-    """A list of callbacks.
+    """A list of callbacks; true while there is one.
 
     Args:
         merge: Whether a callback that has not run yet is only told the newest value, so that a
@@ -27,11 +28,18 @@ class Listeners(Generic[_T]):
     def __init__(self, merge: bool = False, depth: int | None = None) -> None:
         self._depth = 1 if merge else depth
         self._lock = threading.Lock()
-        self._listeners: list[_Listener[_T]] = []
+        self._listeners: list[Listener[_T]] = []
 
-    def add(self, callback: Callable[[_T], None], executor: Executor) -> Handle:
-        """Tell `callback` each new value on `executor`, until the handle is closed."""
-        listener = _Listener(self, callback, executor)
+    def __bool__(self) -> bool:
+        return bool(self._listeners)
+
+    def add(self, callback: Callable[[_T], None], executor: Executor) -> Listener[_T]:
+        """Tell `callback` each new value on `executor`, until the handle is closed.
+
+        Raises:
+            ConversionError: One of the two is not what it should be.
+        """
+        listener = Listener(self, callback, executor, self._depth)
         with self._lock:
             self._listeners.append(listener)
         return listener
@@ -44,7 +52,7 @@ class Listeners(Generic[_T]):
         """
         with self._lock:
             told = list(self._listeners)
-        kept = [listener.tell(value, self._depth) for listener in told]
+        kept = [listener.tell(value) for listener in told]
         return all(kept)
 
     def clear(self) -> None:
@@ -54,25 +62,42 @@ class Listeners(Generic[_T]):
         for listener in told:
             listener.closed = True
 
-    def _remove(self, listener: _Listener[_T]) -> None:
+    def remove(self, listener: Listener[_T]) -> None:
+        """Forget a listener; for listeners that are closed."""
         with self._lock:
             if listener in self._listeners:
                 self._listeners.remove(listener)
 
 
-class _Listener(Handle, Generic[_T]):
+class Listener(Handle, Generic[_T]):
+    """A callback of :class:`Listeners`; closing it ends it.
+
+    Attributes:
+        closed: Whether it has ended.
+    """
+
     def __init__(
-        self, owner: Listeners[_T], callback: Callable[[_T], None], executor: Executor
+        self,
+        owner: Listeners[_T],
+        callback: Callable[[_T], None],
+        executor: Executor,
+        depth: int | None,
     ) -> None:
+        if not callable(callback):
+            raise ConversionError("callback", callback, "something that can be called")
+        if not isinstance(executor, Executor):
+            raise ConversionError("executor", executor, "a rosglass.comm.Executor")
         self._owner, self._callback, self._executor = owner, callback, executor
+        self._depth = depth
         self._lock = threading.Lock()
         self._waiting: list[_T] = []
         self.closed = False
 
-    def tell(self, value: _T, depth: int | None) -> bool:
+    def tell(self, value: _T) -> bool:
+        """Call back with `value` soon; returns whether no other value made room for it."""
         with self._lock:
             self._waiting.append(value)
-            if depth is not None and len(self._waiting) > depth:
+            if self._depth is not None and len(self._waiting) > self._depth:
                 # Its run is asked for already; it will find what is left.
                 del self._waiting[0]
                 return False
@@ -86,5 +111,6 @@ class _Listener(Handle, Generic[_T]):
             self._callback(value)
 
     def close(self) -> None:
+        """Call back no more; safe to call twice."""
         self.closed = True
-        self._owner._remove(self)
+        self._owner.remove(self)

@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     from rosglass.comm.graph import EndpointInfo, NodeName, Status
     from rosglass.comm.parameters import ParameterClient, Parameters
     from rosglass.comm.qos import QoS
+    from rosglass.comm.sample import Sample
     from rosglass.comm.service import ServiceClient, ServiceServer
-    from rosglass.comm.subscription import Sample, Subscription
+    from rosglass.comm.subscription import Subscription
     from rosglass.comm.time import Time
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
 

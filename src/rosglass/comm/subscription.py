@@ -1,86 +1,62 @@
-"""Receiving: samples, the inbox that keeps the newest of them, and the subscription around it."""
+"""Receiving: a topic's samples, to be taken, waited for or called back with."""
 
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
-from collections import deque
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from contextlib import suppress
+from functools import wraps
+from typing import TYPE_CHECKING
 
+from rosglass.comm.events import SubscriptionEvents
+from rosglass.comm.inbox import Inbox
 from rosglass.comm.node import Executor, Handle
-from rosglass.comm.qos import History, QoS
-from rosglass.comm.time import Duration, Time
+from rosglass.comm.promise import check_timeout
+from rosglass.comm.source import Source
 from rosglass.errors import ConversionError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import AsyncIterator, Callable, Iterator
 
+    from rosglass.comm.events import (
+        DeadlineMissed,
+        IncompatibleQoS,
+        LivelinessChanged,
+        Matched,
+        SamplesLost,
+    )
+    from rosglass.comm.qos import QoS
+    from rosglass.comm.sample import Sample
+    from rosglass.comm.statistics import Statistics
+    from rosglass.comm.time import Duration
     from rosglass.messages import Message, MessageType
 
-__all__ = ["Sample", "Statistics", "Subscription"]
+__all__ = ["Subscription"]
 
 _log = logging.getLogger("rosglass.comm")
-_WINDOW = 30
-
-
-class Sample(NamedTuple):
-    """A received message before anyone looked into it; made in a fifth of a dataclass's time.
-
-    Attributes:
-        data: The bytes as received, encapsulation header included; big ones may come as a
-            read-only view of the middleware's own buffer.
-        wire: Their format, ``cdr`` or ``ros1``.
-        type: Their type.
-        received: System time of reception.
-        sent: Time the publisher stamped it with, None when the world does not say.
-        publisher: Identity of the publisher, empty when the world does not say.
-        sequence: The publisher's running number, -1 when the world does not say.
-    """
-
-    data: bytes | memoryview
-    wire: str
-    type: MessageType
-    received: Time
-    sent: Time | None = None
-    publisher: bytes = b""
-    sequence: int = -1
-
-    def message(self) -> Message:
-        """Return the message; fields are decoded when they are read."""
-        return self.type.decode(self.data, wire=self.wire)
-
-
-@dataclass(frozen=True, slots=True)
-class Statistics:
-    """How a subscription is doing.
-
-    Attributes:
-        received: Samples received since creation.
-        dropped: Samples thrown out of a full inbox before anyone took them.
-        frequency: Samples per second over the last 30, falling to 0 when they stop.
-        bandwidth: Bytes per second over the same samples.
-        age: Time since the last sample, None before the first.
-    """
-
-    received: int
-    dropped: int
-    frequency: float
-    bandwidth: float
-    age: Duration | None
+#: Seconds that a subscription counts as watched after somebody waited for it.
+_MEMORY = 1.0
+#: Longest uninterrupted wait in seconds: on Windows a lock that is waited for holds up Ctrl-C.
+_SLICE = 0.2
 
 
 class Subscription(Handle):
     """Receives the messages of one topic.
 
-    Worlds create it, call :meth:`deliver` from their threads, and set `on_close`. Once closed, it
-    has nothing more to take: :attr:`closed` tells a polling loop when to end.
+    Worlds create it, call `deliver` from their threads, and set `source` and `on_close`. Once
+    closed, it has nothing more to take: :attr:`closed` tells a polling loop when to end.
+
+    ``for sample in subscription`` and ``async for sample in subscription`` wait for each sample and
+    end when the subscription is closed.
 
     Attributes:
         topic: Absolute topic name.
-        qos: The quality of service requested.
+        deliver: Called with each received sample, from any thread; for worlds.
+        source: What fills it; for worlds.
         on_close: Called once when it is closed; for worlds.
+        events: Who is told about what; for worlds.
     """
 
     def __init__(
@@ -99,19 +75,22 @@ class Subscription(Handle):
         if not isinstance(executor, Executor):
             raise ConversionError("executor", executor, "a rosglass.comm.Executor", topic)
         self.topic = topic
-        self.qos = qos
-        self._type = message_type
-        self._executor = executor
-        self._callback, self._raw_callback = callback, raw_callback
         self.on_close = on_close
-        limit = None if qos.history is History.KEEP_ALL else qos.depth
-        self._inbox: deque[Sample] = deque(maxlen=limit)
-        self._changed = threading.Condition()
-        self._scheduled = False
-        self._closed = False
-        self._received = self._dropped = 0
-        self._recent: deque[tuple[float, int]] = deque(maxlen=_WINDOW)
+        self.source = Source()
+        self.events = SubscriptionEvents()
+        self._qos, self._type, self._executor = qos, message_type, executor
+        self._called = callback is not None or raw_callback is not None
+        self._decodes = callback is not None and raw_callback is None
+        self._watchers = threading.Lock()
+        self._waiting, self._watched_at = 0, -math.inf
         self._problem = ""
+        call = raw_callback
+        if call is None and callback is not None:
+            call = _decoding(callback)
+        self._inbox = Inbox(topic, qos, executor, call)
+        self.deliver = self._inbox.put
+
+    # -- what it is ------------------------------------------------------------------------------
 
     @property
     def type(self) -> MessageType | None:
@@ -119,117 +98,250 @@ class Subscription(Handle):
         return self._type
 
     @property
+    def qos(self) -> QoS:
+        """The quality of service requested; what was left open is filled in as it is decided."""
+        return self._qos
+
+    @property
     def problem(self) -> str:
         """Why nothing can be received, in words; empty when all is well."""
         return self._problem
 
     @property
+    def hint(self) -> str:
+        """What may be wrong when nobody publishes the topic, e.g. a name much like it."""
+        return "" if self.closed else self.source.hint()
+
+    @property
     def closed(self) -> bool:
         """Whether :meth:`close` was called."""
-        return self._closed
+        return self._inbox.closed
 
     def __repr__(self) -> str:
         kind = self._type.name if self._type is not None else "type not known yet"
-        return f"<{type(self).__name__} {self.topic} [{kind}]{' closed' * self._closed}>"
+        return f"<{type(self).__name__} {self.topic} [{kind}]{' closed' * self.closed}>"
+
+    def publisher_count(self) -> int:
+        """Return how many publishers match this subscription now; 0 after closing."""
+        return 0 if self.closed else self.source.publisher_count()
+
+    # -- for worlds ------------------------------------------------------------------------------
+
+    @property
+    def decodes(self) -> bool:
+        """Whether its callback wants messages: bytes without definition are of no use to it."""
+        return self._decodes
+
+    @property
+    def watched(self) -> bool:
+        """Whether somebody is called back or waits, or did so a moment ago."""
+        recent = time.monotonic() - self._watched_at < _MEMORY
+        return self._called or self._waiting > 0 or recent
 
     def set_type(self, message_type: MessageType) -> None:
         """Take the type that was discovered; for worlds."""
         self._type = message_type
 
+    def set_qos(self, qos: QoS) -> None:
+        """Take the profile that was decided on; for worlds."""
+        self._qos = qos
+
     def set_problem(self, problem: str) -> None:
         """Say why nothing can be received; for worlds. Logged once for each new problem."""
-        if problem and problem != self._problem:
-            _log.warning("%s: %s", self.topic, problem)
+        if problem == self._problem:
+            return
         self._problem = problem
+        if problem:
+            _log.warning("%s: %s", self.topic, problem)
+        self.events.problem.notify(problem)
 
-    def deliver(self, sample: Sample) -> None:
-        """Put a sample into the inbox and wake the consumer; for worlds, from any thread."""
-        with self._changed:
-            if self._closed:
-                return
-            if len(self._inbox) == self._inbox.maxlen:
-                self._dropped += 1
-            self._inbox.append(sample)
-            self._received += 1
-            self._recent.append((time.monotonic(), len(sample.data)))
-            wake = not self._scheduled and bool(self._callback or self._raw_callback)
-            self._scheduled = self._scheduled or wake
-            self._changed.notify_all()
-        if wake:
-            self._executor.post(self._drain)
+    # -- taking ----------------------------------------------------------------------------------
 
     def take(self) -> Sample | None:
         """Return the oldest waiting sample, or None."""
-        with self._changed:
-            return self._inbox.popleft() if self._inbox else None
+        self.source.refresh()
+        return self._inbox.pop()
 
     def take_latest(self) -> Sample | None:
         """Return the newest waiting sample and forget the older ones (they count as dropped)."""
-        with self._changed:
-            if not self._inbox:
-                return None
-            sample = self._inbox.pop()
-            self._dropped += len(self._inbox)
-            self._inbox.clear()
-            return sample
+        self.source.refresh()
+        return self._inbox.pop_latest()
 
-    def wait(self, timeout: float) -> Sample | None:
-        """Return the oldest waiting sample, waiting up to `timeout` seconds for one."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._inbox or self._closed, timeout)
-            return self._inbox.popleft() if self._inbox else None
+    def wait(self, timeout: float | None = None) -> Sample | None:
+        """Return the oldest waiting sample, waiting for one if need be.
+
+        Args:
+            timeout: Seconds to wait, None for ever.
+
+        Returns:
+            None when none came in time, or when the subscription was closed.
+
+        Raises:
+            ConversionError: The timeout is no number of seconds.
+        """
+        left = check_timeout(timeout, f"{self.topic}: wait()")
+        deadline = math.inf if left is None else time.monotonic() + left
+        self._watch(1)
+        try:
+            while True:
+                sample = self.take()
+                remaining = deadline - time.monotonic()
+                if sample is not None or self.closed or remaining <= 0:
+                    return sample
+                ready = threading.Lock()
+                ready.acquire()
+                if self._inbox.enlist(ready.release):
+                    ready.acquire(timeout=min(remaining, _SLICE))
+                    self._inbox.dismiss(ready.release)
+        finally:
+            self._watch(-1)
+
+    def __iter__(self) -> Iterator[Sample]:
+        while (sample := self.wait()) is not None:
+            yield sample
+
+    async def __aiter__(self) -> AsyncIterator[Sample]:
+        import asyncio  # noqa: PLC0415 - only for those who use it
+
+        loop = asyncio.get_running_loop()
+        arrived = asyncio.Event()
+
+        def wake() -> None:
+            with suppress(RuntimeError):  # the loop has ended
+                loop.call_soon_threadsafe(arrived.set)
+
+        self._watch(1)
+        try:
+            while True:
+                sample = self.take()
+                if sample is not None:
+                    yield sample
+                elif self.closed:
+                    return
+                elif self._inbox.enlist(wake):
+                    await arrived.wait()
+                    arrived.clear()
+        finally:
+            self._inbox.dismiss(wake)
+            self._watch(-1)
+
+    def set_inbox_limit(self, limit: int) -> None:
+        """Bound the memory of an inbox that keeps all; 256 MiB unless set.
+
+        Beyond it the oldest samples are dropped and counted, and the log says who is too slow. An
+        inbox that keeps the last so many is bounded by that.
+
+        Args:
+            limit: Bytes; each sample counts with its data and some 500 bytes more.
+
+        Raises:
+            ConversionError: It is no number of bytes.
+        """
+        self._inbox.set_limit(limit)
 
     def statistics(self) -> Statistics:
         """Return counts and rates as of now."""
-        now = time.monotonic()
-        with self._changed:
-            recent = list(self._recent)
-            received, dropped = self._received, self._dropped
-        age = now - recent[-1][0] if recent else 0.0
-        frequency = bandwidth = 0.0
-        if len(recent) > 1:
-            period = (recent[-1][0] - recent[0][0]) / (len(recent) - 1)
-            # Once the next sample is overdue, let the figures fall instead of showing a dead rate.
-            span = recent[-1][0] - recent[0][0] + max(0.0, age - 1.5 * period)
-            if span > 0:
-                frequency = (len(recent) - 1) / span
-                bandwidth = sum(size for _, size in recent[1:]) / span
-        return Statistics(
-            received,
-            dropped,
-            frequency,
-            bandwidth,
-            Duration.from_seconds(age) if recent else None,
-        )
+        self.source.refresh()
+        return self._inbox.statistics(self.source.lost())
+
+    def lateness(self, sample: Sample) -> Duration:
+        """Return how much longer a sample took than the fastest of its publisher.
+
+        Zero when nothing is known about that. See :attr:`Statistics.lateness`.
+        """
+        return self._inbox.lateness(sample)
+
+    # -- events ----------------------------------------------------------------------------------
+
+    def on_matched(
+        self, callback: Callable[[Matched], None], executor: Executor | None = None
+    ) -> Handle:
+        """Call `callback` when a publisher comes that matches, and when it goes.
+
+        Those that are there already are told first.
+
+        Args:
+            callback: Told who, and how many there are now.
+            executor: Where it runs; None for where the subscription's own callbacks run.
+
+        Raises:
+            ConversionError: One of the arguments is not what it should be.
+        """
+        return self._inform(self.events.matched.add(callback, executor or self._executor))
+
+    def on_incompatible_qos(
+        self, callback: Callable[[IncompatibleQoS], None], executor: Executor | None = None
+    ) -> Handle:
+        """Call `callback` when a publisher comes that offers less than was asked for.
+
+        Those that are there already are told first; arguments as for :meth:`on_matched`.
+        """
+        return self._inform(self.events.incompatible.add(callback, executor or self._executor))
+
+    def on_deadline_missed(
+        self, callback: Callable[[DeadlineMissed], None], executor: Executor | None = None
+    ) -> Handle:
+        """Call `callback` each time that nothing came within the profile's deadline.
+
+        Time runs from the moment that a publisher matches. Arguments as for :meth:`on_matched`.
+        """
+        return self._inform(self.events.deadline.add(callback, executor or self._executor))
+
+    def on_liveliness_change(
+        self, callback: Callable[[LivelinessChanged], None], executor: Executor | None = None
+    ) -> Handle:
+        """Call `callback` when a publisher becomes alive, and when it is alive no more.
+
+        A publisher is alive while it is seen; one that promises to show its liveliness itself
+        (manual by topic), while it does so in time. Arguments as for :meth:`on_matched`.
+        """
+        return self._inform(self.events.liveliness.add(callback, executor or self._executor))
+
+    def on_samples_lost(
+        self, callback: Callable[[SamplesLost], None], executor: Executor | None = None
+    ) -> Handle:
+        """Call `callback` when samples were lost on the way; arguments as for :meth:`on_matched`.
+
+        What a full inbox drops is no loss of this kind: :meth:`statistics` counts it.
+        """
+        return self._inform(self.events.lost.add(callback, executor or self._executor))
+
+    def on_problem_change(
+        self, callback: Callable[[str], None], executor: Executor | None = None
+    ) -> Handle:
+        """Call `callback` with :attr:`problem` whenever it changes; empty when all is well again.
+
+        Arguments as for :meth:`on_matched`.
+        """
+        return self._inform(self.events.problem.add(callback, executor or self._executor))
+
+    # -- the end ---------------------------------------------------------------------------------
 
     def close(self) -> None:
         """Stop receiving; waiting samples are forgotten. Safe to call twice, from any thread."""
-        with self._changed:
-            if self._closed:
-                return
-            self._closed = True
-            self._inbox.clear()
-            self._changed.notify_all()
+        if not self._inbox.close():
+            return
+        self.events.clear()
         if self.on_close is not None:
             self.on_close()
 
-    def _drain(self) -> None:
-        with self._changed:
-            # Only what waits now: a fast topic must not keep a shared executor for itself.
-            batch = list(self._inbox)
-            self._inbox.clear()
-        for sample in batch:
-            if self._closed:
-                break
-            try:
-                if self._raw_callback is not None:
-                    self._raw_callback(sample)
-                elif self._callback is not None:
-                    self._callback(sample.message())
-            except Exception:
-                _log.exception("callback of subscription %s failed", self.topic)
-        with self._changed:
-            self._scheduled = bool(self._inbox) and not self._closed
-            again = self._scheduled
-        if again:
-            self._executor.post(self._drain)
+    # -- inside ----------------------------------------------------------------------------------
+
+    def _inform(self, handle: Handle) -> Handle:
+        self.source.inform()
+        return handle
+
+    def _watch(self, change: int) -> None:
+        with self._watchers:
+            self._waiting += change
+            self._watched_at = time.monotonic()
+        if change > 0:
+            self.source.attend()
+
+
+def _decoding(callback: Callable[[Message], None]) -> Callable[[Sample], None]:
+    @wraps(callback)
+    def call(sample: Sample) -> None:
+        callback(sample.message())
+
+    return call

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.comm.node import Node
-    from rosglass.comm.subscription import Sample, Subscription
+    from rosglass.comm.sample import Sample
+    from rosglass.comm.subscription import Subscription
     from rosglass.images.frame import RawImage
     from rosglass.messages import MessageType
 

@@ -17,7 +17,7 @@ from rosglass.images.frame import RawImage
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from rosglass.comm.subscription import Sample
+    from rosglass.comm.sample import Sample
     from rosglass.messages import MessageType
 
 __all__ = ["TRANSPORTS", "Choice", "Transport", "choose"]

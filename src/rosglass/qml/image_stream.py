@@ -15,7 +15,7 @@ from rosglass.qt import QtCore, is_alive
 
 if TYPE_CHECKING:
     from rosglass.comm.node import Node
-    from rosglass.comm.subscription import Sample
+    from rosglass.comm.sample import Sample
     from rosglass.images.frame import Frame, RawImage
     from rosglass.qml.session import Session
     from rosglass.qt import QtGui

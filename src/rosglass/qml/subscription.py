@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.comm.node import Node
-    from rosglass.comm.subscription import Sample
+    from rosglass.comm.sample import Sample
     from rosglass.comm.subscription import Subscription as Received
     from rosglass.qml.executor import GuiExecutor
     from rosglass.qml.runtime import Runtime

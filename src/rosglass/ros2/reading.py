@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING
 
-from rosglass.comm import EndpointKind, Sample, Time
+from rosglass.comm import EndpointKind, Sample
 from rosglass.errors import Error, NodeClosedError
 from rosglass.ros2.core import Member
 from rosglass.ros2.repeats import Repeats
@@ -185,7 +185,8 @@ class Reading(Member):
 
     def _receiver(self, message_type: MessageType) -> OnSample:
         ours, strangers, repeats = self._hash, self._strangers, Repeats()
-        deliver, wire = self.subscription.deliver, "cdr"
+        # As Sample(...) does, in half the time.
+        make, deliver, wire = tuple.__new__, self.subscription.deliver, "cdr"
 
         def receive(
             data: bytes | memoryview,
@@ -200,8 +201,7 @@ class Reading(Member):
                     strangers.add(hash)
                     self._core.wake()
             elif not repeats.seen(gid, sequence, sent):
-                stamp = None if sent is None else Time(sent)
-                deliver(Sample(data, wire, message_type, Time(received), stamp, gid, sequence))
+                deliver(make(Sample, (data, wire, message_type, received, sent, gid, sequence)))
 
         return receive
 

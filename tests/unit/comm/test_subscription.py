@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from rosglass import QoS, Time
+from rosglass import QoS
 from rosglass.comm import IMMEDIATE, Executor, History, Sample, Subscription
 
 
@@ -31,7 +31,7 @@ class FakeType:
 
 
 def sample(text="x"):
-    return Sample(text.encode(), "cdr", FakeType(), Time(1))
+    return Sample(text.encode(), "cdr", FakeType(), 1)
 
 
 def subscription(executor=IMMEDIATE, **kwargs):
@@ -167,7 +167,7 @@ def test_statistics_before_the_first_sample():
 
 def test_frequency_and_bandwidth_fall_when_samples_stop(monkeypatch):
     clock = [100.0]
-    monkeypatch.setattr("rosglass.comm.subscription.time.monotonic", lambda: clock[0])
+    monkeypatch.setattr("rosglass.comm.inbox.time.monotonic", lambda: clock[0])
     sub = subscription()
     for _ in range(40):
         feed(sub, "1234")

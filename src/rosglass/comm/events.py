@@ -1,0 +1,219 @@
+"""What publishers and subscriptions tell besides messages: who came and went, what went wrong.
+
+The kinds of events are rmw's (``rmw/events_statuses``), and DDS's behind them (OMG DDS 1.4, section
+2.2.4.1).
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+from rosglass.comm.listeners import Listener, Listeners
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from rosglass.comm.graph import EndpointInfo
+    from rosglass.comm.node import Executor, Handle
+
+__all__ = [
+    "Appearances",
+    "DeadlineMissed",
+    "IncompatibleQoS",
+    "LivelinessChanged",
+    "LivelinessLost",
+    "Matched",
+    "PublisherEvents",
+    "SamplesLost",
+    "SubscriptionEvents",
+]
+
+_E = TypeVar("_E")
+
+
+@dataclass(frozen=True, slots=True)
+class Matched:
+    """A publisher and a subscription found each other, or one of them went.
+
+    Attributes:
+        endpoint: The other side.
+        change: 1 when it came, -1 when it went.
+        count: How many match now.
+        total: How many have matched since the callback was registered.
+    """
+
+    endpoint: EndpointInfo
+    change: int
+    count: int
+    total: int
+
+
+@dataclass(frozen=True, slots=True)
+class IncompatibleQoS:
+    """Somebody appeared on the topic whose quality of service does not match.
+
+    Attributes:
+        endpoint: Who.
+        policies: Which policies are in conflict, e.g. ``("reliability",)``.
+        problem: The conflict in words.
+        total: How many such endpoints have appeared since the callback was registered.
+    """
+
+    endpoint: EndpointInfo
+    policies: tuple[str, ...]
+    problem: str
+    total: int
+
+
+@dataclass(frozen=True, slots=True)
+class DeadlineMissed:
+    """Nothing was received, or published, within the deadline.
+
+    Attributes:
+        change: Deadlines missed since the last event.
+        total: Deadlines missed in all.
+    """
+
+    change: int
+    total: int
+
+
+@dataclass(frozen=True, slots=True)
+class LivelinessChanged:
+    """A publisher became alive, or is not alive any more.
+
+    Attributes:
+        endpoint: Which publisher.
+        change: 1 when it is alive now, -1 when not.
+        alive: How many are alive now.
+        not_alive: How many are still there but have not shown their liveliness in time.
+    """
+
+    endpoint: EndpointInfo
+    change: int
+    alive: int
+    not_alive: int
+
+
+@dataclass(frozen=True, slots=True)
+class LivelinessLost:
+    """A publisher did not show its liveliness within its own lease duration.
+
+    Attributes:
+        total: How often that has happened.
+    """
+
+    total: int
+
+
+@dataclass(frozen=True, slots=True)
+class SamplesLost:
+    """Samples were sent and have not arrived.
+
+    Attributes:
+        change: How many since the last event.
+        total: How many in all.
+    """
+
+    change: int
+    total: int
+
+
+class Appearances(Generic[_E]):
+    """Tells each listener about who appears and who goes, those who are there already first."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._listeners: Listeners[_E] = Listeners()
+        self._known: dict[Listener[_E], tuple[Counter[EndpointInfo], list[int]]] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self._listeners)
+
+    def add(self, callback: Callable[[_E], None], executor: Executor) -> Handle:
+        """Tell `callback` from the next :meth:`update` on, until the handle is closed."""
+        listener = self._listeners.add(callback, executor)
+        with self._lock:
+            self._known[listener] = (Counter(), [0])
+        return listener
+
+    def update(
+        self,
+        endpoints: Iterable[EndpointInfo],
+        event: Callable[[EndpointInfo, int, int, int], _E | None],
+    ) -> None:
+        """Tell everyone the difference to what they were told; always from the same thread.
+
+        Args:
+            endpoints: Who is there now.
+            event: Called with an endpoint, the change (1 or -1), how many are there now, and how
+                many have appeared in all; returns what to tell, None for nothing.
+        """
+        with self._lock:
+            for listener in [one for one in self._known if one.closed]:
+                del self._known[listener]
+            known = list(self._known.items())
+        if not known:
+            return
+        now = Counter(endpoints)
+        for listener, (told, total) in known:
+            for change, endpoint in (
+                *((-1, gone) for gone in (told - now).elements()),
+                *((1, come) for come in (now - told).elements()),
+            ):
+                told[endpoint] += change
+                if not told[endpoint]:
+                    del told[endpoint]
+                total[0] += change > 0
+                made = event(endpoint, change, told.total(), total[0])
+                if made is not None:
+                    listener.tell(made)
+
+    def clear(self) -> None:
+        """Forget everyone."""
+        self._listeners.clear()
+        with self._lock:
+            self._known.clear()
+
+
+class SubscriptionEvents:
+    """Who wants to know what about a subscription; worlds tell them."""
+
+    def __init__(self) -> None:
+        self.matched: Appearances[Matched] = Appearances()
+        self.incompatible: Appearances[IncompatibleQoS] = Appearances()
+        self.liveliness: Appearances[LivelinessChanged] = Appearances()
+        self.deadline: Listeners[DeadlineMissed] = Listeners()
+        self.lost: Listeners[SamplesLost] = Listeners()
+        self.problem: Listeners[str] = Listeners()
+
+    def clear(self) -> None:
+        """Forget everyone."""
+        self.matched.clear()
+        self.incompatible.clear()
+        self.liveliness.clear()
+        self.deadline.clear()
+        self.lost.clear()
+        self.problem.clear()
+
+
+class PublisherEvents:
+    """Who wants to know what about a publisher; worlds tell them."""
+
+    def __init__(self) -> None:
+        self.matched: Appearances[Matched] = Appearances()
+        self.incompatible: Appearances[IncompatibleQoS] = Appearances()
+        self.deadline: Listeners[DeadlineMissed] = Listeners()
+        self.liveliness: Listeners[LivelinessLost] = Listeners()
+        self.problem: Listeners[str] = Listeners()
+
+    def clear(self) -> None:
+        """Forget everyone."""
+        self.matched.clear()
+        self.incompatible.clear()
+        self.deadline.clear()
+        self.liveliness.clear()
+        self.problem.clear()

@@ -1,0 +1,247 @@
+"""Where received samples wait, and from where they are handed on: once, in order, counted.
+
+Everything here happens for each sample of the fastest topics, so that it is written for speed.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import threading
+import time
+from collections import deque
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from rosglass.comm.executor import IMMEDIATE
+from rosglass.comm.qos import History
+from rosglass.comm.statistics import MARK_PERIOD, Meter
+from rosglass.errors import ConversionError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rosglass.comm.node import Executor
+    from rosglass.comm.qos import QoS
+    from rosglass.comm.sample import Sample
+    from rosglass.comm.statistics import Statistics
+    from rosglass.comm.time import Duration
+
+__all__ = ["INBOX_LIMIT", "Inbox"]
+
+_log = logging.getLogger("rosglass.comm")
+#: Bytes that wait at most in an inbox that keeps all, unless set otherwise.
+INBOX_LIMIT = 256 * 1024 * 1024
+#: Bytes that a waiting sample takes up besides its data, about.
+_SAMPLE_SIZE = 500
+#: Seconds between two log lines about a consumer that is too slow.
+_LOG_EVERY = 10.0
+
+
+class Inbox:
+    """Keeps the newest samples until they are taken, or hands them to a callback.
+
+    With keep-last history it holds `qos.depth` samples; with keep-all as many as fit into a number
+    of bytes. What does not fit drops the oldest, and is counted.
+
+    Args:
+        topic: For messages.
+        qos: History and depth.
+        executor: Where `call` runs.
+        call: Takes each sample; None when they are taken by somebody who asks for them.
+    """
+
+    def __init__(
+        self, topic: str, qos: QoS, executor: Executor, call: Callable[[Sample], None] | None
+    ) -> None:
+        keep_all = qos.history is History.KEEP_ALL
+        self._topic = topic
+        self._executor, self._call = executor, call
+        # Who is called at once needs no inbox, as long as no call is under way.
+        self._direct = executor is IMMEDIATE
+        self._depth = -1 if keep_all else qos.depth
+        self._limit: int | None = INBOX_LIMIT if keep_all else None
+        self._samples: deque[Sample] = deque(maxlen=None if keep_all else qos.depth)
+        self._lock = threading.Lock()
+        self._waiters: list[Callable[[], object]] = []
+        self._calling = self._closed = False
+        self._held = self._received = self._bytes = self._dropped = 0
+        self._last = self._next_mark = self._next_log = -math.inf
+        self._meter = Meter()
+
+    @property
+    def closed(self) -> bool:
+        """Whether it takes and gives nothing any more."""
+        return self._closed
+
+    def put(self, sample: Sample) -> None:
+        """Take a sample in and wake whoever wants it; from any thread."""
+        now = time.monotonic()
+        waiters: list[Callable[[], object]] | None = None
+        slow = 0
+        with self._lock:
+            if self._closed:
+                return
+            if now >= self._next_mark:
+                self._next_mark = now + MARK_PERIOD
+                self._meter.mark(self._last, self._received, self._bytes, sample)
+            self._last = now
+            self._received += 1
+            self._bytes += len(sample[0])
+            call = None if self._calling else self._call
+            if call is not None:
+                self._calling = True
+            if call is None or not self._direct:
+                samples = self._samples
+                if len(samples) == self._depth:
+                    self._dropped += 1
+                samples.append(sample)
+                if self._limit is not None:
+                    slow = self._keep_within(self._limit, now)
+                if self._waiters:
+                    waiters, self._waiters = self._waiters, []
+        if call is not None:
+            if self._direct:
+                self._call_now(sample, call)
+            else:
+                self._executor.post(self._call_soon)
+        if waiters is not None:
+            for wake in waiters:
+                wake()
+        if slow:
+            self._log_slow(slow)
+
+    def pop(self) -> Sample | None:
+        """Take the oldest sample out, None when there is none."""
+        with self._lock:
+            return self._pop() if self._samples else None
+
+    def pop_latest(self) -> Sample | None:
+        """Take the newest sample out and drop the others."""
+        with self._lock:
+            if not self._samples:
+                return None
+            sample = self._samples.pop()
+            self._dropped += len(self._samples)
+            self._samples.clear()
+            self._held = 0
+            return sample
+
+    def enlist(self, wake: Callable[[], object]) -> bool:
+        """Have `wake` called once when there is something to take; False if there is already."""
+        with self._lock:
+            if self._samples or self._closed:
+                return False
+            self._waiters.append(wake)
+            return True
+
+    def dismiss(self, wake: Callable[[], object]) -> None:
+        """Take back what :meth:`enlist` was given, if it was not called."""
+        with self._lock, suppress(ValueError):
+            self._waiters.remove(wake)
+
+    def set_limit(self, limit: int) -> None:
+        """Bound the bytes that an inbox keeps that keeps all; raises ConversionError."""
+        if type(limit) is not int or limit < 1:
+            raise ConversionError("limit", limit, "a number of bytes, at least 1", self._topic)
+        if self._limit is None:
+            return
+        with self._lock:
+            self._limit = limit
+            self._shrink(limit)
+
+    def statistics(self, lost: int) -> Statistics:
+        """Return counts and rates as of now; `lost` is what never came."""
+        now = time.monotonic()
+        with self._lock:
+            return self._meter.read(
+                now, self._last, self._received, self._bytes, self._dropped, lost
+            )
+
+    def lateness(self, sample: Sample) -> Duration:
+        """Return how much longer a sample took than the fastest of its publisher."""
+        with self._lock:
+            return self._meter.lateness(sample)
+
+    def close(self) -> bool:
+        """Forget what waits, take nothing more, wake who waits; returns whether it was open."""
+        with self._lock:
+            if self._closed:
+                return False
+            self._closed = True
+            self._samples.clear()
+            waiters, self._waiters = self._waiters, []
+        for wake in waiters:
+            wake()
+        return True
+
+    def _pop(self) -> Sample:
+        sample = self._samples.popleft()
+        if self._limit is not None:
+            self._held -= len(sample[0]) + _SAMPLE_SIZE
+        return sample
+
+    def _keep_within(self, limit: int, now: float) -> int:
+        """Make room for the sample that came last; returns how many drops to complain about."""
+        self._held += len(self._samples[-1][0]) + _SAMPLE_SIZE
+        if not self._shrink(limit) or now < self._next_log:
+            return 0
+        self._next_log = now + _LOG_EVERY
+        return self._dropped
+
+    def _shrink(self, limit: int) -> bool:
+        before = self._dropped
+        while self._held > limit and len(self._samples) > 1:
+            self._pop()
+            self._dropped += 1
+        return self._dropped > before
+
+    def _log_slow(self, dropped: int) -> None:
+        who = "nobody takes them" if self._call is None else f"{_name(self._call)} is too slow"
+        _log.warning(
+            "%s: %d messages were dropped, the oldest first: %s, and %.0f MB wait already",
+            self._topic,
+            dropped,
+            who,
+            (self._limit or 0) / 1e6,
+        )
+
+    def _call_now(self, sample: Sample, call: Callable[[Sample], None]) -> None:
+        """Call back in this thread, also for what comes meanwhile from others, or from in there."""
+        while True:
+            try:
+                call(sample)
+            except Exception:
+                self._log_failure()
+            with self._lock:
+                if not self._samples:
+                    self._calling = False
+                    return
+                sample = self._pop()
+
+    def _call_soon(self) -> None:
+        """Call back for what waits now: a fast topic must not keep an executor for itself."""
+        assert self._call is not None
+        with self._lock:
+            batch = list(self._samples)
+            self._samples.clear()
+            self._held = 0
+        for sample in batch:
+            if self._closed:
+                break
+            try:
+                self._call(sample)
+            except Exception:
+                self._log_failure()
+        with self._lock:
+            self._calling = again = bool(self._samples)
+        if again:
+            self._executor.post(self._call_soon)
+
+    def _log_failure(self) -> None:
+        _log.exception("callback of subscription %s failed", self._topic)
+
+
+def _name(call: Callable[[Sample], None]) -> str:
+    """Return what to call a callback in a message to people."""
+    return f"the callback {getattr(call, '__qualname__', repr(call))}"
