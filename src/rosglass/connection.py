@@ -14,14 +14,23 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from rosglass.comm import Node
+    from rosglass.ros2 import Middleware
 
 __all__ = ["connect", "default_url"]
 
 _EXAMPLE = "zenoh://127.0.0.1:7447"
+_EXAMPLES = "zenoh://127.0.0.1:7447 or dds://?domain=0"
+_KNOWN = "dds:// (ROS 2 with any DDS), zenoh:// (ROS 2 with rmw_zenoh)"
 #: Schemes that are refused in this version, and why.
-_REFUSED = {
-    "ros1": "ROS 1 is not in this version",
-    "dds": "DDS is not in this version; run the robot with RMW_IMPLEMENTATION=rmw_zenoh_cpp",
+_REFUSED = {"ros1": "ROS 1 is not in this version"}
+#: Values of RMW_IMPLEMENTATION and what they mean; dynamic and vendor variants speak plain DDS.
+_MIDDLEWARES = {
+    "rmw_zenoh_cpp": "zenoh://",
+    "rmw_cyclonedds_cpp": "dds://",
+    "rmw_fastrtps_cpp": "dds://",
+    "rmw_fastrtps_dynamic_cpp": "dds://",
+    "rmw_connextdds": "dds://",
+    "rmw_gurumdds_cpp": "dds://",
 }
 _anonymous = itertools.count(1)
 
@@ -39,14 +48,25 @@ def connect(
     :meth:`~rosglass.comm.Node.status`, and catches up when someone does.
 
     Args:
-        url: ``zenoh://host:port`` of a Zenoh router (rmw_zenoh), port 7447 when left out. Options
+        url: ``dds://`` joins a DDS domain, where ROS 2 nodes find each other by themselves.
+            Options follow as in ``dds://?domain=5&interface=eth0``: ``domain`` (default:
+            ROS_DOMAIN_ID, or 0), ``range`` (where to look for others: ``subnet``, ``localhost``,
+            ``off``, ``system_default``; default: ROS_AUTOMATIC_DISCOVERY_RANGE, or ``subnet``),
+            ``peers`` (machines to ask besides, as in ``peers=192.168.1.5,robot``; short:
+            ``dds://192.168.1.5``; ROS_STATIC_PEERS adds some), ``interface`` (network
+            interfaces, by name or address), ``distro=humble`` (announce nodes as Humble does;
+            default: as the others do). ROS_LOCALHOST_ONLY and CYCLONEDDS_URI are respected.
+
+            ``zenoh://host:port`` of a Zenoh router (rmw_zenoh), port 7447 when left out. Options
             follow as in ``zenoh://robot:7447?domain=5&mode=client``: ``domain`` (default:
             ROS_DOMAIN_ID, or 0), ``mode`` (``peer`` links directly with other nodes, ``client``
             only with the router), ``distro=humble`` (announce types as Humble does),
             ``shm=true`` (shared memory between programs of one machine that both allow it).
             ``zenoh://`` alone means the router that ZENOH_SESSION_CONFIG_URI names, or one on this
-            machine. None asks the environment: ROSGLASS_URL, then RMW_IMPLEMENTATION and
-            ZENOH_SESSION_CONFIG_URI.
+            machine.
+
+            None asks the environment: ROSGLASS_URL, then RMW_IMPLEMENTATION,
+            ZENOH_SESSION_CONFIG_URI, ROS_DISTRO and ROS_DOMAIN_ID.
         name: Base name of the node; None for ``rosglass_<process id>``.
         namespace: Absolute namespace of the node.
         library: Where message definitions come from; None for the shared library.
@@ -60,59 +80,80 @@ def connect(
     if url is None:
         url = default_url(os.environ)
     if not isinstance(url, str):
-        raise ConversionError("url", url, f"a text such as {_EXAMPLE}")
+        raise ConversionError("url", url, f"a text such as {_EXAMPLES}")
     scheme, separator, rest = url.partition("://")
     scheme = scheme.lower()
     if separator:
         url = f"{scheme}://{rest}"
     if library is not None and not isinstance(library, Library):
         raise ConversionError("library", library, "a rosglass.Library, or None for the shared one")
-    if scheme != "zenoh" or not separator:
+    if scheme not in ("dds", "zenoh") or not separator:
         reason = _REFUSED.get(scheme, f"unknown scheme {scheme!r}" if separator else "no scheme")
         raise UnsupportedError(
-            f"cannot connect to {url!r}: {reason}; known: zenoh:// (ROS 2 with rmw_zenoh), "
-            f"e.g. {_EXAMPLE}"
+            f"cannot connect to {url!r}: {reason}; known: {_KNOWN}, e.g. {_EXAMPLES}"
         )
     if name is None:
         number = next(_anonymous)
         name = f"rosglass_{os.getpid()}" + (f"_{number}" if number > 1 else "")
-    return _connect_zenoh(url, name, namespace, library)
+    middleware = _dds(url) if scheme == "dds" else _zenoh(url)
+    from rosglass.ros2.node import Ros2Node  # noqa: PLC0415
+
+    return Ros2Node(middleware, url, name, namespace, library)
 
 
 def default_url(env: Mapping[str, str]) -> str:
     """Return the URL that the environment `env` asks for; raises UnsupportedError when it doesn't.
 
     ROSGLASS_URL wins; otherwise RMW_IMPLEMENTATION names the middleware, as for ROS 2's own
-    programs, and a Zenoh session configuration implies Zenoh.
+    programs, and a Zenoh session configuration implies Zenoh. Where ROS 2 is set up, or a domain is
+    chosen, without any of these, it means DDS, ROS 2's default.
     """
-    choice = f"pass a URL to connect(), or set ROSGLASS_URL, e.g. ROSGLASS_URL={_EXAMPLE}"
+    choice = f"pass a URL to connect(), or set ROSGLASS_URL, e.g. to {_EXAMPLES}"
     if env.get("ROSGLASS_URL"):
         return env["ROSGLASS_URL"]
     implementation = env.get("RMW_IMPLEMENTATION", "")
-    if implementation and implementation != "rmw_zenoh_cpp":
-        raise UnsupportedError(
-            f"RMW_IMPLEMENTATION={implementation} asks for DDS, which is not in this version; "
-            f"run the robot with rmw_zenoh_cpp and {choice}"
-        )
-    if implementation or env.get("ZENOH_SESSION_CONFIG_URI"):
+    if implementation:
+        if implementation not in _MIDDLEWARES:
+            known = ", ".join(_MIDDLEWARES)
+            raise UnsupportedError(
+                f"RMW_IMPLEMENTATION={implementation} is not known (known: {known}): {choice}"
+            )
+        return _MIDDLEWARES[implementation]
+    if env.get("ZENOH_SESSION_CONFIG_URI"):
         return "zenoh://"
+    ros2 = env.get("ROS_DISTRO") and env.get("ROS_VERSION") != "1"
+    if ros2 or env.get("ROS_DOMAIN_ID") or env.get("CYCLONEDDS_URI"):
+        return "dds://"
     hint = ""
     if env.get("ROS_MASTER_URI"):
         hint = " (ROS_MASTER_URI is set, but ROS 1 is not in this version)"
     raise UnsupportedError(f"no robot was named{hint}: {choice}")
 
 
-def _connect_zenoh(url: str, name: str, namespace: str, library: Library | None) -> Node:
+def _zenoh(url: str) -> Middleware:
     # Zenoh's package is an extra, and takes a while to import.
     if find_spec("zenoh") is None or find_spec("xxhash") is None:
         raise UnsupportedError(
             f"cannot connect to {url!r}: Zenoh is not installed; "
             'install it with: pip install "rosglass[zenoh]"'
         )
-    from rosglass.ros2.node import Ros2Node  # noqa: PLC0415
     from rosglass.ros2.zenoh_options import ZenohOptions  # noqa: PLC0415
 
     options = ZenohOptions.parse(url, os.environ)
     from rosglass.ros2.zenoh import ZenohMiddleware  # noqa: PLC0415
 
-    return Ros2Node(ZenohMiddleware(options), url, name, namespace, library)
+    return ZenohMiddleware(options)
+
+
+def _dds(url: str) -> Middleware:
+    if find_spec("cyclonedds") is None:
+        raise UnsupportedError(
+            f"cannot connect to {url!r}: Cyclone DDS is not installed; "
+            'install it with: pip install "rosglass[dds]"'
+        )
+    from rosglass.ros2.dds_options import DdsOptions  # noqa: PLC0415
+
+    options = DdsOptions.parse(url, os.environ)
+    from rosglass.ros2.dds import DdsMiddleware  # noqa: PLC0415
+
+    return DdsMiddleware(options)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING
 
-from rosglass.comm import ConnectionState, Handle, Status
+from rosglass.comm import ConnectionState, EndpointInfo, EndpointKind, Handle, Status
 from rosglass.errors import NodeClosedError
+from rosglass.ros2.dds_discovery import DdsDiscovery
 from rosglass.ros2.dds_endpoints import DdsReader, DdsWriter
 from rosglass.ros2.dds_participant import Participant
 from rosglass.ros2.middleware import Middleware, Reader, Writer
@@ -31,23 +32,30 @@ class DdsMiddleware(Middleware):
         self._options = options
         self._lock = threading.Lock()
         self._participant: Participant | None = None
+        self._discovery: DdsDiscovery | None = None
         self._closed = False
         self._changed: Callable[[], None] = lambda: None
 
-    def open(self, graph: Graph, changed: Callable[[], None]) -> None:  # noqa: ARG002
+    def open(self, graph: Graph, changed: Callable[[], None]) -> None:
         """Join the domain."""
         self._changed = changed
-        self._participant = Participant(self._options)
+        participant = Participant(self._options)
+        self._discovery = DdsDiscovery(participant, graph, self._options.humble, changed)
+        self._participant = participant
         changed()
 
     def status(self) -> Status:
-        """Return whether the domain was joined; DDS has no server to lose."""
+        """Return whether anyone else is in the domain."""
+        where = f"DDS domain {self._options.domain}"
+        discovery = self._discovery
         if self._closed:
             return Status(ConnectionState.CLOSED, "closed")
-        where = f"domain {self._options.domain}"
-        if self._participant is None:
-            return Status(ConnectionState.CONNECTING, f"joining {where}")
-        return Status(ConnectionState.CONNECTED, where)
+        if discovery is not None and (peers := discovery.peers):
+            participants = "1 other participant" if peers == 1 else f"{peers} other participants"
+            return Status(ConnectionState.CONNECTED, f"{where}, {participants}")
+        if discovery is not None and discovery.had_peers:
+            return Status(ConnectionState.LOST, f"everyone has left {where}, waiting for them")
+        return Status(ConnectionState.CONNECTING, f"nobody else is in {where}, waiting for them")
 
     def announce(self, node: NodeName) -> Handle:
         """Show a node in the graph until the handle is closed."""
@@ -57,7 +65,10 @@ class DdsMiddleware(Middleware):
         self, node: NodeName, topic: str, type_name: str, type_hash: str, qos: QoS
     ) -> Writer:
         """Create a DDS writer."""
-        return DdsWriter(self._joined(), node, topic, type_name, type_hash, qos)
+        writer = DdsWriter(self._joined(), node, topic, type_name, type_hash, qos)
+        kind = EndpointKind.PUBLISHER
+        self._show(EndpointInfo(kind, topic, type_name, node, qos, type_hash, writer.gid))
+        return writer
 
     def create_reader(
         self,
@@ -69,7 +80,10 @@ class DdsMiddleware(Middleware):
         on_sample: OnSample,
     ) -> Reader:
         """Create a DDS reader."""
-        return DdsReader(self._joined(), node, topic, type_name, type_hash, qos, on_sample)
+        reader = DdsReader(self._joined(), node, topic, type_name, type_hash, qos, on_sample)
+        kind = EndpointKind.SUBSCRIPTION
+        self._show(EndpointInfo(kind, topic, type_name, node, qos, type_hash, reader.gid))
+        return reader
 
     def poll(self) -> None:
         """Do nothing: everything has events."""
@@ -84,6 +98,11 @@ class DdsMiddleware(Middleware):
         if participant is not None:
             participant.close()
         self._changed()
+
+    def _show(self, endpoint: EndpointInfo) -> None:
+        """Show an endpoint of ours in our graph at once; discovery hides it when it is gone."""
+        if self._discovery is not None:
+            self._discovery.show(endpoint)
 
     def _joined(self) -> Participant:
         if self._participant is None or self._closed:

@@ -29,6 +29,7 @@ __all__ = [
     "ParticipantEntities",
     "format_user_data",
     "hash_of",
+    "is_rosglass",
     "parse_user_data",
 ]
 
@@ -39,8 +40,9 @@ TYPE = "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"
 #: Profiles that rmw's implementations use for it.
 WRITER_QOS = QoS(depth=1, durability=Durability.TRANSIENT_LOCAL)
 READER_QOS = QoS(depth=1, durability=Durability.TRANSIENT_LOCAL, history=History.KEEP_ALL)
-#: Without an enclave, rmw's graphs leave a participant out.
-PARTICIPANT_USER_DATA = b"enclave=/;"
+#: Without an enclave, rmw's graphs leave a participant out. By the rest our participants know each
+#: other: they follow the width of identities that others use, and must not follow one another.
+PARTICIPANT_USER_DATA = b"enclave=/;client=rosglass;"
 
 _NAME = "rmw_dds_common/msg/ParticipantEntitiesInfo"
 _GID = 16
@@ -144,7 +146,9 @@ class _Reader:
         return NodeName(namespace or "/", name)
 
     def _gids(self) -> tuple[bytes, ...]:
-        return tuple(self._gid() for _ in range(self._count(self._width)))
+        width = self._width
+        data = self._take(self._count(width) * width)
+        return tuple(data[at : at + _GID] for at in range(0, len(data), width))
 
     def _gid(self) -> bytes:
         return self._take(self._width)[:_GID]
@@ -205,3 +209,8 @@ def format_user_data(pairs: Mapping[str, str]) -> bytes:
 def hash_of(user_data: bytes) -> str:
     """Return the type hash that an endpoint's user data announces, empty when it has none."""
     return parse_user_data(user_data).get("typehash", "")
+
+
+def is_rosglass(user_data: bytes) -> bool:
+    """Return whether a participant's user data says that it is one of ours."""
+    return parse_user_data(user_data).get("client") == "rosglass"

@@ -82,6 +82,16 @@ def test_locators():
         ({"ROSGLASS_URL": "zenoh://r", "RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}, "zenoh://r"),
         ({"RMW_IMPLEMENTATION": "rmw_zenoh_cpp"}, "zenoh://"),
         ({"ZENOH_SESSION_CONFIG_URI": "/x"}, "zenoh://"),
+        ({"ZENOH_SESSION_CONFIG_URI": "/x", "ROS_DISTRO": "jazzy"}, "zenoh://"),
+        ({"RMW_IMPLEMENTATION": "rmw_zenoh_cpp", "ROS_DOMAIN_ID": "3"}, "zenoh://"),
+        ({"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}, "dds://"),
+        ({"RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}, "dds://"),
+        ({"RMW_IMPLEMENTATION": "rmw_fastrtps_dynamic_cpp"}, "dds://"),
+        ({"RMW_IMPLEMENTATION": "rmw_connextdds"}, "dds://"),
+        ({"ROS_DISTRO": "jazzy"}, "dds://"),
+        ({"ROS_DISTRO": "jazzy", "ROS_VERSION": "2"}, "dds://"),
+        ({"ROS_DOMAIN_ID": "7"}, "dds://"),
+        ({"CYCLONEDDS_URI": "/x.xml"}, "dds://"),
     ],
 )
 def test_the_environment_chooses_the_world(env, url):
@@ -93,9 +103,10 @@ def test_the_environment_chooses_the_world(env, url):
     [
         ({}, "no robot was named: pass a URL to connect()"),
         (
-            {"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"},
-            "asks for DDS, which is not in this version",
+            {"RMW_IMPLEMENTATION": "rmw_email_cpp"},
+            "RMW_IMPLEMENTATION=rmw_email_cpp is not known (known: rmw_zenoh_cpp, rmw_cyclonedds",
         ),
+        ({"ROS_DISTRO": "noetic", "ROS_VERSION": "1"}, "no robot was named"),
         ({"ROS_MASTER_URI": "http://r:11311"}, "ROS 1 is not in this version"),
     ],
 )
@@ -103,16 +114,16 @@ def test_without_a_choice_the_user_is_told_the_choices(env, told):
     with pytest.raises(rosglass.UnsupportedError) as error:
         default_url(env)
     assert told in str(error.value)
-    assert "ROSGLASS_URL=zenoh://127.0.0.1:7447" in str(error.value)
+    assert "zenoh://127.0.0.1:7447 or dds://?domain=0" in str(error.value)
 
 
 @pytest.mark.parametrize(
     ("url", "told"),
     [
-        ("ros1://robot:11311", "ROS 1 is not in this version; known: zenoh://"),
-        ("dds://?domain=0", "DDS is not in this version"),
-        ("mqtt://robot", "unknown scheme 'mqtt'; known: zenoh://"),
-        ("robot:7447", "no scheme; known: zenoh://"),
+        ("ros1://robot:11311", "ROS 1 is not in this version; known: dds://"),
+        ("mqtt://robot", "unknown scheme 'mqtt'; known: dds://"),
+        ("robot:7447", "no scheme; known: dds://"),
+        ("dds", "no scheme"),
         ("", "no scheme"),
     ],
 )
@@ -120,6 +131,14 @@ def test_other_worlds_are_refused_and_the_known_ones_listed(url, told):
     with pytest.raises(rosglass.UnsupportedError) as error:
         rosglass.connect(url)
     assert told in str(error.value)
+
+
+@pytest.mark.parametrize(("url", "package"), [("dds://", "cyclonedds"), ("zenoh://", "zenoh")])
+def test_a_middleware_that_is_not_installed_says_how_to_get_it(monkeypatch, url, package):
+    monkeypatch.setattr("rosglass.connection.find_spec", lambda name: None)
+    extra = url.partition(":")[0]
+    with pytest.raises(rosglass.UnsupportedError, match=rf'pip install "rosglass\[{extra}\]"'):
+        rosglass.connect(url)
 
 
 def test_something_that_is_no_url_at_all():
