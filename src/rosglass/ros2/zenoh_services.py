@@ -307,6 +307,15 @@ class ZenohReplier(Declaration, Replier):
 
         _start(answer, len(data), f"{self._service} reply")
 
+    def fail(self, request: RequestId, reason: str) -> None:
+        """Tell the client that no response will come."""
+        held = request.handle
+        query = held.release() if isinstance(held, _Held) else None
+        if query is not None:
+            with suppress(zenoh.ZError):
+                query.reply_err(reason.encode())
+            query.drop()  # type: ignore[no-untyped-call]
+
     def close(self) -> None:
         """Withdraw the server; calls without reply end."""
         super().close()
