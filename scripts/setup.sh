@@ -18,8 +18,10 @@ apt_demo=(xvfb libegl1 libgl1 libopengl0 libxkbcommon-x11-0 libdbus-1-3 libfontc
           libxcb-cursor0 libxcb-icccm4 libxcb-image0 libxcb-keysyms1 libxcb-randr0
           libxcb-render-util0 libxcb-shape0 libxcb-xinerama0 libxcb-xkb1 libpulse0
           libgl1-mesa-dri fonts-dejavu-core)
-# Debian's own Python for the RViz environment, and ROS 1's message generator to compare with.
-apt_test=(python3 python3-venv python3-genpy python3-genmsg xdotool x11-apps)
+# Debian's own Python for the RViz environment, ROS 1's message generator to compare with, a private
+# network for DDS, and Fast DDS to talk to.
+apt_test=(python3 python3-venv python3-genpy python3-genmsg xdotool x11-apps
+          iproute2 util-linux g++ libfastrtps-dev)
 
 install_apt() {
   command -v dpkg-query >/dev/null && command -v apt-get >/dev/null || {

@@ -15,7 +15,7 @@ NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict --quiet
 say "wheel"
 scripts/check_wheel.sh
 say "tests on Debian's own Python ($(.venv-system/bin/python -V))"
-.venv-system/bin/python -m pytest -q tests/unit "$@"
+scripts/private_network.sh .venv-system/bin/python -m pytest -q tests/unit "$@"
 say "tests, standalone ($(.venv/bin/python -V))"
 # Coverage slows tight loops tenfold: what compares every type ran above, without it.
-.venv/bin/python -m pytest -q -m "not exhaustive" --cov --cov-report=term --cov-report=html "$@"
+scripts/private_network.sh .venv/bin/python -m pytest -q -m "not exhaustive" --cov --cov-report=term --cov-report=html "$@"
