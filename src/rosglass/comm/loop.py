@@ -31,8 +31,12 @@ class LoopExecutor(Executor):
         self._told = False
 
     @classmethod
-    def running(cls, where: str) -> LoopExecutor:
-        """Return one for the event loop that runs in this thread; raises ConversionError."""
+    def running(cls, callback: object, where: str) -> LoopExecutor:
+        """Return one for the loop that runs in this thread, for a coroutine function.
+
+        Raises:
+            ConversionError: None runs, so that `callback` could never be called.
+        """
         import asyncio  # noqa: PLC0415 - only for those who use it
 
         try:
@@ -40,7 +44,7 @@ class LoopExecutor(Executor):
         except RuntimeError:
             raise ConversionError(
                 "callback",
-                "a coroutine function",
+                callback,
                 "a plain function, or to be created inside a running event loop, as in "
                 "`async def main()`, where coroutine functions are run",
                 where,
@@ -76,4 +80,4 @@ def executor_for(
     if executor is not None:
         told = "no executor beside a coroutine function, which runs in its event loop"
         raise ConversionError("executor", executor, told, where)
-    return LoopExecutor.running(where)
+    return LoopExecutor.running(callback, where)

@@ -1,0 +1,50 @@
+"""Callbacks that are told about a value."""
+
+from __future__ import annotations
+
+import pytest
+
+from rosglass.comm import Executor, Listeners
+
+
+class Manual(Executor):
+    def __init__(self):
+        self.jobs = []
+
+    def post(self, job):
+        self.jobs.append(job)
+
+    def run(self):
+        while self.jobs:
+            self.jobs.pop(0)()
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [({}, [1, 2, 3, 4]), ({"merge": True}, [4]), ({"depth": 3}, [2, 3, 4]), ({"depth": 9}, None)],
+)
+def test_how_many_values_wait_for_a_slow_callback(options, told):
+    listeners, executor, seen = Listeners(**options), Manual(), []
+    listeners.add(seen.append, executor)
+    told = told or [1, 2, 3, 4]
+    kept = [listeners.notify(value) for value in (1, 2, 3, 4)]
+    assert kept.count(True) == len(told)
+    executor.run()
+    assert seen == told
+    assert listeners.notify(5)
+    executor.run()
+    assert seen == [*told, 5]
+
+
+def test_closed_and_cleared_listeners_are_not_told():
+    listeners, executor, seen = Listeners(), Manual(), []
+    first = listeners.add(lambda value: seen.append(("first", value)), executor)
+    listeners.add(lambda value: seen.append(("second", value)), executor)
+    listeners.notify(1)
+    first.close()
+    executor.run()
+    assert seen == [("second", 1)]
+    listeners.notify(2)
+    listeners.clear()
+    executor.run()
+    assert seen == [("second", 1)]

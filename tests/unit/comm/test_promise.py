@@ -1,0 +1,88 @@
+"""What comes later."""
+
+from __future__ import annotations
+
+import asyncio
+import concurrent.futures
+import threading
+
+import pytest
+
+import rosglass
+from rosglass.comm import IMMEDIATE, Dispatcher, Promise
+
+
+@pytest.fixture(params=[True, False], ids=["cancellable", "not cancellable"])
+def promise(request):
+    return Promise("the tea is not ready", cancellable=request.param)
+
+
+def test_it_comes_once(promise):
+    assert promise.fulfil(1)
+    assert not promise.fulfil(2)
+    assert not promise.fail(ValueError())
+    assert promise.result() == promise.result(0) == 1
+    assert promise.exception() is None
+    assert not promise.cancel()
+
+
+def test_an_error_comes_instead(promise):
+    assert promise.fail(rosglass.TimeoutError("its own"))
+    with pytest.raises(rosglass.TimeoutError, match="its own"):
+        promise.result(1)
+    assert str(promise.exception(1)) == "its own"
+
+
+def test_waiting_ends_and_the_promise_stands(promise):
+    with pytest.raises(rosglass.TimeoutError, match=r"the tea is not ready within 0\.01 s"):
+        promise.result(0.01)
+    threading.Timer(0.3, promise.fulfil, [3]).start()
+    assert promise.result() == 3
+
+
+@pytest.mark.parametrize("timeout", [-1, "x", True, float("nan"), []])
+def test_odd_timeouts_are_refused(promise, timeout):
+    with pytest.raises(rosglass.ConversionError, match="seconds from 0 on, or None for ever"):
+        promise.result(timeout)
+
+
+def test_giving_up():
+    promise = Promise(cancellable=True)
+    told = []
+    promise.on_done(told.append)
+    assert promise.cancel()
+    assert promise.cancel()
+    assert not promise.fulfil(1)
+    assert told == [promise]
+    assert concurrent.futures.wait([promise], 0).done == {promise}
+    with pytest.raises(concurrent.futures.CancelledError):
+        promise.result()
+
+
+def test_what_cannot_be_given_up_stays():
+    promise = Promise(cancellable=False)
+
+    async def main():
+        with pytest.raises((asyncio.TimeoutError, TimeoutError)):
+            await asyncio.wait_for(promise, 0.01)
+        threading.Timer(0.01, promise.fulfil, [1]).start()
+        return await promise
+
+    assert asyncio.run(main()) == 1
+
+
+def test_callbacks_run_where_they_should():
+    home, elsewhere = Dispatcher("home"), Dispatcher("elsewhere")
+    promise = Promise(executor=home, cancellable=False)
+    told = concurrent.futures.Future(), concurrent.futures.Future(), []
+    promise.on_done(lambda _: told[0].set_result(threading.current_thread().name))
+    promise.on_done(lambda _: told[1].set_result(threading.current_thread().name), elsewhere)
+    promise.on_done(told[2].append, IMMEDIATE)
+    promise.fulfil(None)
+    assert told[2] == [promise]
+    assert [future.result(5) for future in told[:2]] == ["home", "elsewhere"]
+    late = concurrent.futures.Future()
+    promise.on_done(late.set_result)
+    assert late.result(5) is promise
+    home.close()
+    elsewhere.close()

@@ -1,0 +1,76 @@
+"""Jobs that run after a while."""
+
+from __future__ import annotations
+
+import queue
+import threading
+
+import pytest
+
+from rosglass.comm import Timers
+
+
+@pytest.fixture
+def timers():
+    made = Timers("timers of the test")
+    yield made
+    made.close()
+
+
+def test_jobs_run_in_order_of_time_on_one_thread(timers):
+    done = queue.Queue()
+    for delay in (0.06, 0.02, 0.04, 0.0):
+        timers.after(delay, lambda d=delay: done.put((d, threading.current_thread().name)))
+    assert [done.get(timeout=5) for _ in range(4)] == [
+        (delay, "timers of the test") for delay in (0.0, 0.02, 0.04, 0.06)
+    ]
+
+
+def test_a_job_that_was_called_off_does_not_run(timers):
+    done = queue.Queue()
+    handle = timers.after(0.02, lambda: done.put("called off"))
+    timers.after(0.04, lambda: done.put("kept"))
+    handle.close()
+    handle.close()
+    assert done.get(timeout=5) == "kept"
+    assert done.empty()
+
+
+def test_a_job_that_fails_is_logged_and_the_others_run(timers, caplog):
+    done = threading.Event()
+
+    def fail():
+        raise ValueError("broken")
+
+    timers.after(0, fail)
+    timers.after(0.01, done.set)
+    assert done.wait(5)
+    assert "timers of the test: a job failed" in caplog.text
+
+
+def test_jobs_called_off_take_no_memory(timers):
+    kept = timers.after(60, print)
+    for _ in range(1000):
+        timers.after(60, print).close()
+    assert len(timers._jobs) < 100
+    kept.close()
+
+
+def test_closing_forgets_jobs_and_may_be_done_by_one(timers):
+    ended, done = threading.Event(), threading.Event()
+
+    def close():
+        timers.close()
+        ended.set()
+
+    timers.after(0.05, done.set)
+    timers.after(0, close)
+    assert ended.wait(5)
+    timers.close()
+    assert not timers._thread.is_alive()
+    timers.after(0, done.set)
+    assert not done.wait(0.1)
+
+
+def test_without_jobs_there_is_no_thread(timers):
+    assert timers._thread is None

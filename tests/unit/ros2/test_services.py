@@ -1,0 +1,805 @@
+"""Services on a middleware without network."""
+
+from __future__ import annotations
+
+import asyncio
+import concurrent.futures
+import threading
+
+import pytest
+
+import rosglass
+from rosglass.comm import Dispatcher, EndpointKind, Executor, Promise
+from rosglass.interfaces import Library
+from rosglass.ros2 import Ros2Node
+from rosglass.ros2.middleware import RequestId
+
+SERVER, CLIENT = EndpointKind.SERVICE_SERVER, EndpointKind.SERVICE_CLIENT
+ADD, TRIGGER, SET = (
+    "example_interfaces/srv/AddTwoInts",
+    "std_srvs/srv/Trigger",
+    "std_srvs/srv/SetBool",
+)
+OTHER_HASH = "RIHS01_" + "0" * 64
+
+
+def add(request):
+    return {"sum": request.a + request.b}
+
+
+@pytest.fixture
+def robot(connect):
+    return connect("robot")
+
+
+@pytest.fixture
+def client(node):
+    return node.create_service_client("/add", ADD)
+
+
+@pytest.fixture
+def requester(client, middleware):
+    return middleware.requesters[0]
+
+
+def call_in(client, blocking, **options):
+    return client.call(**options) if blocking else client.call_async(**options).result(5)
+
+
+def answer(total=3):
+    return rosglass.load(ADD).response.encode({"sum": total})
+
+
+# -- calling -------------------------------------------------------------------------------------
+
+
+def test_a_service_is_called_and_answered(node, robot, client):
+    server = robot.create_service_server("/add", ADD, add)
+    assert client.call({"a": 1, "b": 2}).sum == 3
+    assert client.call(rosglass.load(ADD).request.create(a=2, b=3)).sum == 5
+    assert client.call().sum == 0
+    assert client.problem == server.problem == ""
+    assert client.ready
+    assert client.pending == 0
+    assert repr(client) == f"<Ros2ServiceClient /add [{ADD}]>"
+    assert repr(server) == f"<Ros2ServiceServer /add [{ADD}]>"
+
+
+def test_names_are_resolved_and_the_type_is_announced_with_its_hash(node, robot, middleware):
+    client = node.create_service_client("add", ADD)
+    assert client.name == "/arm/add"
+    info = middleware.requesters[0].info
+    assert (info.name, info.type, info.type_hash) == ("/arm/add", ADD, rosglass.load(ADD).rihs01)
+    server = robot.create_service_server("~/add", ADD, add, qos=rosglass.QoS(3))
+    assert server.name == "/robot/add"
+    assert robot.fake.repliers[0].info.qos == rosglass.QoS(3)
+
+
+@pytest.mark.parametrize("create", ["create_service_client", "create_service_server"])
+@pytest.mark.parametrize(
+    ("name", "type_", "error", "told"),
+    [
+        ("a b", ADD, rosglass.InvalidNameError, "contains ' '"),
+        ("/x", "nowhere_msgs/srv/Nothing", rosglass.TypeNotFoundError, "nowhere_msgs/srv/Nothing"),
+        ("/x", "std_msgs/msg/String", rosglass.TypeNotFoundError, "is not a service type"),
+        ("/x", 7, rosglass.TypeNotFoundError, "7 is not a service type"),
+        (
+            "/x",
+            rosglass.load(TRIGGER, ros=1),
+            rosglass.UnsupportedError,
+            "ROS 1's",
+        ),
+    ],
+    ids=["name", "unknown", "message", "number", "ROS 1"],
+)
+def test_what_cannot_be_used_is_refused_at_creation(node, create, name, type_, error, told):
+    arguments = (name, type_) if create == "create_service_client" else (name, type_, add)
+    with pytest.raises(error, match=told):
+        getattr(node, create)(*arguments)
+
+
+@pytest.mark.parametrize("call", ["call", "call_async"])
+@pytest.mark.parametrize(
+    ("request_", "timeout", "told"),
+    [
+        ({"a": "x"}, 1, "a: expected an integer"),
+        ({"c": 1}, 1, "c"),
+        ("text", 1, "expected"),
+        ({}, -1, "timeout: expected seconds from 0 on, or None for ever, got -1"),
+        ({}, "soon", "timeout: expected seconds"),
+        ({}, True, "timeout: expected seconds"),
+        ({}, float("nan"), "timeout: expected seconds"),
+    ],
+)
+def test_what_does_not_fit_is_refused_and_not_sent(
+    client, requester, call, request_, timeout, told
+):
+    requester.linked = True
+    with pytest.raises(rosglass.ConversionError, match=told):
+        getattr(client, call)(request_, timeout=timeout)
+    assert requester.sent == []
+    assert client.pending == 0
+
+
+def test_a_request_waits_for_the_server_as_it_was_when_it_was_made(robot, client):
+    request = {"a": 1, "b": 2}
+    calls = [client.call_async(request) for _ in range(3)]
+    request["a"] = 100
+    assert client.pending == 3
+    robot.create_service_server("/add", ADD, add)
+    assert [call.result(5).sum for call in calls] == [3, 3, 3]
+
+
+def test_a_blocking_call_waits_for_the_server_too(robot, client):
+    threading.Timer(0.05, lambda: robot.create_service_server("/add", ADD, add)).start()
+    assert client.call({"a": 1, "b": 2}, timeout=5).sum == 3
+
+
+def test_requests_are_sent_in_the_order_of_the_calls(robot, client):
+    seen = []
+    for value in range(50):
+        client.call_async({"a": value})
+    robot.create_service_server("/add", ADD, lambda r: seen.append(r.a))
+    for value in range(50, 100):
+        client.call_async({"a": value})
+    client.call({"a": 100})
+    assert seen == list(range(101))
+
+
+def test_a_server_that_is_seen_before_it_is_linked_is_called_when_it_is(
+    client, requester, middleware, eventually
+):
+    requester.linked = False
+    middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01)
+    call = client.call_async({"a": 1})
+    eventually(lambda: "/robot offers it, but is not linked yet" in client.problem)
+    assert requester.sent == []
+    requester.linked = True  # without news
+    eventually(lambda: requester.sent)
+    requester.reply(1, answer())
+    assert call.result(1).sum == 3
+
+
+def test_a_reply_may_come_before_sending_returns(connect, network):
+    network.immediate = True
+    node, robot = connect("one"), connect("two")
+    robot.create_service_server("/add", ADD, add, executor=rosglass.comm.IMMEDIATE)
+    assert node.create_service_client("/add", ADD).call({"a": 1, "b": 2}).sum == 3
+
+
+def test_many_calls_are_in_flight_and_answered_in_any_order(client, requester):
+    requester.linked = True
+    calls = [client.call_async({"a": value}) for value in range(20)]
+    assert client.pending == 20
+    for number in range(20, 0, -1):
+        requester.reply(number, answer(number))
+    requester.reply(7, answer(0))  # twice, and one that nobody asked for
+    requester.reply(99, answer(0))
+    assert [call.result(0).sum for call in calls] == list(range(1, 21))
+    assert client.pending == 0
+
+
+def test_the_middleware_is_told_how_long_a_reply_is_of_use(client, requester):
+    requester.linked = True
+    client.call_async(timeout=5)
+    client.call_async(timeout=None)
+    client.call_async(timeout=float("inf"))
+    assert requester.timeouts[0] == pytest.approx(5, abs=0.5)
+    assert requester.timeouts[1:] == [None, None]
+
+
+# -- what does not come --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("blocking", [True, False])
+def test_without_a_server_a_call_ends_after_its_time(node, connect, client, blocking):
+    connect("else").create_service_server("/base/add", TRIGGER, lambda _: None)
+    told = (
+        r"/add could not be called within 0\.05 s: no server offers /add "
+        rf"\[{ADD}\] on fake:// \(CONNECTING: no answer\); did you mean /base/add\?; nothing was"
+    )
+    with pytest.raises(rosglass.ServiceUnavailableError, match=told):
+        call_in(client, blocking, timeout=0.05)
+    assert client.pending == 0
+
+
+@pytest.mark.parametrize("blocking", [True, False])
+def test_a_server_that_does_not_answer_is_given_up(client, requester, middleware, blocking):
+    requester.linked = True
+    middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01)
+    told = r"/add did not answer within 0\.05 s: /robot was sent the request 0\.\d s ago, and may"
+    with pytest.raises(rosglass.TimeoutError, match=told):
+        call_in(client, blocking, timeout=0.05)
+    assert requester.forgotten == [1]
+    assert client.pending == 0
+
+
+def test_waiting_for_a_call_ends_without_ending_the_call(client, requester):
+    requester.linked = True
+    call = client.call_async(timeout=None)
+    with pytest.raises(rosglass.TimeoutError, match=r"/add has not answered.* within 0\.01 s"):
+        call.result(0.01)
+    with pytest.raises(TimeoutError):
+        call.exception(0.01)
+    with pytest.raises(rosglass.ConversionError, match="timeout"):
+        call.result("soon")
+    requester.reply(1, answer())
+    assert call.result().sum == 3
+    assert call.exception() is None
+
+
+def test_a_cancelled_call_is_not_sent_or_its_reply_dropped(robot, client, node, middleware):
+    waiting = client.call_async({"a": 1})
+    assert waiting.cancel()
+    requester = middleware.requesters[0]
+    requester.linked = True
+    sent = client.call_async({"a": 2})
+    assert sent.cancel()
+    assert sent.cancel()
+    assert len(requester.sent) == 1
+    assert requester.forgotten == [1]
+    requester.reply(1, answer())
+    with pytest.raises(concurrent.futures.CancelledError):
+        sent.result(0)
+    done = concurrent.futures.wait([waiting, sent], timeout=5).done
+    assert done == {waiting, sent}
+    assert client.pending == 0
+
+
+def test_an_error_in_place_of_a_reply(client, requester):
+    requester.linked = True
+    call = client.call_async()
+    requester.reply(1, None, "the arm is off")
+    with pytest.raises(rosglass.ServiceError, match="call of /add failed: the arm is off"):
+        call.result(0)
+
+
+@pytest.mark.parametrize(
+    ("data", "told"),
+    [
+        (b"", "ADD_Response"),
+        (b"\0\1\0\0abc", "at byte 4"),
+        (b"\0\1\0\0" + bytes(40), "32 bytes left over"),
+        (b"\7\7\0\0" + bytes(8), "ADD_Response"),
+    ],
+)
+def test_a_reply_that_cannot_be_decoded(client, requester, middleware, data, told):
+    requester.linked = True
+    middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01)
+    call = client.call_async()
+    requester.reply(1, data)
+    told = told.replace("ADD", ADD)
+    with pytest.raises(rosglass.ServiceError, match=told) as caught:
+        call.result(0)
+    assert "/robot answered the call of /add with bytes that are no" in str(caught.value)
+
+
+def test_an_empty_response_is_taken_in_every_shape(node, middleware):
+    client = node.create_service_client("/clear", "std_srvs/srv/Empty")
+    middleware.requesters[0].linked = True
+    for number, body in enumerate((b"", b"\0", b"\0\0\0\0"), 1):
+        call = client.call_async()
+        middleware.requesters[0].reply(number, b"\0\1\0\0" + body)
+        assert call.result(0).type.name == "std_srvs/srv/Empty_Response"
+
+
+def test_calls_end_soon_when_their_server_is_gone(client, requester, middleware, monkeypatch):
+    monkeypatch.setattr("rosglass.ros2.service_client._GRACE", 0.05)
+    requester.linked = True
+    key = middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01, gid=b"1" * 16)
+    call = client.call_async(timeout=60)
+    middleware.graph.remove(key)
+    told = "server of /add went away before it answered the request sent .* may have carried it out"
+    with pytest.raises(rosglass.ConnectionLostError, match=told):
+        call.result(5)
+
+
+def test_a_server_that_comes_back_soon_keeps_its_calls(client, requester, middleware, eventually):
+    changes = []
+    client.on_ready_change(changes.append)
+    requester.linked = True
+    where = ("/add", ADD, rosglass.load(ADD).rihs01)
+    key = middleware.appear(SERVER, *where, gid=b"1" * 16)
+    eventually(lambda: changes == [True])
+    call = client.call_async(timeout=60)
+    requester.linked = False
+    middleware.graph.remove(key)
+    eventually(lambda: changes == [True, False])
+    middleware.appear(SERVER, *where, gid=b"1" * 16)
+    requester.linked = True
+    eventually(lambda: changes == [True, False, True])
+    requester.reply(1, answer())
+    assert call.result(0).sum == 3
+
+
+def test_a_middleware_that_ends_the_call_of_a_server_that_went(client, requester, middleware):
+    requester.linked = True
+    key = middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01, gid=b"1" * 16)
+    call = client.call_async()
+    middleware.graph.remove(key)
+    requester.reply(1, None, "its server went away")
+    with pytest.raises(rosglass.ConnectionLostError, match="went away before it answered"):
+        call.result(0)
+
+
+def test_a_middleware_that_cannot_send(client, requester, caplog):
+    requester.linked = True
+    for error, expected in (
+        (rosglass.ConnectionLostError("no link"), rosglass.ConnectionLostError),
+        (OSError("cable"), rosglass.ServiceError),
+    ):
+
+        def fail(*_, error=error):
+            raise error
+
+        requester.send = fail
+        with pytest.raises(expected, match=r"no link|could not be sent: cable"):
+            client.call()
+    assert "/add: sending a request failed" in caplog.text
+
+
+# -- types ---------------------------------------------------------------------------------------
+
+
+def test_the_type_is_discovered(node, robot, eventually):
+    client = node.create_service_client("/add")
+    assert client.type is None
+    assert "type not known yet" in repr(client)
+    request = {"a": 1, "b": 2}
+    call = client.call_async(request)
+    wrong = client.call_async({"a": "text"})
+    request["a"] = 100
+    with pytest.raises(rosglass.ServiceUnavailableError, match="no server offers /add on fake"):
+        client.call(timeout=0.02)
+    robot.create_service_server("/add", ADD, add)
+    assert call.result(5).sum == 3
+    assert client.type.name == ADD
+    with pytest.raises(rosglass.ConversionError, match="a: expected an integer"):
+        wrong.result(5)
+    assert node.create_service_client("/add").type.name == ADD
+
+
+def test_a_type_that_nobody_has_is_named(node, middleware, eventually):
+    client = node.create_service_client("/x")
+    middleware.appear(SERVER, "/x", "nowhere_msgs/srv/Nothing")
+    eventually(
+        lambda: "/robot has nowhere_msgs/srv/Nothing, which cannot be used" in client.problem
+    )
+    with pytest.raises(rosglass.ServiceUnavailableError, match="no definition of nowhere_msgs"):
+        client.call(timeout=0.01)
+
+
+def test_several_types_of_one_service_are_named(node, middleware, eventually):
+    middleware.appear(SERVER, "/x", ADD, node="one")
+    middleware.appear(SERVER, "/x", TRIGGER, node="two")
+    client = node.create_service_client("/x")
+    assert f"several types ({ADD}, {TRIGGER}); choose one" in client.problem
+    assert f"create_service_client('/x', '{ADD}')" in client.problem
+    assert client.type is None
+
+
+def test_a_server_with_another_type_is_named(client, middleware, caplog, eventually):
+    middleware.requesters[0].linked = True
+    middleware.appear(SERVER, "/add", TRIGGER)
+    told = f"/robot offers {TRIGGER} here, not {ADD}: it cannot be called"
+    assert client.problem == told
+    assert not client.ready
+    with pytest.raises(rosglass.ServiceUnavailableError, match=told):
+        client.call(timeout=0.01)
+    assert middleware.requesters[0].sent == []
+    eventually(lambda: caplog.text.count(told) == 1)
+
+
+def test_a_server_with_another_definition_is_named(client, middleware, eventually):
+    middleware.requesters[0].linked = True
+    middleware.appear(SERVER, "/add", ADD, OTHER_HASH)
+    told = (
+        f"/robot has {ADD}, which cannot be used: no definition of {ADD} has the hash {OTHER_HASH}"
+    )
+    eventually(lambda: told in client.problem)
+    assert not client.ready
+
+
+def test_the_version_that_the_server_announces_is_taken(middleware, tmp_path, eventually):
+    text = "int64 a\nint64 b\nint64 c\n---\nint64 sum\n"
+    folder = tmp_path / "example_interfaces" / "srv"
+    folder.mkdir(parents=True)
+    (folder / "AddTwoInts.srv").write_text(text)
+    (folder.parent / "package.xml").write_text("<package><name>example_interfaces</name></package>")
+    library = Library()
+    newer = Library()
+    newer.add_path(tmp_path)
+    newer.prefer("folders")
+    theirs = rosglass.load(ADD, library=newer)
+    library.add_path(tmp_path)
+    library.prefer("distribution")
+    with Ros2Node(middleware, "fake://", "cockpit", library=library) as node:
+        client = node.create_service_client("/add", ADD)
+        fixed = node.create_service_client("/add", rosglass.load(ADD, library=library))
+        assert client.type.rihs01 != theirs.rihs01
+        call = client.call_async({"a": 1})
+        middleware.appear(SERVER, "/add", ADD, theirs.rihs01)
+        eventually(lambda: client.type.rihs01 == theirs.rihs01)
+        old, new = middleware.requesters[0], middleware.requesters[-1]
+        assert old.closed
+        new.linked = True
+        eventually(lambda: new.sent == [theirs.request.encode(a=1)])
+        new.reply(1, theirs.response.encode(sum=4))
+        assert call.result(5).sum == 4
+        assert client.call_async({"c": 1}).cancel()
+        assert f"/robot has another definition of {ADD} ({theirs.rihs01}, ours is" in fixed.problem
+        assert "add the robot's definition to the library" in fixed.problem
+
+
+# -- readiness -----------------------------------------------------------------------------------
+
+
+def test_readiness_is_told_to_and_fro(client, robot, eventually):
+    changes = []
+    client.on_ready_change(changes.append)
+    assert not client.wait_for_server(0.02)
+    assert not client.wait_for_server(0)
+    server = robot.create_service_server("/add", ADD, add)
+    assert client.wait_for_server(5)
+    assert client.wait_for_server()
+    eventually(lambda: changes == [True])
+    server.close()
+    eventually(lambda: changes == [True, False])
+    assert not client.ready
+    with pytest.raises(rosglass.ConversionError, match="callback"):
+        client.on_ready_change("told")
+
+
+def test_a_change_that_only_the_middleware_sees_is_told(client, requester, eventually):
+    changes = []
+    client.on_ready_change(changes.append)
+    requester.linked = True
+    requester.changed()
+    eventually(lambda: changes == [True])
+
+
+# -- threads and asyncio -------------------------------------------------------------------------
+
+
+def test_calls_are_awaited_in_asyncio(client, robot):
+    robot.create_service_server("/add", ADD, add)
+
+    async def main():
+        calls = [client.call_async({"a": value}) for value in range(5)]
+        slow = client.call_async({"a": 7}, timeout=None)
+        return [m.sum for m in await asyncio.gather(*calls)], (await slow).sum
+
+    assert asyncio.run(main()) == ([0, 1, 2, 3, 4], 7)
+
+
+def test_giving_up_in_asyncio_cancels_the_call(client, requester, eventually):
+    requester.linked = True
+
+    async def main():
+        await asyncio.wait_for(client.call_async(timeout=None), 0.02)
+
+    with pytest.raises((asyncio.TimeoutError, TimeoutError)):
+        asyncio.run(main())
+    eventually(lambda: requester.forgotten == [1])
+
+
+def test_the_end_of_a_call_is_told_on_an_executor(client, robot, eventually):
+    robot.create_service_server("/add", ADD, add)
+    told = []
+    call = client.call_async({"a": 1})
+    call.on_done(lambda c: told.append((c, threading.current_thread().name)))
+    elsewhere = Dispatcher("elsewhere")
+    call.on_done(lambda c: told.append((c, threading.current_thread().name)), elsewhere)
+    eventually(lambda: len(told) == 2)
+    assert sorted(told, key=lambda t: t[1]) == [(call, "cockpit callbacks"), (call, "elsewhere")]
+    elsewhere.close()
+    with pytest.raises(rosglass.ConversionError, match="callback"):
+        call.on_done(None)
+
+
+def test_callbacks_may_call_and_wait(node, robot, client, eventually):
+    """The reply does not need the thread that waits for it."""
+    robot.create_service_server("/add", ADD, add)
+    results = []
+    node.create_service_client("/x", ADD).on_ready_change(
+        lambda _: results.append(client.call({"a": 5}).sum)
+    )
+    robot.create_service_server("/x", ADD, add)
+    eventually(lambda: results == [5])
+
+
+def test_a_callback_that_would_wait_for_itself_is_told_so(node, client, robot):
+    node.create_service_server("/add", ADD, add)
+    node.create_service_server("/twice", ADD, lambda r: client.call({"a": r.a, "b": r.a}))
+    with pytest.raises(rosglass.ServiceError, match="this callback would wait for itself"):
+        robot.create_service_client("/twice", ADD).call({"a": 2}, timeout=5)
+    assert client.call({"a": 2}).sum == 2
+
+
+def test_ctrl_c_gives_the_call_up(client, requester, monkeypatch):
+    requester.linked = True
+
+    def interrupt(self, timeout=None):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Promise, "result", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        client.call()
+    assert client.pending == 0
+    assert requester.forgotten == [1]
+
+
+def test_calls_from_many_threads(client, robot):
+    robot.create_service_server("/add", ADD, add)
+    with concurrent.futures.ThreadPoolExecutor(8) as pool:
+        sums = pool.map(lambda value: client.call({"a": value, "b": 1}).sum, range(200))
+        assert list(sums) == list(range(1, 201))
+
+
+# -- serving -------------------------------------------------------------------------------------
+
+
+def test_a_response_is_a_message_a_dict_or_nothing(node, robot):
+    kind = rosglass.load(SET)
+    for name, response in (
+        ("/message", kind.response.create(success=True, message="done")),
+        ("/dict", {"success": True, "message": "done"}),
+    ):
+        robot.create_service_server(name, SET, lambda _, r=response: r)
+        got = node.create_service_client(name).call({"data": True}, timeout=5)
+        assert got.to_dict() == {"success": True, "message": "done"}
+    robot.create_service_server("/nothing", kind, lambda _: None)
+    assert node.create_service_client("/nothing").call(timeout=5).message == ""
+
+
+def test_a_response_may_come_later(node, robot, client, eventually):
+    futures = []
+
+    def later(request):
+        futures.append(concurrent.futures.Future())
+        return futures[-1]
+
+    robot.create_service_server("/add", ADD, later)
+    calls = [client.call_async() for _ in range(4)]
+    eventually(lambda: len(futures) == 4)
+    futures[1].set_result({"sum": 1})
+    assert calls[1].result(5).sum == 1
+    futures[0].set_exception(ValueError("broken"))
+    futures[2].cancel()
+    futures[3].set_result({"sum": "x"})
+    for number, told in ((0, "ValueError: broken"), (2, "cancelled"), (3, "no valid response: ")):
+        with pytest.raises(rosglass.ServiceError, match=told):
+            calls[number].result(5)
+
+
+@pytest.mark.parametrize(
+    ("response", "told"),
+    [
+        ({"sum": "x"}, f"{ADD}_Response: sum: expected an integer"),
+        ({"total": 1}, "total"),
+        (7, "expected"),
+        (rosglass.load(SET).response.create(), "expected"),
+    ],
+)
+def test_a_response_that_does_not_fit_is_logged(robot, client, caplog, response, told):
+    robot.create_service_server("/add", ADD, lambda _: response)
+    with pytest.raises(rosglass.ServiceError, match="the server made no valid response"):
+        client.call(timeout=5)
+    assert "/add: the callback's response to /arm/cockpit does not fit" in caplog.text
+    assert told in caplog.text
+
+
+def test_a_callback_that_fails_is_logged_with_who_asked(robot, client, caplog):
+    answers = iter([ValueError("the arm is off"), {"sum": 1}])
+
+    def callback(_):
+        got = next(answers)
+        if isinstance(got, Exception):
+            raise got
+        return got
+
+    robot.create_service_server("/add", ADD, callback)
+    with pytest.raises(rosglass.ServiceError, match="ValueError: the arm is off"):
+        client.call(timeout=5)
+    assert "/add: the callback failed on a request of /arm/cockpit; it gets no resp" in caplog.text
+    assert "in callback" in caplog.text
+    assert client.call(timeout=5).sum == 1
+
+
+def test_rubbish_is_named_once_per_client_and_disturbs_nobody(robot, client, caplog):
+    robot.create_service_server("/add", ADD, add)
+    replier = robot.fake.repliers[0]
+    for _ in range(3):
+        for who in (b"a" * 16, b"b" * 16):
+            replier.receive(RequestId(who, 1), b"\0\1\0\0rubbish")
+    for number in range(200):
+        replier.receive(RequestId(number.to_bytes(16, "big"), 1), b"")
+    assert client.call({"a": 1}, timeout=5).sum == 1
+    told = [r.getMessage() for r in caplog.records if "refusing requests" in r.getMessage()]
+    assert len(told) == 100
+    assert f"the request is no {ADD}_Request: " in told[0]
+    assert len(replier.failures) == 206
+
+
+def test_a_client_gone_wild_cannot_fill_the_memory(robot, middleware, client, caplog):
+    release = threading.Event()
+    robot.create_service_server("/add", ADD, lambda _: release.wait(5) and None)
+    replier = robot.fake.repliers[0]
+    data = rosglass.load(ADD).request.encode()
+    for number in range(1500):
+        replier.receive(RequestId(b"w" * 16, number), data)
+    release.set()
+    assert 499 <= len(replier.failures) <= 500
+    assert caplog.text.count("1000 requests wait for the callback already") == 1
+
+
+def test_executors_of_servers(robot, client, eventually):
+    jobs = []
+
+    class Manual(Executor):
+        def post(self, job):
+            jobs.append(job)
+
+    robot.create_service_server("/add", ADD, add, executor=Manual())
+    call = client.call_async({"a": 1})
+    eventually(lambda: jobs)
+    assert not call.done()
+    jobs.pop()()
+    assert call.result(5).sum == 1
+
+
+def test_coroutine_functions_serve_in_their_loop(node, connect):
+    robot = connect("robot")
+
+    async def slow(request):
+        await asyncio.sleep(0.01)
+        if request.a < 0:
+            raise ValueError("negative")
+        return {"sum": request.a}
+
+    class Callable:
+        async def __call__(self, request):
+            return {"sum": 7}
+
+    async def main():
+        robot.create_service_server("/add", ADD, slow)
+        robot.create_service_server("/seven", ADD, Callable())
+        client = node.create_service_client("/add", ADD)
+        sums = await asyncio.gather(*(client.call_async({"a": value}) for value in range(3)))
+        with pytest.raises(rosglass.ServiceError, match="ValueError: negative"):
+            await client.call_async({"a": -1})
+        seven = await node.create_service_client("/seven", ADD).call_async()
+        return [message.sum for message in sums], seven.sum
+
+    assert asyncio.run(main()) == ([0, 1, 2], 7)
+
+
+async def serve(request):
+    return None
+
+
+@pytest.mark.parametrize(
+    ("callback", "executor", "told"),
+    [
+        (None, None, "callback: expected something that can be called, got None"),
+        (add, "gui", "executor: expected a rosglass.comm.Executor"),
+        (serve, None, "created inside a running event loop"),
+        (serve, rosglass.comm.IMMEDIATE, "no executor beside a coroutine function"),
+    ],
+)
+def test_callbacks_that_cannot_run_are_refused_at_creation(robot, callback, executor, told):
+    with pytest.raises(rosglass.ConversionError, match=f"/add: .*{told}"):
+        robot.create_service_server("/add", ADD, callback, executor=executor)
+    assert robot.fake.repliers == []
+
+
+def test_a_plain_function_that_returns_a_coroutine_is_told_so(robot, client):
+    robot.create_service_server("/add", ADD, lambda _: serve(None))
+    with pytest.raises(rosglass.ServiceError, match="must be an async def"):
+        client.call(timeout=5)
+
+
+def test_a_second_server_and_strange_clients_are_named(robot, middleware, caplog, eventually):
+    server = robot.create_service_server("/add", ADD, add)
+    theirs = robot.fake
+    theirs.appear(SERVER, "/add", ADD, node="twin")
+    assert "/twin offers /add, too" in server.problem
+    theirs.appear(CLIENT, "/add", TRIGGER, node="lost")
+    theirs.appear(CLIENT, "/add", ADD, OTHER_HASH, node="older")
+    assert f"/lost calls {TRIGGER} here, not {ADD}: it is not served" in server.problem
+    assert f"/older has another definition of {ADD} ({OTHER_HASH}" in server.problem
+    eventually(lambda: "/twin offers /add, too" in caplog.text)
+    eventually(lambda: caplog.text.count("/older has another definition") == 1)
+
+
+# -- the end -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("close", ["client", "node"])
+def test_closing_ends_pending_calls(node, client, requester, close, eventually):
+    waiting = client.call_async(timeout=None)
+    requester.linked = True
+    sent = client.call_async(timeout=None)
+    told = []
+    sent.add_done_callback(told.append)
+    (client if close == "client" else node).close()
+    for call in (waiting, sent):
+        with pytest.raises(rosglass.NodeClosedError, match="client of /add was closed during a c"):
+            call.result(0)
+    assert told == [sent]
+    assert requester.closed
+    client.close()
+    assert (client.ready, client.pending, client.problem) == (False, 0, "the client is closed")
+    for use in (client.call, client.call_async, client.wait_for_server):
+        with pytest.raises(rosglass.NodeClosedError, match="closed"):
+            use()
+    with pytest.raises(rosglass.NodeClosedError, match="closed"):
+        client.on_ready_change(print)
+
+
+def test_closing_ends_waiting_for_the_server(client):
+    threading.Timer(0.05, client.close).start()
+    with pytest.raises(rosglass.NodeClosedError, match="client of /add is closed"):
+        client.wait_for_server()
+
+
+def test_closing_a_server(robot, client, eventually):
+    started, futures = threading.Event(), []
+
+    def callback(request):
+        started.set()
+        futures.append(concurrent.futures.Future())
+        return futures[0]
+
+    server = robot.create_service_server("/add", ADD, callback)
+    call = client.call_async(timeout=0.2)
+    assert started.wait(5)
+    server.close()
+    server.close()
+    assert server.problem == "the server is closed"
+    futures[0].set_result(None)  # too late, and no error
+    robot.fake.repliers[0].on_request(RequestId(b"", 1), b"")  # on its way when it closed
+    with pytest.raises(rosglass.Error):
+        call.result(5)
+    assert len(futures) == 1
+    assert not client.ready
+
+
+def test_closing_a_server_cancels_its_coroutines(node, robot):
+    ended = threading.Event()
+
+    async def slow(request):
+        try:
+            await asyncio.sleep(60)
+        finally:
+            ended.set()
+
+    async def main():
+        server = robot.create_service_server("/add", ADD, slow)
+        node.create_service_client("/add", ADD).call_async()
+        await asyncio.sleep(0.05)
+        server.close()
+        await asyncio.to_thread(ended.wait, 5)
+
+    asyncio.run(main())
+    assert ended.is_set()
+
+
+def test_clients_and_servers_leave_nothing_behind(node, robot, middleware, eventually):
+    for _ in range(50):
+        with (
+            robot.create_service_server("/add", ADD, add),
+            node.create_service_client("/add", ADD) as client,
+        ):
+            assert client.call({"a": 1}, timeout=5).sum == 1
+    assert middleware.graph.services() == {}
+    assert node._core._members == {}
+    assert robot._core._members == {}
+
+
+def test_timers_of_ended_calls_are_forgotten(client, requester, node):
+    requester.linked = True
+    for number in range(1, 1001):
+        client.call_async(timeout=60)
+        requester.reply(number, answer())
+    assert len(node._core.timers._jobs) < 200
