@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from rosglass.comm import Duration, Node, QoS, Time
     from rosglass.connection import connect
     from rosglass.errors import (
+        BagError,
         ConnectionLostError,
         ConversionError,
         CyclicTypeError,
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
         ServiceError,
         ServiceUnavailableError,
         TimeoutError,  # noqa: A004 - also a builtin TimeoutError
+        TransitionError,
         TypeNotFoundError,
         UnsupportedError,
     )
@@ -39,6 +41,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "BagError",
     "ActionType",
     "ConnectionLostError",
     "ConversionError",
@@ -65,6 +68,7 @@ __all__ = [
     "ServiceUnavailableError",
     "Time",
     "TimeoutError",
+    "TransitionError",
     "TypeNotFoundError",
     "UnsupportedError",
     "__version__",
@@ -82,7 +86,7 @@ _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 
 #: Reached as attributes, too: `rosglass.comm.IMMEDIATE`.
-_PACKAGES = ("comm", "connection", "errors", "interfaces", "images", "messages", "qml", "ros2")
+_PACKAGES = ("bags", "comm", "connection", "errors", "interfaces", "images", "messages", "qml", "ros2")
 
 
 def __getattr__(name: str) -> object:

@@ -11,7 +11,7 @@ from rosglass.errors import ConversionError, UnsupportedError
 from rosglass.interfaces import Library
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from rosglass.comm import Node
     from rosglass.ros2 import Middleware
@@ -41,6 +41,8 @@ def connect(
     namespace: str = "/",
     *,
     library: Library | None = None,
+    arguments: Sequence[str] = (),
+    own_services: bool = True,
 ) -> Node:
     """Join a robot's graph and return the node that stands for this program in it.
 
@@ -70,9 +72,17 @@ def connect(
         name: Base name of the node; None for ``rosglass_<process id>``.
         namespace: Absolute namespace of the node.
         library: Where message definitions come from; None for the shared library.
+        arguments: A command line such as ``sys.argv``: what stands in it between ``--ros-args``
+            and ``--`` can rename the node, its topics and services (``-r chatter:=talk``,
+            ``-r __node:=left``, ``-r __ns:=/arm``), set parameters (``-p speed:=1.5``,
+            ``--params-file robot.yaml``) and log levels (``--log-level debug``).
+        own_services: Whether other nodes find what every ROS 2 node offers: its parameters, its
+            log, descriptions of its types. They appear shortly after connecting.
 
     Raises:
         ConversionError: A part of the URL or an environment variable is not valid.
+        RosArgumentError: One of `arguments` is not valid; the message says which, and what to
+            write instead.
         UnsupportedError: The URL's scheme is unknown, or there is neither URL nor environment.
         InvalidNameError: The name or namespace breaks ROS's rules.
         ConnectionLostError: This machine cannot open a session at all.
@@ -95,10 +105,15 @@ def connect(
     if name is None:
         number = next(_anonymous)
         name = f"rosglass_{os.getpid()}" + (f"_{number}" if number > 1 else "")
+    from rosglass.ros2.arguments import Arguments  # noqa: PLC0415
+
+    told = Arguments.parse(arguments)
+    name = told.node_name(name)
+    namespace = told.namespace(name, namespace)
     middleware = _dds(url) if scheme == "dds" else _zenoh(url)
     from rosglass.ros2.node import Ros2Node  # noqa: PLC0415
 
-    return Ros2Node(middleware, url, name, namespace, library)
+    return Ros2Node(middleware, url, name, namespace, library, told, own_services=own_services)
 
 
 def default_url(env: Mapping[str, str]) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import builtins
 
 __all__ = [
+    "BagError",
     "ConnectionLostError",
     "ConversionError",
     "CyclicTypeError",
@@ -25,6 +26,7 @@ __all__ = [
     "ServiceError",
     "ServiceUnavailableError",
     "TimeoutError",
+    "TransitionError",
     "TypeNotFoundError",
     "UnsupportedError",
 ]
@@ -134,8 +136,16 @@ class ParameterError(Error):
     """A parameter does not exist, has another type, or its node refuses the value."""
 
 
+class TransitionError(Error):
+    """A lifecycle node cannot take a transition, or failed to."""
+
+
 class RosArgumentError(Error, ValueError):
     """What a program was told with ``--ros-args`` is not valid."""
+
+
+class BagError(Error):
+    """A recording cannot be read or written; the message names the file."""
 
 
 class QmlError(Error):

@@ -14,16 +14,18 @@ from rosglass.errors import UnsupportedError
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
     from concurrent.futures import Future
+    from logging import Logger
     from types import TracebackType
 
     from rosglass.comm.action import ActionClient, ActionServer, ServerGoal
+    from rosglass.comm.clock import Clock, Timer
     from rosglass.comm.graph import EndpointInfo, NodeName, Status
     from rosglass.comm.parameters import ParameterClient, Parameters
     from rosglass.comm.qos import QoS
     from rosglass.comm.sample import Sample
     from rosglass.comm.service import ServiceClient, ServiceServer
     from rosglass.comm.subscription import Subscription
-    from rosglass.comm.time import Time
+    from rosglass.comm.time import Duration, Time
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
 
 __all__ = ["Answer", "Executor", "Handle", "Node", "Publisher"]
@@ -123,7 +125,7 @@ class Node(Handle):
     wire: str
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} {self.resolve(self.name)} on {self.url}>"
+        return f"<{type(self).__name__} {self.namespace.rstrip('/')}/{self.name} on {self.url}>"
 
     @abstractmethod
     def create_publisher(
@@ -258,6 +260,37 @@ class Node(Handle):
     def create_parameter_client(self, node: str | NodeName) -> ParameterClient:
         """Return a client of another node's parameters; `node` is its full name."""
         raise self._unsupported("parameters")
+
+    @property
+    def logger(self) -> Logger:
+        """The node's logger, whose messages other nodes can follow (``/rosout``), too."""
+        raise self._unsupported("a logger")
+
+    @property
+    def clock(self) -> Clock:
+        """The node's clock: the system's time, or that of a simulation."""
+        raise self._unsupported("a clock")
+
+    def create_timer(
+        self,
+        period: Duration | float,
+        callback: Callable[[], None],
+        *,
+        executor: Executor | None = None,
+    ) -> Timer:
+        """Call `callback` again and again, by the node's clock.
+
+        Args:
+            period: Seconds, or a Duration, between two calls.
+            callback: What to call. One that is still running or waiting when its time comes again
+                misses that turn.
+            executor: Where it runs; None for the node's own dispatcher thread.
+
+        Raises:
+            ConversionError: The period is not above zero.
+            NodeClosedError: The node is closed.
+        """
+        return self.clock.create_timer(period, callback, executor)
 
     def services(self) -> dict[str, list[str]]:
         """Return every service in the graph with the types announced for it."""

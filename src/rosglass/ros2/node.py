@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rosglass.comm import EndpointKind, Node, NodeName, QoS, Subscription, Time
+from rosglass.comm import EndpointKind, Node, NodeName, QoS, Subscription
+from rosglass.ros2.arguments import NO_ARGUMENTS
 from rosglass.ros2.core import Core
+from rosglass.ros2.furniture import Furniture
 from rosglass.ros2.names import validate_namespace, validate_node_name
 from rosglass.ros2.publisher import Ros2Publisher
 from rosglass.ros2.reading import Reading
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
 
     from rosglass.comm import (
         Answer,
+        Clock,
         EndpointInfo,
         Executor,
         Handle,
@@ -25,10 +28,16 @@ if TYPE_CHECKING:
         ServiceClient,
         ServiceServer,
         Status,
+        Time,
     )
     from rosglass.interfaces import Library
     from rosglass.messages import Message, MessageType, ServiceType
+    from rosglass.ros2.arguments import Arguments
+    from rosglass.ros2.lifecycle import LifecycleClient
     from rosglass.ros2.middleware import Middleware
+    from rosglass.ros2.parameter_client import Ros2ParameterClient
+    from rosglass.ros2.parameters import Ros2Parameters
+    from rosglass.ros2.rosout import NodeLogger
 
 __all__ = ["Ros2Node"]
 
@@ -42,10 +51,15 @@ class Ros2Node(Node):
         name: Base name.
         namespace: Absolute namespace.
         library: Where definitions come from; None for the shared library.
+        arguments: What the program was told with ``--ros-args``; name and namespace are the
+            final ones.
+        own_services: Whether other nodes find what every ROS 2 node offers: its parameters, its
+            log, descriptions of its types.
 
     Raises:
         InvalidNameError: The name or namespace breaks ROS's rules.
         ConnectionLostError: The middleware cannot start on this machine.
+        RosArgumentError: A remapping rule makes a name that is not valid.
     """
 
     wire = "cdr"
@@ -57,11 +71,15 @@ class Ros2Node(Node):
         name: str,
         namespace: str = "/",
         library: Library | None = None,
+        arguments: Arguments = NO_ARGUMENTS,
+        *,
+        own_services: bool = False,
     ) -> None:
         validate_node_name(name)
         validate_namespace(namespace)
         self.url, self.name, self.namespace = url, name, namespace
-        self._core = Core(NodeName(namespace, name), url, middleware, library)
+        self._core = Core(NodeName(namespace, name), url, middleware, library, arguments)
+        self._furniture = Furniture(self, self._core, own_services)
 
     def create_publisher(
         self, topic: str, type: str | MessageType, qos: QoS | int = 10
@@ -101,7 +119,7 @@ class Ros2Node(Node):
         """Return a client; see :meth:`rosglass.comm.Node.create_service_client`."""
         self._core.check_open()
         profile = QoS.services() if qos is None else _profile(qos)
-        return Ros2ServiceClient(self._core, self.resolve(name), type, profile)
+        return Ros2ServiceClient(self._core, self._core.resolve(name, "service"), type, profile)
 
     def create_service_server(
         self,
@@ -115,8 +133,37 @@ class Ros2Node(Node):
         """Offer a service; see :meth:`rosglass.comm.Node.create_service_server`."""
         self._core.check_open()
         profile = QoS.services() if qos is None else _profile(qos)
-        full = self.resolve(name)
+        full = self._core.resolve(name, "service")
         return Ros2ServiceServer(self._core, full, type, callback, profile, executor)
+
+    @property
+    def parameters(self) -> Ros2Parameters:
+        """This node's own parameters."""
+        return self._furniture.parameters
+
+    def create_parameter_client(self, node: str | NodeName) -> Ros2ParameterClient:
+        """Return a client of another node's parameters; `node` is its full name."""
+        from rosglass.ros2.parameter_client import Ros2ParameterClient  # noqa: PLC0415 - yaml
+
+        self._core.check_open()
+        return Ros2ParameterClient(self, self._node_name(node))
+
+    def create_lifecycle_client(self, node: str | NodeName) -> LifecycleClient:
+        """Return a client that drives a lifecycle node; `node` is its full name."""
+        from rosglass.ros2.lifecycle import LifecycleClient  # noqa: PLC0415
+
+        self._core.check_open()
+        return LifecycleClient(self, self._node_name(node))
+
+    @property
+    def logger(self) -> NodeLogger:
+        """The node's logger, whose messages go to ``/rosout``, too."""
+        return self._furniture.logger
+
+    @property
+    def clock(self) -> Clock:
+        """The node's clock, which follows ``/clock`` when the parameter use_sim_time is set."""
+        return self._core.clock
 
     def topics(self) -> dict[str, list[str]]:
         """Return every topic in the graph with the types announced for it."""
@@ -144,16 +191,17 @@ class Ros2Node(Node):
 
     def service_servers(self, name: str) -> list[EndpointInfo]:
         """Return the servers of a service."""
-        return self._core.graph.endpoints(EndpointKind.SERVICE_SERVER, self.resolve(name))
+        full = self._core.resolve(name, "service")
+        return self._core.graph.endpoints(EndpointKind.SERVICE_SERVER, full)
 
     def service_clients(self, name: str) -> list[EndpointInfo]:
         """Return the clients of a service."""
-        return self._core.graph.endpoints(EndpointKind.SERVICE_CLIENT, self.resolve(name))
+        full = self._core.resolve(name, "service")
+        return self._core.graph.endpoints(EndpointKind.SERVICE_CLIENT, full)
 
     def endpoints(self, node: str | NodeName) -> list[EndpointInfo]:
         """Return what a node publishes, subscribes, serves and calls; none when it is unknown."""
-        full = node.full if isinstance(node, NodeName) else self.resolve(node)
-        namespace, _, name = full.rpartition("/")
+        namespace, _, name = self._node_name(node).rpartition("/")
         return self._core.graph.endpoints_of(NodeName(namespace or "/", name))
 
     def on_graph_change(
@@ -181,8 +229,8 @@ class Ros2Node(Node):
         return self._core.resolve(name)
 
     def now(self) -> Time:
-        """Return the system's time."""
-        return Time.now()
+        """Return the time of the node's clock."""
+        return self._core.clock.now()
 
     def close(self) -> None:
         """Leave the graph, close everything created from the node and end its threads.
@@ -190,6 +238,9 @@ class Ros2Node(Node):
         Safe to call twice, from any thread and from callbacks.
         """
         self._core.close()
+
+    def _node_name(self, node: str | NodeName) -> str:
+        return node.full if isinstance(node, NodeName) else self._core.expand(node)
 
 
 def _profile(qos: QoS | int) -> QoS:

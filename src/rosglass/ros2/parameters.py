@@ -23,7 +23,6 @@ from rosglass.comm import (
 )
 from rosglass.comm import ParameterEvent as Event
 from rosglass.errors import ParameterError
-from rosglass.ros2 import parameter_files
 from rosglass.ros2.parameter_values import TYPE_NAMES, TypedValue, check_name, in_range, typed
 
 if TYPE_CHECKING:
@@ -231,6 +230,8 @@ class Ros2Parameters(Parameters):
 
     def load(self, path: str | PathLike[str]) -> None:
         """Set the parameters that a file has for this node; see the base class."""
+        from rosglass.ros2 import parameter_files  # noqa: PLC0415 - yaml
+
         values = parameter_files.read(path).for_node(self.node)
         if not values:
             raise ParameterError(f"{path} has no parameters for {self.node}")
@@ -241,6 +242,8 @@ class Ros2Parameters(Parameters):
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the parameters to a file that can be loaded; raises ParameterError."""
+        from rosglass.ros2 import parameter_files  # noqa: PLC0415 - yaml
+
         values = {name: value.value for name, value in self.snapshot().items()}
         parameter_files.write(path, {self.node: values})
 

@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import Duration, QoS, Worker
 from rosglass.errors import Error
+from rosglass.ros2.core import Member
 
 if TYPE_CHECKING:
-    from rosglass.comm import Publisher
+    from rosglass.comm import Node, Publisher
     from rosglass.ros2.core import Core
 
 __all__ = ["ROSOUT_QOS", "NodeLogger", "Rosout", "RosoutHandler", "logger_name"]
@@ -87,9 +88,9 @@ class RosoutHandler(logging.Handler):
     long ones are cut.
     """
 
-    def __init__(self, core: Core) -> None:
+    def __init__(self, node: Node, core: Core) -> None:
         super().__init__()
-        self._core = core
+        self._node, self._core = node, core
         self._waiting: deque[dict[str, Any]] = deque()
         self._lost = 0
         self._second, self._count = 0, 0
@@ -102,12 +103,9 @@ class RosoutHandler(logging.Handler):
         """Announce the publisher, so that subscriptions are there before the first message."""
         with self._start:
             if self._publisher is None and not self._closed:
-                from rosglass.ros2.publisher import Ros2Publisher  # noqa: PLC0415 - numpy
-
-                core = self._core
-                self._publisher = Ros2Publisher(
-                    core, core.resolve(_TOPIC), core.types.message(_TYPE), ROSOUT_QOS
-                )
+                self._publisher = self._node.create_publisher(_TOPIC, _TYPE, ROSOUT_QOS)
+                # Closed before the publisher, as members are: what waits is still sent.
+                self._core.add(_Flush(self, self._core))
 
     def emit(self, record: logging.LogRecord) -> None:
         """Publish a record soon."""
@@ -182,6 +180,20 @@ class RosoutHandler(logging.Handler):
         return _fields(record)
 
 
+class _Flush(Member):
+    """Closes a handler as its node closes."""
+
+    def __init__(self, handler: RosoutHandler, core: Core) -> None:
+        self._handler, self._core = handler, core
+
+    def follow(self, moved: bool, idle: bool) -> None:
+        """Follow the graph, which is of no concern here."""
+
+    def close(self) -> None:
+        self._handler.close()
+        self._core.remove(self)
+
+
 class _OwnThreads(logging.Filter):
     """Lets the library's warnings pass that a node's own threads make: they are about it."""
 
@@ -197,12 +209,13 @@ class Rosout:
     """A node's logging: its logger and its publisher of ``/rosout``.
 
     Args:
-        core: The node it belongs to.
+        node: The node it belongs to.
+        core: What that consists of.
     """
 
-    def __init__(self, core: Core) -> None:
+    def __init__(self, node: Node, core: Core) -> None:
         arguments, name = core.arguments, logger_name(core.name.full)
-        self.handler = RosoutHandler(core) if arguments.rosout else None
+        self.handler = RosoutHandler(node, core) if arguments.rosout else None
         self.logger = NodeLogger(name, logging.getLogger(), dict(arguments.logger_levels))
         if name not in arguments.logger_levels:
             level = arguments.log_level
