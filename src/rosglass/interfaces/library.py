@@ -20,7 +20,7 @@ from rosglass.interfaces.definition import Definition, parts_of
 from rosglass.interfaces.derived import derive, derived_from
 from rosglass.interfaces.distributions import Distributions
 from rosglass.interfaces.folders import Folders, workspace
-from rosglass.interfaces.hashes import check_definition, md5, rihs01
+from rosglass.interfaces.hashes import announced_hashes, check_definition, md5
 from rosglass.interfaces.idl import parse_idl
 from rosglass.interfaces.names import KINDS, join_name, split_name
 from rosglass.interfaces.parser import parse
@@ -98,7 +98,8 @@ class Library:
             ros: 1 or 2.
             hash: md5 sum (ROS 1) or RIHS01 hash (ROS 2) that a peer announced for it. Picks the
                 definition that has it, of any provider and any distribution; ``*``, with which
-                ROS 1 peers say "any", is the same as none.
+                ROS 1 peers say "any", is the same as none. For a service it may be that of its
+                request, which is what ROS 2 nodes announce over DDS.
 
         Raises:
             InvalidNameError: `name` is not a type name.
@@ -234,6 +235,15 @@ class Library:
         with self._lock:
             return self._versions.add(definition)
 
+    def version(self, name: str, hash: str = "") -> InterfaceDefinition | None:
+        """Return what :meth:`add_version` was given for a name and hash (empty: for a name).
+
+        Raises:
+            InvalidNameError: `name` is not a type name.
+        """
+        with self._lock:
+            return self._version(name, 2, hash)
+
     def prefer(self, *providers: str) -> None:
         """Let these providers' definitions win over differing ones, instead of an error.
 
@@ -365,10 +375,11 @@ class Library:
             except (DefinitionError, DefinitionConflictError) as error:
                 problem = problem or error
                 continue
-            actual = md5(found) if ros == 1 else rihs01(found)
-            if actual == wanted:
-                return found
-            tried.setdefault(actual, _place(None, found))
+            hashes = (md5(found),) if ros == 1 else announced_hashes(found)
+            if wanted in hashes:
+                # The usual definition, when it is the one that was asked for, stays one object.
+                return self._loaded.setdefault((ros, found.name, ""), found) if check else found
+            tried.setdefault(hashes[0], _place(None, found))
         if problem is not None and not tried:
             raise problem
         known = "; ".join(f"{place} has {actual}" for actual, place in tried.items())

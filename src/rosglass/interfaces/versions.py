@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rosglass.errors import DefinitionError, UnsupportedError
-from rosglass.interfaces.definition import Definition, parts_of
+from rosglass.interfaces.definition import Definition, ServiceDefinition, parts_of
 from rosglass.interfaces.derived import derive, derived_from
-from rosglass.interfaces.hashes import check_definition, rihs01
+from rosglass.interfaces.hashes import announced_hashes, check_definition, rihs01
 from rosglass.interfaces.resolver import Resolver
 
 if TYPE_CHECKING:
@@ -57,12 +57,15 @@ class Versions:
 
         Args:
             name: Full type name.
-            wanted: Its hash; empty takes what came last.
+            wanted: A hash that it is announced by; empty takes what came last.
         """
         known = self._known.get(name, {})
         found = known.get(wanted) if wanted else next(reversed(known.values()), None)
         if found is not None:
             return found
+        for version in known.values():
+            if isinstance(version, ServiceDefinition) and wanted in announced_hashes(version):
+                return version
         for owner, suffix in derived_from(name, 2):
             for version in reversed(self._known.get(owner, {}).values()):
                 derived = derive(version, suffix)

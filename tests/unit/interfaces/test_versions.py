@@ -96,6 +96,19 @@ def test_nested_versions_are_those_that_were_sent(library: Library) -> None:
     assert [f.name for f in found.nested["std_msgs/msg/Header"].fields] == ["seq"]
 
 
+def test_services_are_announced_by_the_hash_of_their_request_too(library: Library) -> None:
+    definition = sent("my_msgs/srv/Ask", "string question\n---\nint8 answer")
+    assert isinstance(definition, ServiceDefinition)
+    library.add_version(definition)
+    local = library.definition("std_srvs/srv/SetBool")
+    assert isinstance(local, ServiceDefinition)
+    for service in (definition, local):
+        for part in (service, service.request, service.response):
+            assert library.definition(service.name, hash=rihs01(part)) is service
+        with pytest.raises((TypeNotFoundError, DefinitionConflictError)):
+            library.definition(service.name, hash="RIHS01_" + "0" * 64)
+
+
 @pytest.mark.parametrize("suffix", ["_Request", "_Response", "_Event"])
 def test_what_services_imply(library: Library, suffix: str) -> None:
     definition = sent("my_msgs/srv/Ask", "string question\n---\nmy_msgs/Part[] answer",
