@@ -45,8 +45,7 @@ class Furniture(Member):
         self._rosout: Rosout | None = None
         self._made: list[Handle] = []
         self._steps: deque[Callable[[], None]] = deque()
-        self._closed = False
-        core.add(self)
+        self._joined = self._closed = False
         if "use_sim_time" in core.arguments.parameters(core.name.full):
             _ = self.parameters
         if offered:
@@ -63,6 +62,7 @@ class Furniture(Member):
                 self._check_open()
                 core, full = self._core, self._core.name.full
                 overrides = core.arguments.parameters(full)
+                self._join()
                 self._parameters = Ros2Parameters(full, core.dispatcher, overrides)
                 self._made.append(SimTime(self._node, core.clock, self._parameters))
             return self._parameters
@@ -95,9 +95,17 @@ class Furniture(Member):
                 from rosglass.ros2.rosout import Rosout  # noqa: PLC0415
 
                 self._rosout = Rosout(self._node, self._core)
-                if self._closed:
+                if self._closed or self._core.closed:
                     self._rosout.close()
+                else:
+                    self._join()
             return self._rosout
+
+    def _join(self) -> None:
+        """End with the node, now that there is something to end."""
+        if not self._joined:
+            self._joined = True
+            self._core.add(self)
 
     def _check_open(self) -> None:
         self._core.check_open()
