@@ -1,0 +1,147 @@
+from __future__ import annotations
+
+import os
+import threading
+import xml.etree.ElementTree as ET
+
+import pytest
+
+import rosglass
+from rosglass.ros2 import dds_peers
+from rosglass.ros2.dds_config import domain_config, users_part
+from rosglass.ros2.dds_options import DdsOptions
+
+
+def config(url="dds://", **env):
+    return domain_config(DdsOptions.parse(url, env))
+
+
+def ours(url="dds://", **env):
+    """Our part of a configuration, as a tree."""
+    return ET.fromstring(config(url, **env)).find("Domain")
+
+
+def test_big_messages_get_big_datagrams_and_room():
+    domain = ours()
+    assert domain.findtext("General/MaxMessageSize") == "65500B"
+    assert domain.findtext("General/FragmentSize") == "65000B"
+    assert domain.find("Internal/SocketReceiveBufferSize").attrib == {
+        "min": "default",
+        "max": "10MB",
+    }
+
+
+@pytest.mark.parametrize(
+    ("url", "multicast", "index", "localhost"),
+    [
+        ("dds://", None, "auto", "default"),
+        ("dds://?range=localhost", "false", "auto", "true"),
+        ("dds://?range=off", "false", "none", "false"),
+        ("dds://?range=system_default", None, None, None),
+    ],
+)
+def test_the_range_becomes_settings_as_in_rmw_cyclonedds(url, multicast, index, localhost):
+    domain = ours(url)
+    assert domain.findtext("General/AllowMulticast") == multicast
+    assert domain.findtext("Discovery/ParticipantIndex") == index
+    peers = domain.find("Discovery/Peers")
+    assert (None if peers is None else peers.get("AddLocalhost")) == localhost
+    tag = domain.findtext("Discovery/Tag")
+    assert tag == (f"ros_discovery_off_{os.getpid()}" if "off" in url else None)
+
+
+def test_there_is_room_for_a_hundred_programs_on_a_machine():
+    assert int(ours().findtext("Discovery/MaxAutoParticipantIndex")) >= 100
+
+
+def test_peers_are_asked_for_ever_and_by_address():
+    peers = ours("dds://localhost;10.0.0.9", ROS_STATIC_PEERS="10.0.0.8:7412").findall(
+        "Discovery/Peers/Peer"
+    )
+    assert [peer.get("Address") for peer in peers] == ["127.0.0.1", "10.0.0.9", "10.0.0.8:7412"]
+    assert {peer.get("PruneDelay") for peer in peers} == {"inf"}
+
+
+def test_a_peer_that_nobody_knows_is_named():
+    with pytest.raises(rosglass.ConnectionLostError, match=r"address of peer 'robot\.invalid'"):
+        config("dds://robot.invalid")
+
+
+def test_a_name_server_that_does_not_answer_does_not_hang_us(monkeypatch):
+    never = threading.Event()
+
+    def look_up(*_):
+        never.wait(10)
+        raise OSError
+
+    monkeypatch.setattr(dds_peers, "_PATIENCE", 0.05)
+    monkeypatch.setattr(dds_peers.socket, "getaddrinfo", look_up)
+    with pytest.raises(rosglass.ConnectionLostError, match="no answer within"):
+        config("dds://slow")
+    never.set()
+
+
+def test_interfaces_by_name_and_address():
+    found = ours("dds://?interface=eth0,192.168.1.2").findall("General/Interfaces/NetworkInterface")
+    assert [interface.attrib for interface in found] == [
+        {"name": "eth0"},
+        {"address": "192.168.1.2"},
+    ]
+
+
+LO = '<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo"/></Interfaces>'
+LO += "</General></Domain></CycloneDDS>"
+
+
+def test_the_users_own_configuration_comes_last_and_so_wins():
+    whole = config(CYCLONEDDS_URI=LO)
+    assert whole.endswith("," + LO)
+    assert users_part(whole) == LO
+    assert users_part(config()) == ""
+
+
+@pytest.mark.parametrize(
+    ("url", "own", "element"),
+    [
+        ("dds://?interface=eth0", LO, "Interfaces"),
+        (
+            "dds://?interface=eth0",
+            "<general><networkinterfaceaddress>lo</networkinterfaceaddress></general>",
+            "NetworkInterfaceAddress",
+        ),
+        (
+            "dds://?range=localhost",
+            "<General><AllowMulticast>spdp</AllowMulticast></General>",
+            "AllowMulticast",
+        ),
+        ("dds://?range=localhost", "FILE", "AllowMulticast"),
+        ("dds://?range=localhost", "file://FILE,<General/>", "AllowMulticast"),
+        (
+            "dds://?range=localhost&domain=5",
+            '<Domain Id="5"><General><AllowMulticast>true</AllowMulticast></General></Domain>',
+            "AllowMulticast",
+        ),
+    ],
+)
+def test_what_the_url_and_the_users_configuration_both_say_is_refused(tmp_path, url, own, element):
+    file = tmp_path / "cyclone.xml"
+    file.write_text("<General><AllowMulticast>spdp,asm</AllowMulticast></General>")
+    with pytest.raises(rosglass.ConversionError) as error:
+        config(url, CYCLONEDDS_URI=own.replace("FILE", str(file)))
+    assert f"expected CYCLONEDDS_URI without <{element}>" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("url", "own"),
+    [
+        ("dds://", LO),
+        ("dds://?interface=eth0", "<General><!-- <Interfaces/> --></General>"),
+        (
+            "dds://?range=localhost&domain=4",
+            '<Domain Id="5"><General><AllowMulticast>true</AllowMulticast></General></Domain>',
+        ),
+        ("dds://?range=localhost", "/no/such/file.xml"),
+    ],
+)
+def test_what_only_one_of_them_says_is_taken(url, own):
+    assert users_part(config(url, CYCLONEDDS_URI=own)) == own

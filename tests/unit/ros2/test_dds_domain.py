@@ -1,0 +1,113 @@
+"""What Cyclone DDS has against a configuration; it talks to nobody here: discovery is off."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+
+import pytest
+
+import rosglass
+
+pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
+
+from rosglass.ros2 import cyclone, dds_domain
+from rosglass.ros2.dds_domain import Domain
+from rosglass.ros2.dds_options import DdsOptions
+
+URL = "dds://?domain=57&range=off"
+
+
+def join(url=URL, **env):
+    return Domain(DdsOptions.parse(url, env))
+
+
+@pytest.fixture(autouse=True)
+def nothing_stays_joined():
+    yield
+    assert dds_domain._joined == {}
+
+
+def test_users_of_a_domain_share_it_and_the_last_one_leaves_it():
+    one, two = join(), join()
+    one.close()
+    one.close()
+    assert 57 in dds_domain._joined
+    two.close()
+    with join("dds://?domain=57&range=off&distro=humble"):
+        assert 57 in dds_domain._joined
+
+
+def test_one_process_cannot_have_two_configurations_for_a_domain():
+    with join(), pytest.raises(rosglass.UnsupportedError) as error:
+        join("dds://?domain=57&range=localhost")
+    assert "in DDS domain 57 with other settings" in str(error.value)
+    assert "<AllowMulticast>false" in str(error.value)
+    join("dds://?domain=57&range=localhost").close()
+
+
+@pytest.mark.parametrize(
+    ("own", "told"),
+    [
+        (
+            "<CycloneDDS><Domain><General><Colour/></General></Domain></CycloneDDS>",
+            (
+                "CYCLONEDDS_URI: expected what Cyclone DDS accepts "
+                "(config: //CycloneDDS/Domain/General: Colour: unknown element)"
+            ),
+        ),
+        ("<General><MaxMessageSize>lots</MaxMessageSize></General>", "lots: invalid value"),
+        ("/no/such/file.xml", "can't open configuration file /no/such/file.xml"),
+        # Cyclone DDS ends the process that gives it this.
+        ('<Discovery><Peers><Peer Address="nobody.invalid"/></Peers></Discovery>', "unknown addr"),
+        ("<unfinished", "parser error"),
+    ],
+)
+def test_a_configuration_that_is_refused_is_explained(own, told, capfd):
+    with pytest.raises(rosglass.ConversionError) as error:
+        join(CYCLONEDDS_URI=own)
+    assert told in str(error.value)
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("own", ["", "<General><Interfaces/></General>"])
+def test_an_interface_that_is_not_there_is_named(own, capfd):
+    with pytest.raises(rosglass.ConversionError) as error:
+        join(
+            URL + ("" if own else "&interface=wlan77"),
+            CYCLONEDDS_URI=own.replace(
+                "<Interfaces/>", '<Interfaces><NetworkInterface name="wlan77"/></Interfaces>'
+            ),
+        )
+    assert "interface: expected one of this machine's (wlan77: does not match" in str(error.value)
+    assert capfd.readouterr().err == ""
+
+
+def test_a_domain_that_someone_else_in_this_process_uses_is_joined_with_a_warning(caplog):
+    others = cyclone.create_domain(57, "")
+    participant = cyclone.create_participant(57, None)
+    try:
+        joined = join()
+        assert "something else in this process takes part in DDS domain 57" in caplog.text
+        joined.close()
+        assert len(cyclone.guid(participant)) == 16
+    finally:
+        cyclone.delete(others)
+
+
+def _in_a_fork(answer):
+    try:
+        join()
+    except rosglass.UnsupportedError as error:
+        answer.send(str(error))
+    os._exit(0)
+
+
+def test_a_fork_is_told_to_start_anew():
+    with join():
+        here, there = multiprocessing.Pipe()
+        child = multiprocessing.get_context("fork").Process(target=_in_a_fork, args=(there,))
+        child.start()
+        assert here.poll(10)
+        assert 'multiprocessing.set_start_method("spawn")' in here.recv()
+        child.join(10)
