@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 from rosglass.errors import Error
+from rosglass.interfaces.hashes import announced_hashes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from rosglass.comm import EndpointInfo
+    from rosglass.interfaces.definition import InterfaceDefinition
 
 __all__ = ["Announced", "choose", "identity", "mismatches", "nodes_of", "similar"]
 
@@ -18,7 +20,7 @@ class _Type(Protocol):
     name: str
 
     @property
-    def rihs01(self) -> str: ...
+    def definition(self) -> InterfaceDefinition: ...
 
 
 _T = TypeVar("_T", bound=_Type)
@@ -34,7 +36,9 @@ class Announced(Generic[_T]):
 
     Attributes:
         type: The type; None while nobody has told it.
-        hash: Its hash, empty without type.
+        hash: Its own hash, empty without type.
+        hashes: The hashes that peers announce it by; see
+            :func:`rosglass.interfaces.hashes.announced_hashes`.
         failure: Why the announced version cannot be had, in words; empty when all is well.
     """
 
@@ -42,7 +46,7 @@ class Announced(Generic[_T]):
         self._load, self._fixed = load, fixed
         self._failed: tuple[str, str] | None = None
         self.type: _T | None = None
-        self.hash = ""
+        self.hash, self.hashes = "", frozenset[str]()
         self.failure = ""
         if given is not None:
             self._take(given)
@@ -62,7 +66,7 @@ class Announced(Generic[_T]):
             return False
         hashes = {peer.type_hash for peer in peers if peer.type == name and peer.type_hash}
         current = self.type if self.type is not None and self.type.name == name else None
-        if current is not None and (len(hashes) != 1 or self.hash in hashes):
+        if current is not None and (len(hashes) != 1 or hashes <= self.hashes):
             self._failed, self.failure = None, ""
             return False
         wanted = (name, hashes.pop() if len(hashes) == 1 else "")
@@ -87,11 +91,12 @@ class Announced(Generic[_T]):
         return (
             self.type is not None
             and peer.type == self.type.name
-            and peer.type_hash in ("", self.hash)
+            and (not peer.type_hash or peer.type_hash in self.hashes)
         )
 
     def _take(self, found: _T) -> None:
-        self.type, self.hash = found, found.rihs01
+        hashes = announced_hashes(found.definition)
+        self.type, self.hash, self.hashes = found, hashes[0], frozenset(hashes)
 
 
 def choose(names: Iterable[str], current: str, example: str) -> tuple[str, str]:
