@@ -20,6 +20,7 @@ RANK = {
     "ros1": 4,
     "ros2": 4,
     "connection": 5,
+    "bags": 5,
     "tf": 5,
     "images": 5,
     "qt": 5,

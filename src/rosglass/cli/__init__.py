@@ -20,6 +20,8 @@ COMMANDS = {
     "run": ("rosglass.cli.run", "open an interface written in QML"),
     "demo": ("rosglass.cli.demo", "open the demo cockpit on a simulated robot"),
     "robot": ("rosglass.cli.robot", "run the simulated robot"),
+    "record": ("rosglass.cli.record", "record topics into an MCAP file"),
+    "play": ("rosglass.cli.play", "play a recording: MCAP, ROS 2 bag or ROS 1 bag"),
     "router": ("rosglass.cli.router", "run a Zenoh router for ROS 2 (rmw_zenoh)"),
 }
 
@@ -78,4 +80,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 130
 
 
-_EXTRA_OF = {"PySide6": "qml", "zenoh": "zenoh", "cv2": "images", "xxhash": "zenoh"}
+_EXTRA_OF = {
+    "PySide6": "qml",
+    "zenoh": "zenoh",
+    "xxhash": "zenoh",
+    "cyclonedds": "dds",
+    "cv2": "images",
+    "mcap": "bags",
+    "rosbags": "bags",
+}

@@ -1,0 +1,169 @@
+"""MCAP recordings (https://mcap.dev/spec), read with the ``mcap`` package."""
+
+from __future__ import annotations
+
+import heapq
+import logging
+from typing import TYPE_CHECKING, Any
+
+from mcap.exceptions import McapError
+from mcap.reader import NonSeekingReader, SeekingReader
+
+from rosglass.bags.bag import Bag, BagMessage, Channel
+from rosglass.bags.qos_text import read_profiles
+from rosglass.errors import BagError
+from rosglass.interfaces.names import join_name
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator
+    from pathlib import Path
+
+__all__ = ["McapBag"]
+
+_log = logging.getLogger("rosglass.bags")
+_WIRES = {"cdr": "cdr", "ros1": "ros1"}
+_LANGUAGES = {"ros2msg": "msg", "ros1msg": "msg", "ros2idl": "idl"}
+#: A file cut short is read from its start, and sorted by time over this many messages.
+_SORTED = 1000
+
+
+class McapBag(Bag):
+    """An MCAP file with ROS 1 or ROS 2 messages.
+
+    Topics in other encodings (JSON, Protobuf) are left out, and named in :attr:`problem`.
+
+    Raises:
+        BagError: It cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            self._file = path.open("rb")
+        except OSError as error:
+            raise BagError(f"{path} cannot be read: {error.strerror}") from error
+        self._known: dict[int, Channel] = {}
+        self._foreign: dict[str, str] = {}
+        try:
+            self._index()
+        except BaseException:
+            self._file.close()
+            raise
+        self.channels = tuple(sorted(self._known.values(), key=lambda c: (c.topic, c.type_name)))
+        if self._foreign:
+            told = ", ".join(f"{topic} ({what})" for topic, what in sorted(self._foreign.items()))
+            self._note(f"these topics are not ROS messages and are left out: {told}")
+
+    def messages(
+        self,
+        channels: Collection[Channel] | None = None,
+        start: int | None = None,
+        end: int | None = None,
+    ) -> Iterator[BagMessage]:
+        """Yield messages in order of time; see :meth:`Bag.messages`."""
+        wanted = {n: c for n, c in self._known.items() if channels is None or c in channels}
+        topics = {channel.topic for channel in wanted.values()}
+        if not topics:
+            return
+        if self._complete:
+            found = self._seek(topics, start, end)
+        else:
+            found = _by_time(self._scan())
+        for number, time, data in found:
+            late = end is not None and time >= end
+            if number in wanted and not late and (start is None or time >= start):
+                yield BagMessage(wanted[number], time, data)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def _index(self) -> None:
+        summary = None
+        try:
+            summary = SeekingReader(self._file).get_summary()
+        except (McapError, EOFError, ValueError, OverflowError) as error:
+            self._note(f"it was not closed properly ({error or 'its end is missing'})")
+        complete = summary is not None and summary.statistics is not None
+        self._complete = bool(complete and summary and summary.channels)
+        if summary is not None and summary.statistics is not None and self._complete:
+            counts = summary.statistics.channel_message_counts
+            for number, channel in summary.channels.items():
+                schema = summary.schemas.get(channel.schema_id)
+                self._add(number, channel, schema, counts.get(number, 0))
+            self.start = summary.statistics.message_start_time
+            self.end = summary.statistics.message_end_time
+            return
+        times = [time for _, time, _ in self._scan()]
+        self.start, self.end = min(times, default=0), max(times, default=0)
+        if not self._known and not self._foreign and not times and not self.problem:
+            self._note("it holds no messages")
+
+    def _seek(
+        self, topics: set[str], start: int | None, end: int | None
+    ) -> Iterator[tuple[int, int, bytes]]:
+        # A reader of its own for each pass: passes may overlap, and share the file.
+        with self.path.open("rb") as file:
+            try:
+                found = SeekingReader(file).iter_messages(topics, start, end)
+                for _, channel, message in found:
+                    yield channel.id, message.log_time, message.data
+            except (McapError, EOFError, ValueError) as error:
+                raise BagError(f"{self.path} is damaged: {error}") from error
+
+    def _scan(self) -> Iterator[tuple[int, int, bytes]]:
+        """Read from the start for as far as the file goes, learning channels on the way."""
+        with self.path.open("rb") as file:
+            try:
+                # Magic numbers and lengths are checked by the reader; a cut chunk ends it.
+                for schema, channel, message in NonSeekingReader(file).iter_messages(
+                    log_time_order=False
+                ):
+                    if channel.id not in self._known:
+                        self._add(channel.id, channel, schema, -1)
+                    yield channel.id, message.log_time, message.data
+            except (McapError, EOFError, ValueError, OverflowError) as error:
+                if not self._known and not self._foreign:
+                    raise BagError(
+                        f"{self.path} is no MCAP file, or damaged at its beginning: {error}"
+                    ) from error
+
+    def _add(self, number: int, channel: Any, schema: Any, count: int) -> None:
+        wire = _WIRES.get(channel.message_encoding)
+        language = "" if schema is None else _LANGUAGES.get(schema.encoding, "")
+        if wire is None or schema is None or (schema.encoding and not language):
+            what = channel.message_encoding or "no encoding"
+            if schema is not None and schema.encoding:
+                what += f" described by {schema.encoding}"
+            self._foreign[channel.topic] = what
+            return
+        self._known[number] = Channel(
+            channel.topic,
+            join_name(schema.name),
+            wire,
+            schema.data.decode("utf-8", "replace"),
+            language or "msg",
+            channel.metadata.get("topic_type_hash", ""),
+            read_profiles(channel.metadata.get("offered_qos_profiles", "")),
+            count,
+        )
+
+    def _note(self, problem: str) -> None:
+        self.problem = f"{self.problem}; {problem}" if self.problem else problem
+        _log.warning("%s: %s", self.path, problem)
+
+
+def _by_time(messages: Iterator[tuple[int, int, bytes]]) -> Iterator[tuple[int, int, bytes]]:
+    """Sort what is nearly sorted, without holding a whole file in memory."""
+    heap: list[tuple[int, int, int, bytes]] = []
+    for order, (number, time, data) in enumerate(messages):
+        heapq.heappush(heap, (time, order, number, data))
+        if len(heap) > _SORTED:
+            yield _unwrap(heapq.heappop(heap))
+    while heap:
+        yield _unwrap(heapq.heappop(heap))
+
+
+def _unwrap(entry: tuple[int, int, int, bytes]) -> tuple[int, int, bytes]:
+    time, _, number, data = entry
+    return number, time, data

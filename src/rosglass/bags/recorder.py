@@ -1,0 +1,301 @@
+"""Recording topics into an MCAP file."""
+
+from __future__ import annotations
+
+import logging
+import re
+import threading
+import time
+from collections import deque
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mcap.writer import CompressionType, Writer
+
+import rosglass
+from rosglass.bags.qos_text import write_profiles
+from rosglass.comm import IMMEDIATE, Handle, QoS
+from rosglass.errors import BagError, Error, NodeClosedError
+from rosglass.interfaces import full_text
+from rosglass.messages import OpaqueType
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterable
+
+    from rosglass.comm import Node, Sample, Subscription
+    from rosglass.messages import MessageType
+
+__all__ = ["COMPRESSIONS", "Recorder", "RecordingStatus"]
+
+_log = logging.getLogger("rosglass.bags")
+COMPRESSIONS = {
+    "none": CompressionType.NONE,
+    "lz4": CompressionType.LZ4,
+    "zstd": CompressionType.ZSTD,
+}
+#: Seconds of recording that a power failure may cost.
+_FLUSH = 1.0
+#: Samples that a subscription keeps while the writer is busy.
+_DEPTH = 1000
+#: Seconds that closing waits for what was received to be written.
+_PATIENCE = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingStatus:
+    """How a recording is doing.
+
+    Attributes:
+        topics: Messages written, by topic.
+        dropped: Messages that came faster than they could be written.
+        size: Bytes in the file so far.
+        duration: Seconds since the start.
+        problems: What keeps topics from being recorded, in words, by topic.
+    """
+
+    topics: dict[str, int]
+    dropped: int
+    size: int
+    duration: float
+    problems: dict[str, str]
+
+    @property
+    def messages(self) -> int:
+        """Messages written in all."""
+        return sum(self.topics.values())
+
+
+class Recorder(Handle):
+    """Writes topics into an MCAP file, each as its publishers offer it, until it is closed.
+
+    Messages are stored as received, with the definitions of their types, so that the file can be
+    played anywhere; types that nobody can describe are stored by name and hash. What the file
+    holds is complete up to a second before a crash.
+
+    Args:
+        node: Where to listen.
+        path: File to write; it must not exist.
+        topics: Names of topics, absolute or relative; empty for all that there are and that
+            appear later, hidden ones excepted.
+        include: Regular expression; topics whose whole name matches are recorded as well.
+        exclude: Regular expression; topics whose whole name matches are never recorded.
+        hidden: Whether hidden topics (of actions, say) are among "all".
+        compression: ``zstd``, ``lz4`` or ``none``.
+        memory: Bytes of messages that may wait for the disk; what comes beyond is dropped,
+            counted and logged.
+
+    Raises:
+        BagError: The file cannot be written, or an argument makes no sense.
+        InvalidNameError: A topic's name breaks ROS's rules.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        path: str | os.PathLike[str],
+        topics: Iterable[str] = (),
+        *,
+        include: str = "",
+        exclude: str = "",
+        hidden: bool = False,
+        compression: str = "zstd",
+        memory: int = 256 * 2**20,
+    ) -> None:
+        if node.wire != "cdr":
+            raise BagError(f"only ROS 2 topics can be recorded, and {node.url} is none of its URLs")
+        if isinstance(topics, str):
+            raise BagError(f"topics are given as a list, e.g. [{topics!r}]")
+        if compression not in COMPRESSIONS:
+            raise BagError(f"compression {compression!r} is unknown: {', '.join(COMPRESSIONS)}")
+        self.path = Path(path)
+        self._node, self._memory, self._hidden = node, memory, hidden
+        self._topics = frozenset(node.resolve(topic) for topic in topics)
+        self._include = _expression(include, "include")
+        self._exclude = _expression(exclude, "exclude")
+        self._lock = threading.Condition()
+        self._queue: deque[tuple[str, Sample]] = deque()
+        self._waiting = self._dropped = self._size = 0
+        self._lost: dict[str, int] = {}
+        self._failure = ""
+        self._started = time.monotonic()
+        self._subscriptions: dict[str, Subscription] = {}
+        self._failed: dict[str, str] = {}
+        self._counts: dict[str, int] = {}
+        self._channels: dict[tuple[str, str, str], int] = {}
+        self._closed = False
+        try:
+            self._file = self.path.open("xb")
+        except OSError as error:
+            hint = "choose another name" if isinstance(error, FileExistsError) else "see the path"
+            raise BagError(f"{self.path} cannot be written: {error.strerror}; {hint}") from error
+        self._writer: Any = Writer(self._file, compression=COMPRESSIONS[compression])
+        self._writer.start(profile="ros2", library=f"rosglass {rosglass.__version__}")
+        self._thread = threading.Thread(target=self._work, name="recorder", daemon=True)
+        self._thread.start()
+        self._graph = node.on_graph_change(self._follow)
+        self._follow()
+
+    def status(self) -> RecordingStatus:
+        """Return counts as of now.
+
+        Raises:
+            BagError: The disk is full, or the file cannot be written for another reason; nothing
+                more is recorded.
+        """
+        if self._failure:
+            raise BagError(self._failure)
+        with self._lock:
+            problems = dict(self._failed)
+            for topic, subscription in self._subscriptions.items():
+                if subscription.problem:
+                    problems[topic] = subscription.problem
+            for topic in sorted(self._topics - self._subscriptions.keys() - problems.keys()):
+                problems[topic] = "nobody publishes it"
+            counts = {topic: self._counts.get(topic, 0) for topic in sorted(self._subscriptions)}
+            duration = time.monotonic() - self._started
+            return RecordingStatus(counts, self._dropped, self._size, duration, problems)
+
+    def close(self) -> None:
+        """Stop, write what was received, and complete the file; safe to call twice.
+
+        Raises:
+            BagError: The file could not be completed.
+        """
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+            subscriptions = list(self._subscriptions.values())
+        self._graph.close()
+        for subscription in subscriptions:
+            subscription.close()
+        with self._lock:
+            self._lock.notify_all()
+        self._thread.join(_PATIENCE)
+        if self._thread.is_alive():
+            raise BagError(f"{self.path} is cut short: the disk does not take it")
+        if self._failure:
+            raise BagError(self._failure)
+
+    def _follow(self) -> None:
+        try:
+            found = self._node.topics()
+        except NodeClosedError:
+            return
+        for topic in sorted(found):
+            if topic not in self._subscriptions and self._wants(topic):
+                self._subscribe(topic)
+
+    def _wants(self, topic: str) -> bool:
+        if self._exclude is not None and self._exclude.fullmatch(topic):
+            return False
+        if topic in self._topics:
+            return bool(self._node.publishers(topic))
+        if self._include is not None:
+            chosen = bool(self._include.fullmatch(topic))
+        else:
+            hidden = any(part.startswith("_") for part in topic.split("/"))
+            chosen = not self._topics and (self._hidden or not hidden)
+        return chosen and bool(self._node.publishers(topic))
+
+    def _subscribe(self, topic: str) -> None:
+        with self._lock:
+            if self._closed:
+                return
+        try:
+            subscription = self._node.create_subscription(
+                topic,
+                qos=QoS.best_available(_DEPTH),
+                raw_callback=lambda sample: self._receive(topic, sample),
+                executor=IMMEDIATE,
+            )
+        except Error as error:
+            if topic not in self._failed:
+                _log.warning("%s is not recorded: %s", topic, error)
+            self._failed[topic] = str(error)
+            return
+        with self._lock:
+            self._failed.pop(topic, None)
+            self._subscriptions[topic] = subscription
+            closed = self._closed
+        if closed:
+            subscription.close()
+
+    def _receive(self, topic: str, sample: Sample) -> None:
+        size = len(sample.data)
+        with self._lock:
+            if self._failure:
+                return
+            if self._waiting + size > self._memory and self._queue:
+                self._dropped += 1
+                self._lost[topic] = self._lost.get(topic, 0) + 1
+                return
+            self._waiting += size
+            self._queue.append((topic, sample))
+            self._lock.notify_all()
+
+    def _work(self) -> None:
+        flushed = time.monotonic()
+        try:
+            while True:
+                with self._lock:
+                    self._lock.wait_for(lambda: self._queue or self._closed, _FLUSH)
+                    batch, closed = list(self._queue), self._closed
+                    self._queue.clear()
+                    self._waiting = 0
+                    lost, self._lost = self._lost, {}
+                for topic, sample in batch:
+                    self._write(topic, sample)
+                if lost:
+                    told = ", ".join(f"{count} of {topic}" for topic, count in lost.items())
+                    _log.warning("%s: too much for the disk, lost %s", self.path, told)
+                if time.monotonic() - flushed > _FLUSH:
+                    self._writer.flush()
+                    flushed = time.monotonic()
+                self._size = self._file.tell()
+                if closed and not batch:
+                    break
+            self._writer.finish()
+        except Exception as error:
+            reason = getattr(error, "strerror", None) or error
+            self._failure = f"{self.path} cannot be written: {reason}; nothing more is recorded"
+            _log.exception("%s cannot be written", self.path)
+        finally:
+            self._file.close()
+
+    def _write(self, topic: str, sample: Sample) -> None:
+        key = (topic, sample.type.name, sample.type.rihs01)
+        channel = self._channels.get(key)
+        if channel is None:
+            channel = self._channels[key] = self._register(topic, sample.type)
+        received = sample.received.nanoseconds
+        self._writer.add_message(
+            channel,
+            log_time=received,
+            data=bytes(sample.data),
+            publish_time=received if sample.sent is None else sample.sent.nanoseconds,
+            sequence=max(0, sample.sequence) & 0xFFFFFFFF,
+        )
+        self._counts[topic] = self._counts.get(topic, 0) + 1
+
+    def _register(self, topic: str, found: MessageType) -> int:
+        if isinstance(found, OpaqueType):
+            schema = self._writer.register_schema(found.name, "", b"")
+        else:
+            text = full_text(found.definition).encode()
+            schema = self._writer.register_schema(found.name, "ros2msg", text)
+        profiles = [endpoint.qos for endpoint in self._node.publishers(topic)]
+        metadata: dict[str, Any] = {
+            "offered_qos_profiles": write_profiles(dict.fromkeys(profiles)),
+            "topic_type_hash": found.rihs01,
+        }
+        return int(self._writer.register_channel(topic, "cdr", schema, metadata))
+
+
+def _expression(text: str, what: str) -> re.Pattern[str] | None:
+    try:
+        return re.compile(text) if text else None
+    except re.error as error:
+        raise BagError(f"{what} {text!r} is no regular expression: {error}") from error

@@ -1,0 +1,110 @@
+"""ROS 2 bags (SQLite, MCAP) and ROS 1 bags, read with the ``rosbags`` package."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from rosbags.highlevel import AnyReader, AnyReaderError
+from rosbags.rosbag1 import ReaderError as Reader1Error
+from rosbags.rosbag2 import ReaderError as Reader2Error
+
+from rosglass.bags.bag import Bag, BagMessage, Channel
+from rosglass.bags.qos_text import profile
+from rosglass.comm import QoS
+from rosglass.errors import BagError
+from rosglass.interfaces.names import join_name
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator
+    from pathlib import Path
+
+__all__ = ["RosbagsBag"]
+
+_ERRORS = (AnyReaderError, Reader1Error, Reader2Error, OSError, ValueError, KeyError)
+
+
+class RosbagsBag(Bag):
+    """A ROS 2 bag's folder or file, or a ROS 1 ``.bag`` file.
+
+    Raises:
+        BagError: It cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            self._reader: Any = AnyReader([path])
+            self._reader.open()
+        except _ERRORS as error:
+            raise BagError(
+                f"{path} cannot be read as a recording: {error}; there are MCAP files (.mcap), "
+                "ROS 2 bags (a folder with metadata.yaml, .db3) and ROS 1 bags (.bag)"
+            ) from error
+        self._open = True
+        wire = "cdr" if self._reader.is2 else "ros1"
+        grouped: dict[Channel, list[Any]] = {}
+        for connection in self._reader.connections:
+            grouped.setdefault(_channel(connection, wire), []).append(connection)
+        self._connections: dict[Channel, list[Any]] = {}
+        for channel, connections in grouped.items():
+            counted = replace(channel, count=sum(c.msgcount for c in connections))
+            self._connections[counted] = connections
+        self.channels = tuple(sorted(self._connections, key=lambda c: (c.topic, c.type_name)))
+        self.start, self.end = self._reader.start_time, self._reader.end_time
+        if not any(channel.count for channel in self.channels):
+            self.start = self.end = 0
+
+    def messages(
+        self,
+        channels: Collection[Channel] | None = None,
+        start: int | None = None,
+        end: int | None = None,
+    ) -> Iterator[BagMessage]:
+        """Yield messages in order of time; see :meth:`Bag.messages`."""
+        owner = {
+            (c.id, id(c.owner)): channel
+            for channel, connections in self._connections.items()
+            if channels is None or channel in channels
+            for c in connections
+        }
+        wanted = [c for c in self._reader.connections if (c.id, id(c.owner)) in owner]
+        if not wanted:
+            return
+        try:
+            for connection, time, data in self._reader.messages(wanted, start, end):
+                yield BagMessage(owner[connection.id, id(connection.owner)], time, bytes(data))
+        except _ERRORS as error:
+            raise BagError(f"{self.path} is damaged: {error}") from error
+
+    def close(self) -> None:
+        """Close the files."""
+        if self._open:
+            self._open = False
+            self._reader.close()
+
+
+def _channel(connection: Any, wire: str) -> Channel:
+    extra = connection.ext
+    offered: tuple[QoS, ...] = ()
+    if wire == "ros1":
+        offered = (QoS.latched(),) if extra.latching else ()
+    else:
+        offered = tuple(_profile(qos) for qos in extra.offered_qos_profiles)
+    return Channel(
+        connection.topic,
+        join_name(connection.msgtype),
+        wire,
+        connection.msgdef.data,
+        "idl" if connection.msgdef.format.name == "IDL" else "msg",
+        connection.digest if connection.digest.startswith("RIHS") else "",
+        offered,
+    )
+
+
+def _profile(qos: Any) -> QoS:
+    parts = {
+        key: value._asdict() if hasattr(value, "_asdict") else getattr(value, "name", value)
+        for key, value in qos._asdict().items()
+    }
+    return profile({k: v.lower() if isinstance(v, str) else v for k, v in parts.items()})

@@ -1,0 +1,206 @@
+"""``rosglass play``: publish what a recording holds."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import select
+import signal
+import sys
+import threading
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rosglass.cli.connecting import add_connection_options, connect, seconds
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from rosglass.bags import Bag, Player
+
+__all__ = ["configure", "run"]
+
+_KEYS = (
+    "space pauses, s sends one message, left and right jump 10 s, + and - change the rate, q ends"
+)
+#: What a terminal sends for keys, in order of looking.
+_JUMPS = {"\033[D": -10.0, "\033[C": 10.0}
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's options."""
+    parser.add_argument("file", metavar="FILE", type=Path, help="MCAP file, ROS 2 bag or ROS 1 bag")
+    parser.add_argument(
+        "--list", action="store_true", help="show what the recording holds, and end"
+    )
+    parser.add_argument("--json", action="store_true", help="with --list: as JSON")
+    parser.add_argument(
+        "-r", "--rate", type=float, default=1.0, help="2 is twice as fast (default: %(default)g)"
+    )
+    parser.add_argument("-l", "--loop", action="store_true", help="begin again at the end")
+    parser.add_argument(
+        "--clock",
+        nargs="?",
+        type=float,
+        const=40.0,
+        default=0.0,
+        metavar="HZ",
+        help="publish /clock, so that nodes with use_sim_time follow (40 Hz unless told)",
+    )
+    parser.add_argument(
+        "-t", "--topics", nargs="+", default=[], metavar="TOPIC", help="play only these"
+    )
+    parser.add_argument(
+        "-x", "--exclude", default="", metavar="REGEX", help="leave out topics that match"
+    )
+    parser.add_argument(
+        "-m",
+        "--remap",
+        nargs="+",
+        default=[],
+        type=_rule,
+        metavar="OLD:=NEW",
+        help="publish a topic under another name",
+    )
+    parser.add_argument(
+        "--start", type=seconds, default=0.0, metavar="SECONDS", help="begin so far in"
+    )
+    parser.add_argument("--duration", type=seconds, metavar="SECONDS", help="play only so long")
+    parser.add_argument(
+        "--delay",
+        type=seconds,
+        default=1.0,
+        metavar="SECONDS",
+        help="time for subscriptions to be linked before the first message (default: %(default)g)",
+    )
+    parser.add_argument("-p", "--paused", action="store_true", help="begin paused")
+    add_connection_options(parser)
+    parser.epilog = f"Keys while it plays: {_KEYS}."
+
+
+def run(args: argparse.Namespace) -> int:
+    """Play until the end, Ctrl-C or SIGTERM."""
+    from rosglass.bags import Player, open_bag
+
+    with open_bag(args.file) as bag:
+        if args.list:
+            print(json.dumps(_table(bag), indent=2) if args.json else _listing(bag))
+            return 0
+        end = threading.Event()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda *_: end.set())
+        with (
+            connect(args, "play", args.arguments) as node,
+            Player(
+                node,
+                bag,
+                topics=args.topics,
+                exclude=args.exclude,
+                remap=dict(args.remap),
+                rate=args.rate,
+                loop=args.loop,
+                clock=args.clock,
+                start=args.start,
+                duration=args.duration,
+                delay=args.delay,
+                paused=args.paused,
+            ) as player,
+        ):
+            topics = len({channel.topic for channel in player.channels})
+            print(f"playing {topics} topics of {args.file} ({bag.duration:.1f} s) to {node.url}")
+            _watch(player, bag, end)
+            status = player.status()
+            print(f"{status.sent} messages sent")
+            for topic, problem in player.problems.items():
+                print(f"rosglass: {topic or args.file}: {problem}", file=sys.stderr)
+            return 0 if status.sent else 1
+
+
+def _watch(player: Player, bag: Bag, end: threading.Event) -> None:
+    interactive = sys.stdin.isatty() and sys.stdout.isatty()
+    if interactive:
+        print(_KEYS)
+    with _keys() if interactive else contextlib.nullcontext():
+        while not end.is_set() and not player.wait(0.0 if interactive else 0.2):
+            if not interactive:
+                continue
+            if select.select([sys.stdin], [], [], 0.2)[0] and not _obey(player, bag):
+                break
+            status = player.status()
+            lag = f", {status.lag:.1f} s behind" if status.lag > 0.5 else ""
+            print(
+                f"\r\033[K{status.state.value} {status.position:.1f} of {bag.duration:.1f} s, "
+                f"rate {status.rate:g}, {status.sent} messages{lag}",
+                end="",
+                flush=True,
+            )
+    if interactive:
+        print()
+
+
+def _obey(player: Player, bag: Bag) -> bool:
+    """Do what the keys say; returns False for the end."""
+    import os
+
+    typed = os.read(sys.stdin.fileno(), 16).decode(errors="replace")
+    if typed in _JUMPS:
+        player.seek(min(max(player.position + _JUMPS[typed], 0.0), bag.duration))
+    for key in "" if typed.startswith("\033") else typed:
+        if key == " ":
+            (player.resume if player.is_paused else player.pause)()
+        elif key == "s":
+            player.step()
+        elif key in "+-":
+            factor = 1.25 if key == "+" else 0.8
+            player.set_rate(min(max(player.status().rate * factor, 0.01), 100.0))
+        elif key == "q":
+            return False
+    return True
+
+
+@contextlib.contextmanager
+def _keys() -> Iterator[None]:
+    """Read keys one by one; Ctrl-C still ends the program."""
+    import termios
+    import tty
+
+    before = termios.tcgetattr(sys.stdin)
+    tty.setcbreak(sys.stdin)
+    try:
+        yield
+    finally:
+        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
+
+
+def _rule(text: str) -> tuple[str, str]:
+    old, separator, new = text.partition(":=")
+    if not (separator and old and new):
+        raise argparse.ArgumentTypeError(f"{text!r} is not of the form /old:=/new")
+    return old, new
+
+
+def _table(bag: Bag) -> dict[str, Any]:
+    return {
+        "file": str(bag.path),
+        "start": bag.start / 1e9,
+        "end": bag.end / 1e9,
+        "duration": bag.duration,
+        "problem": bag.problem,
+        "topics": [
+            {"topic": c.topic, "type": c.type_name, "wire": c.wire, "messages": c.count}
+            for c in bag.channels
+        ],
+    }
+
+
+def _listing(bag: Bag) -> str:
+    began = datetime.fromtimestamp(bag.start / 1e9).astimezone()
+    lines = [f"{bag.path}: {bag.duration:.1f} s from {began:%Y-%m-%d %H:%M:%S %Z}"]
+    if bag.problem:
+        lines.append(f"  {bag.problem}")
+    lines += [
+        f"  {'?' if c.count < 0 else c.count:>8} {c.topic} [{c.type_name}]" for c in bag.channels
+    ]
+    return "\n".join(lines)
