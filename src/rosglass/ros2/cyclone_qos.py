@@ -48,6 +48,10 @@ class Qos:
         """Keep the newest `depth` samples, or all with None."""
         library().dds_qset_history(self.address, int(depth is None), depth or 0)
 
+    def wait_at_most(self, seconds: float) -> None:
+        """Let a reliable writer wait no longer than so for readers that take nothing."""
+        library().dds_qset_reliability(self.address, 1, round(seconds * 1e9))
+
     def limit(self, samples: int) -> None:
         """Hold at most so many samples; more are refused until some are taken."""
         library().dds_qset_resource_limits(self.address, samples, _UNLIMITED, _UNLIMITED)

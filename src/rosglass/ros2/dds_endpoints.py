@@ -5,9 +5,9 @@ from __future__ import annotations
 import threading
 import time
 from contextlib import suppress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import History
+from rosglass.comm import History, Reliability
 from rosglass.errors import NodeClosedError
 from rosglass.ros2 import cyclone, cyclone_builtin
 from rosglass.ros2.cyclone_listener import (
@@ -15,6 +15,7 @@ from rosglass.ros2.cyclone_listener import (
     liveliness_changed,
     sample_lost,
     set_events,
+    subscription_matched,
 )
 from rosglass.ros2.cyclone_qos import qos_of
 from rosglass.ros2.cyclone_samples import Batch, discard, payload, write
@@ -43,8 +44,8 @@ _SOON = 0.001
 #: Writers that a reader remembers; more come only from a robot that restarts for days.
 _MAX_WRITERS = 1024
 
-#: Payload, time stamp of the writer, handle of the writer, address that its serdata had.
-Taken = tuple["bytes | memoryview", int, int, int]
+#: Payload, time stamp of the writer, handle of the writer, what the reader's `describe` said.
+Taken = tuple["bytes | memoryview", int, int, Any]
 
 
 def topic_name(name: str) -> str:
@@ -62,6 +63,8 @@ class SampleWriter:
         qos: Its profile.
         user_data: What everyone sees who discovers it.
         place: What it is for, in errors.
+        make_topic: Creates the topic, instead of :func:`cyclone.create_topic`.
+        patience: Seconds that a write may wait for reliable readers, None for ever.
 
     Attributes:
         entity: Cyclone's number for it.
@@ -79,13 +82,17 @@ class SampleWriter:
         qos: QoS,
         user_data: bytes,
         place: str,
+        make_topic: Callable[[int, str, str], int] = cyclone.create_topic,
+        patience: float | None = None,
     ) -> None:
         self._place = place
         self._lock = threading.Lock()
         self._closed = False
-        self._topic = cyclone.create_topic(participant.entity, topic, dds_type)
+        self._topic = make_topic(participant.entity, topic, dds_type)
         try:
             policies = qos_of(qos, writer=True, user_data=user_data)
+            if patience is not None and qos.reliability is Reliability.RELIABLE:
+                policies.wait_at_most(patience)
             self.entity = cyclone.create_writer(
                 participant.entity, self._topic, policies, None, place
             )
@@ -129,7 +136,9 @@ class SampleReader:
         user_data: What everyone sees who discovers it.
         place: What it is for, in errors.
         on_taken: Takes the samples, some at a time and in order, and must return at once.
-        prepare: Called with the reader's number before samples are taken.
+        make_topic: Creates the topic, instead of :func:`cyclone.create_topic`.
+        describe: Returns what to tell besides of the sample in a serdata (its address).
+        on_matched: Called, on the pump's thread, when writers came or went.
 
     Attributes:
         entity: Cyclone's number for it.
@@ -148,9 +157,12 @@ class SampleReader:
         user_data: bytes,
         place: str,
         on_taken: Callable[[list[Taken]], None],
-        prepare: Callable[[int], None] | None = None,
+        make_topic: Callable[[int, str, str], int] = cyclone.create_topic,
+        describe: Callable[[int], Any] | None = None,
+        on_matched: Callable[[], None] | None = None,
     ) -> None:
         self._participant, self._place, self._on_taken = participant, place, on_taken
+        self._describe, self._on_matched = describe, on_matched
         self._closed = False
         self._eager = True
         self._lost = 0
@@ -161,15 +173,16 @@ class SampleReader:
             policies.limit(_MAX_KEPT)
         else:
             policies.set_history(max(qos.depth, _MIN_DEPTH))
-        self._topic = cyclone.create_topic(participant.entity, topic, dds_type)
+        self._topic = make_topic(participant.entity, topic, dds_type)
         try:
             self.entity = cyclone.create_reader(
                 participant.entity, self._topic, policies, None, place
             )
-            if prepare is not None:
-                prepare(self.entity)
             self.guid = cyclone.guid(self.entity)
-            participant.pump.watch(self.entity, Event.DATA_AVAILABLE, self._serve)
+            events = Event.DATA_AVAILABLE
+            if on_matched is not None:
+                events |= Event.SUBSCRIPTION_MATCHED
+            participant.pump.watch(self.entity, events, self._serve)
         except BaseException:
             cyclone.delete(self._topic)
             raise
@@ -213,6 +226,10 @@ class SampleReader:
         cyclone.delete(self._topic)
 
     def _serve(self) -> bool:
+        if self._on_matched is not None:
+            with suppress(NodeClosedError):
+                if subscription_matched(self.entity).change:
+                    self._on_matched()
         if not self._busy.acquire(timeout=_SOON):
             return True
         try:
@@ -238,9 +255,12 @@ class SampleReader:
         except NodeClosedError:
             return []
         taken: list[Taken] = []
+        describe = self._describe
         for serdata, (valid, sent, writer) in found:
             if valid:
-                taken.append((payload(serdata), sent, writer, serdata))
+                # While the address is still this sample's.
+                told = None if describe is None else describe(serdata)
+                taken.append((payload(serdata), sent, writer, told))
             else:
                 discard(serdata)
         return taken
