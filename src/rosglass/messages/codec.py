@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from rosglass.errors import ConversionError, DecodeError
@@ -39,14 +40,16 @@ class Codec:
         wire: The wire.
         cls: The class of plain messages.
         stride: (stride, size) of its elements in arrays if constant, otherwise None.
+        plain: The codec of the same wire in bytes; itself unless it is of views.
     """
 
     def __init__(self, schema: Schema, wire: Wire) -> None:
         self.schema, self.wire = schema, wire
         self.cls = plain_class(schema)
         self.stride = layout.constant_stride(schema, wire)
+        self.plain = codec_of(schema, replace(wire, view=False)) if wire.view else self
         self._made: dict[object, Any] = {}
-        self._read_many: Callable[[bytes, int, int], tuple[Any, int]] | None = None
+        self._read_many: Callable[[Any, int, int], tuple[Any, int]] | None = None
 
     def of(self, schema: Schema) -> Codec:
         """Return the codec of another schema on the same wire."""
@@ -136,7 +139,7 @@ class Codec:
         )
         return found
 
-    def reader_of_many(self, known: Knowledge) -> Callable[[bytes, int, int], tuple[Any, int]]:
+    def reader_of_many(self, known: Knowledge) -> Callable[[Any, int, int], tuple[Any, int]]:
         """Return ``read(buffer, offset, count) -> (list, end)`` for what is known of the offset."""
         return self.made(("many", known), lambda: self._many(known))  # type: ignore[no-any-return]
 
@@ -147,7 +150,7 @@ class Codec:
         source.line("return out, o")
         return source.compile("read_list(b, o, count)", self._title("list"))
 
-    def read_many(self, buffer: bytes, offset: int, count: int) -> list[Message]:
+    def read_many(self, buffer: bytes | memoryview, offset: int, count: int) -> list[Message]:
         """Decode `count` elements from `offset` on."""
         read = self._read_many
         if read is None:
@@ -160,19 +163,21 @@ class Codec:
             self._explain_many(buffer, offset, count, error)
         return items  # type: ignore[no-any-return]
 
-    def _explain_many(self, buffer: bytes, offset: int, count: int, error: Exception) -> NoReturn:
+    def _explain_many(
+        self, buffer: bytes | memoryview, offset: int, count: int, error: Exception
+    ) -> NoReturn:
         for _ in range(count):
             offset = diagnosis.Walk(self.schema, self.wire, buffer, offset).run()
         raise DecodeError(self.schema.name, f"{type(error).__name__}: {error}") from None
 
-    def element(self, buffer: bytes, offset: int) -> Message:
+    def element(self, buffer: bytes | memoryview, offset: int) -> Message:
         """Return the shell of an element."""
         message = self.shell()
         message._buffer__ = buffer
         message._offset__ = offset
         return message
 
-    def skip(self, buffer: bytes, offset: int) -> int:
+    def skip(self, buffer: bytes | memoryview, offset: int) -> int:
         """Return the offset after the message at `offset`."""
         skipper = self.made("skip", self._skip)
         try:
@@ -191,7 +196,7 @@ class Codec:
 
     # -- whole messages --------------------------------------------------------------------------
 
-    def decode_all(self, buffer: bytes) -> Message:
+    def decode_all(self, buffer: bytes | memoryview) -> Message:
         """Decode everything at once."""
         eager = self.made("eager", self._eager)
         try:
@@ -208,7 +213,7 @@ class Codec:
         source.line("return m")
         return source.compile("decode(b)", self._title("decode"))
 
-    def end(self, buffer: bytes) -> int:
+    def end(self, buffer: bytes | memoryview) -> int:
         """Return the offset after the last field, having checked every length on the way."""
         scan = self.made("scan", self._scan)
         try:
@@ -256,6 +261,6 @@ class Codec:
             lambda: write_function(self, from_dict, joined, None),
         )
 
-    def explain(self, buffer: bytes, error: Exception) -> DecodeError:
+    def explain(self, buffer: bytes | memoryview, error: Exception) -> DecodeError:
         """Return the error to raise for a whole message that generated code failed on."""
         return diagnosis.explain(self.schema, self.wire, buffer, self.wire.origin, error)

@@ -42,7 +42,7 @@ class Walk:
         offset: Where in the buffer the walk has got to.
     """
 
-    def __init__(self, schema: Schema, wire: Wire, buffer: bytes, offset: int) -> None:
+    def __init__(self, schema: Schema, wire: Wire, buffer: bytes | memoryview, offset: int) -> None:
         self.schema, self.wire, self.buffer, self.offset = schema, wire, buffer, offset
 
     def run(self) -> int:
@@ -112,7 +112,7 @@ class Walk:
             if member.wide and width == 4:
                 try:
                     order = "be" if self.wire.big else "le"
-                    self.buffer[start : self.offset].decode(f"utf-32-{order}", "surrogatepass")
+                    str(self.buffer[start : self.offset], f"utf-32-{order}", "surrogatepass")
                 except UnicodeDecodeError as error:
                     self.offset = start + error.start
                     self._fail(path, "a wstring holds a unit beyond U+10FFFF")
@@ -122,7 +122,7 @@ class Walk:
 
 
 def explain(
-    schema: Schema, wire: Wire, buffer: bytes, offset: int, error: Exception
+    schema: Schema, wire: Wire, buffer: bytes | memoryview, offset: int, error: Exception
 ) -> DecodeError:
     """Return the error to raise for a buffer that generated code failed on."""
     if isinstance(error, DecodeError):
@@ -136,7 +136,7 @@ def explain(
     return DecodeError(schema.name, f"{type(error).__name__}: {error}")
 
 
-def encapsulation_error(type_name: str, buffer: bytes) -> DecodeError:
+def encapsulation_error(type_name: str, buffer: bytes | memoryview) -> DecodeError:
     """Return the error for a CDR header that is missing or names another representation."""
     if len(buffer) < 4:
         return DecodeError(

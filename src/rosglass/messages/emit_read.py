@@ -23,8 +23,6 @@ INLINE_LEAVES = 16
 #: Arrays of up to this many messages of varying size are decoded with the fields around them.
 _FEW = 8
 
-_DECODE = '.decode("utf-8", "surrogateescape")'
-
 
 class Reader(Skipper):
     """Emits the decoding of a buffer called ``b``."""
@@ -106,16 +104,22 @@ class Reader(Skipper):
         elif self.wire.aligned:
             last = self._other_var(var)
             line(f"{last} = {self.cursor.at(-1)} + n")
-            line(f"{target} = b[{start}:{last}]{_DECODE}")
+            line(f"{target} = {self._decoded(f'b[{start}:{last}]')}")
             # The look at the last byte is the bounds check, too. Some writers send no NUL.
-            line(f"if b[{last}]: {target} = b[{start}:{last} + 1]{_DECODE}")
+            whole = self._decoded(f"b[{start}:{last} + 1]")
+            line(f"if b[{last}]: {target} = {whole}")
             self.cursor.move(last, known, 1)
         else:
             last = self._other_var(var)
             line(f"{last} = {start} + n")
-            line(f"{target} = b[{start}:{last}]{_DECODE}")
+            line(f"{target} = {self._decoded(f'b[{start}:{last}]')}")
             self.cursor.move(last, known)
         self.unproved = not self.wire.aligned
+
+    def _decoded(self, part: str) -> str:
+        """Return the expression for the text in a part of the buffer."""
+        how = '"utf-8", "surrogateescape"'
+        return f"str({part}, {how})" if self.wire.view else f"{part}.decode({how})"
 
     def _other_var(self, var: str) -> str:
         """Return the other of the two locals that take turns in holding the offset."""

@@ -29,11 +29,14 @@ class Wire:
         name: ``cdr`` or ``ros1``.
         big: Whether numbers are big endian.
         wide: Bytes for each character of a ``wstring``: 2 (Fast CDR 2 and later) or 4 (before).
+        view: Whether the bytes are in a memoryview, whose slices cannot be decoded as those of
+            bytes can, and more quickly.
     """
 
     name: str
     big: bool = False
     wide: int = 2
+    view: bool = False
 
     @property
     def aligned(self) -> bool:
@@ -53,7 +56,7 @@ class Wire:
     @property
     def title(self) -> str:
         """Its name for people."""
-        return f"{self.name} big endian" if self.big else self.name
+        return f"{self.name}{' big endian' * self.big}{' view' * self.view}"
 
 
 def align_of(member: Member, wire: Wire) -> int:

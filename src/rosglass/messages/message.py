@@ -50,8 +50,8 @@ class Message:
 
     __slots__ = ("_buffer__", "_offset__")
     __hash__ = None  # type: ignore[assignment]
-    #: The bytes of a shell; unset in plain objects.
-    _buffer__: bytes
+    #: The bytes of a shell; unset in plain objects. A view keeps what it is of alive.
+    _buffer__: bytes | memoryview
     #: Where in the bytes the shell of a nested message starts.
     _offset__: int
     _schema__: ClassVar[Schema]

@@ -63,15 +63,15 @@ def hint(name: Any, known: Sequence[str]) -> str:
     return f"did you mean {near[0]!r}?" if near else f"it has: {', '.join(known) or 'no fields'}"
 
 
-def read_wide(buffer: bytes, start: int, end: int, width: int, big: bool) -> str:
+def read_wide(buffer: bytes | memoryview, start: int, end: int, width: int, big: bool) -> str:
     """Decode the code units of a ``wstring``: UTF-16, or one unit in 4 bytes (Fast CDR 1)."""
     raw = buffer[start:end]
     if len(raw) < end - start:
         too_short()
     order = "be" if big else "le"
     if width == 2:
-        return raw.decode(f"utf-16-{order}", "surrogatepass")
-    text = raw.decode(f"utf-32-{order}", "surrogatepass")
+        return str(raw, f"utf-16-{order}", "surrogatepass")
+    text = str(raw, f"utf-32-{order}", "surrogatepass")
     # Units beyond the BMP arrive as surrogate pairs, each in 4 bytes.
     return text.encode("utf-16-le", "surrogatepass").decode("utf-16-le", "surrogatepass")
 

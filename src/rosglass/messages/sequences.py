@@ -34,7 +34,7 @@ class MessageSequence(MutableSequence["Message"]):
     _codec: ClassVar[Codec]
     #: The elements; before that, those asked for by their index, or None.
     _items: list[Message] | dict[int, Message] | None
-    _buffer: bytes
+    _buffer: bytes | memoryview
     _start: int
     _count: int
 

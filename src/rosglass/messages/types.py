@@ -26,10 +26,11 @@ if TYPE_CHECKING:
 __all__ = ["Constants", "MessageType", "portable"]
 
 _WIRES = {
-    (name, big, wide): Wire(name, big, wide)
+    (name, big, wide, view): Wire(name, big, wide, view)
     for name in ("cdr", "ros1")
     for big in (False, True)
     for wide in (2, 4)
+    for view in (False, True)
     if not (name == "ros1" and big)
 }
 _ORDERS = {"little": False, "big": True}
@@ -177,8 +178,10 @@ class MessageType:
         """Return the message in `buffer`; fields are decoded when they are read.
 
         Args:
-            buffer: The bytes as received, for CDR with the encapsulation header. ``bytes`` are
-                kept, not copied; anything else with bytes in it is copied first.
+            buffer: The bytes as received, for CDR with the encapsulation header. ``bytes`` and
+                read-only memoryviews of bytes are kept, not copied: what a view is of stays alive,
+                and must stay unchanged, as long as the message or an array out of it is used.
+                Anything else with bytes in it is copied first.
             wire: ``cdr`` or ``ros1``; None for the type's own.
             wstring_width: Bytes for each character of wstrings, 2 or 4; None finds out.
 
@@ -204,20 +207,24 @@ class MessageType:
     def _decode(self, buffer: Any, wire: str | None, wide: int | None) -> Message:
         data = self._bytes(buffer)
         codec = self._codec_for(data, wire, wide)
-        if not self._schema.has_wide and not codec.wire.big:
+        if not (self._schema.has_wide or codec.wire.big or codec.wire.view):
             self._shells[codec.wire.name] = codec.root
         message = codec.root()
         message._buffer__ = data
         return message
 
-    def _bytes(self, buffer: Any) -> bytes:
+    def _bytes(self, buffer: Any) -> bytes | memoryview:
+        """Return what can be kept: bytes, or a read-only view of some."""
         if type(buffer) is bytes:
             return buffer
         try:
-            return memoryview(buffer).tobytes()
+            view = memoryview(buffer)
         except TypeError:
             kind = type(buffer).__name__
             raise DecodeError(self.name, f"expected bytes to decode, got {kind}") from None
+        if type(buffer) is memoryview and view.readonly and view.format == "B" and view.contiguous:
+            return buffer
+        return view.tobytes()
 
     def _wire_name(self, wire: str | None) -> str:
         if wire is None:
@@ -226,18 +233,18 @@ class MessageType:
             raise UnsupportedError(f"wire format {wire!r} is unknown; there are 'cdr' and 'ros1'")
         return wire
 
-    def _codec_for(self, data: bytes, wire: str | None, wide: int | None) -> Codec:
+    def _codec_for(self, data: bytes | memoryview, wire: str | None, wide: int | None) -> Codec:
         """Return the codec for received bytes: their header tells the byte order."""
         name = self._wire_name(wire)
         big = name == "cdr" and _encapsulation(self.name, data)
         if wide is None and self._schema.has_wide:
             wide = self._plausible_width(data, name, big)
-        return self._codec(name, big, _width(wide))
+        return self._codec(name, big, _width(wide), type(data) is memoryview)
 
-    def _codec(self, name: str, big: bool, wide: int) -> Codec:
-        return codec_of(self._schema, _WIRES[name, big, wide])
+    def _codec(self, name: str, big: bool, wide: int, view: bool = False) -> Codec:
+        return codec_of(self._schema, _WIRES[name, big, wide, view])
 
-    def _plausible_width(self, data: bytes, name: str, big: bool) -> int:
+    def _plausible_width(self, data: bytes | memoryview, name: str, big: bool) -> int:
         """Return the wstring width that makes the message end where its bytes end.
 
         If both do, the padding that the encapsulation header announces decides, then the newer.
@@ -309,26 +316,35 @@ class MessageType:
         return self._path(name, _width(wstring_width), False, (path, *more), not more)
 
     def _path(
-        self, name: str, wide: int, big: bool, paths: tuple[str, ...], single: bool
+        self,
+        name: str,
+        wide: int,
+        big: bool,
+        paths: tuple[str, ...],
+        single: bool,
+        view: bool = False,
     ) -> Callable[[Any], Any]:
-        key = (name, wide, big, paths, single)
+        key = (name, wide, big, paths, single, view)
         known = self._paths.get(key)
         if known is not None:
             return known
-        codec = self._codec(name, big, wide)
+        codec = self._codec(name, big, wide, view)
+        kind = memoryview if view else bytes
 
         def other(buffer: Any) -> Any:
             data = self._bytes(buffer)
-            return self._path(name, wide, _encapsulation(self.name, data), paths, single)(data)
+            big = name == "cdr" and _encapsulation(self.name, data)
+            view = type(data) is memoryview
+            return self._path(name, wide, big, paths, single, view)(data)
 
         def failed(buffer: Any, error: Exception) -> Any:
-            if type(buffer) is not bytes:
-                return made(self._bytes(buffer))
+            if type(buffer) is not kind:
+                return other(buffer)
             if isinstance(error, Error):
                 raise error
             found = codec
             if name == "cdr":
-                found = self._codec(name, _encapsulation(self.name, buffer), wide)
+                found = self._codec(name, _encapsulation(self.name, buffer), wide, view)
             raise found.explain(buffer, error) from None
 
         made = path_function(codec, paths, single, other, failed)
@@ -340,7 +356,8 @@ class MessageType:
     def _path_by_bytes(self, name: str, paths: tuple[str, ...], single: bool, buffer: Any) -> Any:
         data = self._bytes(buffer)
         codec = self._codec_for(data, name, None)
-        return self._path(name, codec.wire.wide, codec.wire.big, paths, single)(data)
+        wire = codec.wire
+        return self._path(name, wire.wide, wire.big, paths, single, wire.view)(data)
 
     # -- writing ---------------------------------------------------------------------------------
 
@@ -381,7 +398,9 @@ class MessageType:
         if value.__class__ is dict:
             return codec.writer(True, True)(value)  # type: ignore[no-any-return]
         untouched = _untouched(value, codec)
-        return codec.writer(False, True)(value) if untouched is None else untouched
+        if untouched is None:
+            return codec.writer(False, True)(value)  # type: ignore[no-any-return]
+        return untouched if type(untouched) is bytes else bytes(untouched)
 
     def encode_parts(
         self,
@@ -395,8 +414,8 @@ class MessageType:
     ) -> list[bytes | memoryview]:
         """Return the bytes of a message in parts, for ``writev``; arguments as :meth:`encode`.
 
-        Big arrays are not copied: the parts are views of the arrays in `value`, which must not
-        change until the parts are sent.
+        Big arrays are not copied, nor a message that was received and never looked into: the parts
+        are views of what is in `value`, which must not change until the parts are sent.
         """
         if value is None:
             value = fields
@@ -424,14 +443,15 @@ class MessageType:
         return codec
 
 
-def _untouched(value: Any, codec: Codec) -> bytes | None:
+def _untouched(value: Any, codec: Codec) -> bytes | memoryview | None:
     """Return the bytes of a shell that was received through `codec` and never looked into."""
-    if getattr(value, "_root__", None) is not codec:
+    root = getattr(value, "_root__", None)
+    if root is not codec and (root is None or root.plain is not codec):
         return None
     return getattr(value, "_buffer__", None)
 
 
-def _encapsulation(type_name: str, data: bytes) -> bool:
+def _encapsulation(type_name: str, data: bytes | memoryview) -> bool:
     """Return whether a CDR message is big endian; raises DecodeError for what we cannot read."""
     if len(data) < 4 or data[0] or data[1] > 1:
         raise encapsulation_error(type_name, data)
