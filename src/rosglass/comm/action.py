@@ -92,9 +92,9 @@ class ClientGoal(Handle):
         return f"<{type(self).__name__} {self.id_text} {self.status.value}>"
 
     @property
-    @abstractmethod
     def id_text(self) -> str:
-        """The id as ROS's own tools print it."""
+        """The id as ``ros2 action`` prints it: 32 hexadecimal digits (some logs put dashes in)."""
+        return self.id.hex()
 
     @property
     @abstractmethod
@@ -285,9 +285,9 @@ class ServerGoal(Handle):
         return f"<{type(self).__name__} {self.id_text} {self.status.value}>"
 
     @property
-    @abstractmethod
     def id_text(self) -> str:
-        """The id as ROS's own tools print it."""
+        """The id as ``ros2 action`` prints it: 32 hexadecimal digits (some logs put dashes in)."""
+        return self.id.hex()
 
     @property
     @abstractmethod

@@ -9,11 +9,10 @@ import time
 from collections import deque
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import Call, EndpointKind, Handle, Listeners, QoS, ServiceClient
+from rosglass.comm import Call, EndpointKind, QoS, ServiceClient
 from rosglass.comm.promise import check_timeout
 from rosglass.errors import (
     ConnectionLostError,
-    ConversionError,
     DecodeError,
     Error,
     NodeClosedError,
@@ -24,12 +23,13 @@ from rosglass.errors import (
 )
 from rosglass.ros2.announced import Announced, choose, identity, mismatches, nodes_of, similar
 from rosglass.ros2.core import Member
+from rosglass.ros2.readiness import Readiness
 from rosglass.ros2.requests import Link, Request
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from rosglass.comm import EndpointInfo, Executor
+    from rosglass.comm import EndpointInfo, Executor, Handle
     from rosglass.messages import Message, ServiceType
     from rosglass.ros2.core import Core
 
@@ -41,8 +41,6 @@ _log = logging.getLogger("rosglass.ros2")
 _GRACE = 3.0
 #: Seconds between looks at a server that is in the graph but not linked yet.
 _RETRY = 0.05
-#: Longest sleep in seconds of a thread that waits for a server.
-_SLICE = 0.1
 
 
 class Ros2ServiceClient(ServiceClient, Member):
@@ -55,6 +53,7 @@ class Ros2ServiceClient(ServiceClient, Member):
             library has it; None takes whatever type the server announces.
         qos: Profile of requests and replies; None for the usual one.
         patient: Whether calls go on when their server has left the graph.
+        quiet: Whether somebody else logs what is wrong.
     """
 
     def __init__(
@@ -65,22 +64,23 @@ class Ros2ServiceClient(ServiceClient, Member):
         qos: QoS | None = None,
         *,
         patient: bool = False,
+        quiet: bool = False,
     ) -> None:
         self.name, self.qos = name, qos or QoS.services()
-        self._core, self._patient = core, patient
+        self._core, self._patient, self._quiet = core, patient, quiet
         self._discovers = wanted is None
         given = None if wanted is None else core.types.service(wanted)
         fixed = wanted is not None and not isinstance(wanted, str)
         self._announced: Announced[ServiceType] = Announced(core.types.service, given, fixed)
         self.type = given
-        self._changed = threading.Condition()
+        self._lock = threading.Lock()
         self._link: Link | None = None
         self._requests: dict[Call, Request] = {}
         self._queue: deque[Request] = deque()
         self._flushing = self._again = self._retrying = False
-        self._closed = self._told = False
+        self._closed = False
         self._choice = self._failure = self._warned = ""
-        self._ready_listeners: Listeners[bool] = Listeners()
+        self._readiness = Readiness(name, lambda: self.ready, self._check_open, core.dispatcher)
         self._adopt(retry=True)
         if self._announced.type is not None:
             self._connect(self._announced.type)
@@ -115,26 +115,13 @@ class Ros2ServiceClient(ServiceClient, Member):
 
     def wait_for_server(self, timeout: float | None = None) -> bool:
         """Wait for a server; see :meth:`rosglass.comm.ServiceClient.wait_for_server`."""
-        timeout = check_timeout(timeout, self.name)
-        deadline = None if timeout is None else time.monotonic() + timeout
-        while True:
-            self._check_open()
-            if self.ready:
-                return True
-            left = _SLICE if deadline is None else deadline - time.monotonic()
-            if left <= 0:
-                return False
-            with self._changed:
-                self._changed.wait(min(left, _SLICE))
+        return self._readiness.wait(timeout)
 
     def on_ready_change(
         self, callback: Callable[[bool], None], executor: Executor | None = None
     ) -> Handle:
         """Call `callback` with :attr:`ready` whenever it changes."""
-        self._check_open()
-        if not callable(callback):
-            raise ConversionError("callback", callback, "something that can be called", self.name)
-        return self._ready_listeners.add(callback, executor or self._core.dispatcher)
+        return self._readiness.add(callback, executor)
 
     # -- calling ---------------------------------------------------------------------------------
 
@@ -170,6 +157,15 @@ class Ros2ServiceClient(ServiceClient, Member):
         entry = self._start(request, timeout, alarm=True)
         return entry.call
 
+    def withdraw(self, call: Call) -> bool:
+        """Cancel a call if its request was not sent yet; return whether that was so."""
+        with self._lock:
+            entry = self._requests.get(call)
+            if entry is None or entry not in self._queue:
+                return False
+            self._queue.remove(entry)
+        return call.cancel()
+
     def _start(self, value: Any, timeout: float | None, *, alarm: bool = False) -> Request:
         self._check_open()
         kind = self._announced.type
@@ -182,7 +178,7 @@ class Ros2ServiceClient(ServiceClient, Member):
         )
         deadline = None if timeout is None else time.monotonic() + timeout
         entry = Request(call, taken, kind, deadline)
-        with self._changed:
+        with self._lock:
             closed = self._closed
             if not closed:
                 self._requests[call] = entry
@@ -197,7 +193,7 @@ class Ros2ServiceClient(ServiceClient, Member):
 
     def _flush(self) -> None:
         """Send what waits, in order, if a server is there."""
-        with self._changed:
+        with self._lock:
             if self._flushing:
                 self._again = True  # whoever does it sees to what was added
                 return
@@ -206,7 +202,7 @@ class Ros2ServiceClient(ServiceClient, Member):
         try:
             while again:
                 self._send_waiting()
-                with self._changed:
+                with self._lock:
                     again, self._again = self._again, False
                     self._flushing = again
         except BaseException:
@@ -219,7 +215,7 @@ class Ros2ServiceClient(ServiceClient, Member):
 
     def _send_waiting(self) -> None:
         while (link := self._link) is not None and self._queue and self.ready:
-            with self._changed:
+            with self._lock:
                 entry = self._queue.popleft() if self._queue else None
             if entry is not None and not entry.call.done():
                 self._send(link, entry)
@@ -256,13 +252,13 @@ class Ros2ServiceClient(ServiceClient, Member):
             message = response.decode(data)
         except DecodeError as problem:
             who = nodes_of(self._fitting(self._servers())) or "the server"
-            call.fail(
-                ServiceError(
-                    f"{who} answered the call of {self.name} with bytes that are no "
-                    f"{response.name}: {problem}; it was probably built from another definition "
-                    "of the type: add that to the library"
-                )
+            rubbish = ServiceError(
+                f"{who} answered the call of {self.name} with bytes that are no "
+                f"{response.name}: {problem}; it was probably built from another definition "
+                "of the type: add that to the library"
             )
+            rubbish.__cause__ = problem
+            call.fail(rubbish)
         else:
             call.fulfil(message)
 
@@ -301,7 +297,7 @@ class Ros2ServiceClient(ServiceClient, Member):
     def _ended(self, entry: Request) -> None:
         if entry.timer is not None:
             entry.timer.close()
-        with self._changed:
+        with self._lock:
             self._requests.pop(entry.call, None)
             if entry.sent is None and entry in self._queue:
                 self._queue.remove(entry)
@@ -323,15 +319,10 @@ class Ros2ServiceClient(ServiceClient, Member):
                 self._failure = str(error)
         servers = self._servers()
         problem = "; ".join(self._conflicts(servers))
-        if problem and problem != self._warned:
+        if problem and problem != self._warned and not self._quiet:
             _log.warning("%s: %s", self.name, problem)
         self._warned = problem
-        ready = self.ready
-        with self._changed:
-            changed, self._told = ready != self._told, ready
-            self._changed.notify_all()
-        if changed:
-            self._ready_listeners.notify(ready)
+        self._readiness.update()
         if self._queue:
             self._flush()
         self._watch(servers)
@@ -353,7 +344,7 @@ class Ros2ServiceClient(ServiceClient, Member):
             self._core.name, self.name, kind.name, self._announced.hash, self.qos, link.take
         )
         link.requester.changed = self._core.wake
-        with self._changed:
+        with self._lock:
             old, self._link = self._link, link
             self.type = kind
             closed = self._closed
@@ -373,7 +364,7 @@ class Ros2ServiceClient(ServiceClient, Member):
             return
         here = set(map(identity, self._fitting(servers)))
         now = time.monotonic()
-        with self._changed:
+        with self._lock:
             entries = list(self._requests.values())
         for entry in entries:
             if entry.sent is None:
@@ -426,21 +417,20 @@ class Ros2ServiceClient(ServiceClient, Member):
 
     def close(self) -> None:
         """End pending calls with NodeClosedError, and withdraw the client; safe to call twice."""
-        with self._changed:
+        with self._lock:
             if self._closed:
                 return
             self._closed = True
             link, self._link = self._link, None
             entries = list(self._requests.values())
             self._queue.clear()
-            self._changed.notify_all()
         if self._core.forked:
             return
         for entry in entries:
             entry.call.fail(NodeClosedError(f"the client of {self.name} was closed during a call"))
         if link is not None:
             link.requester.close()
-        self._ready_listeners.clear()
+        self._readiness.close()
         self._core.remove(self)
 
     def _check_open(self) -> None:

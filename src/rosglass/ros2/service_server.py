@@ -12,6 +12,7 @@ from rosglass.comm import EndpointKind, QoS, ServiceServer
 from rosglass.comm.loop import LoopExecutor, executor_for
 from rosglass.errors import DecodeError, Error, NodeClosedError
 from rosglass.ros2.announced import Announced, mismatches, nodes_of
+from rosglass.ros2.complaints import Complaints
 from rosglass.ros2.core import Member
 
 if TYPE_CHECKING:
@@ -27,8 +28,6 @@ __all__ = ["Ros2ServiceServer"]
 _log = logging.getLogger("rosglass.ros2")
 #: Requests that wait for the callback; more come only from a client gone wild.
 _MAX_WAITING = 1000
-#: Clients whose rubbish is logged.
-_MAX_NAMED = 100
 
 
 class Ros2ServiceServer(ServiceServer, Member):
@@ -62,7 +61,7 @@ class Ros2ServiceServer(ServiceServer, Member):
         self._closed = False
         self._waiting = 0
         self._running: set[Future[Any]] = set()
-        self._named: set[bytes] = set()
+        self._complaints = Complaints()
         self._warned = ""
         self._replier = core.middleware.create_replier(
             core.name, name, self.type.name, self._announced.hash, self.qos, self._on_request
@@ -210,11 +209,7 @@ class Ros2ServiceServer(ServiceServer, Member):
 
     def _refuse(self, request: RequestId, reason: str) -> None:
         """Turn a client's fault down, and name it in the log once."""
-        with self._lock:
-            fresh = request.client not in self._named and len(self._named) < _MAX_NAMED
-            if fresh:
-                self._named.add(request.client)
-        if fresh:
+        if self._complaints.fresh(request.client):
             who = self._origin(request)
             _log.warning("%s: refusing requests of %s: %s", self.name, who, reason)
         self._replier.fail(request, reason)
