@@ -18,7 +18,6 @@ from rosglass.ros2.parameter_values import (
     value_from_message,
     value_to_message,
 )
-from rosglass.ros2.parameters import Change
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
     from rosglass.comm import Executor, Node, Publisher
     from rosglass.messages import Message
     from rosglass.ros2.parameter_values import TypedValue
-    from rosglass.ros2.parameters import Ros2Parameters
+    from rosglass.ros2.parameters import Change, Ros2Parameters
 
 __all__ = ["EVENTS", "EVENTS_QOS", "EVENT_TYPE", "SERVICES", "SERVICES_QOS", "ParameterServices"]
 
@@ -87,7 +86,6 @@ class ParameterServices(Handle):
     def _announce(self) -> None:
         self._events = self._node.create_publisher(EVENTS, EVENT_TYPE, EVENTS_QOS)
         self._made += [self._events, self._parameters.changes.add(self._tell, IMMEDIATE)]
-        self._tell(Change(self._parameters.snapshot(), {}, ()))
 
     def _tell(self, change: Change) -> None:
         events = self._events
