@@ -126,6 +126,7 @@ class MemoryNode(Node):
         *,
         raw_callback: Callable[[Sample], None] | None = None,
         executor: Executor | None = None,
+        ignore_local: bool = False,
     ) -> Subscription:
         subscription = Subscription(
             self.resolve(topic),

@@ -25,7 +25,7 @@ from rosglass.comm.graph import ConnectionState, EndpointInfo, EndpointKind, Nod
 from rosglass.comm.inbox import INBOX_LIMIT
 from rosglass.comm.listeners import Listeners
 from rosglass.comm.loop import LoopExecutor, executor_for
-from rosglass.comm.node import Answer, Executor, Handle, Node, Publisher
+from rosglass.comm.node import Answer, Executor, Handle, Node
 from rosglass.comm.parameters import (
     ParameterClient,
     ParameterDescriptor,
@@ -37,6 +37,7 @@ from rosglass.comm.parameters import (
     SetResult,
 )
 from rosglass.comm.promise import Promise
+from rosglass.comm.publisher import Publisher
 from rosglass.comm.qos import BEST_AVAILABLE, Durability, History, Liveliness, QoS, Reliability
 from rosglass.comm.sample import Sample
 from rosglass.comm.service import Call, ServiceClient, ServiceServer

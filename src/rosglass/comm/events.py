@@ -201,14 +201,25 @@ class SubscriptionEvents:
 
 
 class PublisherEvents:
-    """Who wants to know what about a publisher; worlds tell them."""
+    """Who wants to know what about a publisher; worlds tell them.
 
-    def __init__(self) -> None:
+    Args:
+        executor: Where callbacks run that bring no executor of their own.
+        added: Called when there is a new listener, which is to be told soon.
+    """
+
+    def __init__(self, executor: Executor, added: Callable[[], None]) -> None:
+        self.executor, self._added = executor, added
         self.matched: Appearances[Matched] = Appearances()
         self.incompatible: Appearances[IncompatibleQoS] = Appearances()
         self.deadline: Listeners[DeadlineMissed] = Listeners()
         self.liveliness: Listeners[LivelinessLost] = Listeners()
         self.problem: Listeners[str] = Listeners()
+
+    def added(self, handle: Handle) -> Handle:
+        """Have a new listener told soon; returns its handle."""
+        self._added()
+        return handle
 
     def clear(self) -> None:
         """Forget everyone."""

@@ -74,6 +74,11 @@ class Inbox:
         """Whether it takes and gives nothing any more."""
         return self._closed
 
+    @property
+    def last(self) -> float:
+        """When the last sample came, by :func:`time.monotonic`; minus infinity before the first."""
+        return self._last
+
     def put(self, sample: Sample) -> None:
         """Take a sample in and wake whoever wants it; from any thread."""
         now = time.monotonic()

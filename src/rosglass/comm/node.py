@@ -7,9 +7,14 @@ package knows which one it talks to.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, overload
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
-from rosglass.errors import UnsupportedError
+from rosglass.comm.qos import QoS
+from rosglass.errors import (
+    NodeClosedError,
+    TimeoutError,  # noqa: A004 - the field's own word
+    UnsupportedError,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
@@ -21,14 +26,15 @@ if TYPE_CHECKING:
     from rosglass.comm.clock import Clock, Timer
     from rosglass.comm.graph import EndpointInfo, NodeName, Status
     from rosglass.comm.parameters import ParameterClient, Parameters
-    from rosglass.comm.qos import QoS
+    from rosglass.comm.promise import Promise
+    from rosglass.comm.publisher import Publisher
     from rosglass.comm.sample import Sample
     from rosglass.comm.service import ServiceClient, ServiceServer
     from rosglass.comm.subscription import Subscription
     from rosglass.comm.time import Duration, Time
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
 
-__all__ = ["Answer", "Executor", "Handle", "Node", "Publisher"]
+__all__ = ["Answer", "Executor", "Handle", "Node"]
 
 _H = TypeVar("_H", bound="Handle")
 #: What answers a request: a response, or the promise of one.
@@ -66,49 +72,6 @@ class Handle(ABC):
         self.close()
 
 
-class Publisher(Handle):
-    """Sends messages of one type on one topic.
-
-    Attributes:
-        topic: Absolute topic name.
-        type: The message type.
-        qos: The quality of service offered.
-    """
-
-    topic: str
-    type: MessageType
-    qos: QoS
-
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__} {self.topic} [{self.type.name}]>"
-
-    @overload
-    def publish(self, message: Message | dict[str, Any], /) -> None: ...
-    @overload
-    def publish(self, /, **fields: Any) -> None: ...
-    @abstractmethod
-    def publish(self, message: Message | dict[str, Any] = ..., /, **fields: Any) -> None:
-        """Send a message.
-
-        Args:
-            message: A :class:`Message`, or a dict of fields; missing fields get their defaults.
-                None is refused: it is what a function that forgot its return gives.
-            fields: The fields as keyword arguments, instead of `message`.
-
-        Raises:
-            ConversionError: A value does not fit its field; nothing is sent.
-            NodeClosedError: The publisher is closed.
-        """
-
-    @abstractmethod
-    def publish_serialized(self, data: bytes | bytearray | memoryview) -> None:
-        """Send `data`, already encoded in the world's wire format, unchanged."""
-
-    @abstractmethod
-    def subscription_count(self) -> int:
-        """Return how many subscriptions match this publisher now."""
-
-
 class Node(Handle):
     """A participant of a ROS graph; made by :func:`rosglass.connect`.
 
@@ -135,7 +98,7 @@ class Node(Handle):
 
         Args:
             topic: Absolute, relative or private (``~name``) topic name.
-            type: Type name or type.
+            type: Type name or type; an :class:`rosglass.messages.OpaqueType` to pass on bytes.
             qos: Profile; an integer is the depth of a reliable, volatile profile.
 
         Raises:
@@ -153,6 +116,7 @@ class Node(Handle):
         *,
         raw_callback: Callable[[Sample], None] | None = None,
         executor: Executor | None = None,
+        ignore_local: bool = False,
     ) -> Subscription:
         """Subscribe to `topic`.
 
@@ -163,13 +127,47 @@ class Node(Handle):
             callback: Called with each message, on `executor`. Without callbacks, samples wait in
                 the subscription until they are taken.
             qos: Profile; an integer is the depth of a reliable, volatile profile.
-            raw_callback: Called with each :class:`Sample` instead: bytes, stamps, origin.
+            raw_callback: Called with each :class:`Sample` instead: bytes, stamps, origin. Samples
+                of a type that nobody can define have an :class:`rosglass.messages.OpaqueType`.
             executor: Where callbacks run; None for the node's own dispatcher thread.
+            ignore_local: Whether to leave out what this node publishes itself.
 
         Raises:
             InvalidNameError: The topic name breaks ROS's rules.
             TypeNotFoundError: No definition of the given type is known.
         """
+
+    def wait_for_message(
+        self,
+        topic: str,
+        type: str | MessageType | None = None,
+        timeout: float | None = None,
+        qos: QoS | int | None = None,
+    ) -> Message:
+        """Subscribe to `topic`, wait for one message and return it.
+
+        Args:
+            topic: Absolute, relative or private topic name.
+            type: Type name or type; None takes the type that publishers announce.
+            timeout: Seconds to wait, None for ever.
+            qos: Profile; None for the strongest that is available, so that a latched message comes
+                at once.
+
+        Raises:
+            TimeoutError: None came within the time; says what stood in the way.
+            NodeClosedError: The node is closed, or gets closed meanwhile.
+            InvalidNameError: The topic name breaks ROS's rules.
+            TypeNotFoundError: No definition of the type is known.
+        """
+        wanted = QoS.best_available() if qos is None else qos
+        with self.create_subscription(topic, type, qos=wanted) as subscription:
+            sample = subscription.wait(timeout)
+            if sample is not None:
+                return sample.message()
+            if subscription.closed:
+                raise NodeClosedError(f"{self!r} was closed while waiting for {topic}")
+            why = subscription.problem or subscription.hint or "it is published, but nothing came"
+            raise TimeoutError(f"{subscription.topic}: no message within {timeout:g} s: {why}")
 
     def create_service_client(
         self, name: str, type: str | ServiceType | None = None, qos: QoS | None = None
@@ -311,6 +309,49 @@ class Node(Handle):
     def endpoints(self, node: str | NodeName) -> list[EndpointInfo]:
         """Return what a node publishes, subscribes, serves and calls; `node` is its full name."""
         raise self._unsupported("a list of endpoints")
+
+    def fetch_type(
+        self,
+        name: str,
+        *,
+        hash: str = "",
+        node: str | NodeName | None = None,
+        timeout: float | None = 5.0,
+    ) -> MessageType | ServiceType | ActionType:
+        """Return a type in the version that the robot uses, asking the robot for it if need be.
+
+        Subscriptions do so by themselves, without waiting. What is fetched is in the library
+        afterwards, so that its name is enough for everything else.
+
+        Args:
+            name: ``pkg/msg/Type``, ``pkg/srv/Type``, ``pkg/action/Type``, or ``pkg/Type``.
+            hash: RIHS01 hash of the version, when the robot uses several.
+            node: Full name of the node whose version it shall be.
+            timeout: Seconds to wait in all, for somebody who uses the type to appear and for the
+                answer; None for ever.
+
+        Raises:
+            InvalidNameError: `name` is no type's name, or `hash` no hash.
+            TypeNotFoundError: Nobody uses or nobody sends it; says who was asked, and why not.
+            DefinitionConflictError: Several versions are in use.
+            NodeClosedError: The node is closed, or gets closed meanwhile.
+            UnsupportedError: In this world nobody can be asked.
+        """
+        return self.fetch_type_async(name, hash=hash, node=node, timeout=timeout).result()
+
+    def fetch_type_async(
+        self,
+        name: str,
+        *,
+        hash: str = "",
+        node: str | NodeName | None = None,
+        timeout: float | None = 5.0,
+    ) -> Promise[MessageType | ServiceType | ActionType]:
+        """Ask for a type as :meth:`fetch_type` does, and return at once.
+
+        The promise can be waited for, awaited in asyncio, or call back.
+        """
+        raise self._unsupported("fetching types")
 
     def _unsupported(self, what: str) -> UnsupportedError:
         return UnsupportedError(f"{self!r} does not support {what}")

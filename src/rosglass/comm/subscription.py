@@ -138,6 +138,11 @@ class Subscription(Handle):
         recent = time.monotonic() - self._watched_at < _MEMORY
         return self._called or self._waiting > 0 or recent
 
+    @property
+    def last_arrival(self) -> float:
+        """When the last sample came, by :func:`time.monotonic`; minus infinity before the first."""
+        return self._inbox.last
+
     def set_type(self, message_type: MessageType) -> None:
         """Take the type that was discovered; for worlds."""
         self._type = message_type

@@ -15,7 +15,7 @@ from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
     from rosglass.comm.node import Node
-    from rosglass.comm.node import Publisher as Sender
+    from rosglass.comm.publisher import Publisher as Sender
     from rosglass.comm.qos import QoS
     from rosglass.messages.schema import Schema
     from rosglass.qml.runtime import Runtime

@@ -77,6 +77,7 @@ class Core:
         timers: Runs short jobs later, and jobs that the middleware's threads must not wait for.
         graph_listeners: Told after each change of the graph.
         status_listeners: Told each new status.
+        local_gids: Identities of the node's own publishers.
 
     Raises:
         ConnectionLostError: The middleware cannot start on this machine.
@@ -108,6 +109,7 @@ class Core:
         self._closed = False
         self._process = os.getpid()
         self._members: dict[Member, None] = {}
+        self.local_gids: set[bytes] = set()
         self._moved = True
         self._told = middleware.status()
         self.graph = Graph(self.wake)

@@ -4,13 +4,29 @@ from __future__ import annotations
 
 import logging
 import os
+import threading
+import time
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import EndpointKind, Publisher
+from rosglass.comm import (
+    DeadlineMissed,
+    EndpointKind,
+    Liveliness,
+    LivelinessLost,
+    Matched,
+    Publisher,
+    PublisherEvents,
+    Sample,
+)
 from rosglass.errors import ConversionError, NodeClosedError
+from rosglass.ros2.announced import similar
 from rosglass.ros2.core import Member
+from rosglass.ros2.matching import conflict_events, words
+from rosglass.ros2.watchdog import Watchdog
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rosglass.comm import EndpointInfo, QoS
     from rosglass.messages import Message, MessageType
     from rosglass.ros2.core import Core
@@ -18,6 +34,7 @@ if TYPE_CHECKING:
 __all__ = ["Ros2Publisher"]
 
 _log = logging.getLogger("rosglass.ros2")
+_SUBSCRIPTION = EndpointKind.SUBSCRIPTION
 #: Tells `publish()` from `publish(None)`.
 _NO_MESSAGE: Any = object()
 
@@ -26,15 +43,29 @@ class Ros2Publisher(Publisher, Member):
     """A publisher; made by :meth:`Node.create_publisher`."""
 
     def __init__(self, core: Core, topic: str, type: MessageType, qos: QoS) -> None:
-        self.topic, self.type, self.qos = topic, type, qos
+        self.topic, self.type = topic, type
         self._core = core
         self._hash = type.rihs01
         self._closed = False
         self._process = os.getpid()
-        self._warned: set[EndpointInfo] = set()
-        self._writer = core.middleware.create_writer(core.name, topic, type.name, self._hash, qos)
+        self._problem = ""
+        self.events: PublisherEvents = PublisherEvents(core.dispatcher, core.wake)
+        self._lock = threading.Lock()
+        self._watchdogs: dict[str, Watchdog] = {}
+        self._missed = self._lost = 0
+        self._sent_at = self._shown_at = self._lost_since = 0.0
+        self.qos = qos.for_publisher([s.qos for s in self._subscriptions() if s.type == type.name])
+        self._writer = core.middleware.create_writer(
+            core.name, topic, type.name, self._hash, self.qos
+        )
+        # Only then sending costs a look at the clock.
+        self._timed = self.qos.deadline is not None or self.qos.lease_duration is not None
+        if self._writer.gid:
+            core.local_gids.add(self._writer.gid)
         core.add(self)
-        self._writer.match(self._matching())
+        self._writer.match(self._matching(self._subscriptions()))
+
+    # -- sending ---------------------------------------------------------------------------------
 
     def publish(self, message: Message | dict[str, Any] = _NO_MESSAGE, /, **fields: Any) -> None:
         """Encode and send a message; see :meth:`rosglass.comm.Publisher.publish`."""
@@ -47,61 +78,191 @@ class Ros2Publisher(Publisher, Member):
             # Most likely a function that forgot its return: it must not become a zero command.
             raise ConversionError("", None, "a message, a dict or keyword fields", self.type.name)
         value = fields if message is _NO_MESSAGE else message
-        self._writer.write(self.type.encode(value, wire="cdr"))
+        self._write(self.type.encode(value, wire="cdr"))
 
-    def publish_serialized(self, data: bytes | bytearray | memoryview) -> None:
+    def publish_serialized(self, data: bytes | bytearray | memoryview | Sample) -> None:
         """Send `data`, which starts with its 4-byte encapsulation header, unchanged."""
         self._check_open()
-        if not isinstance(data, (bytes, bytearray, memoryview)):
-            raise ConversionError("", data, "bytes, a bytearray or a memoryview", self.type.name)
+        if isinstance(data, Sample):
+            data = self._content(data)
+        elif not isinstance(data, (bytes, bytearray, memoryview)):
+            raise ConversionError(
+                "", data, "bytes, a bytearray, a memoryview or a Sample", self.type.name
+            )
         # Copied: the caller may reuse its buffer at once.
         payload = bytes(data)
         if len(payload) < 4 or payload[0] != 0:
             raise ConversionError(
                 "", payload, "CDR bytes with their 4-byte encapsulation header", self.type.name
             )
+        self._write(payload)
+
+    def assert_liveliness(self) -> None:
+        """Show that the publisher is alive; see :meth:`rosglass.comm.Publisher`."""
+        self._check_open()
+        self._writer.assert_liveliness()
+        self._shown_at = time.monotonic()
+        self._watch()
+
+    def _write(self, payload: bytes | bytearray) -> None:
         self._writer.write(payload)
+        if self._timed:
+            self._note_sending()
+
+    def _note_sending(self) -> None:
+        first = not self._sent_at
+        self._sent_at = self._shown_at = time.monotonic()
+        if first:
+            self._watch()
+
+    def _content(self, sample: Sample) -> bytes | memoryview:
+        """Return the bytes of a sample that can be passed on here."""
+        kind, ours = sample.type, self.type
+        hashes = {kind.rihs01, self._hash} - {""}
+        if sample.wire != "cdr" or kind.name != ours.name or len(hashes) > 1:
+            told = f"{kind.name} ({kind.rihs01 or 'no hash'}, {sample.wire})"
+            expected = f"a sample of {ours.name} ({self._hash or 'any hash'}, cdr)"
+            raise ConversionError("", told, expected, self.topic)
+        return sample.data
+
+    # -- who is there ----------------------------------------------------------------------------
 
     def subscription_count(self) -> int:
         """Return how many subscriptions in the graph match now; 0 after closing."""
-        return 0 if self._closed else len(self._matching())
+        return 0 if self._closed else len(self._matching(self._subscriptions()))
+
+    @property
+    def problem(self) -> str:
+        """Why some subscriptions on the topic get nothing, in words; empty when all is well."""
+        return self._problem
+
+    @property
+    def hint(self) -> str:
+        """What may be wrong when nobody subscribes to the topic; empty when somebody does."""
+        if self._closed or self._subscriptions():
+            return ""
+        graph = self._core.graph
+        wanted = [name for name in graph.topics() if graph.endpoints(_SUBSCRIPTION, name)]
+        return f"nobody subscribes to {self.topic}{similar(self.topic, wanted)}"
 
     def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - the graph alone matters
         """Follow a change of the graph."""
-        if moved and not self._closed:
-            self._writer.match(self._matching())
+        if not moved or self._closed:
+            return
+        subscriptions = self._subscriptions()
+        matching = self._matching(subscriptions)
+        self._writer.match(matching)
+        self._say(self._problems(subscriptions))
+        self._tell(subscriptions, matching)
+        self._watch()
 
     def close(self) -> None:
         """Withdraw the publisher; safe to call twice."""
-        if not self._closed:
-            self._closed = True
-            if self._process != os.getpid():
+        with self._lock:
+            if self._closed:
                 return
-            self._writer.close()
-            self._core.remove(self)
+            self._closed = True
+            watchdogs = list(self._watchdogs.values())
+        for watchdog in watchdogs:
+            watchdog.close()
+        self.events.clear()
+        if self._process != os.getpid():
+            return
+        self._writer.close()
+        self._core.local_gids.discard(self._writer.gid)
+        self._core.remove(self)
 
-    def _matching(self) -> list[EndpointInfo]:
-        found = []
-        for endpoint in self._core.graph.endpoints(EndpointKind.SUBSCRIPTION, self.topic):
-            if endpoint.type != self.type.name:
-                continue
-            if endpoint.type_hash not in ("", self._hash):
-                self._warn(endpoint)
-            elif not (self._core.middleware.matches_qos and endpoint.qos.incompatibility(self.qos)):
-                found.append(endpoint)
-        return found
+    def _subscriptions(self) -> list[EndpointInfo]:
+        return self._core.graph.endpoints(_SUBSCRIPTION, self.topic)
 
-    def _warn(self, endpoint: EndpointInfo) -> None:
-        if endpoint not in self._warned:
-            self._warned.add(endpoint)
-            _log.warning(
-                "%s: %s has another definition of %s (%s; ours is %s) and receives nothing from us",
-                self.topic,
-                endpoint.node,
-                self.type.name,
-                endpoint.type_hash,
-                self._hash,
-            )
+    def _understands(self, endpoint: EndpointInfo) -> bool:
+        """Return whether a subscription is for our type, in our version as far as it says."""
+        same = not self._hash or endpoint.type_hash in ("", self._hash)
+        return same and endpoint.type == self.type.name
+
+    def _matching(self, subscriptions: Sequence[EndpointInfo]) -> list[EndpointInfo]:
+        found = [one for one in subscriptions if self._understands(one)]
+        if not self._core.middleware.matches_qos:
+            return found
+        return [one for one in found if not one.qos.conflicts(self.qos)]
+
+    def _conflicts(
+        self, subscriptions: Sequence[EndpointInfo]
+    ) -> dict[EndpointInfo, dict[str, str]]:
+        """Return what those ask for too much of that understand us."""
+        found = {
+            one: one.qos.conflicts(self.qos) for one in subscriptions if self._understands(one)
+        }
+        return {one: conflicts for one, conflicts in found.items() if conflicts}
+
+    def _problems(self, subscriptions: Sequence[EndpointInfo]) -> list[str]:
+        problems: dict[str, None] = {}
+        name = self.type.name
+        for one in subscriptions:
+            if one.type != name:
+                told = f"{one.node} subscribes to {one.type} here, not {name}"
+                problems[f"{told}: it receives nothing from us"] = None
+            elif not self._understands(one):
+                problems[
+                    f"{one.node} has another definition of {name} ({one.type_hash}; ours is "
+                    f"{self._hash}): it receives nothing from us"
+                ] = None
+        effect = (
+            "it receives nothing from us"
+            if self._core.middleware.matches_qos
+            else "it is served without that guarantee"
+        )
+        for one, conflicts in self._conflicts(subscriptions).items():
+            problems[
+                f"quality of service requested by {one.node} does not match "
+                f"({words(conflicts)}): {effect}; offer what it asks for"
+            ] = None
+        return list(problems)
+
+    def _say(self, problems: Sequence[str]) -> None:
+        problem = "; ".join(problems)
+        if problem == self._problem:
+            return
+        self._problem = problem
+        if problem:
+            _log.warning("%s: %s", self.topic, problem)
+        self.events.problem.notify(problem)
+
+    # -- events ----------------------------------------------------------------------------------
+
+    def _tell(
+        self, subscriptions: Sequence[EndpointInfo], matching: Sequence[EndpointInfo]
+    ) -> None:
+        self.events.matched.update(matching, Matched)
+        if not self.events.incompatible:
+            return
+        conflicts = self._conflicts(subscriptions)
+        self.events.incompatible.update(conflicts, conflict_events(conflicts))
+
+    def _watch(self) -> None:
+        """Watch the limits that somebody wants to be told about, from the first sending on."""
+        limit, lease = self.qos.deadline, self.qos.lease_duration
+        manual = self.qos.liveliness is Liveliness.MANUAL_BY_TOPIC
+        timers, known = self._core.timers, self._watchdogs
+        with self._lock:
+            if self._closed:
+                return
+            sent = self._sent_at and self.events.deadline
+            if limit is not None and sent and "deadline" not in known:
+                known["deadline"] = Watchdog(timers, limit, lambda: self._sent_at, self._miss)
+            shown = manual and self._shown_at and self.events.liveliness
+            if lease is not None and shown and "lease" not in known:
+                known["lease"] = Watchdog(timers, lease, lambda: self._shown_at, self._lose)
+
+    def _miss(self, count: int) -> None:
+        self._missed += count
+        self.events.deadline.notify(DeadlineMissed(count, self._missed))
+
+    def _lose(self, count: int) -> None:  # noqa: ARG002 - lost once, however long it lasts
+        if self._shown_at != self._lost_since:
+            self._lost_since = self._shown_at
+            self._lost += 1
+            self.events.liveliness.notify(LivelinessLost(self._lost))
 
     def _check_open(self) -> None:
         if self._process != os.getpid():

@@ -5,90 +5,159 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING
 
-from rosglass.comm import EndpointKind, Sample
-from rosglass.errors import Error, NodeClosedError
+from rosglass.comm import (
+    DeadlineMissed,
+    EndpointKind,
+    LivelinessChanged,
+    Matched,
+    Sample,
+    SamplesLost,
+    Source,
+)
+from rosglass.errors import Error, NodeClosedError, TypeNotFoundError
+from rosglass.ros2.announced import similar
 from rosglass.ros2.core import Member
+from rosglass.ros2.liveliness import Liveness
+from rosglass.ros2.matching import conflict_events, words
 from rosglass.ros2.repeats import Repeats
+from rosglass.ros2.topic_types import TopicTypes
+from rosglass.ros2.watchdog import Watchdog
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from collections.abc import Set as AbstractSet
 
-    from rosglass.comm import EndpointInfo, Handle, Subscription
+    from rosglass.comm import EndpointInfo, QoS, Subscription
     from rosglass.messages import MessageType
     from rosglass.ros2.core import Core
-    from rosglass.ros2.middleware import OnSample
+    from rosglass.ros2.middleware import OnSample, Reader
 
-__all__ = ["Reading"]
+__all__ = ["Reading", "type_if_known"]
 
-#: Unknown definitions that are named, of publishers that announce nothing.
-_MAX_STRANGERS = 16
+_PUBLISHER = EndpointKind.PUBLISHER
 
 
-class Reading(Member):
+def type_if_known(core: Core, topic: str, wanted: MessageType | str | None) -> MessageType | None:
+    """Return the type that a subscription was asked for; None when publishers have to tell it.
+
+    Raises:
+        TypeNotFoundError: Nobody has a definition, and nobody is seen to publish that type.
+    """
+    if wanted is None:
+        return None
+    try:
+        return core.types.message(wanted)
+    except TypeNotFoundError:
+        publishers = core.graph.endpoints(EndpointKind.PUBLISHER, topic)
+        if isinstance(wanted, str) and any(p.type == wanted for p in publishers):
+            return None
+        raise
+
+
+class Reading(Member, Source):
     """Serves a subscription from its creation to its end.
-
-    A subscription created with a type keeps it. One created with a type's name takes the version
-    of it that the robot publishes, if the library has it; one created without takes the type that
-    is published.
 
     Args:
         core: The node it belongs to.
         subscription: Whom to serve.
         wanted: Type or type name it was created with; None to take what is published.
+        ignore_local: Whether to leave out what this node publishes itself.
     """
 
     def __init__(
-        self, core: Core, subscription: Subscription, wanted: MessageType | str | None
+        self,
+        core: Core,
+        subscription: Subscription,
+        wanted: MessageType | str | None,
+        ignore_local: bool = False,
     ) -> None:
         self.subscription = subscription
         self._core = core
-        self._discovers = wanted is None
-        self._fixed = not (wanted is None or isinstance(wanted, str))
+        self._topic, self._wanted = subscription.topic, subscription.qos
+        self._ignored: AbstractSet[bytes] = core.local_gids if ignore_local else frozenset()
+        self._types = TopicTypes(
+            subscription.topic,
+            core.types,
+            wanted,
+            subscription.type,
+            not subscription.decodes,
+            core.wake,
+        )
+        self._repeats = Repeats()
         self._lock = threading.Lock()
-        self._reader: Handle | None = None
-        self._type: MessageType | None = None
-        self._hash = ""
+        self._attention = threading.Lock()
+        self._reader: Reader | None = None
+        self._eager = True
         self._closed = False
-        self._failed: tuple[str, str] | None = None
-        self._failure = ""
-        self._strangers: set[str] = set()
-        subscription.on_close = self.close
-        if subscription.type is not None:
-            self.read(subscription.type)
+        self._alone = True
+        self._lost_before = self._told_lost = self._missed = 0
+        self._deadline: Watchdog | None = None
+        self._liveness = Liveness(core, self._repeats)
+        subscription.source, subscription.on_close = self, self.close
+        subscription.set_qos(self._wanted.for_subscription(self._offers(self._publishers())))
+        if self._types.type is not None:
+            self._read(self._types.type)
         core.add(self)
         core.wake()
 
-    def read(self, message_type: MessageType) -> None:
-        """Receive samples of `message_type` from now on, instead of any before."""
-        self._strangers.clear()
-        self._type, self._hash = message_type, message_type.rihs01
-        self.subscription.set_type(message_type)
-        reader = self._core.middleware.create_reader(
-            self._core.name,
-            self.subscription.topic,
-            message_type.name,
-            self._hash,
-            self.subscription.qos,
-            self._receiver(message_type),
-        )
-        with self._lock:
-            old, self._reader = self._reader, reader
-            if self._closed:
-                self._reader = None
-        if old is not None:
-            old.close()
-        if self._reader is None:
-            reader.close()
+    # -- what the subscription asks --------------------------------------------------------------
+
+    def publisher_count(self) -> int:
+        """Return how many publishers match now."""
+        return len(self._matching(self._publishers()))
+
+    def hint(self) -> str:
+        """Say what may be wrong when nobody publishes the topic; empty when somebody does."""
+        if self._publishers():
+            return ""
+        graph = self._core.graph
+        published = [name for name in graph.topics() if graph.endpoints(_PUBLISHER, name)]
+        return f"nobody publishes {self._topic}{similar(self._topic, published)}"
+
+    def attend(self) -> None:
+        """Let the middleware hand on samples as they come only while somebody waits for them."""
+        with self._attention:
+            reader, eager = self._reader, self.subscription.watched
+            if reader is None or eager == self._eager:
+                return
+            self._eager = eager
+            reader.set_eager(eager)
+        if eager:
+            reader.flush()
+
+    def refresh(self) -> None:
+        """Have handed on what the middleware holds back."""
+        reader = self._reader
+        if reader is not None and not self._eager:
+            reader.flush()
+
+    def inform(self) -> None:
+        """Tell the listeners soon."""
+        self._core.wake()
+
+    def lost(self) -> int:
+        """Return how many samples were sent and have not arrived."""
+        reader = self._reader
+        by_reader = 0 if reader is None else reader.lost()
+        return self._repeats.lost + self._lost_before + by_reader
+
+    # -- following the graph ---------------------------------------------------------------------
 
     def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - types may be added, too
         """Follow the graph; now and then look again for a definition that was not found."""
-        topic = self.subscription.topic
+        if self._closed:
+            return
+        publishers = self._publishers()
         try:
-            self._update(self._core.graph.endpoints(EndpointKind.PUBLISHER, topic), idle)
+            self._update(publishers, idle)
         except NodeClosedError:
             raise
         except Error as error:
             self.subscription.set_problem(str(error))
+        self._tell(publishers)
+        if idle:
+            self.attend()
+            self._tell_losses()
 
     def close(self) -> None:
         """Stop receiving."""
@@ -100,93 +169,106 @@ class Reading(Member):
         self.subscription.close()
         if reader is not None:
             reader.close()
+        self._watch_deadline(published=False)
+        self._liveness.close()
         self._core.remove(self)
 
-    def _update(self, publishers: Sequence[EndpointInfo], retry: bool) -> None:
-        if self._closed:
-            return
-        problems: list[str] = []
-        name = self._name(publishers, problems)
-        if name and not self._fixed:
-            self._select(name, publishers, retry, problems)
-        if self._type is not None:
-            problems += self._compare(self._type, publishers)
+    def _publishers(self) -> list[EndpointInfo]:
+        found = self._core.graph.endpoints(_PUBLISHER, self._topic)
+        if self._ignored:
+            found = [one for one in found if one.gid not in self._ignored]
+        return found
+
+    def _update(self, publishers: Sequence[EndpointInfo], idle: bool) -> None:
+        changed = self._types.follow(publishers, idle)
+        ours = self._types.type
+        problems = self._types.problems
+        if ours is not None:
+            profile = self._profile(publishers)
+            if changed or profile != self.subscription.qos or self._reader is None:
+                self.subscription.set_qos(profile)
+                self._read(ours)
+            elif idle:
+                self._repeats.guarded = False
+            problems = problems + self._misfits(publishers)
         self.subscription.set_problem("; ".join(problems))
 
-    def _name(self, publishers: Sequence[EndpointInfo], problems: list[str]) -> str:
-        """Return the name of the type to receive, empty while that is open."""
-        ours = "" if self._type is None else self._type.name
-        types = sorted({publisher.type for publisher in publishers})
-        if not self._discovers or ours in types or not types:
-            return ours
-        if len(types) == 1:
-            return types[0]
-        told = ", ".join(f"{t} by {_nodes([p for p in publishers if p.type == t])}" for t in types)
-        example = f"create_subscription({self.subscription.topic!r}, {types[0]!r})"
-        problems.append(f"published with several types ({told}); choose one, e.g. {example}")
-        return ours
+    def _profile(self, publishers: Sequence[EndpointInfo]) -> QoS:
+        """Return the profile to ask for: the one in use, unless it leaves somebody out."""
+        current = self.subscription.qos
+        if self._wanted.is_decided:
+            return current
+        offers = self._offers(publishers)
+        first, self._alone = self._alone and bool(offers), not offers
+        # Once nobody is there any more, whoever comes next may be met with something stronger.
+        if offers and (first or any(current.conflicts(offered) for offered in offers)):
+            return self._wanted.for_subscription(offers)
+        return current
 
-    def _select(
-        self, name: str, publishers: Sequence[EndpointInfo], retry: bool, problems: list[str]
-    ) -> None:
-        """Load and read the version of the type that publishers announce."""
-        hashes = {p.type_hash for p in publishers if p.type == name and p.type_hash}
-        ours = self._type if self._type is not None and self._type.name == name else None
-        if ours is not None and (len(hashes) != 1 or self._hash in hashes):
-            return
-        wanted = (name, hashes.pop() if len(hashes) == 1 else "")
-        if wanted != self._failed or retry:
-            try:
-                found = self._core.types.message(*wanted)
-            except Error as error:
-                self._failed = wanted
-                who = _nodes([p for p in publishers if p.type == name])
-                self._failure = (
-                    f"{who} publishes {name}, which cannot be decoded: {error}; "
-                    "this is tried again until a definition is found"
-                )
-            else:
-                self._failed = None
-                self.read(found)
-                return
-        if self._type is None:
-            problems.append(self._failure)
+    def _offers(self, publishers: Sequence[EndpointInfo]) -> list[QoS]:
+        ours = self._types.type
+        return [p.qos for p in publishers if ours is None or p.type == ours.name]
 
-    def _compare(self, ours: MessageType, publishers: Sequence[EndpointInfo]) -> list[str]:
-        """Say what keeps publishers' samples away."""
-        problems = []
-        others = [p for p in publishers if p.type != ours.name]
-        if others:
-            types = ", ".join(sorted({p.type for p in others}))
-            problems.append(f"{_nodes(others)} publishes {types} here, not {ours.name}")
-        strangers = dict.fromkeys(self._strangers, "")
-        for publisher in publishers:
-            if publisher.type != ours.name:
-                continue
-            if publisher.type_hash not in ("", self._hash):
-                strangers[publisher.type_hash] = f" of {publisher.node}"
-            conflict = self.subscription.qos.incompatibility(publisher.qos)
-            if conflict:
-                effect = (
-                    "nothing is received from it"
-                    if self._core.middleware.matches_qos
-                    else "it is received without that guarantee"
-                )
-                problems.append(
-                    f"quality of service offered by {publisher.node} does not match ({conflict}): "
-                    f"{effect}; ask for no more than it offers"
-                )
-        problems += [
-            f"the publisher{who} has another definition of {ours.name} ({type_hash}, ours is "
-            f"{self._hash}): its samples are refused; add the robot's definition to the library"
-            for type_hash, who in sorted(strangers.items())
+    def _misfits(self, publishers: Sequence[EndpointInfo]) -> list[str]:
+        effect = (
+            "nothing is received from it"
+            if self._core.middleware.matches_qos
+            else "it is received without that guarantee"
+        )
+        return [
+            f"quality of service offered by {publisher.node} does not match ("
+            f"{words(conflicts)}): "
+            f"{effect}; ask for no more than it offers"
+            for publisher, conflicts in self._conflicts(publishers).items()
         ]
-        return problems
 
-    def _receiver(self, message_type: MessageType) -> OnSample:
-        ours, strangers, repeats = self._hash, self._strangers, Repeats()
+    def _conflicts(self, publishers: Sequence[EndpointInfo]) -> dict[EndpointInfo, dict[str, str]]:
+        """Return what those offer too little of that are understood."""
+        qos = self.subscription.qos
+        found = {p: qos.conflicts(p.qos) for p in publishers if self._types.accepts(p)}
+        return {publisher: conflicts for publisher, conflicts in found.items() if conflicts}
+
+    def _matching(self, publishers: Sequence[EndpointInfo]) -> list[EndpointInfo]:
+        understood = [p for p in publishers if self._types.accepts(p)]
+        if not self._core.middleware.matches_qos:
+            return understood
+        qos = self.subscription.qos
+        return [p for p in understood if not qos.conflicts(p.qos)]
+
+    # -- reading ---------------------------------------------------------------------------------
+
+    def _read(self, message_type: MessageType) -> None:
+        """Receive samples of `message_type` from now on, instead of any before."""
+        self.subscription.set_type(message_type)
+        self._repeats.guarded = self._reader is not None
+        reader = self._core.middleware.create_reader(
+            self._core.name,
+            self._topic,
+            message_type.name,
+            message_type.rihs01,
+            self.subscription.qos,
+            self._receiver(),
+        )
+        with self._attention:
+            with self._lock:
+                old, self._reader = self._reader, reader
+                if self._closed:
+                    self._reader = None
+            self._eager = True
+        if old is not None:
+            self._lost_before += old.lost()
+            old.close()
+        if self._reader is None:
+            reader.close()
+        else:
+            self.attend()
+
+    def _receiver(self) -> OnSample:
+        """Return what takes the samples; every line of it is paid for by each sample."""
+        accepted, meet, ignored = self._types.accepted, self._types.meet, self._ignored
+        seen, deliver = self._repeats.seen, self.subscription.deliver
         # As Sample(...) does, in half the time.
-        make, deliver, wire = tuple.__new__, self.subscription.deliver, "cdr"
+        make = tuple.__new__
 
         def receive(
             data: bytes | memoryview,
@@ -196,15 +278,56 @@ class Reading(Member):
             sequence: int,
             hash: str,
         ) -> None:
-            if hash not in ("", ours):
-                if hash not in strangers and len(strangers) < _MAX_STRANGERS:
-                    strangers.add(hash)
-                    self._core.wake()
-            elif not repeats.seen(gid, sequence, sent):
-                deliver(make(Sample, (data, wire, message_type, received, sent, gid, sequence)))
+            kind = accepted.get(hash) or meet(hash)
+            if kind is None or seen(gid, sequence, sent) or gid in ignored:
+                return
+            deliver(make(Sample, (data, "cdr", kind, received, sent, gid, sequence)))
 
         return receive
 
+    # -- events ----------------------------------------------------------------------------------
 
-def _nodes(endpoints: Sequence[EndpointInfo]) -> str:
-    return ", ".join(sorted({endpoint.node.full for endpoint in endpoints}))
+    def _tell(self, publishers: Sequence[EndpointInfo]) -> None:
+        events = self.subscription.events
+        matching = self._matching(publishers)
+        events.matched.update(matching, Matched)
+        if events.incompatible:
+            conflicts = self._conflicts(publishers)
+            events.incompatible.update(conflicts, conflict_events(conflicts))
+        if events.liveliness:
+            alive = self._liveness.follow(matching, self._reader)
+
+            def changed(
+                endpoint: EndpointInfo, change: int, count: int, _total: int
+            ) -> LivelinessChanged:
+                return LivelinessChanged(endpoint, change, count, len(matching) - count)
+
+            events.liveliness.update(alive, changed)
+        self._watch_deadline(bool(matching))
+
+    def _watch_deadline(self, published: bool) -> None:
+        limit = self.subscription.qos.deadline
+        listened = published and bool(self.subscription.events.deadline)
+        wanted = limit is not None and listened and not self._closed
+        if self._deadline is not None and not (wanted and self._deadline.limit == limit):
+            self._deadline.close()
+            self._deadline = None
+        if wanted and self._deadline is None and limit is not None:
+            self._deadline = Watchdog(self._core.timers, limit, self._last_arrival, self._miss)
+
+    def _last_arrival(self) -> float:
+        self.refresh()
+        return self.subscription.last_arrival
+
+    def _miss(self, count: int) -> None:
+        self._missed += count
+        self.subscription.events.deadline.notify(DeadlineMissed(count, self._missed))
+
+    def _tell_losses(self) -> None:
+        events = self.subscription.events
+        if not events.lost:
+            return
+        total = self.lost()
+        change, self._told_lost = total - self._told_lost, total
+        if change > 0:
+            events.lost.notify(SamplesLost(change, total))

@@ -13,7 +13,7 @@ import pytest
 from rosglass.comm import ConnectionState, EndpointInfo, EndpointKind, Handle, NodeName, QoS, Status
 from rosglass.errors import NodeClosedError
 from rosglass.ros2 import Graph, Middleware, Ros2Node, Writer
-from rosglass.ros2.middleware import Replier, Requester, RequestId
+from rosglass.ros2.middleware import Reader, Replier, Requester, RequestId
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -175,10 +175,30 @@ class FakeWriter(Writer):
         self.closed = True
 
 
-class FakeReader(Handle):
-    def __init__(self, topic: str, type_name: str, type_hash: str, on_sample: Any) -> None:
+class FakeReader(Reader):
+    """`waiting` samples are handed on when somebody asks for them."""
+
+    def __init__(
+        self, topic: str, type_name: str, type_hash: str, on_sample: Any, qos: QoS | None = None
+    ) -> None:
         self.topic, self.type_name, self.type_hash = topic, type_name, type_hash
-        self.on_sample, self.closed, self.count = on_sample, False, 0
+        self.on_sample, self.closed, self.count, self.qos = on_sample, False, 0, qos
+        self.eager, self.waiting = True, []
+        self.missing, self.living = 0, None
+
+    def set_eager(self, eager: bool) -> None:
+        self.eager = eager
+
+    def flush(self) -> None:
+        waiting, self.waiting = self.waiting, []
+        for data in waiting:
+            self.receive(data)
+
+    def lost(self) -> int:
+        return self.missing
+
+    def alive(self) -> int | None:
+        return self.living
 
     def receive(self, data: bytes, hash: str | None = None, gid: bytes = b"g" * 16) -> None:
         """Hand over a sample as if it had been received."""
@@ -241,7 +261,7 @@ class FakeMiddleware(Middleware):
         qos: QoS,
         on_sample: Any,
     ) -> Handle:
-        reader = FakeReader(topic, type_name, type_hash, on_sample)
+        reader = FakeReader(topic, type_name, type_hash, on_sample, qos)
         self.readers.append(reader)
         return reader
 

@@ -216,8 +216,8 @@ def test_an_unknown_definition_is_a_problem_until_it_is_added(middleware, eventu
     library = Library()
     node = Ros2Node(middleware, "fake://", "cockpit", library=library)
     middleware.appear(PUBLISHER, "/t", "secret_msgs/msg/Thing")
-    subscription = node.create_subscription("/t")
-    told = eventually(lambda: subscription.problem)
+    subscription = node.create_subscription("/t", callback=id)
+    told = eventually(lambda: "decoded" in subscription.problem and subscription.problem)
     assert "/robot publishes secret_msgs/msg/Thing, which cannot be decoded" in told
     assert "tried again" in told
     library.add_text("secret_msgs/msg/Thing", "int32 number\n")
