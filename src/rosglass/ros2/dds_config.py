@@ -96,9 +96,11 @@ def _discovery(options: DdsOptions, peers: Sequence[str]) -> str:
             f"<Tag>ros_discovery_off_{os.getpid()}</Tag>"
             '<Peers AddLocalhost="false"/></Discovery>'
         )
-    localhost = options.discovery is DiscoveryRange.LOCALHOST
+    # To Cyclone DDS this machine is the address of the interface it uses, never 127.0.0.1.
+    others = [peer for peer in peers if not peer.startswith("127.") or ":" in peer]
+    localhost = options.discovery is DiscoveryRange.LOCALHOST or len(others) < len(peers)
     # Asked for ever: a robot may be switched on hours after the cockpit.
-    named = "".join(f'<Peer Address={quoteattr(peer)} PruneDelay="inf"/>' for peer in peers)
+    named = "".join(f'<Peer Address={quoteattr(peer)} PruneDelay="inf"/>' for peer in others)
     around = f'<Peers AddLocalhost="{"true" if localhost else "default"}">{named}</Peers>'
     return (
         "<Discovery><ParticipantIndex>auto</ParticipantIndex>"

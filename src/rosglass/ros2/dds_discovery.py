@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rosglass.errors import DecodeError, Error
 from rosglass.ros2 import cyclone
-from rosglass.ros2.cyclone_builtin import BuiltinTopic, Discovered, take
+from rosglass.ros2.cyclone_builtin import BuiltinTopic, Discovered, matched_publication, take
 from rosglass.ros2.cyclone_listener import Event
 from rosglass.ros2.dds_discovery_info import (
     PARTICIPANT_USER_DATA,
@@ -66,7 +66,7 @@ class DdsDiscovery:
         self._told: ParticipantEntities | None = None
         self._late = False
         self.had_peers = False
-        self._strange: set[bytes] = set()
+        self._strange: set[int] = set()
         self._readers: dict[BuiltinTopic, int] = {}
         self._writer = SampleWriter(participant, TOPIC, TYPE, WRITER_QOS, b"", _PLACE)
         for topic in BuiltinTopic:
@@ -76,7 +76,9 @@ class DdsDiscovery:
             )
         for reader in self._readers.values():
             participant.pump.watch(reader, Event.DATA_AVAILABLE, self._take)
-        SampleReader(participant, TOPIC, TYPE, READER_QOS, b"", _PLACE, self._on_entities)
+        self._reader = SampleReader(
+            participant, TOPIC, TYPE, READER_QOS, b"", _PLACE, self._on_entities
+        )
         participant.on_nodes = self._on_nodes
         self._on_nodes(participant.nodes())
 
@@ -128,23 +130,26 @@ class DdsDiscovery:
 
     def _on_entities(self, taken: list[Taken]) -> None:
         # Each sample replaces its participant's earlier ones.
-        newest = {bytes(data[4:20]): data for data, *_ in taken}
-        newest.pop(self._participant.guid, None)
-        for sender, data in newest.items():
-            info = self._decode(sender, data)
-            if info is not None and not self._put(info):
+        newest = {(writer, bytes(data[4:20])): data for data, _, writer, _ in taken}
+        for (writer, _), data in newest.items():
+            info = self._decode(writer, data)
+            if info is None or info.gid == self._participant.guid:
+                continue
+            if not self._put(info):
                 self._take_participants()
                 self._put(info)
         self._tell()
 
-    def _decode(self, sender: bytes, data: bytes | memoryview) -> ParticipantEntities | None:
+    def _decode(self, writer: int, data: bytes | memoryview) -> ParticipantEntities | None:
         try:
             return ParticipantEntities.decode(data)
         except DecodeError as error:
-            if sender not in self._strange and len(self._strange) < _MAX_STRANGE:
-                self._strange.add(sender)
+            if writer not in self._strange and len(self._strange) < _MAX_STRANGE:
+                self._strange.add(writer)
+                found = matched_publication(self._reader.entity, writer)
+                sender = "that left" if found is None else found.participant.hex()
                 _log.warning(
-                    "ignoring what DDS participant %s says of its nodes: %s", sender.hex(), error
+                    "ignoring what DDS participant %s says of its nodes: %s", sender, error
                 )
             return None
 

@@ -1,10 +1,11 @@
-"""Fixtures for tests with real ROS 2 peers over Zenoh."""
+"""Fixtures for tests with real ROS 2 peers over Zenoh and DDS."""
 
 from __future__ import annotations
 
 import importlib.util
 import json
 import os
+import random
 import socket
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -55,6 +56,36 @@ def connect(router: Router) -> Iterator[Callable[..., Node]]:
 
     def connect(name: str, options: str = "", namespace: str = "/", url: str = "") -> Node:
         node = rosglass.connect((url or router.url) + options, name, namespace)
+        nodes.append(node)
+        return node
+
+    yield connect
+    for node in nodes:
+        node.close()
+
+
+def pytest_report_header() -> str:
+    """Say how far the traffic of the tests reaches."""
+    if os.environ.get("ROSGLASS_PRIVATE_NETWORK"):
+        return "DDS: in a private network"
+    return "DDS: in this machine's own network, in random domains (scripts/private_network.sh)"
+
+
+@pytest.fixture(scope="module")
+def dds_domain() -> int:
+    """A ROS domain for the tests of a module, most likely nobody else's on this machine."""
+    # Above 101 the ports are among those that Linux gives to programs that ask for any.
+    return random.SystemRandom().randint(1, 101)
+
+
+@pytest.fixture
+def dds_connect(dds_domain: int) -> Iterator[Callable[..., Node]]:
+    """Connect to the module's domain; nodes are closed at the end of the test."""
+    pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
+    nodes: list[Node] = []
+
+    def connect(name: str, options: str = "", namespace: str = "/") -> Node:
+        node = rosglass.connect(f"dds://?domain={dds_domain}{options}", name, namespace)
         nodes.append(node)
         return node
 

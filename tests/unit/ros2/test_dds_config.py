@@ -54,12 +54,24 @@ def test_there_is_room_for_a_hundred_programs_on_a_machine():
     assert int(ours().findtext("Discovery/MaxAutoParticipantIndex")) >= 100
 
 
-def test_peers_are_asked_for_ever_and_by_address():
-    peers = ours("dds://localhost;10.0.0.9", ROS_STATIC_PEERS="10.0.0.8:7412").findall(
-        "Discovery/Peers/Peer"
+def test_peers_are_asked_for_ever_and_by_address(monkeypatch):
+    found = [(0, 0, 0, "", ("10.0.0.7", 0))]
+    look_up = dds_peers.socket.getaddrinfo
+    monkeypatch.setattr(
+        dds_peers.socket,
+        "getaddrinfo",
+        lambda host, *rest: found if host == "robot" else look_up(host, *rest),
     )
-    assert [peer.get("Address") for peer in peers] == ["127.0.0.1", "10.0.0.9", "10.0.0.8:7412"]
-    assert {peer.get("PruneDelay") for peer in peers} == {"inf"}
+    around = ours("dds://robot;10.0.0.9", ROS_STATIC_PEERS="10.0.0.8:7412").find("Discovery/Peers")
+    assert [peer.get("Address") for peer in around] == ["10.0.0.7", "10.0.0.9", "10.0.0.8:7412"]
+    assert {peer.get("PruneDelay") for peer in around} == {"inf"}
+    assert around.get("AddLocalhost") == "default"
+
+
+@pytest.mark.parametrize("peer", ["localhost", "127.0.0.1", "127.0.1.1"])
+def test_this_machine_as_a_peer_is_whatever_address_it_uses(peer):
+    around = ours(f"dds://{peer}").find("Discovery/Peers")
+    assert (around.get("AddLocalhost"), len(around)) == ("true", 0)
 
 
 def test_a_peer_that_nobody_knows_is_named():

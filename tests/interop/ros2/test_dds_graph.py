@@ -1,0 +1,245 @@
+"""The graph over DDS: others' nodes and endpoints as we see them, and ours as others see them."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+import rosglass
+from rosglass.comm import ConnectionState, Durability, Duration, NodeName, QoS, Reliability
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+PEERS = Path(__file__).parent / "peers"
+STRING = "std_msgs/msg/String"
+HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
+TALKER, ADDER = NodeName("/cyclone", "talker"), NodeName("/cyclone", "adder")
+#: A killed participant is gone after its lease, which is 10 s without this.
+SHORT_LEASE = "<Discovery><LeaseDuration>1s</LeaseDuration></Discovery>"
+NODES: dict[str, Any] = {
+    "topics": {"/chatter": "writer", "/heard": "reader"},
+    "service": "/add",
+    "hash": HASH,
+    "foreign": "Square",
+}
+
+pytestmark = pytest.mark.peers
+
+
+@pytest.fixture
+def cyclone(start, dds_domain):
+    """Start Cyclone DDS's own Python nodes in the module's domain; ended after the test."""
+    started = []
+
+    def cyclone(config: str = "", **plan: Any) -> Any:
+        plan["domain"] = dds_domain
+        env = os.environ | ({"CYCLONEDDS_URI": config} if config else {})
+        process = start(str(PEERS / "cyclone_peer.py"), json.dumps(plan), env=env)
+        started.append(process)
+        process.event("ready")
+        return process
+
+    yield cyclone
+    for process in started:
+        process.ask(quit=True) if process.popen.poll() is None else None
+    for process in started:
+        process.popen.wait(10)
+
+
+def event(process: Any, kind: str, wanted: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+    """Return the next event of a kind that is wanted."""
+    deadline = time.monotonic() + 10
+    while time.monotonic() < deadline:
+        found = process.event(kind)
+        if wanted(found):
+            return found
+    pytest.fail(f"no {kind} that is wanted")
+
+
+def gids_of(info: dict[str, Any], name: str) -> dict[str, list[str]]:
+    """Return the identities that ros_discovery_info lists for a node, none without the node."""
+    named = [node for node in info["nodes"] if f"{node['namespace']}/{node['name']}" == name]
+    return named[0] if named else {"readers": [], "writers": []}
+
+
+def seen_of_cyclone(node: Any) -> set[str]:
+    """Return what is left of the peer's topics and services."""
+    return {"/chatter", "/heard", "/add"} & {*node.topics(), *node.services()}
+
+
+@pytest.mark.parametrize("width", [16, 24])
+def test_we_see_the_nodes_of_cyclone_dds(cyclone, dds_connect, wait_for, width):
+    node = dds_connect("cockpit")
+    cyclone(width=width, **NODES)
+    wait_for(lambda: node.nodes() == [NodeName("/", "cockpit"), ADDER, TALKER], what=node.nodes())
+    wait_for(lambda: len(node.endpoints(TALKER)) == 2 and node.endpoints(ADDER))
+    topics = node.topics()
+    assert "Square" not in "".join(topics)
+    assert (topics["/chatter"], topics["/heard"]) == ([STRING], [STRING])
+    assert node.services()["/add"] == ["example_interfaces/srv/AddTwoInts"]
+    (publisher,) = node.publishers("/chatter")
+    assert (publisher.node, publisher.type_hash, len(publisher.gid)) == (TALKER, HASH, 16)
+    assert publisher.qos.reliability is Reliability.RELIABLE
+    assert publisher.qos.durability is Durability.VOLATILE
+    assert publisher.qos.deadline == Duration.from_seconds(0.5)
+    assert [end.node for end in node.subscriptions("/heard")] == [TALKER]
+    assert [end.node for end in node.service_servers("/add")] == [ADDER]
+    assert [end.name for end in node.endpoints("/cyclone/adder")] == ["/add"]
+
+
+def test_who_leaves_is_gone_at_once(cyclone, dds_connect, wait_for):
+    node = dds_connect("cockpit")
+    peer = cyclone(**NODES)
+    wait_for(lambda: node.publishers("/chatter"))
+    assert node.status().state is ConnectionState.CONNECTED
+    peer.ask(quit=True)
+    wait_for(lambda: node.status().state is ConnectionState.LOST, 3)
+    wait_for(lambda: not seen_of_cyclone(node), 3)
+    assert node.nodes() == [NodeName("/", "cockpit")]
+
+
+def test_who_is_killed_is_gone_with_the_lease(cyclone, dds_connect, wait_for):
+    node = dds_connect("cockpit")
+    peer = cyclone(SHORT_LEASE, **NODES)
+    wait_for(lambda: node.publishers("/chatter"))
+    peer.end()
+    wait_for(lambda: node.nodes() == [NodeName("/", "cockpit")], 5)
+    wait_for(lambda: not seen_of_cyclone(node), 5)
+    assert node.status().state is ConnectionState.LOST
+
+
+def test_others_see_our_nodes_by_plain_cyclone_dds(cyclone, dds_connect, wait_for):
+    observer = cyclone(observe=True)
+    node = dds_connect("cockpit", namespace="/ours")
+    publisher = node.create_publisher("chatter", STRING, QoS.latched())
+    subscription = node.create_subscription("/heard", STRING)
+    (writer,) = node.publishers("chatter")
+    (reader,) = node.subscriptions("/heard")
+    ours = {"writer": ("rt/ours/chatter", writer), "reader": ("rt/heard", reader)}
+    for kind, (topic, endpoint) in ours.items():
+        told = event(observer, kind, lambda found, topic=topic: found["topic"] == topic)
+        assert told["type"] == "std_msgs::msg::dds_::String_"
+        assert told["guid"] == endpoint.gid.hex()
+        assert told["user_data"] == f"typehash={HASH};"
+    participant = writer.gid[:12].hex() + "000001c1"
+    found = event(observer, "participant", lambda found: found["guid"] == participant)
+    assert found["user_data"] == "enclave=/;client=rosglass;"
+
+    def told(**gids: bool) -> None:
+        """Wait until ros_discovery_info lists, or does not list, the identities."""
+
+        def wanted(info: dict[str, Any]) -> bool:
+            listed = gids_of(info, "/ours/cockpit")
+            there = {"reader": reader.gid.hex() in listed["readers"]}
+            there["writer"] = writer.gid.hex() in listed["writers"]
+            return info["gid"] == participant and there == gids
+
+        event(observer, "info", wanted)
+
+    told(reader=True, writer=True)
+    publisher.close()
+    told(reader=True, writer=False)
+    subscription.close()
+    told(reader=False, writer=False)
+    wait_for(lambda: not {"/ours/chatter", "/heard"} & set(node.topics()))
+
+
+@pytest.mark.parametrize("choice", ["as the others", "distro=humble"])
+def test_humble_sees_our_nodes_too(cyclone, dds_connect, choice):
+    options = "" if choice == "as the others" else f"&{choice}"
+    topics = {"/chatter": "writer"} if choice == "as the others" else {}
+    observer = cyclone(width=24, observe=True, topics=topics)
+    node = dds_connect("cockpit", options)
+    node.create_subscription("/heard", STRING)
+    (reader,) = node.subscriptions("/heard")
+    gid = reader.gid.hex() + "0" * 16
+    event(observer, "info", lambda info: gid in gids_of(info, "//cockpit")["readers"])
+
+
+def test_nodes_of_one_process_see_each_other(dds_connect, wait_for):
+    one, two = dds_connect("one"), dds_connect("two", namespace="/ns")
+    one.create_publisher("/chatter", STRING)
+    two.create_subscription("/chatter", STRING)
+    nodes = [NodeName("/", "one"), NodeName("/ns", "two")]
+    for node in (one, two):
+        wait_for(lambda node=node: node.nodes() == nodes)
+        wait_for(lambda node=node: [end.node for end in node.publishers("/chatter")] == nodes[:1])
+        wait_for(lambda node=node: [e.node for e in node.subscriptions("/chatter")] == nodes[1:])
+    one.close()
+    wait_for(lambda: two.nodes() == nodes[1:])
+    assert two.publishers("/chatter") == [] or wait_for(lambda: not two.publishers("/chatter"))
+
+
+def test_the_nodes_of_other_processes_change_without_asking(cyclone, dds_connect, wait_for):
+    node = dds_connect("cockpit")
+    seen = []
+    node.on_graph_change(lambda: seen.append(node.nodes()))
+    cyclone(**NODES)
+    wait_for(lambda: any(TALKER in nodes for nodes in seen))
+
+
+def test_rubbish_from_one_peer_is_named_once_and_disturbs_nobody(
+    cyclone, dds_connect, wait_for, caplog
+):
+    node = dds_connect("cockpit")
+    cyclone(rubbish=True)
+    cyclone(**NODES)
+    wait_for(lambda: len(node.endpoints(TALKER)) == 2)
+    wait_for(lambda: [line for line in caplog.messages if "says of its nodes" in line])
+    time.sleep(0.2)
+    complaints = [line for line in caplog.messages if "says of its nodes" in line]
+    assert len(complaints) == 1
+    assert "rmw_dds_common/msg/ParticipantEntitiesInfo" in complaints[0]
+
+
+def test_without_multicast_the_programs_of_this_machine_find_each_other(
+    start, dds_domain, wait_for
+):
+    # In a domain of its own: a process has one configuration for a domain.
+    url = f"dds://?domain={dds_domain % 101 + 1}&range=localhost"
+    code = (
+        f"import rosglass, time; node = rosglass.connect({url!r}, 'peer'); "
+        "print('{\"ready\": true}', flush=True); time.sleep(60)"
+    )
+    start("-c", code).event("ready")
+    with rosglass.connect(url, "cockpit") as node:
+        wait_for(lambda: NodeName("/", "peer") in node.nodes())
+
+
+def test_with_discovery_off_nobody_is_seen(cyclone, dds_domain):
+    cyclone(**NODES)
+    # In a process of its own: a process has one configuration for a domain.
+    code = (
+        "import rosglass, time; "
+        f"node = rosglass.connect('dds://?domain={dds_domain}&range=off', 'alone'); "
+        "time.sleep(1); print([str(name) for name in node.nodes()], node.status())"
+    )
+    command = [sys.executable, "-c", code]
+    told = subprocess.run(command, check=True, capture_output=True, text=True, timeout=30).stdout
+    assert told.startswith("['/alone'] CONNECTING: nobody else is in DDS domain")
+
+
+@pytest.mark.skipif(importlib.util.find_spec("dora") is None, reason="dora-rs is not installed")
+def test_we_see_the_node_of_dora(start, interfaces, dds_domain, dds_connect, wait_for):
+    plan = {"domain": dds_domain, "interfaces": str(interfaces)}
+    plan |= {"publish": {"/from/string": STRING}, "subscribe": {"/to/string": STRING}}
+    env = os.environ | {"ROS_DOMAIN_ID": str(dds_domain), "AMENT_PREFIX_PATH": str(interfaces)}
+    start(str(PEERS / "dora_dds_peer.py"), json.dumps(plan), env=env).event("ready")
+    node = dds_connect("cockpit")
+    dora = NodeName("/dora", "dora_node")
+    wait_for(lambda: node.nodes() == [NodeName("/", "cockpit"), dora])
+    wait_for(lambda: [end.node for end in node.publishers("/from/string")] == [dora])
+    wait_for(lambda: [end.node for end in node.subscriptions("/to/string")] == [dora])
+    assert node.topics()["/from/string"] == [STRING]
+    wait_for(lambda: "/dora/dora_node/get_parameters" in node.services())
+    assert node.services()["/dora/dora_node/get_parameters"] == ["rcl_interfaces/srv/GetParameters"]
+    assert [end.node for end in node.service_servers("/dora/dora_node/get_parameters")] == [dora]
