@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from rosglass.comm.statistics import Statistics
     from rosglass.comm.time import Duration
 
-__all__ = ["INBOX_LIMIT", "Inbox"]
+__all__ = ["INBOX_LIMIT", "ImmediateInbox", "Inbox"]
 
 _log = logging.getLogger("rosglass.comm")
 #: Bytes that wait at most in an inbox that keeps all, unless set otherwise.
@@ -57,8 +57,6 @@ class Inbox:
         keep_all = qos.history is History.KEEP_ALL
         self._topic = topic
         self._executor, self._call = executor, call
-        # Who is called at once needs no inbox, as long as no call is under way.
-        self._direct = executor is IMMEDIATE
         self._depth = -1 if keep_all else qos.depth
         self._limit: int | None = INBOX_LIMIT if keep_all else None
         self._samples: deque[Sample] = deque(maxlen=None if keep_all else qos.depth)
@@ -81,9 +79,8 @@ class Inbox:
 
     def put(self, sample: Sample) -> None:
         """Take a sample in and wake whoever wants it; from any thread."""
-        now = time.monotonic()
         waiters: list[Callable[[], object]] | None = None
-        slow = 0
+        now = time.monotonic()
         with self._lock:
             if self._closed:
                 return
@@ -93,23 +90,18 @@ class Inbox:
             self._last = now
             self._received += 1
             self._bytes += len(sample[0])
-            call = None if self._calling else self._call
-            if call is not None:
+            samples = self._samples
+            if len(samples) == self._depth:
+                self._dropped += 1
+            samples.append(sample)
+            slow = 0 if self._limit is None else self._keep_within(self._limit, now)
+            if self._waiters:
+                waiters, self._waiters = self._waiters, []
+            post = self._call is not None and not self._calling
+            if post:
                 self._calling = True
-            if call is None or not self._direct:
-                samples = self._samples
-                if len(samples) == self._depth:
-                    self._dropped += 1
-                samples.append(sample)
-                if self._limit is not None:
-                    slow = self._keep_within(self._limit, now)
-                if self._waiters:
-                    waiters, self._waiters = self._waiters, []
-        if call is not None:
-            if self._direct:
-                self._call_now(sample, call)
-            else:
-                self._executor.post(self._call_soon)
+        if post:
+            self._executor.post(self._call_soon)
         if waiters is not None:
             for wake in waiters:
                 wake()
@@ -211,19 +203,6 @@ class Inbox:
             (self._limit or 0) / 1e6,
         )
 
-    def _call_now(self, sample: Sample, call: Callable[[Sample], None]) -> None:
-        """Call back in this thread, also for what comes meanwhile from others, or from in there."""
-        while True:
-            try:
-                call(sample)
-            except Exception:
-                self._log_failure()
-            with self._lock:
-                if not self._samples:
-                    self._calling = False
-                    return
-                sample = self._pop()
-
     def _call_soon(self) -> None:
         """Call back for what waits now: a fast topic must not keep an executor for itself."""
         assert self._call is not None
@@ -245,6 +224,67 @@ class Inbox:
 
     def _log_failure(self) -> None:
         _log.exception("callback of subscription %s failed", self._topic)
+
+
+class ImmediateInbox(Inbox):
+    """Hands samples to a callback in the thread that puts them in, one at a time.
+
+    Only what comes while a call is under way waits: from other threads, or from in there.
+    """
+
+    def __init__(self, topic: str, qos: QoS, call: Callable[[Sample], None]) -> None:
+        super().__init__(topic, qos, IMMEDIATE, call)
+        self._call_back = call
+        self._turn = threading.Lock()
+
+    def put(self, sample: Sample) -> None:
+        """Take a sample in and call back, unless another call is under way: it goes on then."""
+        turn = self._turn
+        if not self._samples and turn.acquire(False):
+            try:
+                self._handle(sample)
+            finally:
+                turn.release()
+        else:
+            self._store(sample)
+        # Whoever let go of the turn looks again: what was stored meanwhile is nobody else's.
+        while self._samples and turn.acquire(False):
+            try:
+                stored = self.pop()
+                if stored is not None:
+                    self._handle(stored)
+            finally:
+                turn.release()
+
+    def _handle(self, sample: Sample) -> None:
+        if self._closed:
+            return
+        now = time.monotonic()
+        if now >= self._next_mark:
+            self._next_mark = now + MARK_PERIOD
+            self._meter.mark(self._last, self._received, self._bytes, sample)
+        self._last = now
+        self._received += 1
+        self._bytes += len(sample[0])
+        try:
+            self._call_back(sample)
+        except Exception:
+            self._log_failure()
+
+    def _store(self, sample: Sample) -> None:
+        with self._lock:
+            if self._closed:
+                return
+            dropped = self._dropped
+            if len(self._samples) == self._depth:
+                self._dropped += 1
+            self._samples.append(sample)
+            now = time.monotonic()
+            slow = 0 if self._limit is None else self._keep_within(self._limit, now)
+            # Samples count when they are handled; these will not be.
+            self._received += self._dropped - dropped
+        if slow:
+            self._log_slow(slow)
 
 
 def _name(call: Callable[[Sample], None]) -> str:

@@ -11,7 +11,8 @@ from functools import wraps
 from typing import TYPE_CHECKING
 
 from rosglass.comm.events import SubscriptionEvents
-from rosglass.comm.inbox import Inbox
+from rosglass.comm.executor import IMMEDIATE
+from rosglass.comm.inbox import ImmediateInbox, Inbox
 from rosglass.comm.node import Executor, Handle
 from rosglass.comm.promise import check_timeout
 from rosglass.comm.source import Source
@@ -87,7 +88,10 @@ class Subscription(Handle):
         call = raw_callback
         if call is None and callback is not None:
             call = _decoding(callback)
-        self._inbox = Inbox(topic, qos, executor, call)
+        if call is not None and executor is IMMEDIATE:
+            self._inbox: Inbox = ImmediateInbox(topic, qos, call)
+        else:
+            self._inbox = Inbox(topic, qos, executor, call)
         self.deliver = self._inbox.put
 
     # -- what it is ------------------------------------------------------------------------------
