@@ -6,7 +6,6 @@ import heapq
 import logging
 from typing import TYPE_CHECKING, Any
 
-from mcap.exceptions import McapError
 from mcap.reader import NonSeekingReader, SeekingReader
 
 from rosglass.bags.bag import Bag, BagMessage, Channel
@@ -82,7 +81,7 @@ class McapBag(Bag):
         summary = None
         try:
             summary = SeekingReader(self._file).get_summary()
-        except (McapError, EOFError, ValueError, OverflowError) as error:
+        except Exception as error:  # whatever the damage leads to
             self._note(f"it was not closed properly ({error or 'its end is missing'})")
         complete = summary is not None and summary.statistics is not None
         self._complete = bool(complete and summary and summary.channels)
@@ -105,10 +104,12 @@ class McapBag(Bag):
         # A reader of its own for each pass: passes may overlap, and share the file.
         with self.path.open("rb") as file:
             try:
-                found = SeekingReader(file).iter_messages(topics, start, end)
+                found = SeekingReader(file).iter_messages(
+                    topics, starting_at=start, ending_before=end
+                )
                 for _, channel, message in found:
                     yield channel.id, message.log_time, message.data
-            except (McapError, EOFError, ValueError) as error:
+            except Exception as error:  # whatever the damage leads to
                 raise BagError(f"{self.path} is damaged: {error}") from error
 
     def _scan(self) -> Iterator[tuple[int, int, bytes]]:
@@ -122,7 +123,7 @@ class McapBag(Bag):
                     if channel.id not in self._known:
                         self._add(channel.id, channel, schema, -1)
                     yield channel.id, message.log_time, message.data
-            except (McapError, EOFError, ValueError, OverflowError) as error:
+            except Exception as error:  # whatever the damage leads to
                 if not self._known and not self._foreign:
                     raise BagError(
                         f"{self.path} is no MCAP file, or damaged at its beginning: {error}"

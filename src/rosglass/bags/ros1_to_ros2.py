@@ -104,15 +104,14 @@ class Converter:
                 f"{source.name} has field names that differ only in case, which ROS 2 forbids; "
                 "leave its topics out with --exclude"
             )
-        lines = [f"{c.type} {c.name}={c.text}" for c in source.constants]
-        lines += [f"{field.type} {field.name}" for field in fields]
+        constants = [replace(c, type=_NUMBERS.get(c.type, c.type)) for c in source.constants]
+        lines = [f"{c.type} {c.name}={c.text}" for c in constants]
+        lines += [f"{field.type} {field.name}".replace("/msg/", "/") for field in fields]
         return replace(
             source,
             ros=2,
             fields=tuple(fields),
-            constants=tuple(
-                replace(c, type=_NUMBERS.get(c.type, c.type)) for c in source.constants
-            ),
+            constants=tuple(constants),
             text="\n".join(lines) + "\n",
             source=Source("ros1 recording", f"<{source.name}>"),
             nested=nested,
