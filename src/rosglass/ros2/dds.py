@@ -10,7 +10,8 @@ from rosglass.errors import NodeClosedError
 from rosglass.ros2.dds_discovery import DdsDiscovery
 from rosglass.ros2.dds_endpoints import DdsReader, DdsWriter
 from rosglass.ros2.dds_participant import Participant
-from rosglass.ros2.middleware import Middleware, Reader, Writer
+from rosglass.ros2.dds_services import DdsReplier, DdsRequester
+from rosglass.ros2.middleware import Middleware, Reader, Replier, Requester, Writer
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from rosglass.comm import NodeName, QoS
     from rosglass.ros2.dds_options import DdsOptions
     from rosglass.ros2.graph import Graph
-    from rosglass.ros2.middleware import OnSample
+    from rosglass.ros2.middleware import OnReply, OnRequest, OnSample
 
 __all__ = ["DdsMiddleware"]
 
@@ -34,11 +35,12 @@ class DdsMiddleware(Middleware):
         self._participant: Participant | None = None
         self._discovery: DdsDiscovery | None = None
         self._closed = False
+        self._graph: Graph
         self._changed: Callable[[], None] = lambda: None
 
     def open(self, graph: Graph, changed: Callable[[], None]) -> None:
         """Join the domain."""
-        self._changed = changed
+        self._graph, self._changed = graph, changed
         participant = Participant(self._options)
         self._discovery = DdsDiscovery(participant, graph, self._options.humble, changed)
         self._participant = participant
@@ -84,6 +86,42 @@ class DdsMiddleware(Middleware):
         kind = EndpointKind.SUBSCRIPTION
         self._show(EndpointInfo(kind, topic, type_name, node, qos, type_hash, reader.gid))
         return reader
+
+    def create_requester(
+        self,
+        node: NodeName,
+        service: str,
+        type_name: str,
+        type_hash: str,
+        qos: QoS,
+        on_reply: OnReply,
+    ) -> Requester:
+        """Create a service client's DDS writer and reader."""
+        participant = self._joined()
+        requester = DdsRequester(
+            participant, self._graph, node, service, type_name, type_hash, qos, on_reply
+        )
+        kind = EndpointKind.SERVICE_CLIENT
+        self._show(EndpointInfo(kind, service, type_name, node, qos, type_hash, requester.gid))
+        return requester
+
+    def create_replier(
+        self,
+        node: NodeName,
+        service: str,
+        type_name: str,
+        type_hash: str,
+        qos: QoS,
+        on_request: OnRequest,
+    ) -> Replier:
+        """Create a service server's DDS reader and writer."""
+        participant = self._joined()
+        replier = DdsReplier(
+            participant, self._graph, node, service, type_name, type_hash, qos, on_request
+        )
+        kind = EndpointKind.SERVICE_SERVER
+        self._show(EndpointInfo(kind, service, type_name, node, qos, type_hash, replier.gid))
+        return replier
 
     def poll(self) -> None:
         """Do nothing: everything has events."""

@@ -1,0 +1,397 @@
+"""Sample identities into and out of Cyclone DDS, which has no word for them.
+
+Fast DDS, RustDDS and others tell in inline QoS which request a reply answers
+(:mod:`rosglass.ros2.dds_identity`). The library drops such parameters when it receives, and writes
+none. But it makes and reads samples through a table of functions that each topic's type points to
+(``ddsi_serdata_ops``, meant for other languages' type support), so a topic made here gets a table
+of its own with some entries replaced:
+
+- Receiving: ``from_ser`` is given the packet; what it says is noted under the new sample's address.
+- Sending: a sample that is marked begins with its inline QoS. ``get_size`` leaves that out;
+  ``to_ser_ref``, asked for the bytes that follow a submessage's header, returns the inline QoS with
+  them and sets the header's flag for it. The library does the rest: fragments, retransmissions,
+  several networks.
+
+That takes private layouts, those of Cyclone DDS 11.0.1 on 64-bit Linux. They are tested once, on
+memory of our own, before anything relies on them; where that fails, :func:`reading_problem` and
+:func:`writing_problem` say so, and peers other than Cyclone DDS cannot be called or answered.
+
+What the library was given is never freed, as samples outlive readers, writers and topics.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import logging
+import struct
+import sys
+import threading
+from ctypes import (
+    CFUNCTYPE,
+    PYFUNCTYPE,
+    c_char_p,
+    c_int,
+    c_size_t,
+    c_ubyte,
+    c_uint32,
+    c_void_p,
+    string_at,
+)
+from typing import TYPE_CHECKING, Any
+
+from rosglass.ros2 import cyclone
+from rosglass.ros2.cyclone import keeping
+from rosglass.ros2.cyclone_samples import COPIED, payload
+from rosglass.ros2.dds_identity import Identity, Origin, inline_qos, read_origin
+
+if TYPE_CHECKING:
+    from rosglass.ros2.dds_endpoints import SampleWriter
+
+__all__ = [
+    "create_reading_topic",
+    "create_writing_topic",
+    "origin",
+    "reading_problem",
+    "write",
+    "writing_problem",
+]
+
+_log = logging.getLogger("rosglass.ros2")
+
+#: ``ddsi_sertype.serdata_ops``, and the entries of ``ddsi_serdata_ops`` that are replaced.
+_OPS_OF_TYPE = 8
+_OPS = 17
+_GET_SIZE, _FROM_SER, _TO_SER_REF = 1, 2, 7
+_SDK_DATA = 2
+#: ``ddsi_rdata``: rmsg, nextfrag, min, maxp1, submsg_zoff, payload_zoff, keyhash_zoff; and where
+#: the packet begins that a ``ddsi_rmsg`` holds.
+_RDATA = struct.Struct("=QQIIHHH2x")
+_PACKET = 48
+#: ``ddsi_xmsg``: maxsz, sz, have_params, refd_payload, which come before refd_payload_iov; and how
+#: far behind its beginning kind and data are.
+_XMSG = struct.Struct("=QQi4xQ")
+_XMSG_ROOM = 128
+_XMSG_KIND, _XMSG_DATA = 24, 112
+_XMSG_KINDS = (1, 2, 3)
+#: What an xmsg of INFO_TS and DATA, or DATA_FRAG, has before its payload: by its size, the latter's
+#: id and octetsToInlineQos.
+_FORMS = {36: (0x15, 16), 48: (0x16, 28)}
+#: ``ddsi_xmsg_data``: where INFO_SRC, INFO_DST, INFO_TS begin, with their ids, and then the rest.
+_INFOS = ((0, 0x0C), (24, 0x0E), (40, 0x09))
+_SUBMESSAGES, _SUBMESSAGE = 40, 52
+_INLINE_QOS = 0x02
+#: Begins a sample with inline QoS, the payload's own header coming after that: an encapsulation
+#: header with options that nobody uses, and the first parameter.
+_MARK = b"\x00\x01\xa5\x00"
+_MARKED = _MARK + b"\x83\x00\x18\x00"
+_QOS_SIZE = 60
+_BEFORE = len(_MARK) + _QOS_SIZE
+#: Origins that are kept until somebody asks for them. Those of samples that a reader drops unread
+#: make room when their memory is used again, or here.
+_MAX_ORIGINS = 16384
+
+_from_ser_type = c_void_p, c_void_p, c_int, c_void_p, c_size_t
+_FromSer, _FromSerFree = PYFUNCTYPE(*_from_ser_type), CFUNCTYPE(*_from_ser_type)
+_GetSize = PYFUNCTYPE(c_uint32, c_void_p)
+_ToSerRef = PYFUNCTYPE(c_void_p, c_void_p, c_size_t, c_size_t, c_void_p)
+
+_lock = threading.Lock()
+_origins: dict[int, Origin] = {}
+_told = threading.local()
+#: By the address of the type that points to them; the address may be another type's later.
+_tables: dict[int, Any] = {}
+
+
+def create_reading_topic(participant: int, name: str, type_name: str) -> int:
+    """Create a topic whose readers' samples have an :func:`origin`; see `cyclone.create_topic`."""
+    return _reading.create_topic(participant, name, type_name)
+
+
+def create_writing_topic(participant: int, name: str, type_name: str) -> int:
+    """Create a topic to whose writers :func:`write` can be applied; see `cyclone.create_topic`.
+
+    Its writers must not be used in the main thread: an exception raised there by a signal would end
+    up in the library.
+    """
+    return _writing.create_topic(participant, name, type_name)
+
+
+def origin(serdata: int) -> Origin | None:
+    """Return where a received sample comes from, once; None when it came within this process.
+
+    Args:
+        serdata: The sample's address, while the caller still holds a reference to it.
+    """
+    return _origins.pop(serdata, None)
+
+
+def write(writer: SampleWriter, identity: Identity, data: bytes | bytearray) -> bool:
+    """Send a payload with inline QoS that relates it to another sample.
+
+    Args:
+        writer: Of a topic of :func:`create_writing_topic`.
+        identity: What it relates to.
+        data: The payload with its encapsulation header.
+
+    Returns:
+        Whether it went out with inline QoS; not so if nobody outside this process is matched.
+    """
+    _told.identity = False
+    writer.write((_MARK, inline_qos(identity), data))
+    return bool(_told.identity)
+
+
+def reading_problem() -> str:
+    """Return why received samples have no origin on this machine; empty when they have."""
+    return _reading.problem
+
+
+def writing_problem() -> str:
+    """Return why nothing can be sent with inline QoS on this machine; empty when it can."""
+    return _writing.problem
+
+
+class _Hook:
+    """Replaces functions of the types of topics."""
+
+    def __init__(self) -> None:
+        self.problem = ""
+        self._tested = False
+        self._replaced: dict[int, dict[int, Any]] = {}
+
+    def create_topic(self, participant: int, name: str, type_name: str) -> int:
+        # Topics whose types look the same to the library share one: nobody may get in between.
+        with _lock:
+            topic = cyclone.create_topic(participant, name, type_name)
+            try:
+                self._prepare(cyclone.sertype(topic))
+            except BaseException:
+                cyclone.delete(topic)
+                raise
+        return topic
+
+    def replace(self, originals: Any) -> dict[int, Any]:
+        """Return functions by their place in the table, which call the original ones."""
+        raise NotImplementedError
+
+    def test(self, sertype: int) -> None:
+        """Raise when the functions do not do what they should with samples of a type."""
+        raise NotImplementedError
+
+    def _prepare(self, sertype: int) -> None:
+        if not self._tested:
+            self._tested = True
+            self.problem = self._try(sertype)
+            if self.problem:
+                _log.warning("%s", self.problem)
+        elif not self.problem:
+            self._install(sertype)
+
+    def _try(self, sertype: int) -> str:
+        if sys.platform != "linux" or sys.byteorder != "little":
+            return f"DDS on {sys.platform} does without identities: it was never tried there"
+        pointer = c_void_p.from_address(sertype + _OPS_OF_TYPE)
+        originals = pointer.value
+        try:
+            self._install(sertype)
+            self.test(sertype)
+        except Exception as error:
+            pointer.value = originals
+            return (
+                f"Cyclone DDS {cyclone.VERSION} is built differently on this machine "
+                f"({type(self).__name__}: {error!r})"
+            )
+        return ""
+
+    def _install(self, sertype: int) -> None:
+        pointer = c_void_p.from_address(sertype + _OPS_OF_TYPE)
+        table = _tables.get(sertype)
+        if table is not None and pointer.value == ctypes.addressof(table):
+            return
+        originals = pointer.value
+        assert originals is not None
+        if originals not in self._replaced:
+            self._replaced[originals] = self.replace((c_void_p * _OPS).from_address(originals))
+        # One for each type: otherwise the library would take types for the same that it knows as
+        # two, and remove the wrong one when a topic is deleted.
+        if table is None:
+            table = _tables[sertype] = (c_void_p * _OPS)()
+        ctypes.memmove(table, originals, ctypes.sizeof(table))
+        for place, function in self._replaced[originals].items():
+            table[place] = ctypes.cast(function, c_void_p)
+        pointer.value = ctypes.addressof(table)
+
+
+class _Reading(_Hook):
+    """Notes where samples come from."""
+
+    def replace(self, originals: Any) -> dict[int, Any]:
+        keeping, releasing = _FromSer(originals[_FROM_SER]), _FromSerFree(originals[_FROM_SER])
+
+        def from_ser(sertype: int, kind: int, fragments: int, size: int) -> int | None:
+            make = keeping if size <= COPIED else releasing
+            serdata: int | None = make(sertype, kind, fragments, size)
+            try:
+                if serdata is not None and kind == _SDK_DATA:
+                    _note(serdata, fragments)
+            except Exception:
+                _log.exception("the origin of a DDS sample cannot be noted")
+            return serdata
+
+        return {_FROM_SER: _FromSer(from_ser)}
+
+    def test(self, sertype: int) -> None:
+        data = b"\x00\x01\x00\x00rosglass"
+        sent = Origin(b"\x00\x00\x12\x03", (3 << 32) + 4, Identity(bytes(range(16)), (5 << 32) + 6))
+        header = struct.pack("=BBHHHIIiI", 0x15, 7, 0, 0, 16, 0, 0x1203, 3, 4)
+        assert sent.related is not None
+        before = bytes(20) + header + inline_qos(sent.related)
+        packet = ctypes.create_string_buffer(bytes(_PACKET) + before + data)
+        place = ctypes.addressof(packet)
+        rdata = ctypes.create_string_buffer(
+            _RDATA.pack(place, 0, 0, len(data), 20, len(before), 0), _RDATA.size
+        )
+        # Through the table, as the library does it.
+        from_ser = _FromSer(_tables[sertype][_FROM_SER])
+        serdata = from_ser(sertype, _SDK_DATA, ctypes.addressof(rdata), len(data))
+        noted = origin(serdata)
+        _expect(bytes(payload(serdata)), data)
+        _expect(noted, sent)
+
+
+class _Writing(_Hook):
+    """Sends inline QoS with samples that are marked."""
+
+    #: From a serdata's beginning to its encapsulation header.
+    _header = 0
+
+    def replace(self, originals: Any) -> dict[int, Any]:
+        original_size = _GetSize(originals[_GET_SIZE])
+        original_ref = _ToSerRef(originals[_TO_SER_REF])
+
+        def get_size(serdata: int) -> int:
+            size: int = original_size(serdata)
+            return size - _BEFORE if self._marked(serdata) else size
+
+        def to_ser_ref(serdata: int, offset: int, size: int, part: int) -> int:
+            kept: int = original_ref(serdata, offset, size, part)
+            try:
+                if self._marked(serdata):
+                    first = serdata + self._header
+                    if offset == 0 and _flag(part):
+                        first, size = first + len(_MARK), size + _QOS_SIZE
+                        _told.identity = True
+                    else:
+                        first += _BEFORE + offset
+                    c_void_p.from_address(part).value = first
+                    c_size_t.from_address(part + 8).value = size
+            except Exception:
+                _log.exception("a DDS sample cannot be sent with its identity")
+            return kept
+
+        return {_GET_SIZE: _GetSize(get_size), _TO_SER_REF: _ToSerRef(to_ser_ref)}
+
+    def test(self, sertype: int) -> None:
+        self._measure(sertype)
+        data = b"\x00\x01\x00\x00rosglass"
+        qos = inline_qos(Identity(bytes(range(16)), 7))
+        serdata = _make(sertype, _MARK + qos + data)
+        lib = keeping()
+        _expect(lib.ddsi_serdata_size(serdata), len(data))
+        # What is sent within this process has no header to be flagged.
+        _expect(_bytes_of(serdata, 0, len(data), 0), data)
+        _expect(_bytes_of(serdata, 4, 8, 0), data[4:])
+        submessages = bytes(12) + struct.pack("=BBHHH16x", 0x15, 5, 0, 0, 16)
+        held = bytearray(_SUBMESSAGES) + submessages
+        for at, name in _INFOS:
+            held[at] = name
+        packet = (c_ubyte * len(held)).from_buffer(held)
+        _expect(_bytes_of(serdata, 0, len(data), ctypes.addressof(packet)), qos + data)
+        _expect(held[_SUBMESSAGE + 1], 5 | _INLINE_QOS)
+        lib.ddsi_serdata_unref(serdata)
+
+    def _measure(self, sertype: int) -> None:
+        part = (c_size_t * 2)()
+        serdata = _make(sertype, b"\x00\x01\x00\x00rosglass")
+        lib = keeping()
+        lib.ddsi_serdata_to_ser_ref(serdata, 0, 12, part)
+        self._header = part[0] - serdata
+        lib.ddsi_serdata_to_ser_unref(serdata, part)
+        lib.ddsi_serdata_unref(serdata)
+        if not 64 <= self._header <= 256:
+            raise ValueError(f"payloads begin at {self._header}")
+
+    def _marked(self, serdata: int) -> bool:
+        return string_at(serdata + self._header, len(_MARKED)) == _MARKED
+
+
+_reading, _writing = _Reading(), _Writing()
+
+
+def _note(serdata: int, fragments: int) -> None:
+    """Note the origin of a sample that was made from fragments of which the first is the first."""
+    rmsg, _, first, _, submessage, end, _ = _RDATA.unpack(string_at(fragments, _RDATA.size))
+    _origins.pop(serdata, None)
+    if first != 0 or not rmsg or end <= submessage:
+        return
+    # The library has checked that submessage and parameters end where the payload begins.
+    found = read_origin(string_at(rmsg + _PACKET + submessage, end - submessage))
+    if found is None:
+        return
+    while len(_origins) >= _MAX_ORIGINS:
+        _origins.pop(next(iter(_origins)), None)
+    _origins[serdata] = found
+
+
+def _flag(part: int) -> bool:
+    """Say in a submessage's header that inline QoS follows; returns False when there is no header.
+
+    Args:
+        part: Where the library wants the payload's address; an xmsg's refd_payload_iov, unless the
+            sample is about to be copied for a reader in this process.
+    """
+    room, size, parameters, referred = _XMSG.unpack(string_at(part - _XMSG.size, _XMSG.size))
+    form = _FORMS.get(size)
+    if form is None or room != _XMSG_ROOM or parameters or referred:
+        return False
+    if c_uint32.from_address(part + _XMSG_KIND).value not in _XMSG_KINDS:
+        return False
+    data = c_void_p.from_address(part + _XMSG_DATA).value
+    if not data or data % 8:
+        return False
+    held = string_at(data, _SUBMESSAGES + size)
+    if any(held[at] != name for at, name in _INFOS):
+        return False
+    name, flags, to_qos = struct.unpack_from("=BB4xH", held, _SUBMESSAGE)
+    if (name, to_qos) != form or flags & _INLINE_QOS:
+        return False
+    c_ubyte.from_address(data + _SUBMESSAGE + 1).value = flags | _INLINE_QOS
+    return True
+
+
+def _make(sertype: int, data: bytes) -> int:
+    part = (c_size_t * 2)(ctypes.cast(c_char_p(data), c_void_p).value or 0, len(data))
+    made = keeping().ddsi_serdata_from_ser_iov(sertype, _SDK_DATA, 1, part, len(data))
+    if not made:
+        raise ValueError("no sample can be made")
+    return int(made)
+
+
+def _bytes_of(serdata: int, offset: int, size: int, packet: int) -> bytes:
+    """Return what is sent of a sample behind the headers at `packet`; 0 for none."""
+    room = ctypes.create_string_buffer(_XMSG.size + _XMSG_DATA + 8)
+    part = ctypes.addressof(room) + _XMSG.size
+    if packet:
+        _XMSG.pack_into(room, 0, _XMSG_ROOM, 36, 0, 0)
+        c_uint32.from_address(part + _XMSG_KIND).value = 1
+        c_void_p.from_address(part + _XMSG_DATA).value = packet
+    lib = keeping()
+    lib.ddsi_serdata_to_ser_ref(serdata, offset, size, part)
+    data = string_at(c_void_p.from_address(part).value or 0, c_size_t.from_address(part + 8).value)
+    lib.ddsi_serdata_to_ser_unref(serdata, part)
+    return data
+
+
+def _expect(found: object, wanted: object) -> None:
+    if found != wanted:
+        raise ValueError(f"{found!r} instead of {wanted!r}")

@@ -1,0 +1,263 @@
+"""The two topics of a DDS service, as its clients and servers use them, and who else does.
+
+Names and user data are rmw_cyclonedds's, which are every rmw implementation's but for the ids that
+tell it which reader and writer belong together.
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import threading
+from contextlib import suppress
+from dataclasses import replace
+from enum import Enum
+from typing import TYPE_CHECKING
+
+from rosglass.comm import EndpointKind
+from rosglass.errors import Error, NodeClosedError
+from rosglass.ros2 import cyclone, cyclone_builtin, cyclone_identity
+from rosglass.ros2.cyclone_listener import Event, publication_matched
+from rosglass.ros2.dds_discovery_info import format_user_data
+from rosglass.ros2.dds_endpoints import SampleReader, SampleWriter, Taken
+from rosglass.ros2.dds_outbox import Outbox
+from rosglass.ros2.names import mangle_type
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from rosglass.comm import EndpointInfo, NodeName, QoS
+    from rosglass.ros2.cyclone_builtin import Discovered
+    from rosglass.ros2.dds_participant import Participant
+    from rosglass.ros2.graph import Graph
+
+__all__ = ["Ends", "Matched", "Scheme", "names_of", "scheme_of"]
+
+_log = logging.getLogger("rosglass.ros2")
+
+#: First two bytes of a GUID (RTPS 2.5, section 9.3.1.5).
+_CYCLONE = b"\x01\x10"
+_VENDORS = {
+    b"\x01\x01": "RTI Connext",
+    b"\x01\x03": "OpenDDS",
+    b"\x01\x0f": "Fast DDS",
+    _CYCLONE: "Cyclone DDS",
+    b"\x01\x12": "RustDDS",
+}
+#: A participant's readers and writers share the beginning of its GUID.
+_PREFIX = 12
+#: Requests and replies that are kept until they are acknowledged, or handed on.
+_DEPTH = 1000
+#: Seconds that sending waits in the caller's thread for readers that take nothing.
+_PATIENCE = 0.01
+#: Seconds that the first samples wait for their receiver to be made.
+_START = 5.0
+#: Peers whose rubbish is logged, once each.
+_MAX_NAMED = 100
+
+_numbers = itertools.count(1)
+
+
+class Scheme(Enum):
+    """How a reply says which request it answers.
+
+    Measured with, or read from, rmw_cyclonedds, rmw_fastrtps and RustDDS.
+    """
+
+    #: rmw_cyclonedds's: payloads begin with 16 bytes behind the encapsulation header, a number of
+    #: the client's and one of the request's, which servers return as they are.
+    HEADER = "header"
+    #: Everyone else's: plain payloads; a reply's inline QoS carries the identity of its request
+    #: (OMG DDS-RPC 1.0), see :mod:`rosglass.ros2.cyclone_identity`.
+    IDENTITY = "identity"
+
+
+def scheme_of(guid: bytes) -> Scheme:
+    """Return how a peer does it, from the GUID of its reader or writer."""
+    return Scheme.HEADER if guid.startswith(_CYCLONE) else Scheme.IDENTITY
+
+
+def _vendor(guid: bytes) -> str:
+    return _VENDORS.get(guid[:2], f"DDS vendor {guid[:2].hex()}")
+
+
+class Matched:
+    """Whom a reader or writer is matched with.
+
+    Args:
+        handles: Returns their handles.
+        look_up: Returns the one with a handle.
+    """
+
+    def __init__(
+        self,
+        entity: int,
+        handles: Callable[[int], list[int]],
+        look_up: Callable[[int, int], Discovered | None],
+    ) -> None:
+        self._entity, self._handles, self._look_up = entity, handles, look_up
+        self._known: dict[int, Discovered] = {}
+
+    def get(self, handle: int) -> Discovered | None:
+        """Return the one with a handle; None when it is gone, and was not seen before."""
+        known = self._known.get(handle)
+        if known is None:
+            known = self._look_up(self._entity, handle)
+            if known is not None:
+                self._known[handle] = known
+        return known
+
+    def all(self) -> list[Discovered]:
+        """Return all there are now."""
+        try:
+            handles = self._handles(self._entity)
+        except Error:  # deleted meanwhile
+            return []
+        here = {handle: found for handle in handles if (found := self.get(handle)) is not None}
+        self._known = here
+        return list(here.values())
+
+
+class Ends:
+    """The reader and the writer of a service's client or server.
+
+    Whatever the profile says, they hold many samples: a request or a reply is nothing to lose.
+
+    Args:
+        participant: Who they belong to.
+        graph: Where peers' names are looked up.
+        node: The node they belong to.
+        service: Absolute name.
+        type_name: The service's type.
+        type_hash: Its RIHS01 hash.
+        qos: Profile of requests and replies.
+        on_taken: Takes what the reader receives, from :meth:`start` on.
+        on_matched: Called, on the participant's pump, when peers came or went.
+        server: Whether they are a server's.
+    """
+
+    def __init__(
+        self,
+        participant: Participant,
+        graph: Graph,
+        node: NodeName,
+        service: str,
+        type_name: str,
+        type_hash: str,
+        qos: QoS,
+        on_taken: Callable[[list[Taken]], None],
+        on_matched: Callable[[], None],
+        *,
+        server: bool,
+    ) -> None:
+        self._participant, self._graph, self._service = participant, graph, service
+        self._kind = EndpointKind.SERVICE_CLIENT if server else EndpointKind.SERVICE_SERVER
+        self._on_taken, self._on_matched = on_taken, on_matched
+        self._started = threading.Event()
+        self._named: set[bytes] = set()
+        self.closed = False
+        requests = f"rq{service}Request", mangle_type(f"{type_name}_Request")
+        replies = f"rr{service}Reply", mangle_type(f"{type_name}_Response")
+        what = "serviceid" if server else "clientid"
+        user_data = format_user_data({what: _new_id(participant.guid), "typehash": type_hash})
+        qos = replace(qos, depth=max(qos.depth, _DEPTH))
+        place = f"service {service}"
+        self.writer = SampleWriter(
+            participant,
+            *(replies if server else requests),
+            qos,
+            user_data,
+            place,
+            # Requests need no identity beyond that which every sample has.
+            cyclone_identity.create_writing_topic if server else cyclone.create_topic,
+            _PATIENCE,
+        )
+        try:
+            self.reader = SampleReader(
+                participant,
+                *(requests if server else replies),
+                qos,
+                user_data,
+                place,
+                self._hand_on,
+                cyclone_identity.create_reading_topic,
+                cyclone_identity.origin,
+                on_matched,
+            )
+        except BaseException:
+            self.writer.close()
+            raise
+        self.readers = Matched(
+            self.writer.entity, cyclone.matched_subscriptions, cyclone_builtin.matched_subscription
+        )
+        self.writers = Matched(
+            self.reader.entity, cyclone.matched_publications, cyclone_builtin.matched_publication
+        )
+        self.outbox = Outbox(participant.pump, self.writer.entity, in_order=not server)
+        participant.pump.watch(self.writer.entity, Event.PUBLICATION_MATCHED, self._on_event)
+        participant.add_endpoint(node, self.reader.guid, writer=False)
+        participant.add_endpoint(node, self.writer.guid, writer=True)
+
+    def start(self) -> None:
+        """Let what is received be handed on."""
+        self._started.set()
+
+    def strangers(self) -> list[EndpointInfo]:
+        """Return the peers in the graph that do not use Cyclone DDS."""
+        return [
+            peer
+            for peer in self._graph.endpoints(self._kind, self._service)
+            if scheme_of(peer.gid) is Scheme.IDENTITY
+        ]
+
+    def who(self, guid: bytes) -> str:
+        """Return whose reader or writer it is, for people."""
+        nodes = {
+            peer.node.full
+            for peer in self._graph.endpoints(self._kind, self._service)
+            if peer.gid[:_PREFIX] == guid[:_PREFIX]
+        }
+        return f"{' or '.join(sorted(nodes)) or guid.hex()} ({_vendor(guid)})"
+
+    def name(self, guid: bytes, text: str, *values: object) -> None:
+        """Log what is wrong with a peer, once."""
+        if guid not in self._named and len(self._named) < _MAX_NAMED:
+            self._named.add(guid)
+            _log.warning(f"%s: {text}", self._service, *values)
+
+    def close(self) -> None:
+        """Delete both; safe to call twice."""
+        if self.closed:
+            return
+        self.closed = True
+        for end in (self.reader, self.writer):
+            self._participant.remove_endpoint(end.guid)
+        self.reader.close()
+        self.outbox.close()
+        self.writer.close()
+        self._participant.pump.forget(self.writer.entity)
+
+    def _hand_on(self, taken: list[Taken]) -> None:
+        # The first may come while their receiver is being made.
+        if self._started.wait(_START):
+            self._on_taken(taken)
+
+    def _on_event(self) -> None:
+        if self.closed:
+            return
+        with suppress(NodeClosedError):
+            if publication_matched(self.writer.entity).change:
+                self._on_matched()
+        self.outbox.retry()
+
+
+def names_of(peers: Iterable[EndpointInfo]) -> str:
+    """Return the names of the nodes that peers belong to, and their vendors, for people."""
+    named = sorted({f"{peer.node} ({_vendor(peer.gid)})" for peer in peers})
+    return ", ".join(named)
+
+
+def _new_id(participant: bytes) -> str:
+    """Return what rmw_cyclonedds calls a client or service id, spelled as it does."""
+    first, *rest = participant[:_PREFIX] + next(_numbers).to_bytes(4, "big")
+    return ".".join((f"{first:2x}", *(f"{byte:x}" for byte in rest)))

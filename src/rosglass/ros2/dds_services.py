@@ -1,0 +1,399 @@
+"""Service clients and servers over DDS, with peers of every DDS implementation.
+
+A service's replies go to all its clients, who pick their own. How, depends on the peer; see
+:class:`rosglass.ros2.dds_service_ends.Scheme`.
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import secrets
+import struct
+import threading
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rosglass.errors import (
+    Error,
+    NodeClosedError,
+    ServiceError,
+    TimeoutError,  # noqa: A004 - the field's own word
+    UnsupportedError,
+)
+from rosglass.ros2 import cyclone_identity
+from rosglass.ros2.dds_discovery_info import parse_user_data
+from rosglass.ros2.dds_identity import UNKNOWN_GUID, Identity, Origin
+from rosglass.ros2.dds_service_ends import Ends, Scheme, names_of, scheme_of
+from rosglass.ros2.middleware import Replier, Requester, RequestId
+
+if TYPE_CHECKING:
+    from rosglass.comm import NodeName, QoS
+    from rosglass.ros2.cyclone_builtin import Discovered
+    from rosglass.ros2.dds_endpoints import Taken
+    from rosglass.ros2.dds_participant import Participant
+    from rosglass.ros2.graph import Graph
+    from rosglass.ros2.middleware import OnReply, OnRequest
+
+__all__ = ["DdsReplier", "DdsRequester"]
+
+_log = logging.getLogger("rosglass.ros2")
+
+#: An encapsulation header, and what comes behind it with Scheme.HEADER.
+_ENCAPSULATION, _HEADER = 4, 16
+#: A participant's readers and writers share the beginning of its GUID.
+_PREFIX = 12
+#: Seconds that a reply waits for its client's reader to be found, or to take something.
+_REPLY_PATIENCE = 3.0
+#: Seconds that closing waits for replies that are on their way.
+_FAREWELL = 0.5
+_REMEDY = "start it with RMW_IMPLEMENTATION=rmw_cyclonedds_cpp, or use zenoh:// with rmw_zenoh_cpp"
+
+
+class DdsRequester(Requester):
+    """The ends of a service client; arguments as :class:`Ends`'s.
+
+    Attributes:
+        gid: Identity of its writer of requests, by which the client is known.
+    """
+
+    def __init__(
+        self,
+        participant: Participant,
+        graph: Graph,
+        node: NodeName,
+        service: str,
+        type_name: str,
+        type_hash: str,
+        qos: QoS,
+        on_reply: OnReply,
+    ) -> None:
+        self._service, self._on_reply = service, on_reply
+        self._lock = threading.Lock()
+        #: What rmw_cyclonedds takes an instance handle for: nobody else's may be the same.
+        self._id = secrets.randbits(64)
+        self._next = itertools.count(1)
+        #: Numbers of calls, and the sequence number that each was sent with, 0 for none.
+        self._calls: dict[int, int] = {}
+        self._by_sequence: dict[int, int] = {}
+        self._sequence = 0
+        self._ends = Ends(
+            participant,
+            graph,
+            node,
+            service,
+            type_name,
+            type_hash,
+            qos,
+            self._on_replies,
+            self._on_matched,
+            server=False,
+        )
+        self.gid = self._ends.writer.guid
+        self._ends.start()
+
+    @property
+    def problem(self) -> str:  # type: ignore[override]
+        """Why some servers in the graph cannot be called."""
+        strangers = self._ends.strangers()
+        if not strangers:
+            return ""
+        names = names_of(strangers)
+        if reason := cyclone_identity.reading_problem():
+            return f"{names} cannot be called: {reason}; {_REMEDY}"
+        if Scheme.HEADER in self._schemes():
+            return (
+                f"{names} and a server on Cyclone DDS offer {self._service} in ways that exclude "
+                "each other: only the former is called; end one of them"
+            )
+        return ""
+
+    def ready(self) -> bool:
+        """Return whether a server's reader of requests and its writer of replies are matched."""
+        return not self._ends.closed and self._route() is not None
+
+    def send(self, data: bytes | bytearray, timeout: float | None) -> int:
+        """Send a request; see :meth:`rosglass.ros2.middleware.Requester.send`."""
+        if self._ends.closed:
+            raise NodeClosedError(f"the client of {self._service} is closed")
+        number = next(self._next)
+        with self._lock:
+            self._calls[number] = 0
+
+        def expired() -> None:
+            self._fail(number, "its server takes no requests")
+
+        self._ends.outbox.put(
+            lambda: self._send(number, data), float("inf") if timeout is None else timeout, expired
+        )
+        return number
+
+    def forget(self, number: int) -> None:
+        """Drop the reply to a request, should it still come."""
+        with self._lock:
+            self._by_sequence.pop(self._calls.pop(number, 0), None)
+
+    def close(self) -> None:
+        """Withdraw the client; replies that still come are dropped."""
+        self._ends.close()
+        with self._lock:
+            self._calls.clear()
+            self._by_sequence.clear()
+
+    def _send(self, number: int, data: bytes | bytearray) -> bool:
+        """Send a request; return whether nothing more is to be done for it."""
+        scheme = self._route()
+        if scheme is None:
+            self._fail(number, "its server went away")
+            return True
+        parts: tuple[bytes | bytearray | memoryview, ...] = (data,)
+        if scheme is Scheme.HEADER:
+            header = struct.pack("<Qq", self._id, number)
+            view = memoryview(data)
+            parts = (view[:_ENCAPSULATION], header, view[_ENCAPSULATION:])
+        # Replies are looked up under the lock, too: they may come before this returns.
+        with self._lock:
+            if number not in self._calls:
+                return True
+            if self._sequence < 0:
+                raise ServiceError(f"the client of {self._service} is broken; make another one")
+            try:
+                self._ends.writer.write(parts)
+            except TimeoutError:
+                return False
+            except (NodeClosedError, UnsupportedError):
+                raise
+            except Error:
+                self._sequence = -1  # nobody knows whether a number was used
+                raise
+            self._sequence += 1
+            if scheme is Scheme.IDENTITY:
+                self._calls[number] = self._sequence
+                self._by_sequence[self._sequence] = number
+        return True
+
+    def _on_replies(self, taken: list[Taken]) -> None:
+        for data, _, handle, origin in taken:
+            server = self._ends.writers.get(handle)
+            if server is None:
+                continue
+            try:
+                self._take(server.guid, data, origin)
+            except Exception:
+                _log.exception("%s: a reply is lost", self._service)
+
+    def _take(self, server: bytes, data: bytes | memoryview, origin: Origin | None) -> None:
+        number = None
+        if origin is not None and origin.related is not None:
+            guid, sequence = origin.related
+            if guid in (self._ends.writer.guid, self._ends.reader.guid):
+                with self._lock:
+                    number = self._by_sequence.pop(sequence, None)
+        elif scheme_of(server) is Scheme.IDENTITY:
+            if not cyclone_identity.reading_problem():
+                text = "ignoring replies of %s, which do not say what they answer"
+                self._ends.name(server, text, self._ends.who(server))
+        elif (header := _read_header(data)) is None:
+            text = "ignoring a reply of %s, which is too short for its header: %d bytes"
+            self._ends.name(server, text, self._ends.who(server), len(data))
+        elif header[0] == self._id:
+            number = header[1]
+            data = _without_header(data)
+        if number is None:
+            return
+        with self._lock:
+            known = self._calls.pop(number, None)
+        if known is not None:
+            self._on_reply(number, data, "")
+
+    def _fail(self, number: int, error: str) -> None:
+        with self._lock:
+            known = self._calls.pop(number, None)
+        if known is not None:
+            self._on_reply(number, None, error)
+
+    def _route(self) -> Scheme | None:
+        """Return how to send requests; None when no server is linked."""
+        schemes = self._schemes()
+        if Scheme.IDENTITY in schemes and not cyclone_identity.reading_problem():
+            # Servers on Cyclone DDS find such requests too short, mostly; the others would
+            # take a header for arguments.
+            return Scheme.IDENTITY
+        return Scheme.HEADER if Scheme.HEADER in schemes else None
+
+    def _schemes(self) -> set[Scheme]:
+        """Return what the linked servers speak."""
+        answering = {_server_of(found) for found in self._ends.writers.all()}
+        return {
+            scheme_of(found.guid)
+            for found in self._ends.readers.all()
+            if _server_of(found) in answering
+        }
+
+    def _on_matched(self) -> None:
+        if self.changed is not None:
+            self.changed()
+
+
+@dataclass(frozen=True)
+class _Answer:
+    """What a reply needs.
+
+    Attributes:
+        client: The writer of the request.
+        header: What its payload began with, where replies begin with it, too.
+        identity: The request's identity, where replies carry that.
+        reader: The client's reader of replies, where it told.
+    """
+
+    client: Discovered
+    header: bytes = b""
+    identity: Identity | None = None
+    reader: bytes = b""
+
+
+class DdsReplier(Replier):
+    """The ends of a service server; arguments as :class:`Ends`'s.
+
+    Attributes:
+        gid: Identity of its reader of requests, by which the server is known.
+    """
+
+    def __init__(
+        self,
+        participant: Participant,
+        graph: Graph,
+        node: NodeName,
+        service: str,
+        type_name: str,
+        type_hash: str,
+        qos: QoS,
+        on_request: OnRequest,
+    ) -> None:
+        self._service, self._on_request = service, on_request
+        self._ends = Ends(
+            participant,
+            graph,
+            node,
+            service,
+            type_name,
+            type_hash,
+            qos,
+            self._on_requests,
+            lambda: None,
+            server=True,
+        )
+        self._pump = participant.pump
+        self.gid = self._ends.reader.guid
+        self._ends.start()
+
+    @property
+    def problem(self) -> str:  # type: ignore[override]
+        """Why some clients in the graph cannot be served."""
+        strangers = self._ends.strangers()
+        reason = cyclone_identity.reading_problem() or cyclone_identity.writing_problem()
+        if not strangers or not reason:
+            return ""
+        return f"{names_of(strangers)} cannot be answered: {reason}; {_REMEDY}"
+
+    def reply(self, request: RequestId, data: bytes | bytearray) -> None:
+        """Answer a request, once the client can hear it; a client that is gone is no error."""
+        answer = request.handle
+        if not isinstance(answer, _Answer):
+            return
+
+        def expired() -> None:
+            who = self._ends.who(answer.client.guid)
+            text = "%s did not get its reply: its reader of replies is not found, or takes nothing"
+            self._ends.name(answer.client.guid, text, who)
+
+        # See create_writing_topic() for what the main thread must not do.
+        free = threading.current_thread() is not threading.main_thread()
+        self._ends.outbox.put(
+            lambda: self._answer(answer, data), _REPLY_PATIENCE, expired, now=free
+        )
+
+    def close(self) -> None:
+        """Withdraw the server."""
+        if not self._pump.current:
+            self._ends.outbox.drain(_FAREWELL)
+        self._ends.close()
+
+    def _on_requests(self, taken: list[Taken]) -> None:
+        for data, _, handle, origin in taken:
+            client = self._ends.writers.get(handle)
+            if client is None:
+                continue  # gone: nobody waits for the reply
+            try:
+                self._take(client, data, origin)
+            except Exception:
+                _log.exception("%s: a request is lost", self._service)
+
+    def _take(self, client: Discovered, data: bytes | memoryview, origin: Origin | None) -> None:
+        if scheme_of(client.guid) is Scheme.HEADER:
+            header = _read_header(data)
+            if header is None:
+                text = "ignoring a request of %s, which is too short for its header: %d bytes"
+                self._ends.name(client.guid, text, self._ends.who(client.guid), len(data))
+                return
+            kept = bytes(data[_ENCAPSULATION : _ENCAPSULATION + _HEADER])
+            answer = _Answer(client, kept)
+            self._on_request(RequestId(client.guid, header[1], answer), _without_header(data))
+        elif origin is None:
+            text = "cannot answer %s: %s; %s"
+            why = cyclone_identity.reading_problem() or "its requests have no identity"
+            self._ends.name(client.guid, text, self._ends.who(client.guid), why, _REMEDY)
+        else:
+            given = origin.related
+            reader = b"" if given is None or given.guid == UNKNOWN_GUID else given.guid
+            identity = Identity(reader or client.guid, origin.sequence)
+            answer = _Answer(client, identity=identity, reader=reader)
+            self._on_request(RequestId(client.guid, origin.sequence, answer), data)
+
+    def _answer(self, answer: _Answer, data: bytes | bytearray) -> bool:
+        """Send a reply; return whether nothing more is to be done for it."""
+        if not self._hears(answer):
+            # A reply to a reader that is not matched yet would be lost.
+            return answer.client not in self._ends.writers.all()
+        try:
+            if answer.identity is None:
+                view = memoryview(data)
+                parts = (view[:_ENCAPSULATION], answer.header, view[_ENCAPSULATION:])
+                self._ends.writer.write(parts)
+            elif not cyclone_identity.write(self._ends.writer, answer.identity, data):
+                who = self._ends.who(answer.client.guid)
+                text = "%s did not get its reply: Cyclone DDS sent it without identity; %s"
+                self._ends.name(answer.client.guid, text, who, _REMEDY)
+        except TimeoutError:
+            return False
+        return True
+
+    def _hears(self, answer: _Answer) -> bool:
+        """Return whether the client's reader of replies is matched."""
+        readers = self._ends.readers.all()
+        if answer.reader:
+            return any(found.guid == answer.reader for found in readers)
+        client = _client_of(answer.client)
+        return any(_client_of(found) == client for found in readers)
+
+
+def _server_of(found: Discovered) -> str | bytes:
+    """Return what a server's reader and writer have in common."""
+    return parse_user_data(found.user_data).get("serviceid") or found.guid[:_PREFIX]
+
+
+def _client_of(found: Discovered) -> str | bytes:
+    """Return what a client's reader and writer have in common."""
+    return parse_user_data(found.user_data).get("clientid") or found.guid[:_PREFIX]
+
+
+def _read_header(data: bytes | memoryview) -> tuple[int, int] | None:
+    """Return the client's number and the request's; None when the payload is too short."""
+    if len(data) < _ENCAPSULATION + _HEADER:
+        return None
+    client, number = struct.unpack_from("<Qq" if data[1] & 1 else ">Qq", data, _ENCAPSULATION)
+    return client, number
+
+
+def _without_header(data: bytes | memoryview) -> bytes:
+    return b"".join((data[:_ENCAPSULATION], data[_ENCAPSULATION + _HEADER :]))
