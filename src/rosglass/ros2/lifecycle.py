@@ -16,7 +16,7 @@ from rosglass.errors import NodeClosedError, TransitionError
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from rosglass.comm import Executor, Node, ServiceClient
+    from rosglass.comm import Executor, Node, ServiceClient, Subscription
     from rosglass.messages import Message
 
 __all__ = ["LifecycleClient", "State", "Transition", "TransitionEvent"]
@@ -94,7 +94,7 @@ class LifecycleClient(Handle):
         self._owner = owner
         self._lock = threading.Lock()
         self._clients: dict[str, ServiceClient] = {}
-        self._watches: list[Handle] = []
+        self._watches: list[Subscription] = []
         self._closed = False
         self._client("get_state")
 
@@ -196,7 +196,7 @@ class LifecycleClient(Handle):
             executor=executor,
         )
         with self._lock:
-            self._watches.append(watch)
+            self._watches = [*(w for w in self._watches if not w.closed), watch]
         return watch
 
     def close(self) -> None:

@@ -36,7 +36,14 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
     from os import PathLike
 
-    from rosglass.comm import Executor, Node, ParameterEvent, ParameterValue, ServiceClient
+    from rosglass.comm import (
+        Executor,
+        Node,
+        ParameterEvent,
+        ParameterValue,
+        ServiceClient,
+        Subscription,
+    )
     from rosglass.messages import Message
 
 __all__ = ["Ros2ParameterClient"]
@@ -55,7 +62,7 @@ class Ros2ParameterClient(ParameterClient):
         self._owner = owner
         self._lock = threading.Lock()
         self._clients: dict[str, ServiceClient] = {}
-        self._watches: list[Handle] = []
+        self._watches: list[Subscription] = []
         self._closed = False
         # At once, so that it finds its server while the caller still prepares its question.
         self._client("get_parameters")
@@ -139,7 +146,7 @@ class Ros2ParameterClient(ParameterClient):
             EVENTS, EVENT_TYPE, receive, EVENTS_QOS, executor=executor
         )
         with self._lock:
-            self._watches.append(watch)
+            self._watches = [*(w for w in self._watches if not w.closed), watch]
         return watch
 
     def load(self, path: str | PathLike[str], *, timeout: float | None = 10.0) -> list[str]:
@@ -154,7 +161,11 @@ class Ros2ParameterClient(ParameterClient):
         if refused:
             # What is read-only may stand in a file that was saved, too.
             now = self.get(refused, timeout=deadline.left())
-            refused = [name for name in refused if now[name] != values[name]]
+            refused = [
+                name
+                for name in refused
+                if type(now[name]) is not type(values[name]) or now[name] != values[name]
+            ]
         if refused:
             reasons = "; ".join(f"{name}: {results[name].reason}" for name in refused)
             raise ParameterError(f"{path}: {self.node} refuses {reasons}")

@@ -228,7 +228,8 @@ class _Reader:
                     f"{namespace}/{name}" if namespace else name, begin, depth + 1
                 )
             else:
-                hint = f"; it is spelled {_KEY!r}" if name.startswith("ros_") else ""
+                misspelt = any(p.startswith("ros_") for p in (name, *namespace.split("/")))
+                hint = f"; it is spelled {_KEY!r}" if misspelt else ""
                 raise self._error(
                     key,
                     f"{name!r} has a value, but stands above {_KEY!r}, where only names of "

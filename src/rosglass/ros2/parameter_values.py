@@ -91,6 +91,10 @@ class TypedValue(NamedTuple):
         """Return the value, a list as a copy of its own."""
         return list(self.value) if isinstance(self.value, list) else self.value  # type: ignore[return-value]
 
+    def is_already(self, value: ParameterValue) -> bool:
+        """Return whether setting `value` would change nothing: equal, and of the same type."""
+        return self.value == value and typed("", value, self.type).type is self.type
+
 
 _NOT_SET = TypedValue(ParameterType.NOT_SET, None)
 

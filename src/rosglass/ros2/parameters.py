@@ -31,11 +31,13 @@ if TYPE_CHECKING:
 
     from rosglass.comm import Executor, ParameterValue
 
-__all__ = ["USE_SIM_TIME", "Change", "Ros2Parameters"]
+__all__ = ["DESCRIBE_TYPES", "USE_SIM_TIME", "Change", "Ros2Parameters"]
 
 _log = logging.getLogger("rosglass.ros2")
 #: The parameter that every node has: whether its clock follows ``/clock``.
 USE_SIM_TIME = "use_sim_time"
+#: The other one: whether the node describes its types to others. Only to be given at the start.
+DESCRIBE_TYPES = "start_type_description_service"
 _UNSET = TypedValue(ParameterType.NOT_SET, None)
 _NUMBERS = (ParameterType.INTEGER, ParameterType.DOUBLE)
 _INT_LIMITS = (-(2**63), 2**63 - 1)
@@ -82,6 +84,8 @@ class Ros2Parameters(Parameters):
         self.declare(
             USE_SIM_TIME, False, ParameterDescriptor(description="Follow the time on /clock.")
         )
+        told = ParameterDescriptor(description="Describe types to other nodes.", read_only=True)
+        self.declare(DESCRIBE_TYPES, True, told)
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.node}>"
@@ -103,6 +107,8 @@ class Ros2Parameters(Parameters):
         """Make a parameter known; see :meth:`rosglass.comm.Parameters.declare`."""
         check_name(name)
         descriptor = ParameterDescriptor() if descriptor is None else descriptor
+        if not isinstance(descriptor, ParameterDescriptor):
+            raise ParameterError(f"parameter {name!r}: {descriptor!r} is not a ParameterDescriptor")
         initial = typed(name, default, descriptor.type)
         descriptor = _complete(name, initial, descriptor)
         override = self._overrides.get(name)
@@ -235,8 +241,15 @@ class Ros2Parameters(Parameters):
         values = parameter_files.read(path).for_node(self.node)
         if not values:
             raise ParameterError(f"{path} has no parameters for {self.node}")
+        # What is as it shall be may be read-only.
+        now = self.snapshot()
+        wanted = {
+            name: value
+            for name, value in values.items()
+            if value is not None and not (name in now and now[name].is_already(value))
+        }
         try:
-            self.set({name: value for name, value in values.items() if value is not None})
+            self.set(wanted)
         except ParameterError as error:
             raise ParameterError(f"{path}: {error}") from None
 
@@ -350,8 +363,6 @@ def _complete(
     name: str, initial: TypedValue, descriptor: ParameterDescriptor
 ) -> ParameterDescriptor:
     """Return the descriptor with name and type filled in; raises ParameterError."""
-    if not isinstance(descriptor, ParameterDescriptor):
-        raise ParameterError(f"parameter {name!r}: {descriptor!r} is not a ParameterDescriptor")
     kind = descriptor.type
     if kind is ParameterType.NOT_SET:
         kind = initial.type
