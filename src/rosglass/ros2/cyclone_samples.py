@@ -120,14 +120,14 @@ def write(
         TimeoutError: It could not be sent in time.
         UnsupportedError: The payload is not of the wire format.
     """
-    pieces = (_Part * len(parts))()
-    total = 0
-    kept = []
-    for piece, part in zip(pieces, parts, strict=True):
-        held = _pin(part)
-        kept.append(held)
-        piece.base, piece.size = held.address, held.size
-        total += held.size
+    pieces: Any
+    if len(parts) == 1 and type(parts[0]) is bytes:
+        total = len(parts[0])
+        pieces = byref(_BytesPart(parts[0], total))
+    else:
+        pinned = [_pin(part) for part in parts]
+        pieces = (_Part * len(parts))(*[_Part(pin.address, pin.size) for pin in pinned])
+        total = sum(pin.size for pin in pinned)
     lib = library() if total > COPIED else keeping()
     serdata = lib.ddsi_serdata_from_ser_iov(sertype, _SDK_DATA, len(parts), pieces, total)
     if not serdata:
@@ -148,6 +148,12 @@ class _Part(ctypes.Structure):
     """``ddsrt_iovec_t``: a piece of memory."""
 
     _fields_ = (("base", c_void_p), ("size", c_size_t))
+
+
+class _BytesPart(ctypes.Structure):
+    """The same for bytes, which it keeps alive."""
+
+    _fields_ = (("base", c_char_p), ("size", c_size_t))
 
 
 class _Block:

@@ -67,6 +67,14 @@ class Writer(Handle):
     def write(self, data: bytes | bytearray) -> None:
         """Send a payload, which begins with its encapsulation header."""
 
+    def write_parts(self, parts: Sequence[bytes | bytearray | memoryview]) -> None:
+        """Send a payload that comes in parts, which may change as soon as this returns.
+
+        The first begins with the encapsulation header; views are contiguous and of bytes. For
+        middlewares that take big payloads without another copy; all others join them.
+        """
+        self.write(b"".join(parts))
+
     def match(self, subscriptions: Sequence[EndpointInfo]) -> None:
         """Take note of the subscriptions in the graph that want these samples.
 

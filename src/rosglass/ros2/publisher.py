@@ -35,6 +35,8 @@ __all__ = ["Ros2Publisher"]
 
 _log = logging.getLogger("rosglass.ros2")
 _SUBSCRIPTION = EndpointKind.SUBSCRIPTION
+#: Payloads above this size in bytes are handed on in parts, so that arrays in them are not copied.
+_BIG = 64 * 1024
 #: Tells `publish()` from `publish(None)`.
 _NO_MESSAGE: Any = object()
 
@@ -49,6 +51,7 @@ class Ros2Publisher(Publisher, Member):
         self._closed = False
         self._process = os.getpid()
         self._problem = ""
+        self._big = False
         self.events: PublisherEvents = PublisherEvents(core.dispatcher, core.wake)
         self._lock = threading.Lock()
         self._watchdogs: dict[str, Watchdog] = {}
@@ -78,7 +81,12 @@ class Ros2Publisher(Publisher, Member):
             # Most likely a function that forgot its return: it must not become a zero command.
             raise ConversionError("", None, "a message, a dict or keyword fields", self.type.name)
         value = fields if message is _NO_MESSAGE else message
-        self._write(self.type.encode(value, wire="cdr"))
+        if self._big:
+            self._write_parts(self.type.encode_parts(value, wire="cdr"))
+        else:
+            payload = self.type.encode(value, wire="cdr")
+            self._big = len(payload) > _BIG
+            self._write(payload)
 
     def publish_serialized(self, data: bytes | bytearray | memoryview | Sample) -> None:
         """Send `data`, which starts with its 4-byte encapsulation header, unchanged."""
@@ -89,13 +97,16 @@ class Ros2Publisher(Publisher, Member):
             raise ConversionError(
                 "", data, "bytes, a bytearray, a memoryview or a Sample", self.type.name
             )
-        # Copied: the caller may reuse its buffer at once.
-        payload = bytes(data)
+        payload = data if type(data) is bytes else _octets(data)
         if len(payload) < 4 or payload[0] != 0:
             raise ConversionError(
-                "", payload, "CDR bytes with their 4-byte encapsulation header", self.type.name
+                "", bytes(data), "CDR bytes with their 4-byte encapsulation header", self.type.name
             )
-        self._write(payload)
+        if type(payload) is bytes:
+            self._write(payload)
+        else:
+            # Copied by the middleware: the caller may reuse its buffer at once.
+            self._write_parts((payload,))
 
     def assert_liveliness(self) -> None:
         """Show that the publisher is alive; see :meth:`rosglass.comm.Publisher`."""
@@ -106,6 +117,11 @@ class Ros2Publisher(Publisher, Member):
 
     def _write(self, payload: bytes | bytearray) -> None:
         self._writer.write(payload)
+        if self._timed:
+            self._note_sending()
+
+    def _write_parts(self, parts: Sequence[bytes | bytearray | memoryview]) -> None:
+        self._writer.write_parts(parts)
         if self._timed:
             self._note_sending()
 
@@ -272,3 +288,12 @@ class Ros2Publisher(Publisher, Member):
             )
         if self._closed:
             raise NodeClosedError(f"the publisher of {self.topic} is closed; create another one")
+
+
+def _octets(data: bytes | bytearray | memoryview) -> bytes | memoryview:
+    """Return a buffer as a view of its bytes, or as bytes when that cannot be had."""
+    view = memoryview(data)
+    try:
+        return view.cast("B")
+    except (TypeError, ValueError):  # not contiguous, or of a foreign format
+        return view.tobytes()
