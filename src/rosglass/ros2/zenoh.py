@@ -37,10 +37,10 @@ from rosglass.ros2.zenoh_endpoints import (
     Announcement,
     Declaration,
     Pump,
-    ZenohReader,
     ZenohWriter,
 )
 from rosglass.ros2.zenoh_keys import Token, gid_of, graph_key, topic_key
+from rosglass.ros2.zenoh_reader import Drain, ZenohReader
 from rosglass.ros2.zenoh_services import ZenohReplier, ZenohRequester
 
 if TYPE_CHECKING:
@@ -77,6 +77,7 @@ class ZenohMiddleware(Middleware):
         self._was_connected = self._closed = False
         self._refused = False
         self._pumps: list[Pump] = []
+        self._drain = Drain(f"{self._address} unread")
         self._changed: Callable[[], None] = lambda: None
         self._graph: Graph | None = None
         self._strange: set[str] = set()
@@ -135,7 +136,7 @@ class ZenohMiddleware(Middleware):
         kind = EndpointKind.SUBSCRIPTION
         token = self._token(node, EndpointInfo(kind, topic, type_name, node, qos, type_hash))
         key = topic_key(self._options.domain, topic, type_name, "*")
-        reader = ZenohReader(self, token, key, qos, on_sample)
+        reader = ZenohReader(self, token, key, qos, on_sample, self._drain)
         self._add(reader)
         return reader
 
@@ -178,13 +179,15 @@ class ZenohMiddleware(Middleware):
         return replier
 
     def poll(self) -> None:
-        """Try again to open a client's session, and end calls that get no reply any more."""
+        """Try again to open a client's session; let what is declared see to itself."""
         if self._closed:
             return
         if self._refused:
             self._open()
-        for requester in self._requesters():
-            requester.poll()
+        with self._lock:
+            declared = list(self._declared.values())
+        for declaration in declared:
+            declaration.poll()
 
     def close(self) -> None:
         """Close the session; everything declared on it goes with it."""
@@ -195,6 +198,7 @@ class ZenohMiddleware(Middleware):
             session, self._session = self._session, None
             self._declared.clear()
             self._links.clear()
+        self._drain.close()
         for pump in self._pumps:
             pump.undeclare()
         if session is not None:

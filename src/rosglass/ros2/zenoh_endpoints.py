@@ -1,4 +1,4 @@
-"""What a node declares on a Zenoh session: its token, its readers and writers."""
+"""What a node declares on a Zenoh session: tokens, and the writers of its publishers."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ import zenoh.ext
 
 from rosglass.comm import ConnectionState, Durability, Handle, History, Reliability
 from rosglass.errors import ConnectionLostError, NodeClosedError
-from rosglass.ros2.middleware import OnSample, Reader, Writer
-from rosglass.ros2.zenoh_keys import HUMBLE_HASH, NO_ATTACHMENT, Attachment, gid_of, topic_key
+from rosglass.ros2.middleware import Writer
+from rosglass.ros2.zenoh_keys import ATTACHMENT_FULL, HUMBLE_HASH, gid_of, topic_key
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -31,7 +31,6 @@ __all__ = [
     "Declaration",
     "Owner",
     "Pump",
-    "ZenohReader",
     "ZenohWriter",
     "direct",
 ]
@@ -81,6 +80,9 @@ class Declaration(Handle):
     def declare(self, session: zenoh.Session) -> list[Any]:
         """Declare what comes with the token, and return what has to be undeclared."""
 
+    def poll(self) -> None:
+        """Do what has to be done now and then; called about once a second."""
+
     def close(self) -> None:
         """Undeclare it."""
         with self._lock:
@@ -118,49 +120,6 @@ class Announcement(Declaration):
         return []
 
 
-class ZenohReader(Declaration, Reader):
-    """A subscriber and its token."""
-
-    def __init__(self, owner: Owner, token: str, key: str, qos: QoS, on_sample: OnSample) -> None:
-        super().__init__(owner, token)
-        self._key, self._qos, self._on_sample = key, qos, on_sample
-
-    def declare(self, session: zenoh.Session) -> list[Any]:
-        """Declare the subscriber; a transient local one asks publishers for their last samples."""
-        if self._qos.durability is Durability.TRANSIENT_LOCAL:
-            reliable = self._qos.reliability is Reliability.RELIABLE
-            subscriber = zenoh.ext.declare_advanced_subscriber(
-                session,
-                self._key,
-                CHANNEL,
-                history=zenoh.ext.HistoryConfig(
-                    detect_late_publishers=True, max_samples=self._qos.depth
-                ),
-                recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True)
-                if reliable
-                else None,
-                subscriber_detection=True,
-            )
-            return [Pump(subscriber, self._on_data, f"{self._key} samples")]
-        return [session.declare_subscriber(self._key, direct(self._on_data))]
-
-    def _on_data(self, sample: zenoh.Sample) -> None:
-        received = time.time_ns()
-        if self._closed or sample.kind == zenoh.SampleKind.DELETE:
-            return
-        attached = sample.attachment
-        note = NO_ATTACHMENT if attached is None else Attachment.decode(attached.to_bytes())
-        type_hash = str(sample.key_expr).rpartition("/")[2]
-        self._on_sample(
-            sample.payload.to_bytes(),
-            received,
-            note.sent,
-            note.gid,
-            note.sequence,
-            "" if type_hash == HUMBLE_HASH else type_hash,
-        )
-
-
 class ZenohWriter(Declaration, Writer):
     """A publisher and its token; one publisher for each key that is listened to."""
 
@@ -177,7 +136,7 @@ class ZenohWriter(Declaration, Writer):
         super().__init__(owner, token)
         self._options, self._topic, self._qos = options, topic, qos
         self._type_name, self._type_hash = type_name, type_hash
-        self._gid = gid_of(token)
+        self.gid = gid_of(token)
         self._numbers = itertools.count(1)
         self._session: zenoh.Session | None = None
         self._hashes = {HUMBLE_HASH if options.humble else type_hash or HUMBLE_HASH}
@@ -186,8 +145,8 @@ class ZenohWriter(Declaration, Writer):
         self._abandoned = False
         self._quiet = threading.Condition(self._lock)
         # Kept for keys that are declared later: late subscriptions are owed the last samples.
-        latched = qos.durability is Durability.TRANSIENT_LOCAL
-        self._history: deque[tuple[bytes | bytearray, bytes]] = deque(maxlen=qos.depth * latched)
+        self._latched = qos.durability is Durability.TRANSIENT_LOCAL
+        self._history: deque[tuple[bytes | bytearray, bytes]] = deque(maxlen=qos.depth)
 
     def declare(self, session: zenoh.Session) -> list[Any]:
         """Declare the publishers of the keys known so far."""
@@ -197,26 +156,32 @@ class ZenohWriter(Declaration, Writer):
 
     def write(self, data: bytes | bytearray) -> None:
         """Send a payload; while nothing is linked, only a transient local cache keeps it."""
-        thread = threading.get_ident()
-        with self._lock:
+        # No lock: it would be held while a subscription of this very session is called back.
+        # Either close() sees the entry in this list, or this sees that it was closed.
+        writing, thread = self._writing, threading.get_ident()
+        writing.append(thread)
+        try:
             if self._closed:
                 raise NodeClosedError(f"the publisher of {self._topic} is closed")
-            self._writing.append(thread)
-        try:
-            note = Attachment(next(self._numbers), time.time_ns(), self._gid).encode()
-            self._history.append((data, note))
+            note = ATTACHMENT_FULL.pack(next(self._numbers), time.time_ns(), 16, self.gid)
+            if self._latched:
+                self._history.append((data, note))
             for publisher in self._publishers:
                 publisher.put(data, attachment=note)
         except zenoh.ZError as error:
             raise self._error(error) from error
         finally:
-            with self._lock:
-                self._writing.remove(thread)
-                if self._closed:
-                    self._quiet.notify_all()
-                late = self._abandoned and not self._writing
-            if late:
-                self._release()
+            writing.remove(thread)
+            if self._closed:
+                self._finish()
+
+    def _finish(self) -> None:
+        """Let close() go on; or do its work, if it waits no more."""
+        with self._lock:
+            self._quiet.notify_all()
+            late = self._abandoned and not self._writing
+        if late:
+            self._release()
 
     def match(self, subscriptions: Sequence[EndpointInfo]) -> None:
         """Send under a further key for subscriptions that name the type's definition otherwise.

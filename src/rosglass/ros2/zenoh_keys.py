@@ -26,6 +26,8 @@ from rosglass.comm import (
 from rosglass.ros2.names import demangle_type, mangle_type
 
 __all__ = [
+    "ATTACHMENT",
+    "ATTACHMENT_FULL",
     "HUMBLE_HASH",
     "NO_ATTACHMENT",
     "Attachment",
@@ -216,18 +218,20 @@ class Attachment(NamedTuple):
 
     def encode(self) -> bytes:
         """Return the 33 bytes rmw_zenoh attaches: two integers, the identity with its length."""
-        return _ATTACHMENT.pack(self.sequence, self.sent or 0, len(self.gid), self.gid)
+        return ATTACHMENT_FULL.pack(self.sequence, self.sent or 0, len(self.gid), self.gid)
 
     @classmethod
     def decode(cls, data: bytes) -> Attachment:
         """Return what `data` says; other programs' attachments give :data:`NO_ATTACHMENT`."""
-        if len(data) != _ATTACHMENT.size or data[16] != 16:
+        if len(data) != ATTACHMENT.size or data[16] != 16:
             return NO_ATTACHMENT
-        sequence, sent, _, gid = _ATTACHMENT.unpack(data)
-        return cls(sequence, sent, gid)
+        return cls(*ATTACHMENT.unpack(data))
 
 
-_ATTACHMENT = struct.Struct("<qqB16s")
+#: What :class:`Attachment` reads, for those who have no time for classes; byte 16 must be 16.
+ATTACHMENT = struct.Struct("<qqx16s")
+#: What :meth:`Attachment.encode` writes: number, time of sending, 16, identity.
+ATTACHMENT_FULL = struct.Struct("<qqB16s")
 NO_ATTACHMENT = Attachment(-1, None, b"")
 
 

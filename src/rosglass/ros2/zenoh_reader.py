@@ -1,0 +1,396 @@
+"""Receiving samples over Zenoh, in the way that costs least for how they come and who waits.
+
+Usually each sample comes on the thread that receives it, which is the fastest. Where thousands come
+in a second, a thread of Python's own takes them from a native channel, as entering Python from
+outside costs more than everything else. Where nobody waits for them, they are taken from a channel
+some twenty times a second.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections import deque
+from contextlib import suppress
+from enum import Enum
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+
+import zenoh
+import zenoh.ext
+
+from rosglass.comm import Durability, Reliability
+from rosglass.ros2.middleware import OnSample, Reader
+from rosglass.ros2.zenoh_endpoints import Declaration, Owner, Pump
+from rosglass.ros2.zenoh_keys import ATTACHMENT, HUMBLE_HASH, NO_ATTACHMENT
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rosglass.comm import QoS
+
+__all__ = ["Drain", "ZenohReader"]
+
+_log = logging.getLogger("rosglass.ros2")
+#: Seconds between two looks at what nobody waits for.
+_INTERVAL = 0.05
+_INTERVAL_NS = 50_000_000
+#: Seconds, at least, over which samples are counted to know their rate.
+_WINDOW = 0.5
+#: Samples per second from which collecting what nobody waits for is worth while.
+_OFTEN = 30.0
+#: Samples per second from which a thread of their own is worth while.
+_FAST = 2000.0
+#: Most samples that wait in a channel, and most bytes, going by the largest sample seen.
+_MAX_WAITING = 4096
+_MAX_BYTES = 32 * 1024 * 1024
+#: Most samples that wait for a thread of their own: what waits gets its time stamp late.
+_MAX_BUSY = 512
+#: Largest sample, in bytes, whose copying does not outweigh what a channel saves.
+_SMALL = 65_536
+#: Seconds that closing waits for the thread that takes what nobody waits for.
+_PATIENCE = 1.0
+#: Different keys on a reader's topic that are remembered; each definition of a type has one.
+_MAX_KEYS = 64
+
+#: Takes a sample and the time at which it was received.
+_Take: TypeAlias = "Callable[[zenoh.Sample, int], None]"
+
+
+class Drain:
+    """The thread that takes what nobody waits for, for all readers of a session."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._lock = threading.Lock()
+        self._collected: dict[_Collected, None] = {}
+        self._wake = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def add(self, collected: _Collected) -> None:
+        """Take what comes there from now on."""
+        with self._lock:
+            self._collected[collected] = None
+            if self._thread is None:
+                self._thread = threading.Thread(target=self._work, name=self._name, daemon=True)
+                self._thread.start()
+
+    def remove(self, collected: _Collected) -> None:
+        """Take no more from there; without anything to do, the thread ends."""
+        with self._lock:
+            self._collected.pop(collected, None)
+            if not self._collected:
+                self._wake.set()
+
+    def close(self) -> None:
+        """Take nothing more, and wait for the end of the thread."""
+        with self._lock:
+            self._collected.clear()
+            thread = self._thread
+        self._wake.set()
+        if thread is not None and thread is not threading.current_thread():
+            thread.join(_PATIENCE)
+
+    def _work(self) -> None:
+        while True:
+            with self._lock:
+                collected = list(self._collected)
+                if not collected:
+                    self._thread = None
+                    return
+            for one in collected:
+                one.flush()
+            if self._wake.wait(_INTERVAL):
+                self._wake.clear()
+
+
+class _Source(Protocol):
+    """Where a reader's samples come from."""
+
+    def begin(self) -> None:
+        """Hand on what has come since it was made, and what comes."""
+
+    def end(self) -> None:
+        """Receive no more; hand on what came before that."""
+
+
+class _Direct:
+    """Hands on samples in the thread that receives them."""
+
+    def __init__(self, session: zenoh.Session, key: str, take: _Take) -> None:
+        self._take = take
+        self._lock = threading.Lock()
+        self._held: deque[tuple[zenoh.Sample, int]] | None = deque()
+        self._subscriber: Any = session.declare_subscriber(
+            key, zenoh.handlers.Callback(self._receive, indirect=False)
+        )
+
+    def begin(self) -> None:
+        held = self._held
+        while held is not None:
+            with self._lock:
+                if not held:
+                    self._held = None
+                    return
+                item = held.popleft()
+            self._take(*item)
+
+    def end(self) -> None:
+        with suppress(zenoh.ZError):  # the session went first
+            self._subscriber.undeclare()
+
+    def _receive(self, sample: zenoh.Sample) -> None:
+        received = time.time_ns()
+        if self._held is not None:
+            with self._lock:
+                if self._held is not None:
+                    self._held.append((sample, received))
+                    return
+        self._take(sample, received)
+
+
+class _Pumped:
+    """Hands on samples in a thread of their own."""
+
+    def __init__(self, subscriber: Any, take: _Take, name: str) -> None:
+        self._subscriber, self._take, self._name = subscriber, take, name
+        self._pump: Pump | None = None
+
+    def begin(self) -> None:
+        self._pump = Pump(self._subscriber, self._receive, self._name)
+
+    def end(self) -> None:
+        if self._pump is None:
+            self.begin()
+        assert self._pump is not None
+        self._pump.undeclare()
+
+    def _receive(self, sample: zenoh.Sample) -> None:
+        self._take(sample, time.time_ns())
+
+
+class _Collected:
+    """Hands on samples now and then."""
+
+    def __init__(
+        self, session: zenoh.Session, key: str, room: int, take: _Take, drain: Drain
+    ) -> None:
+        self._take, self._drain = take, drain
+        # Reentrant: what listens to events of a subscription may ask for its samples.
+        self._lock = threading.RLock()
+        self._looked = time.time_ns()
+        self._subscriber: Any = session.declare_subscriber(key, zenoh.handlers.FifoChannel(room))
+        self._next = self._subscriber.handler.try_recv
+
+    def begin(self) -> None:
+        self._drain.add(self)
+
+    def end(self) -> None:
+        self._drain.remove(self)
+        with suppress(zenoh.ZError):  # the session went first
+            self._subscriber.undeclare()
+        self.flush()
+
+    def flush(self) -> None:
+        """Hand on what waits, in the calling thread."""
+        with self._lock, suppress(zenoh.ZError):  # undeclared, and empty
+            now = time.time_ns()
+            # What waited longer than it should must not look new: the program was held up.
+            received = min(now, self._looked + _INTERVAL_NS)
+            for _ in range(_MAX_WAITING):
+                sample = self._next()
+                if sample is None:
+                    break
+                self._take(sample, received)
+            self._looked = now
+
+
+class _Way(Enum):
+    """How a reader's samples come."""
+
+    DIRECT = "one by one"
+    PUMPED = "through a thread of their own"
+    COLLECTED = "together, now and then"
+
+
+class ZenohReader(Declaration, Reader):
+    """A subscriber and its token.
+
+    Args:
+        owner: Keeps the declaration.
+        token: The subscription's token.
+        key: Key expression of the topic's samples, whatever their definition.
+        qos: The subscription's profile.
+        on_sample: Takes the samples.
+        drain: Takes what nobody waits for.
+    """
+
+    def __init__(
+        self, owner: Owner, token: str, key: str, qos: QoS, on_sample: OnSample, drain: Drain
+    ) -> None:
+        super().__init__(owner, token)
+        self._key, self._qos, self._on_sample, self._drain = key, qos, on_sample, drain
+        self._session: zenoh.Session | None = None
+        self._source: _Source | None = None
+        self._way = _Way.DIRECT
+        self._eager, self._moving = True, False
+        self._hashes: dict[str, str] = {}
+        self._warned = self._anonymous = False
+        self._count = self._largest = self._marked = 0
+        self._marked_at, self._rate = time.monotonic(), 0.0
+
+    def declare(self, session: zenoh.Session) -> list[Any]:
+        """Declare the subscriber; a transient local one asks publishers for their last samples."""
+        source: _Source
+        if self._qos.durability is Durability.TRANSIENT_LOCAL:
+            source = _Pumped(self._declare_advanced(session), self._take, f"{self._key} samples")
+        else:
+            self._session = session
+            source = _Direct(session, self._key, self._take)
+        with self._lock:
+            self._source = source
+        source.begin()
+        return []
+
+    def set_eager(self, eager: bool) -> None:
+        """Say whether anybody waits for the samples."""
+        self._eager = eager
+        if eager and self._way is _Way.COLLECTED:
+            self._move()
+
+    def flush(self) -> None:
+        """Hand on what waits for its turn."""
+        source = self._source
+        if isinstance(source, _Collected):
+            source.flush()
+
+    def poll(self) -> None:
+        """Choose how samples come from now on; called about once a second."""
+        now, count = time.monotonic(), self._count
+        if now - self._marked_at < _WINDOW:
+            return
+        self._rate = (count - self._marked) / (now - self._marked_at)
+        self._marked, self._marked_at = count, now
+        self._move()
+
+    def _release(self) -> None:
+        super()._release()
+        with self._lock:
+            source, self._source = self._source, None
+        if source is not None:
+            source.end()
+
+    def _declare_advanced(self, session: zenoh.Session) -> Any:
+        reliable = self._qos.reliability is Reliability.RELIABLE
+        return zenoh.ext.declare_advanced_subscriber(
+            session,
+            self._key,
+            zenoh.handlers.FifoChannel(_MAX_WAITING),
+            history=zenoh.ext.HistoryConfig(
+                detect_late_publishers=True, max_samples=self._qos.depth
+            ),
+            recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True)
+            if reliable
+            else None,
+            subscriber_detection=True,
+        )
+
+    def _wanted(self) -> _Way:
+        """Return how samples should come, going by their rate, their size and who waits."""
+        # Once chosen, a way is kept until the rate is half of what it was chosen for.
+        often = _OFTEN / 2 if self._way is _Way.COLLECTED else _OFTEN
+        fast = _FAST / 2 if self._way is _Way.PUMPED else _FAST
+        room = min(_MAX_WAITING, self._room())
+        if not self._eager and self._rate > often and self._rate * 4 * _INTERVAL < room:
+            return _Way.COLLECTED
+        if self._rate > fast and self._largest <= _SMALL:
+            return _Way.PUMPED
+        return _Way.DIRECT
+
+    def _room(self) -> int:
+        return max(1, _MAX_BYTES // max(1, self._largest))
+
+    def _move(self) -> None:
+        """Let samples come in another way: all of them, and in order.
+
+        The new subscriber is there before the old one goes. What both receive is handed on twice,
+        under one number, and recognised by who takes it.
+        """
+        wanted, session = self._wanted(), self._session
+        with self._lock:
+            staying = self._moving or self._anonymous or wanted is self._way
+            if staying or session is None or self._source is None:
+                return
+            self._moving = True
+        try:
+            new = self._make(session, wanted)
+            with self._lock:
+                old, self._source, self._way = self._source, new, wanted
+                if self._closed:
+                    self._source = None
+            if old is not None:
+                old.end()
+            new.begin()
+            if self._closed:
+                new.end()
+        except zenoh.ZError as error:
+            _log.debug("%s: keeps receiving as before: %s", self._key, error)
+        finally:
+            self._moving = False
+
+    def _make(self, session: zenoh.Session, way: _Way) -> _Source:
+        if way is _Way.DIRECT:
+            return _Direct(session, self._key, self._take)
+        if way is _Way.COLLECTED:
+            room = min(_MAX_WAITING, self._room())
+            return _Collected(session, self._key, room, self._take, self._drain)
+        channel = zenoh.handlers.FifoChannel(min(_MAX_BUSY, self._room()))
+        subscriber = session.declare_subscriber(self._key, channel)
+        return _Pumped(subscriber, self._take, f"{self._key} samples")
+
+    def _take(self, sample: zenoh.Sample, received: int) -> None:
+        """Hand a sample on; every line here is paid for by each sample."""
+        try:
+            if self._closed:
+                return
+            data = sample.payload.to_bytes()
+            size = len(data)
+            if size < 4 and sample.kind == zenoh.SampleKind.DELETE:
+                return
+            self._count += 1
+            if size > self._largest:  # noqa: PLR1730 - max() takes longer
+                self._largest = size
+            attached = sample.attachment
+            note = b"" if attached is None else attached.to_bytes()
+            if len(note) == ATTACHMENT.size and note[16] == 16:
+                sequence, sent, gid = ATTACHMENT.unpack(note)
+            else:
+                sequence, sent, gid = NO_ATTACHMENT
+                self._doubt(note)
+            key = str(sample.key_expr)
+            type_hash = self._hashes.get(key)
+            if type_hash is None:
+                type_hash = self._read_key(key)
+            self._on_sample(data, received, sent, gid, sequence, type_hash)
+        except Exception:
+            _log.exception("%s: handling a sample failed", self._key)
+
+    def _doubt(self, note: bytes) -> None:
+        """Take note of a publisher that does not say who it is."""
+        self._anonymous = True  # its samples cannot be told apart when they come twice
+        if note and not self._warned:
+            self._warned = True
+            _log.warning(
+                "%s: samples come with %d bytes attached that are not what ROS 2 attaches: their "
+                "publisher, number and time of sending stay unknown",
+                self._key,
+                len(note),
+            )
+
+    def _read_key(self, key: str) -> str:
+        type_hash = key.rpartition("/")[2]
+        if type_hash == HUMBLE_HASH:
+            type_hash = ""
+        if len(self._hashes) < _MAX_KEYS:
+            self._hashes[key] = type_hash
+        return type_hash
