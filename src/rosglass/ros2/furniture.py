@@ -115,18 +115,20 @@ class Furniture(Member):
     def _plan(self) -> None:
         """Begin to offer what other nodes expect to find."""
         from rosglass.ros2.parameter_services import ParameterServices  # noqa: PLC0415
+        from rosglass.ros2.type_descriptions import TypeDescriptionServer  # noqa: PLC0415
 
         try:
             parameters = self.parameters
             services = ParameterServices(self._node, parameters, self._core.own_dispatcher)
             rosout = self._logging()
+            descriptions = TypeDescriptionServer(self._core)
         except NodeClosedError:
             return
         with self._lock:
             if self._closed:
                 return
-            self._made.append(services)
-        self._steps += [rosout.open, *services.steps()]
+            self._made += [services, descriptions]
+        self._steps += [rosout.open, descriptions.open, *services.steps()]
         self._step()
 
     def _step(self) -> None:

@@ -107,6 +107,14 @@ class Graph:
         with self._lock:
             return list(self._by_node.get(node, {}).values())
 
+    def users(self) -> dict[str, list[EndpointInfo]]:
+        """Return the endpoints of every type, by the type's name, in order of appearance."""
+        found: dict[str, list[EndpointInfo]] = {}
+        with self._lock:
+            for endpoint in self._endpoints.values():
+                found.setdefault(endpoint.type, []).append(endpoint)
+        return found
+
     def clear(self) -> None:
         """Forget everything: what cannot be seen any more must not look alive."""
         with self._lock:

@@ -13,6 +13,7 @@ from rosglass.ros2.publisher import Ros2Publisher
 from rosglass.ros2.reading import Reading
 from rosglass.ros2.service_client import Ros2ServiceClient
 from rosglass.ros2.service_server import Ros2ServiceServer
+from rosglass.ros2.type_fetching import TypeFetcher
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
         EndpointInfo,
         Executor,
         Handle,
+        Promise,
         Publisher,
         Sample,
         ServiceClient,
@@ -31,7 +33,7 @@ if TYPE_CHECKING:
         Time,
     )
     from rosglass.interfaces import Library
-    from rosglass.messages import Message, MessageType, ServiceType
+    from rosglass.messages import ActionType, Message, MessageType, ServiceType
     from rosglass.ros2.arguments import Arguments
     from rosglass.ros2.lifecycle import LifecycleClient
     from rosglass.ros2.middleware import Middleware
@@ -79,6 +81,7 @@ class Ros2Node(Node):
         validate_namespace(namespace)
         self.url, self.name, self.namespace = url, name, namespace
         self._core = Core(NodeName(namespace, name), url, middleware, library, arguments)
+        self._fetcher = TypeFetcher(self._core)
         self._furniture = Furniture(self, self._core, own_services)
 
     def create_publisher(
@@ -86,6 +89,7 @@ class Ros2Node(Node):
     ) -> Publisher:
         """Announce `topic`; see :meth:`rosglass.comm.Node.create_publisher`."""
         self._core.check_open()
+        self._core.types.ensure(type)
         return Ros2Publisher(
             self._core, self.resolve(topic), self._core.types.message(type), _profile(qos)
         )
@@ -118,6 +122,7 @@ class Ros2Node(Node):
     ) -> ServiceClient:
         """Return a client; see :meth:`rosglass.comm.Node.create_service_client`."""
         self._core.check_open()
+        self._core.types.ensure(type)
         profile = QoS.services() if qos is None else _profile(qos)
         return Ros2ServiceClient(self._core, self._core.resolve(name, "service"), type, profile)
 
@@ -132,6 +137,7 @@ class Ros2Node(Node):
     ) -> ServiceServer:
         """Offer a service; see :meth:`rosglass.comm.Node.create_service_server`."""
         self._core.check_open()
+        self._core.types.ensure(type)
         profile = QoS.services() if qos is None else _profile(qos)
         full = self._core.resolve(name, "service")
         return Ros2ServiceServer(self._core, full, type, callback, profile, executor)
@@ -164,6 +170,19 @@ class Ros2Node(Node):
     def clock(self) -> Clock:
         """The node's clock, which follows ``/clock`` when the parameter use_sim_time is set."""
         return self._core.clock
+
+    def fetch_type_async(
+        self,
+        name: str,
+        *,
+        hash: str = "",
+        node: str | NodeName | None = None,
+        timeout: float | None = 5.0,
+    ) -> Promise[MessageType | ServiceType | ActionType]:
+        """Ask for a type; see :meth:`rosglass.comm.Node.fetch_type_async`."""
+        self._core.check_open()
+        owner = "" if node is None else self._node_name(node)
+        return self._fetcher.fetch(name, hash=hash, node=owner, timeout=timeout)
 
     def topics(self) -> dict[str, list[str]]:
         """Return every topic in the graph with the types announced for it."""

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
-from rosglass.errors import TypeNotFoundError, UnsupportedError
+from rosglass.errors import Error, TypeNotFoundError, UnsupportedError
+from rosglass.interfaces import announced_hashes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from rosglass.comm import EndpointInfo
-    from rosglass.interfaces import Library
+    from rosglass.comm import EndpointInfo, Promise
+    from rosglass.interfaces import InterfaceDefinition, Library
     from rosglass.messages import ActionType, MessageType, ServiceType
 
     _T = TypeVar("_T", MessageType, ServiceType, ActionType)
 
 __all__ = ["Fetcher", "Types"]
 
+#: Seconds that creating something may wait for the robot to send the type.
+_PATIENCE = 2.0
+
 
 class Fetcher(Protocol):
-    """Asks the robot for definitions; see :meth:`Types.request`."""
+    """Asks the robot for definitions; see :meth:`Types.request` and :meth:`Types.ensure`."""
 
     def __call__(
         self,
@@ -29,6 +34,14 @@ class Fetcher(Protocol):
         on_done: Callable[[], None],
     ) -> str:
         """Start asking, unless that goes on already, and return at once."""
+
+    def knows(self, name: str) -> bool:
+        """Return whether somebody in the graph uses a type, so that asking makes sense."""
+
+    def fetch(
+        self, name: str, *, timeout: float | None
+    ) -> Promise[MessageType | ServiceType | ActionType]:
+        """Ask for the version of a type that is in the graph."""
 
 
 class Types:
@@ -45,6 +58,8 @@ class Types:
     def __init__(self, library: Library | None, url: str) -> None:
         self._library, self._url = library, url
         self.fetcher: Fetcher | None = None
+        self._used: dict[int, InterfaceDefinition] = {}
+        self._by_hash: dict[str, InterfaceDefinition] = {}
 
     @property
     def library(self) -> Library:
@@ -107,6 +122,36 @@ class Types:
             return "the robot cannot be asked for it"
         return self.fetcher(name, hash, endpoints, on_done)
 
+    def ensure(self, wanted: object) -> None:
+        """Wait for the robot to send a type that is named and that the library does not have.
+
+        For what a user creates: takes 2 s at most, and no time at all unless somebody in the graph
+        uses the type.
+
+        Raises:
+            TypeNotFoundError: Somebody uses it, but nobody sends it; says why.
+        """
+        if not isinstance(wanted, str) or self.fetcher is None:
+            return
+        try:
+            self.library.definition(wanted)
+        except TypeNotFoundError:
+            if self.fetcher.knows(wanted):
+                self.fetcher.fetch(wanted, timeout=_PATIENCE).result()
+        except Error:
+            pass  # it is known, and what is wrong with it is said by who uses it
+
+    def in_use(self, hash: str) -> InterfaceDefinition | None:
+        """Return the definition, among those in use here, that is announced by a hash."""
+        found = self._by_hash.get(hash)
+        if found is None:
+            for definition in list(self._used.values()):
+                for announced in announced_hashes(definition):
+                    self._by_hash.setdefault(announced, definition)
+            self._used.clear()
+            found = self._by_hash.get(hash)
+        return found
+
     def _find(self, wanted: object, kind: type[_T], hash: str, word: str, example: str) -> _T:
         from rosglass.messages import load  # noqa: PLC0415 - numpy
 
@@ -126,4 +171,6 @@ class Types:
                 f"{found.name} is ROS 1's definition, and {self._url} is a ROS 2 graph; "
                 f"load it with rosglass.load({found.name!r}, ros=2)"
             )
+        with suppress(TypeNotFoundError):  # opaque types have none
+            self._used[id(found.definition)] = found.definition
         return found
