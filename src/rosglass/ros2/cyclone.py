@@ -6,7 +6,7 @@ matching, and takes 0.2 s to import. Entities are the numbers that the library g
 declared here follows the headers of Eclipse Cyclone DDS 11 (``dds/dds.h``, ``dds/ddsc/*.h``).
 
 Samples are in :mod:`rosglass.ros2.cyclone_samples`, profiles in :mod:`rosglass.ros2.cyclone_qos`,
-callbacks in :mod:`rosglass.ros2.cyclone_listener`, the discovered participants and endpoints in
+events in :mod:`rosglass.ros2.cyclone_events`, the discovered participants and endpoints in
 :mod:`rosglass.ros2.cyclone_builtin`.
 """
 
@@ -29,7 +29,6 @@ from rosglass.errors import (
 )
 
 if TYPE_CHECKING:
-    from rosglass.ros2.cyclone_listener import Listener
     from rosglass.ros2.cyclone_qos import Qos
 
 __all__ = [
@@ -52,8 +51,6 @@ __all__ = [
     "matched_publications",
     "matched_subscriptions",
     "sertype",
-    "set_listener",
-    "wait_for_acks",
 ]
 
 #: The version whose layouts are declared here.
@@ -80,23 +77,16 @@ _PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
     "dds_get_matched_subscription_data": (pointer, [_entity, c_uint64]),
     "dds_builtintopic_free_endpoint": (None, [pointer]),
     "dds_assert_liveliness": (c_int32, [_entity]),
-    "dds_wait_for_acks": (c_int32, [_entity, c_int64]),
-    "dds_set_listener": (c_int32, [_entity, pointer]),
-    "dds_create_listener": (pointer, [pointer]),
-    "dds_delete_listener": (None, [pointer]),
     "dds_create_waitset": (_entity, [_entity]),
-    "dds_create_readcondition": (_entity, [_entity, c_uint32]),
     "dds_create_guardcondition": (_entity, [_entity]),
     "dds_set_guardcondition": (c_int32, [_entity, c_bool]),
     "dds_take_guardcondition": (c_int32, [_entity, POINTER(c_bool)]),
     "dds_set_status_mask": (c_int32, [_entity, c_uint32]),
-    "dds_get_status_changes": (c_int32, [_entity, POINTER(c_uint32)]),
     "dds_get_subscription_matched_status": (c_int32, [_entity, pointer]),
     "dds_get_publication_matched_status": (c_int32, [_entity, pointer]),
     "dds_get_liveliness_changed_status": (c_int32, [_entity, pointer]),
     "dds_get_sample_lost_status": (c_int32, [_entity, pointer]),
     "dds_waitset_attach": (c_int32, [_entity, _entity, c_int64]),
-    "dds_waitset_detach": (c_int32, [_entity, _entity]),
     "dds_waitset_wait": (c_int32, [_entity, pointer, c_size_t, c_int64]),
     "dds_take": (c_int32, [_entity, pointer, pointer, c_size_t, c_uint32]),
     "dds_return_loan": (c_int32, [_entity, pointer, c_int32]),
@@ -218,13 +208,13 @@ def create_domain(domain: int, config: str) -> int:
     return check(result, "dds_create_domain", f"domain {domain}")
 
 
-def create_participant(domain: int, qos: Qos | None, listener: Listener | None = None) -> int:
+def create_participant(domain: int, qos: Qos | None) -> int:
     """Join a domain; CYCLONEDDS_URI configures it unless :func:`create_domain` was called before.
 
     Raises:
         ConnectionLostError: This machine has no usable network interface, or no free port.
     """
-    result = library().dds_create_participant(domain, _of(qos), _of(listener))
+    result = library().dds_create_participant(domain, _of(qos), None)
     return check(result, "dds_create_participant", f"domain {domain}")
 
 
@@ -243,19 +233,15 @@ def create_topic(participant: int, name: str, type_name: str) -> int:
     return check(result, "dds_create_topic", f"topic {name} of type {type_name}")
 
 
-def create_reader(
-    participant: int, topic: int, qos: Qos | None, listener: Listener | None, place: str
-) -> int:
+def create_reader(participant: int, topic: int, qos: Qos | None, place: str) -> int:
     """Create a reader; `topic` may be one of the built-in topics, `place` is for errors."""
-    result = library().dds_create_reader(participant, topic, _of(qos), _of(listener))
+    result = library().dds_create_reader(participant, topic, _of(qos), None)
     return check(result, "dds_create_reader", place)
 
 
-def create_writer(
-    participant: int, topic: int, qos: Qos | None, listener: Listener | None, place: str
-) -> int:
+def create_writer(participant: int, topic: int, qos: Qos | None, place: str) -> int:
     """Create a writer; `place` is for errors."""
-    result = library().dds_create_writer(participant, topic, _of(qos), _of(listener))
+    result = library().dds_create_writer(participant, topic, _of(qos), None)
     return check(result, "dds_create_writer", place)
 
 
@@ -309,20 +295,6 @@ def assert_liveliness(entity: int, place: str) -> None:
     check_alive(library().dds_assert_liveliness(entity), "dds_assert_liveliness", place)
 
 
-def wait_for_acks(writer: int, timeout: float, place: str) -> None:
-    """Wait until every reliable reader has all samples; raises TimeoutError after `timeout` s."""
-    result = library().dds_wait_for_acks(writer, round(timeout * 1e9))
-    check(result, "dds_wait_for_acks", place)
-
-
-def set_listener(entity: int, listener: Listener | None, place: str) -> None:
-    """Replace an entity's callbacks.
-
-    Waits for callbacks that are under way to return; their listener can be let go of afterwards.
-    """
-    check(library().dds_set_listener(entity, _of(listener)), "dds_set_listener", place)
-
-
 class _Descriptor(ctypes.Structure):
     """``dds_topic_descriptor_t`` (``dds/ddsc/dds_public_impl.h``)."""
 
@@ -361,8 +333,8 @@ def _descriptor(type_name: str) -> _Descriptor:
     )
 
 
-def _of(item: Qos | Listener | None) -> int | None:
-    return None if item is None else item.address
+def _of(qos: Qos | None) -> int | None:
+    return None if qos is None else qos.address
 
 
 def _matched(call: str, entity: int) -> list[int]:

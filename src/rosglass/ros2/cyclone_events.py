@@ -1,39 +1,28 @@
-"""Being called, or woken, by Cyclone DDS when something happens to a reader or writer."""
+"""Being woken by Cyclone DDS when something happens to a reader or writer, and what it was."""
 
 from __future__ import annotations
 
 import ctypes
-import logging
-from ctypes import CFUNCTYPE, c_bool, c_int32, c_uint32, c_uint64, c_void_p
+from ctypes import c_bool, c_int32, c_uint32, c_uint64
 from enum import IntFlag
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TypeVar
 
 from rosglass.ros2 import cyclone
 from rosglass.ros2.cyclone import INFINITY, check, check_alive, library
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
 __all__ = [
     "Event",
-    "IncompatibleQos",
-    "Listener",
     "LivelinessChanged",
     "Matched",
-    "Missed",
     "Status",
     "Waitset",
     "liveliness_changed",
-    "pending",
     "publication_matched",
-    "read_condition",
     "sample_lost",
     "set_events",
     "subscription_matched",
 ]
 
-_log = logging.getLogger("rosglass.ros2")
-_ANY_STATE = 0x7F
 _S = TypeVar("_S", bound=ctypes.Structure)
 
 
@@ -75,36 +64,6 @@ class Matched(ctypes.Structure):
     handle: int
 
 
-class IncompatibleQos(ctypes.Structure):
-    """A counterpart's policies do not fit.
-
-    Attributes:
-        total: How often since the entity's creation.
-        change: How often since the last time this was told.
-        policy: Number of the policy that was last in the way (``dds_qos_policy_id_t``).
-    """
-
-    _fields_ = (("total", c_uint32), ("change", c_int32), ("policy", c_uint32))
-    total: int
-    change: int
-    policy: int
-
-
-class Missed(ctypes.Structure):
-    """A deadline was missed.
-
-    Attributes:
-        total: How often since the entity's creation.
-        change: How often since the last time this was told.
-        handle: Of which instance.
-    """
-
-    _fields_ = (("total", c_uint32), ("change", c_int32), ("handle", c_uint64))
-    total: int
-    change: int
-    handle: int
-
-
 class LivelinessChanged(ctypes.Structure):
     """Writers went silent or spoke again.
 
@@ -134,45 +93,17 @@ class Event(IntFlag):
     """What can happen to a reader or writer (``dds_status_id_t``)."""
 
     NONE = 0
-    OFFERED_DEADLINE_MISSED = 1 << 1
-    REQUESTED_DEADLINE_MISSED = 1 << 2
-    OFFERED_INCOMPATIBLE_QOS = 1 << 3
-    REQUESTED_INCOMPATIBLE_QOS = 1 << 4
     SAMPLE_LOST = 1 << 5
     DATA_AVAILABLE = 1 << 8
-    LIVELINESS_LOST = 1 << 9
     LIVELINESS_CHANGED = 1 << 10
     PUBLICATION_MATCHED = 1 << 11
     SUBSCRIPTION_MATCHED = 1 << 12
-
-
-#: What can be listened to, and what is told then; nothing is told about data.
-_EVENTS: dict[str, Any] = {
-    "data_available": None,
-    "subscription_matched": Matched,
-    "publication_matched": Matched,
-    "requested_incompatible_qos": IncompatibleQos,
-    "offered_incompatible_qos": IncompatibleQos,
-    "requested_deadline_missed": Missed,
-    "offered_deadline_missed": Missed,
-    "liveliness_changed": LivelinessChanged,
-    "liveliness_lost": Status,
-    "sample_lost": Status,
-}
 
 
 def set_events(entity: int, events: Event) -> None:
     """Let a waitset that an entity is attached to be woken by these events, and no others."""
     result = library().dds_set_status_mask(entity, events)
     check_alive(result, "dds_set_status_mask", f"entity {entity}")
-
-
-def pending(entity: int) -> Event:
-    """Return which of the events that an entity was set to have happened."""
-    value = c_uint32()
-    result = library().dds_get_status_changes(entity, ctypes.byref(value))
-    check_alive(result, "dds_get_status_changes", f"entity {entity}")
-    return Event(value.value)
 
 
 def subscription_matched(reader: int) -> Matched:
@@ -201,42 +132,6 @@ def _status(entity: int, what: str, into: _S) -> _S:
     return into
 
 
-class Listener:
-    """Callbacks for one or more entities; must be kept as long as an entity has it.
-
-    They are called on threads of the library, or on a thread that writes within this process, and
-    must return soon. What they raise is logged.
-
-    Args:
-        callbacks: By event, e.g. ``data_available=f``. Each takes the entity, and what happened
-            unless the event is ``data_available``. Events: ``data_available``,
-            ``subscription_matched``, ``publication_matched``, ``requested_incompatible_qos``,
-            ``offered_incompatible_qos``, ``requested_deadline_missed``,
-            ``offered_deadline_missed``, ``liveliness_changed``, ``liveliness_lost``,
-            ``sample_lost``.
-
-    Attributes:
-        address: Where the library keeps it.
-    """
-
-    def __init__(self, **callbacks: Callable[..., None]) -> None:
-        lib = library()
-        self.address: int = lib.dds_create_listener(None)
-        self._kept: list[Any] = []
-        for event, callback in callbacks.items():
-            status = _EVENTS[event]
-            between = () if status is None else (status,)
-            prototype = CFUNCTYPE(None, c_int32, *between, c_void_p)
-            function = prototype(_guarded(event, callback))
-            self._kept.append(function)
-            setter = getattr(lib, f"dds_lset_{event}")
-            setter.argtypes, setter.restype = [c_void_p, c_void_p], None
-            setter(self.address, ctypes.cast(function, c_void_p))
-
-    def __del__(self) -> None:
-        library().dds_delete_listener(self.address)
-
-
 class Waitset:
     """Waits, without the GIL, until one of several conditions holds.
 
@@ -257,10 +152,6 @@ class Waitset:
         """Be woken by a condition, or by an entity with a status mask; `key` must not be 0."""
         check(library().dds_waitset_attach(self._entity, entity, key), "dds_waitset_attach", "")
 
-    def detach(self, entity: int) -> None:
-        """Be woken by it no more."""
-        library().dds_waitset_detach(self._entity, entity)
-
     def wait(self, timeout: float | None) -> list[int]:
         """Return the keys of what holds, empty after `timeout` seconds or :meth:`wake`."""
         lib, keys = library(), self._keys
@@ -280,20 +171,3 @@ class Waitset:
         """Delete it; nobody may be waiting."""
         for entity in (self._guard, self._entity):
             cyclone.delete(entity)
-
-
-def read_condition(reader: int, place: str) -> int:
-    """Return a condition that holds while the reader has samples."""
-    return check(
-        library().dds_create_readcondition(reader, _ANY_STATE), "dds_create_readcondition", place
-    )
-
-
-def _guarded(event: str, callback: Callable[..., None]) -> Callable[..., None]:
-    def call(entity: int, *rest: Any) -> None:
-        try:
-            callback(entity, *rest[:-1])
-        except Exception:
-            _log.exception("a callback of %s failed", event)
-
-    return call

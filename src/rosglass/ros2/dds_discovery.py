@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rosglass.errors import DecodeError, Error
 from rosglass.ros2 import cyclone
 from rosglass.ros2.cyclone_builtin import BuiltinTopic, Discovered, matched_publication, take
-from rosglass.ros2.cyclone_listener import Event
+from rosglass.ros2.cyclone_events import Event
 from rosglass.ros2.dds_discovery_info import (
     PARTICIPANT_USER_DATA,
     READER_QOS,
@@ -71,9 +71,7 @@ class DdsDiscovery:
         self._writer = SampleWriter(participant, TOPIC, TYPE, WRITER_QOS, b"", _PLACE)
         for topic in BuiltinTopic:
             place = f"discovery of each {topic.name.lower()}"
-            self._readers[topic] = cyclone.create_reader(
-                participant.entity, topic, None, None, place
-            )
+            self._readers[topic] = cyclone.create_reader(participant.entity, topic, None, place)
         for reader in self._readers.values():
             participant.pump.watch(reader, Event.DATA_AVAILABLE, self._take)
         self._reader = SampleReader(

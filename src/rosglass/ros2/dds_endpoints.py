@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm import History, Reliability
 from rosglass.errors import NodeClosedError
 from rosglass.ros2 import cyclone, cyclone_builtin
-from rosglass.ros2.cyclone_listener import (
+from rosglass.ros2.cyclone_events import (
     Event,
     liveliness_changed,
     sample_lost,
@@ -93,9 +93,7 @@ class SampleWriter:
             policies = qos_of(qos, writer=True, user_data=user_data)
             if patience is not None and qos.reliability is Reliability.RELIABLE:
                 policies.wait_at_most(patience)
-            self.entity = cyclone.create_writer(
-                participant.entity, self._topic, policies, None, place
-            )
+            self.entity = cyclone.create_writer(participant.entity, self._topic, policies, place)
         except BaseException:
             cyclone.delete(self._topic)
             raise
@@ -175,9 +173,7 @@ class SampleReader:
             policies.set_history(max(qos.depth, _MIN_DEPTH))
         self._topic = make_topic(participant.entity, topic, dds_type)
         try:
-            self.entity = cyclone.create_reader(
-                participant.entity, self._topic, policies, None, place
-            )
+            self.entity = cyclone.create_reader(participant.entity, self._topic, policies, place)
             self.guid = cyclone.guid(self.entity)
             events = Event.DATA_AVAILABLE
             if on_matched is not None:

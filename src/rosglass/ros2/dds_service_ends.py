@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from rosglass.comm import EndpointKind
 from rosglass.errors import Error, NodeClosedError
 from rosglass.ros2 import cyclone, cyclone_builtin, cyclone_identity
-from rosglass.ros2.cyclone_listener import Event, publication_matched
+from rosglass.ros2.cyclone_events import Event, publication_matched
 from rosglass.ros2.dds_discovery_info import format_user_data
 from rosglass.ros2.dds_endpoints import SampleReader, SampleWriter, Taken
 from rosglass.ros2.dds_outbox import Outbox
