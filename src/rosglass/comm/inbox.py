@@ -196,7 +196,7 @@ class Inbox:
     def _log_slow(self, dropped: int) -> None:
         who = "nobody takes them" if self._call is None else f"{_name(self._call)} is too slow"
         _log.warning(
-            "%s: %d messages were dropped, the oldest first: %s, and %.0f MB wait already",
+            "%s: messages are dropped, the oldest first, %d so far: %s, and %.0f MB wait already",
             self._topic,
             dropped,
             who,

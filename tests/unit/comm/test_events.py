@@ -1,0 +1,135 @@
+from __future__ import annotations
+
+from contextlib import suppress
+
+import pytest
+
+from rosglass import ConversionError, QoS, UnsupportedError
+from rosglass.comm import (
+    IMMEDIATE,
+    EndpointInfo,
+    EndpointKind,
+    Matched,
+    NodeName,
+    Publisher,
+    Subscription,
+)
+from rosglass.comm.events import Appearances
+
+
+def endpoint(node, gid=b""):
+    return EndpointInfo(EndpointKind.PUBLISHER, "/t", "p/msg/T", NodeName("/", node), gid=gid)
+
+
+A, B = endpoint("a"), endpoint("b")
+
+
+def told(appearances):
+    events = []
+    handle = appearances.add(
+        lambda e: events.append((e.endpoint.node.name, e.change, e.count, e.total)), IMMEDIATE
+    )
+    return events, handle
+
+
+def test_who_comes_and_goes_is_told_with_counts():
+    appearances = Appearances()
+    events, _ = told(appearances)
+    for now in ([A], [A, B], [B], [B, A], []):
+        appearances.update(now, Matched)
+    assert events == [
+        ("a", 1, 1, 1),
+        ("b", 1, 2, 2),
+        ("a", -1, 1, 2),
+        ("a", 1, 2, 3),
+        ("b", -1, 1, 3),
+        ("a", -1, 0, 3),
+    ]
+
+
+def test_those_who_are_there_are_told_to_each_new_listener_once():
+    appearances = Appearances()
+    first, _ = told(appearances)
+    appearances.update([A], Matched)
+    second, _ = told(appearances)
+    for _ in range(2):
+        appearances.update([A], Matched)
+    assert first == second == [("a", 1, 1, 1)]
+
+
+def test_twins_are_counted():
+    appearances = Appearances()
+    events, _ = told(appearances)
+    appearances.update([A, A], Matched)
+    appearances.update([A], Matched)
+    assert [event[2] for event in events] == [1, 2, 1]
+
+
+def test_closing_ends_it_and_frees_it():
+    appearances = Appearances()
+    events, handle = told(appearances)
+    assert appearances
+    handle.close()
+    appearances.update([A], Matched)
+    assert events == []
+    assert not appearances
+    assert appearances._known == {}
+
+
+def test_events_that_are_none_are_counted_and_not_told():
+    appearances = Appearances()
+    events, _ = told(appearances)
+    appearances.update([A], Matched)
+    appearances.update([], lambda *_: None)
+    appearances.update([B], Matched)
+    assert events == [("a", 1, 1, 1), ("b", 1, 1, 2)]
+
+
+def test_a_problem_is_told_when_it_changes():
+    seen = []
+    sub = Subscription("/t", None, QoS(), IMMEDIATE)
+    sub.on_problem_change(seen.append)
+    for problem in ("one", "one", "two", "", ""):
+        sub.set_problem(problem)
+    sub.close()
+    sub.set_problem("three")
+    assert seen == ["one", "two", ""]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "on_matched",
+        "on_incompatible_qos",
+        "on_deadline_missed",
+        "on_liveliness_change",
+        "on_samples_lost",
+        "on_problem_change",
+    ],
+)
+def test_listeners_are_checked(name):
+    register = getattr(Subscription("/t", None, QoS(), IMMEDIATE), name)
+    with pytest.raises(ConversionError, match="callback: expected something that can be called"):
+        register(3)
+    with pytest.raises(ConversionError, match=r"executor: expected a rosglass\.comm\.Executor"):
+        register(print, 3)
+
+
+def test_a_world_that_tells_nothing_of_its_publishers_says_so():
+    class Mute(Publisher):
+        topic = "/t"
+        type = type("T", (), {"name": "p/msg/T"})
+
+        def publish(self, *_):
+            pass
+
+        publish_serialized = subscription_count = close = publish
+
+    mute = Mute()
+    assert (mute.problem, mute.hint) == ("", "")
+    for use in (lambda: mute.on_matched(print), mute.assert_liveliness):
+        with pytest.raises(UnsupportedError, match=r"/t \[p/msg/T\]"):
+            use()
+    with suppress(UnsupportedError):
+        mute.on_problem_change(print)
+        pytest.fail("it tells nothing")
