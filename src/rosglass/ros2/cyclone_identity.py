@@ -51,6 +51,7 @@ __all__ = [
     "create_reading_topic",
     "create_writing_topic",
     "origin",
+    "prepare",
     "reading_problem",
     "write",
     "writing_problem",
@@ -108,12 +109,18 @@ def create_reading_topic(participant: int, name: str, type_name: str) -> int:
 
 
 def create_writing_topic(participant: int, name: str, type_name: str) -> int:
-    """Create a topic to whose writers :func:`write` can be applied; see `cyclone.create_topic`.
+    """Create a topic for a writer that :func:`prepare` is applied to; see `cyclone.create_topic`.
 
-    Its writers must not be used in the main thread: an exception raised there by a signal would end
+    The writer must not be used in the main thread: an exception raised there by a signal would end
     up in the library.
     """
     return _writing.create_topic(participant, name, type_name)
+
+
+def prepare(writer: int) -> None:
+    """Let a writer be given to :func:`write`, before it writes anything."""
+    # As its topic's type is not the library's usual one, it has a type of its own.
+    _writing.prepare(cyclone.sertype(writer))
 
 
 def origin(serdata: int) -> Origin | None:
@@ -129,7 +136,7 @@ def write(writer: SampleWriter, identity: Identity, data: bytes | bytearray) -> 
     """Send a payload with inline QoS that relates it to another sample.
 
     Args:
-        writer: Of a topic of :func:`create_writing_topic`.
+        writer: One that :func:`prepare` was applied to.
         identity: What it relates to.
         data: The payload with its encapsulation header.
 
@@ -164,11 +171,24 @@ class _Hook:
         with _lock:
             topic = cyclone.create_topic(participant, name, type_name)
             try:
-                self._prepare(cyclone.sertype(topic))
+                sertype = cyclone.sertype(topic)
+                if not self._tested:
+                    self._tested = True
+                    self.problem = self._try(sertype)
+                    if self.problem:
+                        _log.warning("%s", self.problem)
+                elif not self.problem:
+                    self._install(sertype)
             except BaseException:
                 cyclone.delete(topic)
                 raise
         return topic
+
+    def prepare(self, sertype: int) -> None:
+        """Replace the functions of a type that nobody else uses."""
+        with _lock:
+            if not self.problem:
+                self._install(sertype)
 
     def replace(self, originals: Any) -> dict[int, Any]:
         """Return functions by their place in the table, which call the original ones."""
@@ -177,15 +197,6 @@ class _Hook:
     def test(self, sertype: int) -> None:
         """Raise when the functions do not do what they should with samples of a type."""
         raise NotImplementedError
-
-    def _prepare(self, sertype: int) -> None:
-        if not self._tested:
-            self._tested = True
-            self.problem = self._try(sertype)
-            if self.problem:
-                _log.warning("%s", self.problem)
-        elif not self.problem:
-            self._install(sertype)
 
     def _try(self, sertype: int) -> str:
         if sys.platform != "linux" or sys.byteorder != "little":

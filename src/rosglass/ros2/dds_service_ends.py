@@ -173,6 +173,8 @@ class Ends:
             _PATIENCE,
         )
         try:
+            if server:
+                cyclone_identity.prepare(self.writer.entity)
             self.reader = SampleReader(
                 participant,
                 *(requests if server else replies),

@@ -165,8 +165,9 @@ struct Endpoint : public DataReaderListener, public DataWriterListener {
     calls[static_cast<int64_t>(params.sample_identity().sequence_number().to64long())] = number;
   }
   void answer(const SampleIdentity& identity, Bytes& bytes) {
-    // A reply sent before the client's reader is matched would be lost.
-    for (int i = 0; i < 20; ++i) {
+    // A reply sent before the client's reader is matched would be lost; a writer is none.
+    bool is_reader = identity.writer_guid().entityId.value[3] & 0x04;
+    for (int i = 0; is_reader && i < 20; ++i) {
       std::unique_lock<std::mutex> lock(mutex);
       if (readers.count(InstanceHandle_t(identity.writer_guid()))) break;
       lock.unlock();
@@ -215,7 +216,7 @@ int main(int, char** argv) {
     qos.reliability().kind = reliability(options);
     qos.durability().kind = durability(options);
     qos.history().depth = 10;
-    qos.publish_mode().kind = ASYNCHRONOUS_PUBLISH_MODE;
+    qos.publish_mode().kind = SYNCHRONOUS_PUBLISH_MODE;
     qos.endpoint().history_memory_policy =
         eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
     end->writer = publisher->create_datawriter(on, qos, end);
