@@ -48,6 +48,7 @@ if TYPE_CHECKING:
 
     from rosglass.ros2.graph import Graph
     from rosglass.ros2.zenoh_options import ZenohOptions
+    from rosglass.ros2.zenoh_shm import SharedMemory
 
 __all__ = ["ZenohMiddleware"]
 
@@ -77,6 +78,11 @@ class ZenohMiddleware(Middleware):
         self._was_connected = self._closed = False
         self._refused = False
         self._pumps: list[Pump] = []
+        self._shared: SharedMemory | None = None
+        if json.loads(self._config.get_json("transport/shared_memory/enabled")):
+            from rosglass.ros2.zenoh_shm import SharedMemory  # noqa: PLC0415 - not everywhere
+
+            self._shared = SharedMemory()
         self._drain = Drain(f"{self._address} unread")
         self._changed: Callable[[], None] = lambda: None
         self._graph: Graph | None = None
@@ -119,7 +125,9 @@ class ZenohMiddleware(Middleware):
         """Declare a publisher and its token."""
         kind = EndpointKind.PUBLISHER
         token = self._token(node, EndpointInfo(kind, topic, type_name, node, qos, type_hash))
-        writer = ZenohWriter(self, self._options, token, topic, type_name, type_hash, qos)
+        writer = ZenohWriter(
+            self, self._options, token, topic, type_name, type_hash, qos, self._shared
+        )
         self._add(writer)
         return writer
 

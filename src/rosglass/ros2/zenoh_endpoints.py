@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from rosglass.comm import EndpointInfo, QoS, Status
     from rosglass.ros2.zenoh_options import ZenohOptions
+    from rosglass.ros2.zenoh_shm import SharedMemory
 
 __all__ = [
     "CHANNEL",
@@ -132,6 +133,7 @@ class ZenohWriter(Declaration, Writer):
         type_name: str,
         type_hash: str,
         qos: QoS,
+        shared: SharedMemory | None,
     ) -> None:
         super().__init__(owner, token)
         self._options, self._topic, self._qos = options, topic, qos
@@ -147,6 +149,8 @@ class ZenohWriter(Declaration, Writer):
         # Kept for keys that are declared later: late subscriptions are owed the last samples.
         self._latched = qos.durability is Durability.TRANSIENT_LOCAL
         self._history: deque[tuple[bytes | bytearray, bytes]] = deque(maxlen=qos.depth)
+        # What is kept for late subscriptions would fill the shared memory for good.
+        self._shared = None if self._latched else shared
 
     def declare(self, session: zenoh.Session) -> list[Any]:
         """Declare the publishers of the keys known so far."""
@@ -156,6 +160,18 @@ class ZenohWriter(Declaration, Writer):
 
     def write(self, data: bytes | bytearray) -> None:
         """Send a payload; while nothing is linked, only a transient local cache keeps it."""
+        shared = None if self._shared is None else self._shared.place((data,))
+        self._send(data, data if shared is None else shared)
+
+    def write_parts(self, parts: Sequence[bytes | bytearray | memoryview]) -> None:
+        """Send a payload that comes in parts, which shared memory takes as they are."""
+        shared = None if self._shared is None else self._shared.place(parts)
+        if shared is None:
+            self.write(b"".join(parts))
+        else:
+            self._send(b"", shared)
+
+    def _send(self, data: bytes | bytearray, payload: Any) -> None:
         # No lock: it would be held while a subscription of this very session is called back.
         # Either close() sees the entry in this list, or this sees that it was closed.
         writing, thread = self._writing, threading.get_ident()
@@ -167,7 +183,7 @@ class ZenohWriter(Declaration, Writer):
             if self._latched:
                 self._history.append((data, note))
             for publisher in self._publishers:
-                publisher.put(data, attachment=note)
+                publisher.put(payload, attachment=note)
         except zenoh.ZError as error:
             raise self._error(error) from error
         finally:
