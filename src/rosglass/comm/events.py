@@ -158,7 +158,7 @@ class Appearances(Generic[_E]):
             known = list(self._known.items())
         if not known:
             return
-        now = Counter(endpoints)
+        now = Counter(iter(endpoints))
         for listener, (told, total) in known:
             for change, endpoint in (
                 *((-1, gone) for gone in (told - now).elements()),

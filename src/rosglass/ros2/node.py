@@ -10,7 +10,7 @@ from rosglass.ros2.core import Core
 from rosglass.ros2.furniture import Furniture
 from rosglass.ros2.names import validate_namespace, validate_node_name
 from rosglass.ros2.publisher import Ros2Publisher
-from rosglass.ros2.reading import Reading
+from rosglass.ros2.reading import Reading, type_if_known
 from rosglass.ros2.service_client import Ros2ServiceClient
 from rosglass.ros2.service_server import Ros2ServiceServer
 from rosglass.ros2.type_fetching import TypeFetcher
@@ -103,18 +103,20 @@ class Ros2Node(Node):
         *,
         raw_callback: Callable[[Sample], None] | None = None,
         executor: Executor | None = None,
+        ignore_local: bool = False,
     ) -> Subscription:
         """Subscribe to `topic`; see :meth:`rosglass.comm.Node.create_subscription`."""
         self._core.check_open()
+        full = self.resolve(topic)
         subscription = Subscription(
-            self.resolve(topic),
-            None if type is None else self._core.types.message(type),
+            full,
+            type_if_known(self._core, full, type),
             _profile(qos),
             executor or self._core.dispatcher,
             callback,
             raw_callback,
         )
-        Reading(self._core, subscription, type)
+        Reading(self._core, subscription, type, ignore_local)
         return subscription
 
     def create_service_client(

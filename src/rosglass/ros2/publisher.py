@@ -134,11 +134,13 @@ class Ros2Publisher(Publisher, Member):
     def _content(self, sample: Sample) -> bytes | memoryview:
         """Return the bytes of a sample that can be passed on here."""
         kind, ours = sample.type, self.type
-        hashes = {kind.rihs01, self._hash} - {""}
-        if sample.wire != "cdr" or kind.name != ours.name or len(hashes) > 1:
-            told = f"{kind.name} ({kind.rihs01 or 'no hash'}, {sample.wire})"
-            expected = f"a sample of {ours.name} ({self._hash or 'any hash'}, cdr)"
-            raise ConversionError("", told, expected, self.topic)
+        if sample.wire != "cdr":
+            raise ConversionError("wire", sample.wire, "a sample as cdr", self.topic)
+        if kind.name != ours.name:
+            raise ConversionError("type", kind.name, f"a sample of {ours.name}", self.topic)
+        if kind.rihs01 and self._hash and kind.rihs01 != self._hash:
+            expected = f"a sample of {ours.name} with our definition, {self._hash}"
+            raise ConversionError("type hash", kind.rihs01, expected, self.topic)
         return sample.data
 
     # -- who is there ----------------------------------------------------------------------------

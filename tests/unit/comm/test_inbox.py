@@ -37,7 +37,7 @@ def test_keep_all_is_bounded_by_bytes_counts_what_it_drops_and_complains_once(ca
     assert waiting == list(range(94, 100)), "1000 bytes and some 500 more for each"
     assert (sub.statistics().received, sub.statistics().dropped) == (100, 94)
     (line,) = caplog.messages
-    assert line.startswith("/t: messages are dropped, the oldest first, 1 so far: nobody takes them")
+    assert line.startswith("/t: messages are dropped, the oldest first, 1 so far: nobody takes")
 
 
 def test_the_slow_callback_is_named(caplog):

@@ -1,0 +1,672 @@
+"""Topics beyond sending and receiving: who matches, what went wrong, what nobody can decode."""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import replace
+
+import pytest
+
+import rosglass
+from rosglass import Duration, QoS
+from rosglass.comm import (
+    IMMEDIATE,
+    DeadlineMissed,
+    Durability,
+    EndpointKind,
+    Liveliness,
+    LivelinessLost,
+    Reliability,
+    SamplesLost,
+)
+from rosglass.interfaces import Library
+from rosglass.messages import OpaqueType
+from rosglass.ros2 import Ros2Node
+from rosglass.ros2.watchdog import Watchdog
+
+PUBLISHER, SUBSCRIPTION = EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION
+STRING, TWIST = "std_msgs/msg/String", "geometry_msgs/msg/Twist"
+HELLO = rosglass.load(STRING).encode({"data": "hello"})
+SECRET = "secret_msgs/msg/Thing"
+HASH, OTHER = "RIHS01_" + "a" * 64, "RIHS01_" + "b" * 64
+BEST_EFFORT = QoS.sensor_data()
+MANUAL = QoS(liveliness=Liveliness.MANUAL_BY_TOPIC, lease_duration=Duration.from_seconds(0.05))
+
+
+def hash_of(name):
+    return rosglass.load(name).rihs01
+
+
+@pytest.fixture
+def robot(middleware):
+    """Let the robot publish; ``robot(topic, qos=..., name=...)`` returns the endpoint's key."""
+
+    def appear(topic="/t", type_name=STRING, type_hash=None, qos=None, node="robot", gid=b""):
+        known = hash_of(type_name) if type_hash is None else type_hash
+        return middleware.appear(PUBLISHER, topic, type_name, known, qos, node, gid)
+
+    return appear
+
+
+@pytest.fixture
+def asker(middleware):
+    """Let the robot subscribe, as `robot` publishes."""
+
+    def appear(topic="/t", type_name=STRING, type_hash=None, qos=None, node="robot"):
+        known = hash_of(type_name) if type_hash is None else type_hash
+        return middleware.appear(SUBSCRIPTION, topic, type_name, known, qos, node)
+
+    return appear
+
+
+# -- who matches ---------------------------------------------------------------------------------
+
+
+def test_a_subscription_tells_which_publishers_match(node, middleware, robot, eventually):
+    first = robot(node="first")
+    subscription = node.create_subscription("/t", STRING)
+    events = []
+    subscription.on_matched(events.append)
+    eventually(lambda: events)
+    robot("/t", TWIST, node="wrong")
+    robot(node="second")
+    eventually(lambda: len(events) == 2)
+    assert subscription.publisher_count() == 2
+    middleware.graph.remove(first)
+    eventually(lambda: len(events) == 3)
+    told = [(e.endpoint.node.name, e.change, e.count, e.total) for e in events]
+    assert told == [("first", 1, 1, 1), ("second", 1, 2, 2), ("first", -1, 1, 2)]
+    subscription.close()
+    assert subscription.publisher_count() == 0
+
+
+def test_a_publisher_tells_which_subscriptions_match(node, middleware, asker, eventually):
+    asker(node="first")
+    publisher = node.create_publisher("/t", STRING)
+    events = []
+    handle = publisher.on_matched(events.append, IMMEDIATE)
+    eventually(lambda: events)
+    key = asker(node="second")
+    eventually(lambda: len(events) == 2)
+    handle.close()
+    middleware.graph.remove(key)
+    eventually(lambda: len(middleware.writers[0].matched) == 1)
+    told = [(e.endpoint.node.name, e.change, e.count) for e in events]
+    assert told == [("first", 1, 1), ("second", 1, 2)]
+
+
+@pytest.mark.parametrize("must_match", [True, False], ids=["dds", "zenoh"])
+def test_profiles_that_do_not_match_are_told_with_policies_and_words(
+    node, middleware, robot, eventually, must_match
+):
+    middleware.matches_qos = must_match
+    subscription = node.create_subscription("/t", STRING, qos=QoS.latched())
+    conflicts, matches = [], []
+    subscription.on_incompatible_qos(conflicts.append)
+    subscription.on_matched(matches.append)
+    key = robot(qos=BEST_EFFORT)
+    (event,) = eventually(lambda: conflicts)
+    assert event.endpoint.node.name == "robot"
+    assert event.policies == ("reliability", "durability")
+    assert event.problem == (
+        "reliability: reliable requested, best effort offered; "
+        "durability: transient local requested, volatile offered"
+    )
+    assert event.total == 1
+    assert subscription.publisher_count() == (0 if must_match else 1)
+    middleware.graph.remove(key)
+    robot(qos=QoS(), node="second")
+    eventually(lambda: len(conflicts) == 2)
+    assert conflicts[1].policies == ("durability",)
+    assert conflicts[1].total == 2
+    assert len(matches) == (0 if must_match else 3)
+
+
+@pytest.mark.parametrize("must_match", [True, False], ids=["dds", "zenoh"])
+def test_a_publisher_says_who_gets_nothing_from_it_and_why(
+    node, middleware, asker, eventually, must_match, caplog
+):
+    middleware.matches_qos = must_match
+    publisher = node.create_publisher("/t", STRING, BEST_EFFORT)
+    conflicts, problems = [], []
+    publisher.on_incompatible_qos(conflicts.append)
+    publisher.on_problem_change(problems.append)
+    assert publisher.problem == ""
+    key = asker(node="strict")
+    told = eventually(lambda: publisher.problem)
+    effect = "it receives nothing from us" if must_match else "it is served without that guarantee"
+    assert told == (
+        "quality of service requested by /strict does not match (reliability: reliable requested, "
+        f"best effort offered): {effect}; offer what it asks for"
+    )
+    assert told in caplog.text
+    (event,) = eventually(lambda: conflicts)
+    assert (event.endpoint.node.name, event.policies) == ("strict", ("reliability",))
+    middleware.graph.remove(key)
+    eventually(lambda: problems == [told, ""])
+
+
+def test_a_publisher_names_subscriptions_of_other_types_and_definitions(node, asker, eventually):
+    publisher = node.create_publisher("/t", STRING)
+    asker(type_name=TWIST, node="wrong")
+    asker(type_hash=OTHER, node="other")
+    told = eventually(lambda: "; " in publisher.problem and publisher.problem)
+    assert f"/wrong subscribes to {TWIST} here, not {STRING}: it receives nothing" in told
+    assert f"/other has another definition of {STRING} ({OTHER}; ours is {hash_of(STRING)})" in told
+
+
+def test_hints_at_names_that_were_meant(node, robot, asker, eventually):
+    robot("/scan")
+    robot("/robot/camera/image")
+    asker("/cmd_vel")
+    subscription = node.create_subscription("/scna", STRING)
+    assert subscription.hint == "nobody publishes /scna; did you mean /scan?"
+    assert subscription.problem == ""
+    other = node.create_subscription("/image", STRING)
+    assert other.hint == "nobody publishes /image; did you mean /robot/camera/image?"
+    assert node.create_subscription("/odom").hint == "nobody publishes /odom"
+    assert node.create_subscription("/scan").hint == ""
+    publisher = node.create_publisher("/cmd_vle", STRING)
+    assert publisher.hint == "nobody subscribes to /cmd_vle; did you mean /cmd_vel?"
+    publisher.close()
+    subscription.close()
+    assert (publisher.hint, subscription.hint) == ("", "")
+
+
+# -- what is available ---------------------------------------------------------------------------
+
+
+def test_what_is_available_is_decided_by_who_is_there(node, middleware, robot):
+    robot(qos=BEST_EFFORT)
+    subscription = node.create_subscription("/t", STRING, qos=QoS.best_available(7))
+    assert subscription.qos == QoS(7, Reliability.BEST_EFFORT)
+    assert middleware.readers[0].qos == subscription.qos
+    publisher = node.create_publisher("/t", STRING, QoS.best_available())
+    assert publisher.qos == QoS.latched(10)
+    assert middleware.writers[0].what[3] == publisher.qos
+    assert node.create_subscription("/x", STRING, qos=QoS.system_default()).qos == QoS()
+
+
+def test_a_publisher_takes_the_limits_that_subscriptions_ask_for(node, asker):
+    asker(qos=replace(MANUAL, deadline=Duration.from_seconds(2)))
+    publisher = node.create_publisher("/t", STRING, QoS.best_available())
+    assert publisher.qos.deadline == Duration.from_seconds(2)
+    assert publisher.qos.liveliness is Liveliness.MANUAL_BY_TOPIC
+    assert publisher.qos.lease_duration == MANUAL.lease_duration
+
+
+def test_a_publisher_that_comes_later_with_less_is_received_all_the_same(
+    node, middleware, robot, eventually
+):
+    middleware.matches_qos = True
+    subscription = node.create_subscription("/t", STRING, qos=QoS.best_available())
+    conflicts = []
+    subscription.on_incompatible_qos(conflicts.append)
+    assert subscription.qos.durability is Durability.TRANSIENT_LOCAL
+    keys = [robot(qos=QoS.latched(), node="latched")]
+    eventually(lambda: subscription.publisher_count() == 1)
+    assert len(middleware.readers) == 1
+    keys.append(robot(qos=BEST_EFFORT, node="fast"))
+    first, second = eventually(lambda: len(r := middleware.readers) == 2 and r)
+    eventually(lambda: first.closed)
+    assert not second.closed
+    assert subscription.qos == second.qos == QoS(reliability=Reliability.BEST_EFFORT)
+    assert subscription.publisher_count() == 2
+    second.receive(HELLO)
+    assert subscription.wait(1).data == HELLO
+    # What is stronger comes only after nobody was there, as nothing is lost by it then.
+    for key in keys:
+        middleware.graph.remove(key)
+    eventually(lambda: subscription.publisher_count() == 0)
+    time.sleep(0.05)
+    robot(qos=QoS.latched(), node="again")
+    eventually(lambda: len(middleware.readers) == 3)
+    assert subscription.qos.durability is Durability.TRANSIENT_LOCAL
+    assert subscription.problem == ""
+    assert conflicts == []
+
+
+def test_changing_readers_neither_loses_nor_repeats(node, middleware, robot, eventually):
+    subscription = node.create_subscription("/t", STRING, qos=QoS.best_available(100))
+    first = middleware.readers[0]
+    gid = b"g" * 16
+    numbered = [(HELLO, 10, n, gid, n, "") for n in range(1, 5)]
+    unnumbered = [(HELLO, 10, n, b"u" * 16, -1, "") for n in range(1, 5)]
+    for old in (*numbered[:3], *unnumbered[:3]):
+        first.on_sample(*old)
+    robot(qos=BEST_EFFORT)
+    second = eventually(lambda: middleware.readers[1:])[0]
+    for new in (*numbered[1:], *unnumbered[1:]):
+        second.on_sample(*new)
+    got = []
+    while (sample := subscription.take()) is not None:
+        got.append((sample.publisher[:1], sample.sent_ns))
+    assert got == [(p, n) for p in (b"g", b"u") for n in (1, 2, 3)] + [(b"g", 4), (b"u", 4)]
+    # A publisher whose clock is set back later is heard all the same.
+    eventually(lambda: not subscription.source._repeats.guarded)
+    second.on_sample(HELLO, 10, 2, b"u" * 16, -1, "")
+    assert subscription.take() is not None
+
+
+# -- in time, alive, complete --------------------------------------------------------------------
+
+
+def test_a_deadline_that_passes_without_message_is_told(node, middleware, robot, eventually):
+    qos = QoS(deadline=Duration.from_seconds(0.05))
+    subscription = node.create_subscription("/t", STRING, qos=qos)
+    events = []
+    subscription.on_deadline_missed(events.append, IMMEDIATE)
+    time.sleep(0.12)
+    assert events == [], "nobody is there to be late"
+    key = robot(qos=qos)
+    eventually(lambda: len(events) >= 2)
+    assert all(isinstance(event, DeadlineMissed) and event.change >= 1 for event in events)
+    assert events[1].total == events[0].total + events[1].change
+    end = time.monotonic() + 0.3
+    middleware.readers[0].receive(HELLO)
+    settled = len(events)
+    while time.monotonic() < end:
+        middleware.readers[0].receive(HELLO)
+        time.sleep(0.005)
+    assert len(events) <= settled + 2, "six more would have come without messages"
+    middleware.graph.remove(key)
+    eventually(lambda: subscription.source._deadline is None)
+
+
+def test_a_publisher_that_pauses_misses_its_deadline(node, eventually):
+    publisher = node.create_publisher("/t", STRING, QoS(deadline=Duration.from_seconds(0.05)))
+    events = []
+    publisher.on_deadline_missed(events.append)
+    time.sleep(0.1)
+    assert events == [], "time runs from the first message"
+    publisher.publish(data="x")
+    eventually(lambda: len(events) >= 2)
+    publisher.close()
+    count = len(events)
+    time.sleep(0.12)
+    assert len(events) <= count + 1
+
+
+def test_manual_liveliness_is_lost_once_for_each_silence(node, middleware, eventually):
+    publisher = node.create_publisher("/t", STRING, MANUAL)
+    events = []
+    publisher.on_liveliness_lost(events.append)
+    publisher.assert_liveliness()
+    eventually(lambda: events)
+    time.sleep(0.15)
+    assert events == [LivelinessLost(1)]
+    publisher.publish(data="x")
+    eventually(lambda: len(events) == 2)
+    publisher.close()
+    with pytest.raises(rosglass.NodeClosedError):
+        publisher.assert_liveliness()
+
+
+def test_publishers_that_show_themselves_are_alive_while_they_do(
+    node, middleware, robot, eventually
+):
+    gid = b"m" * 16
+    subscription = node.create_subscription("/t", STRING)
+    events = []
+    subscription.on_liveliness_change(events.append)
+    robot(qos=MANUAL, node="manual", gid=gid)
+    key = robot(node="automatic")
+
+    def told():
+        return [(e.endpoint.node.name, e.change, e.alive, e.not_alive) for e in events]
+
+    eventually(lambda: ("manual", -1, 1, 1) in told())
+    middleware.readers[0].receive(HELLO, gid=gid)
+    eventually(lambda: told()[-1] == ("manual", 1, 2, 0))
+    middleware.graph.remove(key)
+    eventually(lambda: ("automatic", -1) in [event[:2] for event in told()])
+
+
+def test_the_middlewares_word_on_liveliness_is_believed(node, middleware, robot, eventually):
+    subscription = node.create_subscription("/t", STRING)
+    events = []
+    subscription.on_liveliness_change(events.append)
+    middleware.readers[0].living = 1
+    robot(qos=MANUAL, gid=b"m" * 16)
+    eventually(lambda: events)
+    time.sleep(0.15)
+    assert [e.change for e in events] == [1], "it sends nothing, but shows that it is alive"
+    middleware.readers[0].living = 0
+    eventually(lambda: [e.change for e in events] == [1, -1])
+
+
+def test_samples_that_never_come_are_counted_and_told(node, middleware, eventually):
+    subscription = node.create_subscription("/t", STRING)
+    events = []
+    subscription.on_samples_lost(events.append)
+    for number in (1, 2, 6, 4):
+        middleware.readers[0].on_sample(HELLO, 10, number, b"g" * 16, number, "")
+    assert subscription.statistics().lost == 2, "4 came late, but it came"
+    middleware.readers[0].missing = 3
+    assert subscription.statistics().lost == 5
+    eventually(lambda: events)
+    assert events == [SamplesLost(5, 5)]
+
+
+def test_a_watchdog_counts_all_that_it_overslept():
+    class Late:
+        """Timers that run the job when told to."""
+
+        def after(self, delay, job):
+            self.job = job
+            return self
+
+        def close(self):
+            self.job = None
+
+    timers, missed = Late(), []
+    watchdog = Watchdog(timers, Duration.from_seconds(0.01), lambda: 0.0, missed.append)
+    time.sleep(0.055)
+    timers.job()
+    assert missed == [5]
+    watchdog.close()
+    watchdog.close()
+    assert timers.job is None
+
+
+# -- who is waiting ------------------------------------------------------------------------------
+
+
+def test_samples_that_nobody_waits_for_are_fetched_when_somebody_looks(node, middleware):
+    subscription = node.create_subscription("/t", STRING)
+    (reader,) = middleware.readers
+    assert not reader.eager
+    for look in (subscription.take, subscription.take_latest):
+        reader.waiting = [HELLO]
+        assert look().data == HELLO
+    reader.waiting = [HELLO] * 3
+    assert subscription.statistics().received == 5
+    assert reader.waiting == []
+
+
+def test_who_waits_is_told_at_once_and_who_waited_last_not_for_ever(
+    node, middleware, eventually, monkeypatch
+):
+    monkeypatch.setattr("rosglass.comm.subscription._MEMORY", 0.0)
+    subscription = node.create_subscription("/t", STRING)
+    (reader,) = middleware.readers
+    reader.waiting = [HELLO]
+    assert subscription.wait(1).data == HELLO
+    assert reader.eager
+    eventually(lambda: not reader.eager)
+
+
+def test_callbacks_get_samples_as_they_come(node, middleware):
+    node.create_subscription("/t", STRING, id)
+    node.create_subscription("/t", STRING, raw_callback=id)
+    assert all(reader.eager for reader in middleware.readers)
+
+
+# -- bytes that nobody understands ---------------------------------------------------------------
+
+
+@pytest.fixture
+def lost_node(middleware):
+    """A node with a library of its own, and nobody who could be asked for definitions."""
+    made = Ros2Node(middleware, "fake://", "cockpit", library=Library())
+    made._core.types.fetcher = None
+    yield made
+    made.close()
+
+
+def test_what_cannot_be_decoded_comes_as_bytes_with_the_reason(
+    lost_node, middleware, robot, eventually
+):
+    robot(type_name=SECRET, type_hash=HASH)
+    seen = []
+    subscription = lost_node.create_subscription("/t", raw_callback=seen.append, executor=IMMEDIATE)
+    reader = eventually(lambda: middleware.readers)[0]
+    assert (reader.type_name, reader.type_hash) == (SECRET, HASH)
+    eventually(lambda: "handed on as bytes" in subscription.problem)
+    assert "/robot publishes secret_msgs/msg/Thing, which cannot be decoded" in subscription.problem
+    payload = b"\0\1\0\0\xff\xfe"
+    reader.receive(payload)
+    (sample,) = seen
+    assert sample.data == payload
+    assert sample.type == subscription.type == OpaqueType(SECRET, HASH)
+    with pytest.raises(rosglass.TypeNotFoundError, match=r"only bytes: .*robot cannot be asked"):
+        sample.message()
+    # As soon as there is a definition, samples can be decoded.
+    library = lost_node._core.types.library
+    library.add_text(SECRET, "uint8 a\nuint8 b\n")
+    known = rosglass.load(SECRET, library=library)
+    library.definition = lambda *_, **__: known.definition
+    eventually(lambda: subscription.problem == "")
+    middleware.readers[-1].receive(payload)
+    assert (seen[-1].message().a, seen[-1].message().b) == (255, 254)
+
+
+def test_callbacks_that_want_messages_get_none_that_cannot_be_decoded(
+    lost_node, middleware, robot, eventually
+):
+    robot(type_name=SECRET, type_hash=HASH)
+    subscription = lost_node.create_subscription("/t", callback=id)
+    eventually(lambda: "cannot be decoded" in subscription.problem)
+    assert subscription.type is None
+    assert middleware.readers == []
+
+
+def test_nothing_is_opaque_while_the_robot_is_asked(lost_node, middleware, robot, eventually):
+    asked, answers = [], [""]
+
+    def fetcher(name, hash, endpoints, on_done):
+        asked.append((name, hash, [e.node.name for e in endpoints], on_done))
+        return answers[0]
+
+    lost_node._core.types.fetcher = fetcher
+    subscription = lost_node.create_subscription("/t")
+    robot(type_name=SECRET, type_hash=HASH)
+    eventually(lambda: asked)
+    assert asked[0][:3] == (SECRET, HASH, ["robot"])
+    eventually(lambda: "is being fetched from the robot" in subscription.problem)
+    assert subscription.type is None
+    answers[0] = "it did not answer"
+    asked[0][3]()
+    eventually(lambda: subscription.type)
+    assert "it did not answer" in subscription.problem
+    assert isinstance(subscription.type, OpaqueType)
+
+
+def test_a_relay_passes_on_what_it_does_not_understand(lost_node, middleware, robot, eventually):
+    robot("/in", SECRET, HASH)
+    subscription = lost_node.create_subscription("/in")
+    reader = eventually(lambda: middleware.readers)[0]
+    payload = b"\0\0\0\0 big endian"
+    reader.receive(payload)
+    sample = subscription.wait(1)
+    relay = lost_node.create_publisher("/out", sample.type)
+    relay.publish_serialized(sample)
+    writer = middleware.writers[-1]
+    assert writer.what[:3] == ("/out", SECRET, HASH)
+    assert writer.written == [payload]
+    with pytest.raises(rosglass.TypeNotFoundError, match="only bytes"):
+        relay.publish(a=1)
+    named = lost_node.create_publisher("/out", OpaqueType(SECRET))
+    named.publish_serialized(sample)
+    named.publish_serialized(payload)
+    assert middleware.writers[-1].written == [payload] * 2
+    other = lost_node.create_publisher("/out", OpaqueType(SECRET, OTHER))
+    with pytest.raises(rosglass.ConversionError, match=f"/out: type hash: .*{OTHER}.*{HASH}"):
+        other.publish_serialized(sample)
+
+
+def test_a_sample_of_another_type_is_not_passed_on(node, middleware):
+    subscription = node.create_subscription("/in", STRING)
+    middleware.readers[0].receive(HELLO)
+    sample = subscription.wait(1)
+    with pytest.raises(rosglass.ConversionError, match=f"expected a sample of {TWIST}"):
+        node.create_publisher("/out", TWIST).publish_serialized(sample)
+    with pytest.raises(rosglass.ConversionError, match=r"/out: wire: .*ros1"):
+        node.create_publisher("/out", STRING).publish_serialized(sample._replace(wire="ros1"))
+    assert all(writer.written == [] for writer in middleware.writers)
+
+
+def test_an_opaque_type_without_hash_takes_every_version(node, middleware, eventually):
+    subscription = node.create_subscription("/t", OpaqueType(SECRET))
+    reader = middleware.readers[0]
+    for version in ("", HASH, OTHER):
+        reader.receive(b"\0\1\0\0", version)
+    got = [subscription.take().type.rihs01 for _ in range(3)]
+    assert got == ["", HASH, OTHER]
+    assert subscription.problem == ""
+
+
+# -- several versions of a type ------------------------------------------------------------------
+
+
+@pytest.fixture
+def versions(middleware):
+    """A node whose library knows two versions of ``pkg/msg/T``: the node, ours, the other one."""
+    library, other = Library(), Library()
+    library.add_text("pkg/msg/T", "int32 new\n")
+    other.add_text("pkg/msg/T", "int32 old\n")
+    ours = rosglass.load("pkg/msg/T", library=library)
+    theirs = rosglass.load("pkg/msg/T", library=other)
+    real = library.definition
+
+    def definition(name, ros=2, *, hash=""):
+        return other.definition(name, ros) if hash == theirs.rihs01 else real(name, ros, hash=hash)
+
+    library.definition = definition
+    node = Ros2Node(middleware, "fake://", "cockpit", library=library)
+    node._core.types.fetcher = None
+    yield node, ours, theirs
+    node.close()
+
+
+@pytest.mark.parametrize("given", [None, "pkg/msg/T", "pkg/T"])
+def test_publishers_with_different_versions_are_all_understood(
+    versions, middleware, eventually, given
+):
+    node, ours, theirs = versions
+    middleware.appear(PUBLISHER, "/t", "pkg/msg/T", theirs.rihs01, node="old")
+    middleware.appear(PUBLISHER, "/t", "pkg/msg/T", ours.rihs01, node="new")
+    subscription = node.create_subscription("/t", given)
+    eventually(lambda: subscription.publisher_count() == 2)
+    assert subscription.problem == ""
+    reader = middleware.readers[-1]
+    reader.receive(ours.encode({"new": 1}), ours.rihs01)
+    reader.receive(theirs.encode({"old": 2}), theirs.rihs01)
+    assert subscription.take().message().new == 1
+    assert subscription.take().message().old == 2
+
+
+def test_a_version_that_nobody_announced_is_understood_when_it_comes(
+    versions, middleware, eventually
+):
+    node, ours, theirs = versions
+    subscription = node.create_subscription("/t", "pkg/msg/T")
+    assert subscription.type == ours
+
+    def arrived():
+        middleware.readers[-1].receive(theirs.encode({"old": 2}), theirs.rihs01)
+        return subscription.take()
+
+    assert eventually(arrived).message().old == 2
+
+
+def test_a_version_that_nobody_defines_comes_as_bytes_beside_the_others(
+    versions, middleware, eventually
+):
+    node, ours, _ = versions
+    subscription = node.create_subscription("/t")
+    middleware.appear(PUBLISHER, "/t", "pkg/msg/T", ours.rihs01, node="new")
+    eventually(lambda: subscription.type)
+    middleware.appear(PUBLISHER, "/t", "pkg/msg/T", HASH, node="secret")
+    eventually(lambda: "handed on as bytes" in subscription.problem)
+    assert f"the publisher of /secret has another definition of pkg/msg/T ({HASH}" in (
+        subscription.problem
+    )
+    middleware.readers[-1].receive(b"\0\1\0\0????", HASH)
+    assert subscription.take().type == OpaqueType("pkg/msg/T", HASH)
+    middleware.readers[-1].receive(ours.encode({"new": 1}), ours.rihs01)
+    assert subscription.take().message().new == 1
+
+
+def test_a_name_that_only_the_robot_knows_is_enough_once_it_is_seen(
+    lost_node, middleware, robot, eventually
+):
+    with pytest.raises(rosglass.TypeNotFoundError):
+        lost_node.create_subscription("/t", SECRET)
+    robot(type_name=SECRET, type_hash=HASH)
+    subscription = lost_node.create_subscription("/t", SECRET)
+    assert eventually(lambda: subscription.type) == OpaqueType(SECRET, HASH)
+
+
+def test_two_types_on_one_topic_are_received_side_by_side(node, middleware, robot):
+    robot(type_name=STRING, node="a")
+    robot(type_name=TWIST, node="b")
+    texts, twists = (node.create_subscription("/t", name) for name in (STRING, TWIST))
+    middleware.readers[0].receive(HELLO)
+    middleware.readers[1].receive(rosglass.load(TWIST).encode({}))
+    assert texts.wait(1).type.name == STRING
+    assert twists.wait(1).type.name == TWIST
+
+
+# -- ourselves -----------------------------------------------------------------------------------
+
+
+def test_what_the_node_publishes_itself_can_be_left_out(node, middleware, eventually):
+    def create_writer(*what):
+        writer = real(*what)
+        writer.gid = b"w" * 16
+        return writer
+
+    real, middleware.create_writer = middleware.create_writer, create_writer
+    subscription = node.create_subscription("/t", STRING, ignore_local=True)
+    everything = node.create_subscription("/t", STRING)
+    publisher = node.create_publisher("/t", STRING)
+    middleware.appear(PUBLISHER, "/t", STRING, hash_of(STRING), gid=b"w" * 16, node="cockpit")
+    middleware.appear(PUBLISHER, "/t", STRING, hash_of(STRING), gid=b"g" * 16, node="robot")
+    assert subscription.publisher_count() == 1
+    assert everything.publisher_count() == 2
+    for reader in middleware.readers:
+        reader.receive(HELLO, gid=b"w" * 16)
+        reader.receive(HELLO, gid=b"g" * 16)
+    assert subscription.statistics().received == 1
+    assert everything.statistics().received == 2
+    publisher.close()
+    middleware.readers[0].receive(HELLO, gid=b"w" * 16)
+    assert subscription.statistics().received == 2, "that identity is somebody else's now"
+
+
+# -- one message ---------------------------------------------------------------------------------
+
+
+def test_waiting_for_one_message(node, middleware, robot):
+    robot(qos=QoS.latched())
+
+    def feed():
+        while not middleware.readers:
+            time.sleep(0.001)
+        middleware.readers[0].receive(HELLO)
+
+    thread = threading.Thread(target=feed)
+    thread.start()
+    assert node.wait_for_message("/t", STRING, 5).data == "hello"
+    thread.join()
+    assert middleware.readers[0].qos.durability is Durability.TRANSIENT_LOCAL
+    assert middleware.readers[0].closed
+
+
+def test_waiting_in_vain_says_why(node, robot):
+    robot("/scan")
+    with pytest.raises(rosglass.TimeoutError, match=r"/scna: no message within 0.01 s: nobody pub"):
+        node.wait_for_message("/scna", timeout=0.01)
+    with pytest.raises(rosglass.TimeoutError, match="it is published, but nothing came"):
+        node.wait_for_message("/scan", STRING, timeout=0.01)
+
+
+def test_waiting_ends_with_the_node(middleware):
+    node = Ros2Node(middleware, "fake://", "cockpit")
+    later = threading.Timer(0.05, node.close)
+    later.start()
+    with pytest.raises(rosglass.NodeClosedError):
+        node.wait_for_message("/t", STRING)
+    later.join()
