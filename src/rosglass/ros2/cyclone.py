@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 __all__ = [
     "GONE",
     "INFINITY",
+    "TIMEOUT",
     "VERSION",
     "assert_liveliness",
     "check",
@@ -109,7 +110,6 @@ _PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
         [pointer, c_int64, c_int32, c_int32, c_int32, c_int32, c_int32],
     ),
     "dds_qset_history": (None, [pointer, c_int32, c_int32]),
-    "dds_qset_resource_limits": (None, [pointer, c_int32, c_int32, c_int32]),
     "dds_qset_deadline": (None, [pointer, c_int64]),
     "dds_qset_lifespan": (None, [pointer, c_int64]),
     "dds_qset_liveliness": (None, [pointer, c_int32, c_int64]),
@@ -129,6 +129,8 @@ _PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
 }
 #: What a call returns for an entity that is being deleted.
 GONE = -9
+#: What a call returns that waited for as long as it may.
+TIMEOUT = -10
 #: What it returns for an entity that was deleted, whose number means nothing, or something else.
 _WRONG_ENTITY = (-3, -12)
 #: Return codes (``dds/ddsrt/retcode.h``): words, and the error that a caller can handle.
@@ -141,7 +143,7 @@ _CODES: dict[int, tuple[str, type[Error]]] = {
     -7: ("a policy cannot be changed any more", UnsupportedError),
     -8: ("policies contradict each other", UnsupportedError),
     -9: ("it was closed before", NodeClosedError),
-    -10: ("no answer in time", TimeoutError),
+    TIMEOUT: ("no answer in time", TimeoutError),
     -12: ("the entity is of another kind", UnsupportedError),
     -13: ("the security settings do not allow it", ConnectionLostError),
 }

@@ -52,10 +52,6 @@ class Qos:
         """Let a reliable writer wait no longer than so for readers that take nothing."""
         library().dds_qset_reliability(self.address, 1, round(seconds * 1e9))
 
-    def limit(self, samples: int) -> None:
-        """Hold at most so many samples; more are refused until some are taken."""
-        library().dds_qset_resource_limits(self.address, samples, _UNLIMITED, _UNLIMITED)
-
     def user_data(self) -> bytes:
         """Return the bytes attached to the entity, empty when there are none."""
         value, size = c_void_p(), c_size_t()

@@ -14,12 +14,12 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import NodeClosedError, UnsupportedError
-from rosglass.ros2.cyclone import check_alive, keeping, library
+from rosglass.ros2.cyclone import TIMEOUT, check_alive, keeping, library
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-__all__ = ["COPIED", "Batch", "discard", "payload", "write"]
+__all__ = ["COPIED", "Batch", "discard", "payload", "sample", "send"]
 
 #: Payloads up to this size in bytes are copied: a view costs more than that.
 COPIED = 16 * 1024
@@ -104,20 +104,16 @@ def discard(serdata: int) -> None:
     keeping().ddsi_serdata_unref(serdata)
 
 
-def write(
-    writer: int, sertype: int, parts: Sequence[bytes | bytearray | memoryview], place: str
-) -> None:
-    """Send a payload; waits, without the GIL, while a reliable writer's memory is full.
+def sample(sertype: int, parts: Sequence[bytes | bytearray | memoryview], place: str) -> int:
+    """Return the address of a new serdata with a payload, which is copied.
 
     Args:
-        writer: The writer, which must not be deleted before this returns.
-        sertype: Its type, see :func:`rosglass.ros2.cyclone.sertype`.
+        sertype: Type of the writer it is for, see :func:`rosglass.ros2.cyclone.sertype`; its topic
+            must not be deleted before the sample is sent.
         parts: The payload in one piece or several; the first begins with the encapsulation header.
         place: What it is for, in errors.
 
     Raises:
-        NodeClosedError: The writer was deleted.
-        TimeoutError: It could not be sent in time.
         UnsupportedError: The payload is not of the wire format.
     """
     pieces: Any
@@ -129,19 +125,37 @@ def write(
         pieces = (_Part * len(parts))(*[_Part(pin.address, pin.size) for pin in pinned])
         total = sum(pin.size for pin in pinned)
     lib = library() if total > COPIED else keeping()
-    serdata = lib.ddsi_serdata_from_ser_iov(sertype, _SDK_DATA, len(parts), pieces, total)
+    serdata: int = lib.ddsi_serdata_from_ser_iov(sertype, _SDK_DATA, len(parts), pieces, total)
     if not serdata:
         raise UnsupportedError(
             f"{place}: Cyclone DDS refuses a payload of {total} bytes; it takes CDR, which begins "
             "with 4 bytes of encapsulation header and has at least 1 byte after it"
         )
+    return serdata
+
+
+def send(writer: int, serdata: int, place: str) -> bool:
+    """Send a sample; the reference to it stays with the caller.
+
+    Returns:
+        False when it was not sent because the writer's memory stayed full for as long as its
+        profile says that it waits. It waits without the GIL.
+
+    Raises:
+        NodeClosedError: The writer was deleted.
+        ConnectionLostError: This machine cannot do it now.
+    """
+    keeping().ddsi_serdata_ref(serdata)
     result = library().dds_writecdr(writer, serdata)
+    if result == TIMEOUT:
+        return False
     try:
         check_alive(result, "dds_writecdr", place)
     except NodeClosedError:
-        # Only then did the call not take the reference over.
+        # In this case alone the call did not take the reference over.
         discard(serdata)
         raise
+    return True
 
 
 class _Part(ctypes.Structure):

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import History, Reliability
-from rosglass.errors import NodeClosedError
+from rosglass.errors import NodeClosedError, TimeoutError  # noqa: A004 - the field's own word
 from rosglass.ros2 import cyclone, cyclone_builtin
 from rosglass.ros2.cyclone_events import (
     Event,
@@ -18,7 +19,7 @@ from rosglass.ros2.cyclone_events import (
     subscription_matched,
 )
 from rosglass.ros2.cyclone_qos import qos_of
-from rosglass.ros2.cyclone_samples import Batch, discard, payload, write
+from rosglass.ros2.cyclone_samples import Batch, discard, payload, sample, send
 from rosglass.ros2.dds_discovery_info import format_user_data, hash_of
 from rosglass.ros2.middleware import Reader, Writer
 from rosglass.ros2.names import mangle_type
@@ -35,10 +36,12 @@ __all__ = ["DdsReader", "DdsWriter", "SampleReader", "SampleWriter", "Taken", "t
 #: Samples that a reader holds at least until they are handed on, so that it is the subscription's
 #: inbox that drops what is too much, where it is counted.
 _MIN_DEPTH = 64
-#: Samples that a reader holds at most; a reliable writer sends more when some were handed on.
-_MAX_KEPT = 4096
-#: Samples that are taken at once.
-_BATCH = 64
+#: Samples per second above which a reader would lose some if it were looked at as rarely as others.
+_FAST = 1000
+#: Samples that are taken at once, and how often that is done in a row.
+_BATCH, _MOST = 64, 64
+#: Seconds that a write waits in the library before it comes back to see what has happened.
+_SLICE = 0.1
 #: Seconds that the pump waits for a thread that is handing samples on.
 _SOON = 0.001
 #: Writers that a reader remembers; more come only from a robot that restarts for days.
@@ -85,14 +88,14 @@ class SampleWriter:
         make_topic: Callable[[int, str, str], int] = cyclone.create_topic,
         patience: float | None = None,
     ) -> None:
-        self._place = place
+        self._place, self._patience = place, patience
         self._lock = threading.Lock()
         self._closed = False
         self._topic = make_topic(participant.entity, topic, dds_type)
         try:
             policies = qos_of(qos, writer=True, user_data=user_data)
-            if patience is not None and qos.reliability is Reliability.RELIABLE:
-                policies.wait_at_most(patience)
+            if qos.reliability is Reliability.RELIABLE:
+                policies.wait_at_most(_SLICE)
             self.entity = cyclone.create_writer(participant.entity, self._topic, policies, place)
         except BaseException:
             cyclone.delete(self._topic)
@@ -110,7 +113,19 @@ class SampleWriter:
         with self._lock:
             if self._closed:
                 raise NodeClosedError(f"{self._place}: the publisher is closed")
-            write(self.entity, self._type, parts, self._place)
+            serdata = sample(self._type, parts, self._place)
+            try:
+                if not send(self.entity, serdata, self._place):
+                    self._insist(serdata)
+            finally:
+                discard(serdata)
+
+    def _insist(self, serdata: int) -> None:
+        """Try again and again; in between, signals are handled, such as Ctrl-C."""
+        deadline = math.inf if self._patience is None else time.monotonic() + self._patience
+        while not send(self.entity, serdata, self._place):
+            if time.monotonic() >= deadline:
+                raise TimeoutError(f"{self._place}: the readers took nothing for too long")
 
     def close(self) -> None:
         """Delete it; a write that waits in another thread ends with an error."""
@@ -163,22 +178,19 @@ class SampleReader:
         self._describe, self._on_matched = describe, on_matched
         self._closed = False
         self._eager = True
-        self._lost = 0
+        self._lost = self._count = 0
+        self._visited = 0.0
         self._busy = threading.Lock()
         self._batch = Batch(_BATCH)
         policies = qos_of(qos, writer=False, user_data=user_data)
-        if qos.history is History.KEEP_ALL:
-            policies.limit(_MAX_KEPT)
-        else:
+        if qos.history is History.KEEP_LAST:
             policies.set_history(max(qos.depth, _MIN_DEPTH))
         self._topic = make_topic(participant.entity, topic, dds_type)
         try:
             self.entity = cyclone.create_reader(participant.entity, self._topic, policies, place)
             self.guid = cyclone.guid(self.entity)
-            events = Event.DATA_AVAILABLE
-            if on_matched is not None:
-                events |= Event.SUBSCRIPTION_MATCHED
-            participant.pump.watch(self.entity, events, self._serve)
+            self._events = Event.NONE if on_matched is None else Event.SUBSCRIPTION_MATCHED
+            participant.pump.watch(self.entity, self._events | Event.DATA_AVAILABLE, self._serve)
         except BaseException:
             cyclone.delete(self._topic)
             raise
@@ -189,16 +201,23 @@ class SampleReader:
             return
         self._eager = eager
         with suppress(NodeClosedError):
-            set_events(self.entity, Event.DATA_AVAILABLE if eager else Event.NONE)
-            self._participant.pump.visit(self.entity, None if eager else self.flush)
+            set_events(self.entity, self._events | (Event.DATA_AVAILABLE if eager else Event.NONE))
+            self._participant.pump.visit(self.entity, None if eager else self._visit)
 
     def flush(self) -> None:
         """Hand on what waits, unless another thread is about to."""
         if self._busy.acquire(blocking=False):
             try:
-                self._hand_on(_MAX_KEPT // _BATCH)
+                self._hand_on(_MOST)
             finally:
                 self._busy.release()
+
+    def _visit(self) -> bool:
+        """Hand on what waits; return whether so much comes that it should not wait so long."""
+        before, count = self._visited, self._count
+        self.flush()
+        self._visited = time.monotonic()
+        return self._count - count > _FAST * (self._visited - before)
 
     def lost(self) -> int:
         """Return how many samples were announced but never came."""
@@ -240,6 +259,7 @@ class SampleReader:
                 return False
             taken = self._take()
             if taken:
+                self._count += len(taken)
                 self._on_taken(taken)
             if not self._batch.full:
                 return False

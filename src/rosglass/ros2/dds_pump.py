@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 __all__ = ["Pump"]
 
 _log = logging.getLogger("rosglass.ros2")
-#: Seconds between two looks at what nobody waits for.
-_IDLE_INTERVAL = 0.03
+#: Seconds between two looks at what nobody waits for, and when much of it comes.
+_IDLE_INTERVAL, _SHORT_INTERVAL = 0.03, 0.005
 #: Seconds until a look that failed is repeated.
 _BACKOFF = 0.1
 #: Seconds that closing waits for the thread.
@@ -41,7 +41,7 @@ class Pump:
         self._again: deque[int] = deque()
         self._idle: dict[int, Callable[[], object]] = {}
         self._closed = False
-        self._due = 0.0
+        self._due, self._interval = 0.0, _IDLE_INTERVAL
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
@@ -57,7 +57,7 @@ class Pump:
         self._waitset.attach(entity, entity)
 
     def visit(self, entity: int, act: Callable[[], object] | None) -> None:
-        """Call `act` some thirty times a second, whatever happens.
+        """Call `act` some thirty times a second, whatever happens; more often when it says so.
 
         None ends that, and lets what :meth:`watch` was given look for data at once.
         """
@@ -93,15 +93,15 @@ class Pump:
 
     def _turn(self) -> None:
         again = [self._again.popleft() for _ in range(len(self._again))]
-        woken = self._waitset.wait(0.0 if again else _IDLE_INTERVAL if self._idle else None)
+        woken = self._waitset.wait(0.0 if again else self._interval if self._idle else None)
         for entity in dict.fromkeys((*woken, *again)) if again else woken:
             act = self._acts.get(entity)
             if act is not None and self._do(act):
                 self._again.append(entity)
         if self._idle and (now := time.monotonic()) >= self._due:
-            self._due = now + _IDLE_INTERVAL
-            for visit in list(self._idle.values()):
-                self._do(visit)
+            busy = [visit for visit in list(self._idle.values()) if self._do(visit)]
+            self._interval = _SHORT_INTERVAL if busy else _IDLE_INTERVAL
+            self._due = now + self._interval
 
     def _do(self, act: Callable[[], object]) -> object:
         if self._closed:
