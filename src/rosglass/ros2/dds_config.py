@@ -102,9 +102,13 @@ def _discovery(options: DdsOptions, peers: Sequence[str]) -> str:
     # Asked for ever: a robot may be switched on hours after the cockpit.
     named = "".join(f'<Peer Address={quoteattr(peer)} PruneDelay="inf"/>' for peer in others)
     around = f'<Peers AddLocalhost="{"true" if localhost else "default"}">{named}</Peers>'
+    # How long it takes to find who comes later, or back; Cyclone DDS takes up to 30 s. A named peer
+    # costs one packet for each port that a program may have there.
+    interval = "2s" if others else "1s"
     return (
         "<Discovery><ParticipantIndex>auto</ParticipantIndex>"
-        f"<MaxAutoParticipantIndex>{_LAST_INDEX}</MaxAutoParticipantIndex>{around}</Discovery>"
+        f"<MaxAutoParticipantIndex>{_LAST_INDEX}</MaxAutoParticipantIndex>"
+        f"<SPDPInterval>{interval}</SPDPInterval>{around}</Discovery>"
     )
 
 

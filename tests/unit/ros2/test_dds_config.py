@@ -93,6 +93,14 @@ def test_a_name_server_that_does_not_answer_does_not_hang_us(monkeypatch):
     never.set()
 
 
+@pytest.mark.parametrize(
+    ("url", "interval"),
+    [("dds://", "1s"), ("dds://10.0.0.9", "2s"), ("dds://localhost", "1s")],
+)
+def test_who_comes_later_is_found_within_seconds(url, interval):
+    assert ours(url).findtext("Discovery/SPDPInterval") == interval
+
+
 def test_interfaces_by_name_and_address():
     found = ours("dds://?interface=eth0,192.168.1.2").findall("General/Interfaces/NetworkInterface")
     assert [interface.attrib for interface in found] == [
