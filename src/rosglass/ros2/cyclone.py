@@ -13,6 +13,7 @@ events in :mod:`rosglass.ros2.cyclone_events`, the discovered participants and e
 from __future__ import annotations
 
 import ctypes
+import logging
 import sys
 from ctypes import POINTER, c_bool, c_char_p, c_int32, c_int64, c_size_t, c_uint32, c_uint64
 from ctypes import c_void_p as pointer
@@ -46,7 +47,6 @@ __all__ = [
     "create_writer",
     "delete",
     "guid",
-    "instance_handle",
     "keeping",
     "library",
     "matched_publications",
@@ -54,8 +54,9 @@ __all__ = [
     "sertype",
 ]
 
-#: The version whose layouts are declared here.
-VERSION = "11.0.1"
+_log = logging.getLogger("rosglass.ros2")
+#: The version that everything was tried with, and the series with the interface declared here.
+VERSION, _SERIES = "11.0.1", "11."
 #: No limit, where a time span in nanoseconds is wanted.
 INFINITY = 2**63 - 1
 
@@ -70,7 +71,6 @@ _PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
     "dds_create_writer": (_entity, [_entity, _entity, pointer, pointer]),
     "dds_delete": (c_int32, [_entity]),
     "dds_get_guid": (c_int32, [_entity, pointer]),
-    "dds_get_instance_handle": (c_int32, [_entity, POINTER(c_uint64)]),
     "dds_get_entity_sertype": (c_int32, [_entity, POINTER(pointer)]),
     "dds_get_matched_publications": (c_int32, [_entity, pointer, c_size_t]),
     "dds_get_matched_subscriptions": (c_int32, [_entity, pointer, c_size_t]),
@@ -113,11 +113,9 @@ _PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
     "dds_qset_deadline": (None, [pointer, c_int64]),
     "dds_qset_lifespan": (None, [pointer, c_int64]),
     "dds_qset_liveliness": (None, [pointer, c_int32, c_int64]),
-    "dds_qset_ignorelocal": (None, [pointer, c_int32]),
     "dds_qset_userdata": (None, [pointer, c_char_p, c_size_t]),
     "dds_qset_writer_data_lifecycle": (None, [pointer, c_bool]),
     "dds_qset_data_representation": (None, [pointer, c_uint32, pointer]),
-    "dds_qset_entity_name": (None, [pointer, c_char_p]),
     "dds_qget_reliability": (c_bool, [pointer, _int_p, _long_p]),
     "dds_qget_durability": (c_bool, [pointer, _int_p]),
     "dds_qget_history": (c_bool, [pointer, _int_p, _int_p]),
@@ -154,9 +152,18 @@ def library() -> Any:
     """Return the library, whose functions let other Python threads run meanwhile.
 
     Raises:
-        UnsupportedError: The package is not installed, or is another version.
+        UnsupportedError: The package is not installed, or has another interface.
     """
     return _declare(ctypes.CDLL(_path()))
+
+
+def strange_version() -> str:
+    """Return why private layouts must not be relied on, empty with the version that is known.
+
+    What needs nothing but the public interface works with every version of the series.
+    """
+    version = distribution("cyclonedds").version
+    return "" if version == VERSION else f"cyclonedds {version} is installed instead of {VERSION}"
 
 
 @cache
@@ -263,14 +270,6 @@ def guid(entity: int) -> bytes:
     return buffer.raw
 
 
-def instance_handle(entity: int) -> int:
-    """Return the number that identifies an entity within this process."""
-    value = c_uint64()
-    result = library().dds_get_instance_handle(entity, ctypes.byref(value))
-    check(result, "dds_get_instance_handle", f"entity {entity}")
-    return value.value
-
-
 def sertype(entity: int) -> int:
     """Return the address of the type of a reader's, writer's or topic's samples.
 
@@ -356,9 +355,16 @@ def _path() -> str:
         found = distribution("cyclonedds")
     except PackageNotFoundError:
         raise UnsupportedError(f"Cyclone DDS is not installed; {remedy}") from None
-    if found.version != VERSION:
+    if not found.version.startswith(_SERIES):
         raise UnsupportedError(
             f"cyclonedds {found.version} is installed, but {VERSION} is needed; {remedy}"
+        )
+    if strange_version():
+        _log.warning(
+            "%s: services and actions of nodes that use Fast DDS or RustDDS cannot be called, nor "
+            "offered to them, and nobody has tried the rest; %s",
+            strange_version(),
+            remedy,
         )
     if sys.maxsize < 2**32:
         raise UnsupportedError("DDS needs a 64-bit Python")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import multiprocessing
 import os
 
@@ -93,6 +94,31 @@ def test_a_domain_that_someone_else_in_this_process_uses_is_joined_with_a_warnin
         assert len(cyclone.guid(participant)) == 16
     finally:
         cyclone.delete(others)
+
+
+class Package:
+    """An installed package of some version, with the real one's files."""
+
+    def __init__(self, version):
+        self.version, self.files = version, importlib.metadata.distribution("cyclonedds").files
+
+
+@pytest.mark.parametrize("version", ["11.0.1", "11.3.0"])
+def test_another_version_of_the_series_is_used_with_a_word_on_what_is_lost(
+    monkeypatch, caplog, version
+):
+    package = Package(version)
+    monkeypatch.setattr(cyclone, "distribution", lambda _: package)
+    assert "libddsc" in cyclone._path()
+    lost = "services and actions of nodes that use Fast DDS or RustDDS cannot be called"
+    assert (lost in caplog.text) == (version != cyclone.VERSION)
+    assert bool(cyclone.strange_version()) == (version != cyclone.VERSION)
+
+
+def test_another_series_is_refused(monkeypatch):
+    monkeypatch.setattr(cyclone, "distribution", lambda _: Package("0.10.5"))
+    with pytest.raises(rosglass.UnsupportedError, match=r"0\.10\.5 is installed, but 11\.0\.1 is"):
+        cyclone._path()
 
 
 def _in_a_fork(answer):
