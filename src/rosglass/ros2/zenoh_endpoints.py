@@ -39,7 +39,7 @@ __all__ = [
 _log = logging.getLogger("rosglass.ros2")
 #: Seconds between the heartbeats that let subscriptions notice a lost last sample (rmw_zenoh's).
 _HEARTBEAT = 0.5
-#: Seconds that closing a publisher waits for another thread's write.
+#: Seconds that closing waits for another thread's write, or question.
 _PATIENCE = 1.0
 
 
@@ -109,8 +109,26 @@ class Declaration(Handle):
         with self._lock:
             handles, self._handles = self._handles, []
         for handle in handles:
-            with suppress(zenoh.ZError):  # the session went first
-                handle.undeclare()
+            _undeclare(handle)
+
+
+def _undeclare(handle: Any) -> None:
+    """Withdraw a handle, once no other thread is inside one of its methods."""
+    deadline = time.monotonic() + _PATIENCE
+    while not _undeclared(handle):
+        if time.monotonic() > deadline:
+            _log.warning("%r is still in use and is left to the end of the session", handle)
+            return
+        time.sleep(0.0005)
+
+
+def _undeclared(handle: Any) -> bool:
+    try:
+        with suppress(zenoh.ZError):  # the session went first
+            handle.undeclare()
+    except RuntimeError:  # "Already borrowed": another thread asks it who matches
+        return False
+    return True
 
 
 class Announcement(Declaration):
