@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 from rosglass.comm.listeners import Listener, Listeners
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Hashable, Iterable
 
     from rosglass.comm.graph import EndpointInfo
     from rosglass.comm.node import Executor, Handle
@@ -39,7 +39,7 @@ class Matched:
     """A publisher and a subscription found each other, or one of them went.
 
     Attributes:
-        endpoint: The other side.
+        endpoint: The other side. The name of its node may become known later only.
         change: 1 when it came, -1 when it went.
         count: How many match now.
         total: How many have matched since the callback was registered.
@@ -122,13 +122,22 @@ class SamplesLost:
     total: int
 
 
+class _Known:
+    """What a listener was told: how often each endpoint is there, and how many ever came."""
+
+    def __init__(self) -> None:
+        self.there: Counter[Hashable] = Counter()
+        self.endpoints: dict[Hashable, EndpointInfo] = {}
+        self.total = 0
+
+
 class Appearances(Generic[_E]):
     """Tells each listener about who appears and who goes, those who are there already first."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._listeners: Listeners[_E] = Listeners()
-        self._known: dict[Listener[_E], tuple[Counter[EndpointInfo], list[int]]] = {}
+        self._known: dict[Listener[_E], _Known] = {}
 
     def __bool__(self) -> bool:
         return bool(self._listeners)
@@ -137,7 +146,7 @@ class Appearances(Generic[_E]):
         """Tell `callback` from the next :meth:`update` on, until the handle is closed."""
         listener = self._listeners.add(callback, executor)
         with self._lock:
-            self._known[listener] = (Counter(), [0])
+            self._known[listener] = _Known()
         return listener
 
     def update(
@@ -148,29 +157,32 @@ class Appearances(Generic[_E]):
         """Tell everyone the difference to what they were told; always from the same thread.
 
         Args:
-            endpoints: Who is there now.
+            endpoints: Who is there now. Who keeps an identity is the same, whatever becomes known
+                later, such as the node's name.
             event: Called with an endpoint, the change (1 or -1), how many are there now, and how
                 many have appeared in all; returns what to tell, None for nothing.
         """
         with self._lock:
             for listener in [one for one in self._known if one.closed]:
                 del self._known[listener]
-            known = list(self._known.items())
-        if not known:
+            listeners = list(self._known.items())
+        if not listeners:
             return
-        now = Counter(iter(endpoints))
-        for listener, (told, total) in known:
-            for change, endpoint in (
-                *((-1, gone) for gone in (told - now).elements()),
-                *((1, come) for come in (now - told).elements()),
+        found = [(endpoint.gid or endpoint, endpoint) for endpoint in endpoints]
+        now: Counter[Hashable] = Counter(key for key, _ in found)
+        for listener, known in listeners:
+            known.endpoints.update(found)
+            for change, key in (
+                *((-1, gone) for gone in (known.there - now).elements()),
+                *((1, come) for come in (now - known.there).elements()),
             ):
-                told[endpoint] += change
-                if not told[endpoint]:
-                    del told[endpoint]
-                total[0] += change > 0
-                made = event(endpoint, change, told.total(), total[0])
+                known.there[key] += change
+                known.total += change > 0
+                made = event(known.endpoints[key], change, known.there.total(), known.total)
                 if made is not None:
                     listener.tell(made)
+            known.there = now.copy()
+            known.endpoints = dict(found)
 
     def clear(self) -> None:
         """Forget everyone."""

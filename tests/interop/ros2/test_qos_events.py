@@ -1,0 +1,324 @@
+"""Quality of service, events, relays and local delivery, the same over Zenoh and DDS."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from functools import partial
+
+import pytest
+
+import rosglass
+from rosglass import Duration, QoS
+from rosglass.comm import IMMEDIATE, Durability, Liveliness, Reliability
+from rosglass.interfaces import Library
+from rosglass.messages import OpaqueType
+
+STRING, TWIST = "std_msgs/msg/String", "geometry_msgs/msg/Twist"
+BEST_EFFORT = QoS(reliability=Reliability.BEST_EFFORT)
+SHORT = Duration.from_seconds(0.2)
+
+pytestmark = pytest.mark.peers
+
+
+@pytest.fixture(params=["zenoh", "dds"])
+def world(request):
+    return request.param
+
+
+@pytest.fixture
+def link(world, request):
+    """Connect a node to the world: ``link("name")``."""
+    if world == "dds":
+        return request.getfixturevalue("dds_connect")
+    # Each test has topics of its own, but not each world: a domain of its own does it.
+    return partial(request.getfixturevalue("connect"), options="?domain=11")
+
+
+@pytest.fixture
+def nodes(link):
+    return link("talker"), link("listener")
+
+
+@pytest.fixture
+def topic(request):
+    """A topic that no other test uses."""
+    return f"/{request.node.originalname}"
+
+
+def told(events):
+    # Over DDS an endpoint is seen before the name of its node.
+    return [(e.change, e.count) for e in events]
+
+
+def test_both_sides_tell_who_comes_and_goes(nodes, topic, wait_for):
+    talker, listener = nodes
+    subscription = listener.create_subscription(topic, STRING)
+    ours, theirs = [], []
+    subscription.on_matched(ours.append)
+    publisher = talker.create_publisher(topic, STRING)
+    publisher.on_matched(theirs.append)
+    wait_for(lambda: told(ours) == told(theirs) == [(1, 1)])
+    assert ours[0].endpoint.gid == listener.publishers(topic)[0].gid
+    assert theirs[0].endpoint.gid == talker.subscriptions(topic)[0].gid
+    assert (subscription.publisher_count(), publisher.subscription_count()) == (1, 1)
+    publisher.close()
+    wait_for(lambda: told(ours)[1:] == [(-1, 0)])
+    second = talker.create_publisher(topic, STRING)
+    wait_for(lambda: told(ours)[2:] == [(1, 1)])
+    second.on_matched(theirs.append)
+    wait_for(lambda: told(theirs)[1:] == [(1, 1)])
+    subscription.close()
+    wait_for(lambda: told(theirs)[2:] == [(-1, 0)])
+
+
+def test_profiles_that_do_not_match_are_told_to_both(world, nodes, topic, wait_for):
+    talker, listener = nodes
+    wanted = QoS.latched()
+    subscription = listener.create_subscription(topic, STRING, qos=wanted)
+    publisher = talker.create_publisher(topic, STRING, BEST_EFFORT)
+    ours, theirs = [], []
+    subscription.on_incompatible_qos(ours.append)
+    publisher.on_incompatible_qos(theirs.append)
+    for events in (ours, theirs):
+        (event,) = wait_for(lambda events=events: events)
+        assert event.endpoint.name == topic
+        assert event.policies == ("reliability", "durability")
+    for side, peer in ((subscription, "talker"), (publisher, "listener")):
+        problem = f"/{peer} does not match (reliability: reliable requested"
+        wait_for(lambda side=side, problem=problem: problem in side.problem)
+    if world == "dds":
+        assert "nothing is received" in subscription.problem
+        assert (subscription.publisher_count(), publisher.subscription_count()) == (0, 0)
+        publisher.publish(data="x")
+        assert subscription.wait(0.3) is None
+    else:
+        assert "without that guarantee" in subscription.problem
+        wait_for(publisher.subscription_count)
+
+        def arrived():
+            publisher.publish(data="x")
+            return subscription.wait(0.1)
+
+        wait_for(arrived)
+
+
+def test_what_is_available_adapts_to_who_comes(nodes, topic, wait_for):
+    talker, listener = nodes
+    latched = talker.create_publisher(topic, STRING, QoS.latched())
+    latched.publish(data="kept")
+    wait_for(lambda: listener.publishers(topic))
+    subscription = listener.create_subscription(topic, STRING, qos=QoS.best_available())
+    assert subscription.qos.durability is Durability.TRANSIENT_LOCAL
+    assert subscription.wait(5).message().data == "kept"
+    fast = talker.create_publisher(topic, STRING, BEST_EFFORT)
+    wait_for(lambda: subscription.qos == BEST_EFFORT)
+    wait_for(lambda: fast.subscription_count() == 1)
+    assert subscription.publisher_count() == 2
+    received = []
+
+    def arrived():
+        fast.publish(data="fast")
+        while (sample := subscription.take()) is not None:
+            received.append(sample.message().data)
+        return "fast" in received
+
+    wait_for(arrived)
+    latched.publish(data="more")
+    while "more" not in received:
+        received.append(subscription.wait(5).message().data)
+    assert received.count("more") == 1
+    assert "kept" not in received, "what was received once does not come again"
+    assert subscription.problem == ""
+
+
+def test_a_publisher_of_what_is_available_serves_everybody(nodes, topic, wait_for):
+    talker, listener = nodes
+    strict = listener.create_subscription(topic, STRING, qos=QoS.latched())
+    loose = listener.create_subscription(topic, STRING, qos=BEST_EFFORT)
+    wait_for(lambda: len(talker.subscriptions(topic)) == 2)
+    publisher = talker.create_publisher(topic, STRING, QoS.best_available())
+    wait_for(lambda: publisher.subscription_count() == 2)
+    assert publisher.problem == ""
+    received = set()
+
+    def arrived():
+        publisher.publish(data="x")
+        received.update(s for s in (strict, loose) if s.take() is not None)
+        return len(received) == 2
+
+    wait_for(arrived)
+
+
+def test_deadlines_are_watched_on_both_sides(nodes, topic, wait_for):
+    talker, listener = nodes
+    qos = QoS(deadline=SHORT)
+    subscription = listener.create_subscription(topic, STRING, qos=qos)
+    publisher = talker.create_publisher(topic, STRING, qos)
+    wait_for(publisher.subscription_count)
+    publisher.publish(data="x")
+    missed, skipped = [], []
+    subscription.on_deadline_missed(missed.append)
+    publisher.on_deadline_missed(skipped.append)
+    wait_for(lambda: len(missed) >= 2 and len(skipped) >= 2)
+    assert missed[-1].total == sum(event.change for event in missed)
+
+
+def test_manual_liveliness_is_kept_by_sending_and_lost_by_silence(world, nodes, topic, wait_for):
+    talker, listener = nodes
+    manual = QoS(liveliness=Liveliness.MANUAL_BY_TOPIC, lease_duration=SHORT)
+    subscription = listener.create_subscription(topic, STRING, qos=manual)
+    publisher = talker.create_publisher(topic, STRING, manual)
+    changes, lost = [], []
+    subscription.on_liveliness_change(changes.append)
+    publisher.on_liveliness_lost(lost.append)
+    wait_for(publisher.subscription_count)
+    show = publisher.assert_liveliness if world == "dds" else partial(publisher.publish, data="x")
+
+    def alive():
+        show()
+        return bool(changes) and changes[-1].alive == 1
+
+    wait_for(alive)
+    end = time.monotonic() + 0.6
+    count = len(changes)
+    while time.monotonic() < end:
+        show()
+        time.sleep(0.02)
+    assert len(changes) == count or changes[-1].alive == 1
+    wait_for(lambda: changes[-1].change == -1 and lost)
+    assert (changes[-1].alive, changes[-1].not_alive) == (0, 1)
+    publisher.publish(data="x")
+    wait_for(lambda: changes[-1].change == 1)
+
+
+def test_a_relay_passes_on_a_type_that_it_does_not_know(link, topic, wait_for):
+    library = Library()
+    library.add_text("secret_msgs/msg/Thing", "string text\nint32[] numbers\n")
+    secret = rosglass.load("secret_msgs/msg/Thing", library=library)
+    source, relay, sink = link("source"), link("relay"), link("sink")
+    first = source.create_publisher(f"{topic}/a", secret)
+    taken = relay.create_subscription(f"{topic}/a", OpaqueType(secret.name))
+    sample = None
+    value = {"text": "x", "numbers": [1, 2, 3]}
+
+    def arrived():
+        nonlocal sample
+        first.publish(value)
+        sample = taken.wait(0.1)
+        return sample
+
+    wait_for(arrived)
+    assert sample.type == OpaqueType(secret.name, secret.rihs01)
+    with pytest.raises(rosglass.TypeNotFoundError, match="only bytes"):
+        sample.message()
+    second = relay.create_publisher(f"{topic}/b", sample.type)
+    final = sink.create_subscription(f"{topic}/b", secret)
+    (endpoint,) = wait_for(lambda: sink.publishers(f"{topic}/b"))
+    assert (endpoint.type, endpoint.type_hash) == (secret.name, secret.rihs01)
+    wait_for(second.subscription_count)
+    got = None
+
+    def passed_on():
+        nonlocal got
+        second.publish_serialized(sample)
+        got = final.wait(0.1)
+        return got
+
+    wait_for(passed_on)
+    assert got.message() == secret.create(value)
+    assert final.problem == ""
+
+
+def test_local_messages_come_once_and_can_be_left_out(link, topic, wait_for):
+    first, second = link("first"), link("second")
+    publisher = first.create_publisher(topic, STRING, 100)
+    seen = {"own": [], "other": [], "never": []}
+    arguments = {"qos": 100, "executor": IMMEDIATE}
+    for name, node in (("own", first), ("other", second), ("never", first)):
+        node.create_subscription(
+            topic,
+            STRING,
+            lambda m, name=name: seen[name].append(m.data),
+            ignore_local=name == "never",
+            **arguments,
+        )
+    wait_for(lambda: publisher.subscription_count() == 3)
+    for node in (first, second):
+        wait_for(lambda node=node: node.publishers(topic))
+
+    def linked():
+        publisher.publish(data="ready?")
+        return seen["own"] and seen["other"]
+
+    wait_for(linked)
+    texts = [str(number) for number in range(20)]
+    for text in texts:
+        publisher.publish(data=text)
+    for name in ("own", "other"):
+        wait_for(lambda name=name: "19" in seen[name])
+    time.sleep(0.1)
+    for name in ("own", "other"):
+        assert [text for text in seen[name] if text != "ready?"] == texts
+    assert seen["never"] == []
+
+
+def test_several_types_on_one_topic(nodes, topic, wait_for):
+    talker, listener = nodes
+    texts, twists = (talker.create_publisher(topic, name) for name in (STRING, TWIST))
+    wait_for(lambda: len(listener.publishers(topic)) == 2)
+    unsure = listener.create_subscription(topic)
+    wait_for(lambda: "published with several types" in unsure.problem)
+    chosen = {name: listener.create_subscription(topic, name) for name in (STRING, TWIST)}
+    wait_for(lambda: texts.subscription_count() == twists.subscription_count() == 1)
+    received = {}
+
+    def arrived():
+        texts.publish(data="x")
+        twists.publish(linear={"x": 2.0})
+        for name, subscription in chosen.items():
+            sample = subscription.take()
+            if sample is not None:
+                received[name] = sample.message()
+        return len(received) == 2
+
+    wait_for(arrived)
+    assert received[STRING].data == "x"
+    assert received[TWIST].linear.x == 2.0
+    texts.close()
+    wait_for(lambda: unsure.type and unsure.type.name == TWIST)
+
+
+def test_the_last_message_of_a_topic_comes_at_once(nodes, topic, wait_for):
+    talker, listener = nodes
+    qos = replace(QoS.latched(), deadline=Duration.from_seconds(60))
+    talker.create_publisher(topic, STRING, qos).publish(data="kept")
+    wait_for(lambda: listener.publishers(topic))
+    assert listener.wait_for_message(topic, timeout=5).data == "kept"
+    with pytest.raises(rosglass.TimeoutError, match=f"nobody publishes {topic}_; did you mean"):
+        listener.wait_for_message(f"{topic}_", timeout=0.1)
+
+
+def test_what_nobody_waits_for_is_there_when_somebody_looks(nodes, topic, wait_for):
+    talker, listener = nodes
+    publisher = talker.create_publisher(topic, STRING)
+    subscription = listener.create_subscription(topic, STRING, qos=1)
+    wait_for(publisher.subscription_count)
+    end = time.monotonic() + 2.5
+    number = 0
+    behind = []
+    while time.monotonic() < end:
+        number += 1
+        publisher.publish(data=str(number))
+        time.sleep(0.005)
+        if number % 50 == 0:
+            sample = subscription.take()
+            if sample is not None:
+                behind.append(number - int(sample.message().data))
+    assert behind
+    assert sorted(behind)[len(behind) // 2] <= 2, "the newest, although nobody was waiting"
+    statistics = subscription.statistics()
+    assert statistics.received >= 0.9 * number
+    assert statistics.frequency == pytest.approx(number / 2.5, rel=0.3)
+    assert statistics.lost == 0
+    assert statistics.latency.seconds < 0.2
