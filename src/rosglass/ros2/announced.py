@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from rosglass.errors import Error
 from rosglass.interfaces.hashes import announced_hashes
@@ -12,8 +12,9 @@ if TYPE_CHECKING:
 
     from rosglass.comm import EndpointInfo
     from rosglass.interfaces.definition import InterfaceDefinition
+    from rosglass.ros2.core import Core
 
-__all__ = ["Announced", "choose", "identity", "mismatches", "nodes_of", "similar"]
+__all__ = ["Announced", "choose", "identity", "mismatches", "missing", "nodes_of", "similar"]
 
 
 class _Type(Protocol):
@@ -29,7 +30,10 @@ _T = TypeVar("_T", bound=_Type)
 class Announced(Generic[_T]):
     """One type, in the version that peers announce by its hash, if the library has it.
 
+    A version that the library does not have is fetched from the robot.
+
     Args:
+        core: The node.
         load: Returns the type of a name and hash; raises an Error when there is none.
         given: The type that was given; None when only peers can tell it.
         fixed: Whether it stays as given whatever peers announce.
@@ -42,8 +46,10 @@ class Announced(Generic[_T]):
         failure: Why the announced version cannot be had, in words; empty when all is well.
     """
 
-    def __init__(self, load: Callable[[str, str], _T], given: _T | None, fixed: bool) -> None:
-        self._load, self._fixed = load, fixed
+    def __init__(
+        self, core: Core, load: Callable[[str, str], _T], given: _T | None, fixed: bool
+    ) -> None:
+        self._core, self._load, self._fixed = core, load, fixed
         self._failed: tuple[str, str] | None = None
         self.type: _T | None = None
         self.hash, self.hashes = "", frozenset[str]()
@@ -75,12 +81,8 @@ class Announced(Generic[_T]):
         try:
             found = self._load(*wanted)
         except Error as error:
-            self._failed = wanted
-            who = nodes_of(peer for peer in peers if peer.type == name)
-            self.failure = (
-                f"{who} has {name}, which cannot be used: {error}; this is tried again until a "
-                "definition is found"
-            )
+            self.failure, pending = missing(self._core, *wanted, peers, error)
+            self._failed = None if pending else wanted
             return False
         self._failed, self.failure = None, ""
         self._take(found)
@@ -97,6 +99,32 @@ class Announced(Generic[_T]):
     def _take(self, found: _T) -> None:
         hashes = announced_hashes(found.definition)
         self.type, self.hash, self.hashes = found, hashes[0], frozenset(hashes)
+
+
+def missing(
+    core: Core, name: str, hash: str, peers: Sequence[EndpointInfo], error: Error
+) -> tuple[str, bool]:
+    """Ask the robot for a definition that cannot be had here.
+
+    Args:
+        core: The node; its members follow when there is an answer.
+        name: The type's name.
+        hash: The hash that peers announce it by, empty when they do not.
+        peers: Who has it.
+        error: Why it cannot be had here.
+
+    Returns:
+        What to tell people, and whether the answer is awaited.
+    """
+    having = [peer for peer in peers if peer.type.startswith(name)]
+    who = nodes_of(having) or "the robot"
+    reason = core.types.request(name, hash, having, core.wake)
+    if not reason:
+        return f"{who} has {name}, whose definition is being fetched from the robot", True
+    return (
+        f"{who} has {name}, which cannot be used: {error}; {reason}; this is tried again until a "
+        "definition is found"
+    ), False
 
 
 def choose(names: Iterable[str], current: str, example: str) -> tuple[str, str]:
@@ -117,7 +145,7 @@ def choose(names: Iterable[str], current: str, example: str) -> tuple[str, str]:
 
 
 def mismatches(
-    announced: Announced[_T], peers: Sequence[EndpointInfo], verb: str, effect: str
+    announced: Announced[Any], peers: Sequence[EndpointInfo], verb: str, effect: str
 ) -> list[str]:
     """Say which peers do not fit the type, and what follows.
 

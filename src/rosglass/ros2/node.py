@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointKind, Node, NodeName, QoS, Subscription
+from rosglass.ros2.action_client import Ros2ActionClient
+from rosglass.ros2.action_server import Ros2ActionServer
 from rosglass.ros2.arguments import NO_ARGUMENTS
 from rosglass.ros2.core import Core
 from rosglass.ros2.furniture import Furniture
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
 
     from rosglass.comm import (
+        ActionClient,
+        ActionServer,
         Answer,
         Clock,
         EndpointInfo,
@@ -27,11 +31,13 @@ if TYPE_CHECKING:
         Promise,
         Publisher,
         Sample,
+        ServerGoal,
         ServiceClient,
         ServiceServer,
         Status,
         Time,
     )
+    from rosglass.comm.node import Result
     from rosglass.interfaces import Library
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
     from rosglass.ros2.arguments import Arguments
@@ -143,6 +149,28 @@ class Ros2Node(Node):
         profile = QoS.services() if qos is None else _profile(qos)
         full = self._core.resolve(name, "service")
         return Ros2ServiceServer(self._core, full, type, callback, profile, executor)
+
+    def create_action_client(self, name: str, type: str | ActionType | None = None) -> ActionClient:
+        """Return a client; see :meth:`rosglass.comm.Node.create_action_client`."""
+        self._core.check_open()
+        self._core.types.ensure(type)
+        return Ros2ActionClient(self._core, self.resolve(name), type)
+
+    def create_action_server(
+        self,
+        name: str,
+        type: str | ActionType,
+        execute: Callable[[ServerGoal], Result | Awaitable[Result]],
+        *,
+        accept: Callable[[Message], bool] | None = None,
+        cancel: Callable[[ServerGoal], bool] | None = None,
+        executor: Executor | None = None,
+    ) -> ActionServer:
+        """Offer an action; see :meth:`rosglass.comm.Node.create_action_server`."""
+        self._core.check_open()
+        self._core.types.ensure(type)
+        full = self.resolve(name)
+        return Ros2ActionServer(self._core, full, type, execute, accept, cancel, executor)
 
     @property
     def parameters(self) -> Ros2Parameters:

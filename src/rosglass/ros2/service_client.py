@@ -71,7 +71,7 @@ class Ros2ServiceClient(ServiceClient, Member):
         self._discovers = wanted is None
         given = None if wanted is None else core.types.service(wanted)
         fixed = wanted is not None and not isinstance(wanted, str)
-        self._announced: Announced[ServiceType] = Announced(core.types.service, given, fixed)
+        self._announced: Announced[ServiceType] = Announced(core, core.types.service, given, fixed)
         self.type = given
         self._lock = threading.Lock()
         self._link: Link | None = None
@@ -107,6 +107,16 @@ class Ros2ServiceClient(ServiceClient, Member):
         if not problems and not self.ready:
             problems.append(self._absence())
         return "; ".join(problems)
+
+    @property
+    def trouble(self) -> str:
+        """What its middleware has against servers that are there; empty when nothing."""
+        link = self._link
+        return "" if link is None else link.requester.problem
+
+    def server_ids(self) -> frozenset[bytes | str]:
+        """Return the identities of the servers that understand the requests."""
+        return frozenset(map(identity, self._fitting(self._servers())))
 
     @property
     def pending(self) -> int:
@@ -229,7 +239,7 @@ class Ros2ServiceClient(ServiceClient, Member):
             data = entry.encode(link.type)
             now = time.monotonic()
             left = None if entry.deadline is None else max(0.001, entry.deadline - now)
-            entry.servers = frozenset(map(identity, self._fitting(self._servers())))
+            entry.servers = self.server_ids()
             entry.sent = now
             link.send(entry, data, left)
         except Error as error:
@@ -263,8 +273,7 @@ class Ros2ServiceClient(ServiceClient, Member):
             call.fulfil(message)
 
     def _refusal(self, entry: Request, error: str) -> Error:
-        here = set(map(identity, self._fitting(self._servers())))
-        if entry.servers and not entry.servers & here:
+        if entry.servers and not entry.servers & self.server_ids():
             return self._loss(entry)
         return ServiceError(f"the call of {self.name} failed: {error or 'there is no response'}")
 
@@ -325,7 +334,7 @@ class Ros2ServiceClient(ServiceClient, Member):
         self._readiness.update()
         if self._queue:
             self._flush()
-        self._watch(servers)
+        self._watch()
 
     def _adopt(self, *, retry: bool) -> bool:
         """Take the type that servers announce; returns whether it is another one now."""
@@ -358,11 +367,11 @@ class Ros2ServiceClient(ServiceClient, Member):
         for entry in stranded:
             entry.call.fail(self._loss(entry))
 
-    def _watch(self, servers: Sequence[EndpointInfo]) -> None:
+    def _watch(self) -> None:
         """End the calls whose servers have been gone for too long."""
         if self._patient or not self._requests:
             return
-        here = set(map(identity, self._fitting(servers)))
+        here = self.server_ids()
         now = time.monotonic()
         with self._lock:
             entries = list(self._requests.values())
@@ -370,7 +379,7 @@ class Ros2ServiceClient(ServiceClient, Member):
             if entry.sent is None:
                 continue
             if not entry.servers:
-                entry.servers = frozenset(here)
+                entry.servers = here
             if entry.servers & here or not entry.servers:
                 entry.alone = None
             elif entry.alone is None:
@@ -390,9 +399,8 @@ class Ros2ServiceClient(ServiceClient, Member):
         problems = [text for text in problems if text]
         if not problems:
             problems = mismatches(self._announced, servers, "offers", "it cannot be called")
-        link = self._link
-        if not problems and link is not None and link.requester.problem:
-            problems.append(link.requester.problem)
+        if not problems and self.trouble:
+            problems.append(self.trouble)
         return problems
 
     def _absence(self) -> str:

@@ -56,7 +56,7 @@ class Ros2ServiceServer(ServiceServer, Member):
         self.type = core.types.service(type)
         self._core, self._callback = core, callback
         self._executor = executor_for(callback, executor, core.dispatcher, name)
-        self._announced = Announced(core.types.service, self.type, fixed=True)
+        self._announced = Announced(core, core.types.service, self.type, fixed=True)
         self._lock = threading.Lock()
         self._closed = False
         self._waiting = 0

@@ -1,0 +1,419 @@
+"""Offering ROS 2 actions.
+
+Behaviour: http://design.ros2.org/articles/actions.html and ``rcl_action``'s ``action_server.c``.
+"""
+
+from __future__ import annotations
+
+import inspect
+import logging
+import threading
+import time
+from concurrent.futures import Future
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+from rosglass.comm import ActionServer, Dispatcher, Time
+from rosglass.comm.inorder import InOrder
+from rosglass.comm.loop import LoopExecutor, executor_for
+from rosglass.errors import ConversionError, Error, NodeClosedError
+from rosglass.ros2.action_types import (
+    CANCEL_GOAL,
+    CODES,
+    FEEDBACK,
+    FEEDBACK_QOS,
+    GET_RESULT,
+    NO_ID,
+    SEND_GOAL,
+    STATUS,
+    STATUS_QOS,
+    ActionTypes,
+    goal_info,
+    part,
+    stamp_of,
+)
+from rosglass.ros2.core import Member
+from rosglass.ros2.publisher import Ros2Publisher
+from rosglass.ros2.server_goal import Ros2ServerGoal
+from rosglass.ros2.service_server import Ros2ServiceServer
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable, Sequence
+
+    from rosglass.comm import Executor, ServerGoal
+    from rosglass.comm.node import Result
+    from rosglass.messages import ActionType, Message
+    from rosglass.ros2.core import Core
+
+__all__ = ["Ros2ActionServer"]
+
+_log = logging.getLogger("rosglass.ros2")
+#: Seconds that results are kept for clients that ask late, as in Humble's rcl_action.
+_RESULT_TIMEOUT = 900.0
+#: Ended goals that are kept at most.
+_MAX_ENDED = 500
+#: Seconds in all that closing waits for goals to notice.
+_PATIENCE = 2.0
+#: ``action_msgs/srv/CancelGoal``'s return codes.
+_NONE, _REJECTED, _UNKNOWN, _TERMINATED = range(4)
+
+
+class Ros2ActionServer(ActionServer, Member):
+    """An action server; made by :meth:`Node.create_action_server`.
+
+    Args:
+        core: The node it belongs to.
+        name: Absolute action name.
+        type: The type, or its name.
+        execute: Called with each accepted goal.
+        accept: Told a goal, says whether it is accepted; None accepts all.
+        cancel: Told a goal, says whether it may be cancelled; None accepts all.
+        executor: Where all three run; None for a thread for each goal and, for the latter two,
+            the node's dispatcher. When `execute` is a coroutine function, all run in the event
+            loop.
+    """
+
+    def __init__(
+        self,
+        core: Core,
+        name: str,
+        type: ActionType | str,
+        execute: Callable[[ServerGoal], Result | Awaitable[Result]],
+        accept: Callable[[Message], bool] | None = None,
+        cancel: Callable[[ServerGoal], bool] | None = None,
+        executor: Executor | None = None,
+    ) -> None:
+        self.name, self.type = name, core.types.action(type)
+        chosen = executor_for(execute, executor, core.dispatcher, name)
+        for word, callback in (("accept", accept), ("cancel", cancel)):
+            plain = callable(callback) and not inspect.iscoroutinefunction(callback)
+            if callback is not None and not plain:
+                raise ConversionError(word, callback, "a plain function, or None", name)
+        self._core, self._execute, self._accept, self._cancel = core, execute, accept, cancel
+        self._decider = chosen
+        self._runner = chosen if executor is not None or isinstance(chosen, LoopExecutor) else None
+        self._types = types = ActionTypes.of(self.type, core.types)
+        self._lock = threading.Lock()
+        self._goals: dict[bytes, Ros2ServerGoal] = {}
+        self._deciding: set[bytes] = set()
+        self._threads: set[threading.Thread] = set()
+        self._closed = False
+        self._publishing = InOrder()
+        #: Runs the protocol: neither the middleware's threads nor users' callbacks hold it up.
+        self._desk = Dispatcher(f"{name} goals")
+        self._feedback = Ros2Publisher(core, part(name, FEEDBACK), types.feedback, FEEDBACK_QOS)
+        self._status = Ros2Publisher(core, part(name, STATUS), types.status, STATUS_QOS)
+        self._services = [
+            Ros2ServiceServer(core, part(name, service), kind, callback, executor=self._desk)
+            for service, kind, callback in (
+                (GET_RESULT, types.get_result, self._on_result_request),
+                (CANCEL_GOAL, types.cancel_goal, self._on_cancel_request),
+                (SEND_GOAL, types.send_goal, self._on_goal_request),
+            )
+        ]
+        core.add(self)
+
+    @property
+    def closed(self) -> bool:
+        """Whether :meth:`close` was called."""
+        return self._closed
+
+    @property
+    def goals(self) -> Sequence[ServerGoal]:
+        """The goals that have not ended, in order of acceptance."""
+        with self._lock:
+            return tuple(goal for goal in self._goals.values() if goal.status.is_active)
+
+    @property
+    def problem(self) -> str:
+        """Why some clients cannot be served, in words; empty when all is well."""
+        if self._closed:
+            return "the server is closed"
+        problems = [service.problem for service in self._services]
+        return "; ".join(dict.fromkeys(problem for problem in problems if problem))
+
+    def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - time passes
+        """Forget results that nobody asked for in time."""
+        if not idle or self._closed:
+            return
+        oldest = time.monotonic() - _RESULT_TIMEOUT
+        with self._lock:
+            ended = [goal for goal in self._goals.values() if goal.ended is not None]
+            surplus = len(ended) - _MAX_ENDED
+            for number, goal in enumerate(sorted(ended, key=lambda goal: goal.ended or 0.0)):
+                if number < surplus or (goal.ended is not None and goal.ended < oldest):
+                    del self._goals[goal.id]
+
+    def close(self) -> None:
+        """Abort the goals that run, tell their clients, and withdraw; safe to call twice."""
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+            goals = list(self._goals.values())
+            threads = [t for t in self._threads if t is not threading.current_thread()]
+        if self._core.forked:
+            return
+        for goal in goals:
+            goal.close()
+        for end in (*self._services, self._feedback, self._status):
+            end.close()
+        self._desk.close()
+        until = time.monotonic() + _PATIENCE
+        for thread in threads:
+            thread.join(max(0.0, until - time.monotonic()))
+            if thread.is_alive():
+                _log.warning("%s still runs %.0f s after closing", thread.name, _PATIENCE)
+        self._core.remove(self)
+
+    # -- for goals -------------------------------------------------------------------------------
+
+    def make_result(self, result: Any) -> Message:
+        """Return a goal's result; raises ConversionError."""
+        kind = self.type.result
+        return kind.decode(kind.encode(result))
+
+    def make_response(self, code: int, result: Any) -> Message:
+        """Return the answer to a request for a goal's result."""
+        return self._types.get_result.response.create(status=code, result=result)
+
+    def send_feedback(self, goal: Ros2ServerGoal, feedback: Any, fields: dict[str, Any]) -> None:
+        """Publish feedback of a goal; raises ConversionError."""
+        if feedback is not None and fields:
+            told = "either feedback or keyword fields, not both"
+            raise ConversionError("", fields, told, self.type.feedback.name)
+        value = fields if feedback is None else feedback
+        made = self.type.feedback.create(value)
+        self._feedback.publish({"goal_id": {"uuid": goal.id}, "feedback": made})
+
+    def publish_status(self) -> None:
+        """Publish the status of all goals, as of now."""
+        self._publishing.add(self._publish_status)
+
+    def _publish_status(self) -> None:
+        with self._lock:
+            goals = list(self._goals.values())
+        entries = [
+            {"goal_info": goal_info(goal.id, goal.accepted), "status": CODES[goal.status]}
+            for goal in goals
+        ]
+        with suppress(NodeClosedError):  # those who listen see that the server is gone
+            self._status.publish(status_list=entries)
+
+    # -- accepting -------------------------------------------------------------------------------
+
+    def _on_goal_request(self, request: Message) -> Any:
+        goal_id = bytes(request.goal_id.uuid)
+        with self._lock:
+            known = goal_id in self._goals or goal_id in self._deciding
+            if not known:
+                self._deciding.add(goal_id)
+        if known:
+            _log.warning("%s: rejecting goal %s: its id is in use", self.name, goal_id.hex())
+            return {"accepted": False}
+        answer: Future[Any] = Future()
+        if self._accept is None:
+            # Once the answer is waited for: it must be on its way before the goal starts.
+            self._desk.post(lambda: self._take(goal_id, request.goal, answer, True))
+        else:
+            self._decider.post(lambda: self._decide(goal_id, request.goal, answer))
+        return answer
+
+    def _decide(self, goal_id: bytes, goal: Message, answer: Future[Any]) -> None:
+        assert self._accept is not None
+        decision: Any = False
+        try:
+            decision = self._accept(goal)
+        except Exception:
+            _log.exception("%s: accept failed; rejecting goal %s", self.name, goal_id.hex())
+        if decision is not True and decision is not False:
+            _log.error(
+                "%s: accept returned %.80r instead of True or False; rejecting goal %s",
+                self.name,
+                decision,
+                goal_id.hex(),
+            )
+        # Back on the desk, so that what follows waits for no other callback.
+        self._desk.post(lambda: self._take(goal_id, goal, answer, decision is True))
+
+    def _take(self, goal_id: bytes, wanted: Message, answer: Future[Any], accepted: bool) -> None:
+        stamp = self._core.clock.now()
+        goal = Ros2ServerGoal(self, goal_id, wanted, stamp)
+        with self._lock:
+            self._deciding.discard(goal_id)
+            if self._closed:
+                accepted = False
+            if accepted:
+                self._goals[goal_id] = goal
+        answer.set_result({"accepted": accepted, "stamp": stamp.to_dict() if accepted else {}})
+        if accepted:
+            self.publish_status()
+            self._start(goal)
+
+    # -- executing -------------------------------------------------------------------------------
+
+    def _start(self, goal: Ros2ServerGoal) -> None:
+        if self._runner is not None:
+            self._runner.post(lambda: self._run(goal))
+            return
+        thread = threading.Thread(
+            target=self._run_in_thread,
+            args=(goal,),
+            name=f"{self.name} {goal.id_text}",
+            daemon=True,
+        )
+        with self._lock:
+            self._threads.add(thread)
+        try:
+            thread.start()
+        except RuntimeError as error:
+            with self._lock:
+                self._threads.discard(thread)
+            _log.error("%s: aborting goal %s: %s", self.name, goal.id_text, error)
+            goal.close()
+
+    def _run_in_thread(self, goal: Ros2ServerGoal) -> None:
+        try:
+            self._run(goal)
+        finally:
+            with self._lock:
+                self._threads.discard(threading.current_thread())
+
+    def _run(self, goal: Ros2ServerGoal) -> None:
+        if not goal.start():
+            if goal.status.is_active:
+                goal.conclude(None)  # cancelled before its turn
+            return
+        try:
+            result: Any = self._execute(goal)
+        except BaseException as error:
+            self._failed(goal, error)
+            return
+        if not inspect.iscoroutine(result):
+            self._conclude(goal, result)
+        elif isinstance(self._runner, LoopExecutor):
+            future = self._runner.run(result)
+            future.add_done_callback(lambda done: self._finish(goal, done))
+        else:
+            result.close()
+            self._failed(goal, TypeError("execute must be an async def to be awaited"))
+
+    def _finish(self, goal: Ros2ServerGoal, done: Future[Any]) -> None:
+        """Take the end of a coroutine."""
+        try:
+            result = done.result(0)
+        except BaseException as error:
+            self._failed(goal, error)
+        else:
+            self._conclude(goal, result)
+
+    def _conclude(self, goal: Ros2ServerGoal, result: Any) -> None:
+        if not goal.status.is_active:
+            if result is not None and not self._closed:
+                _log.warning(
+                    "%s: goal %s has ended as %s already; what execute returned is dropped",
+                    self.name,
+                    goal.id_text,
+                    goal.status.value,
+                )
+            return
+        try:
+            goal.conclude(result)
+        except Error as error:
+            _log.error(
+                "%s: the result of goal %s does not fit, the goal is aborted: %s",
+                self.name,
+                goal.id_text,
+                error,
+            )
+            goal.close()
+
+    def _failed(self, goal: Ros2ServerGoal, error: BaseException) -> None:
+        if not (self._closed and isinstance(error, NodeClosedError)):
+            _log.error(
+                "%s: execute failed on goal %s, which is aborted",
+                self.name,
+                goal.id_text,
+                exc_info=error,
+            )
+        goal.close()
+
+    # -- cancelling ------------------------------------------------------------------------------
+
+    def _on_cancel_request(self, request: Message) -> Any:
+        goal_id = bytes(request.goal_info.goal_id.uuid)
+        stamp = stamp_of(request.goal_info.stamp)
+        with self._lock:
+            goals = list(self._goals.values())
+        chosen, code = _cancelable(goals, goal_id, stamp)
+        if self._cancel is None or not chosen:
+            return self._cancel_all(chosen, code)
+        answer: Future[Any] = Future()
+
+        def decide() -> None:
+            allowed = [goal for goal in chosen if self._allows(goal)]
+            rejected = _REJECTED if not allowed else code
+            self._desk.post(lambda: answer.set_result(self._cancel_all(allowed, rejected)))
+
+        self._decider.post(decide)
+        return answer
+
+    def _allows(self, goal: Ros2ServerGoal) -> bool:
+        """Return whether a goal may be cancelled; a callback that fails must not hold up a stop."""
+        assert self._cancel is not None
+        try:
+            decision: Any = self._cancel(goal)
+        except Exception:
+            _log.exception("%s: cancel failed; cancelling goal %s", self.name, goal.id_text)
+            return True
+        if decision is not True and decision is not False:
+            _log.error(
+                "%s: cancel returned %.80r instead of True or False; cancelling goal %s",
+                self.name,
+                decision,
+                goal.id_text,
+            )
+        return decision is not False
+
+    def _cancel_all(self, goals: Sequence[Ros2ServerGoal], code: int) -> dict[str, Any]:
+        """Cancel goals; returns the answer to the request."""
+        canceled = [goal for goal in goals if goal.request_cancel()]
+        if goals and not canceled:
+            code = _TERMINATED  # they ended while it was decided
+        if canceled:
+            self.publish_status()
+        infos = [goal_info(goal.id, goal.accepted) for goal in canceled]
+        return {"return_code": code, "goals_canceling": infos}
+
+    # -- results ---------------------------------------------------------------------------------
+
+    def _on_result_request(self, request: Message) -> Any:
+        with self._lock:
+            goal = self._goals.get(bytes(request.goal_id.uuid))
+        if goal is None:
+            return {"status": 0}  # unknown
+        answer: Future[Any] = Future()
+        goal.add_waiting(answer)
+        return answer
+
+
+def _cancelable(
+    goals: Sequence[Ros2ServerGoal], goal_id: bytes, stamp: Time
+) -> tuple[list[Ros2ServerGoal], int]:
+    """Return the goals that a request to cancel means, and the code that answers it.
+
+    An id alone means one goal; a stamp means all accepted until then, and the goal with the id, if
+    there is one; neither means all (``rcl_action_process_cancel_request``).
+    """
+    if goal_id != NO_ID and stamp == Time():
+        found = [goal for goal in goals if goal.id == goal_id]
+        if not found:
+            return [], _UNKNOWN
+        return (found, _NONE) if found[0].cancelable else ([], _TERMINATED)
+    everything = goal_id == NO_ID and stamp == Time()
+    chosen = [
+        goal
+        for goal in goals
+        if goal.cancelable and (everything or goal.accepted <= stamp or goal.id == goal_id)
+    ]
+    return chosen, _NONE
