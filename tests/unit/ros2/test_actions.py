@@ -1114,10 +1114,15 @@ def test_closing_from_execute_does_not_hang(client, robot, eventually):
 
 def test_a_goal_that_ignores_the_end_is_left_to_its_thread(client, robot, monkeypatch, caplog):
     monkeypatch.setattr("rosglass.ros2.action_server._PATIENCE", 0.05)
-    release = threading.Event()
-    server = robot.create_action_server("/fib", FIB, lambda _: release.wait(5) and None)
+    started, release = threading.Event(), threading.Event()
+
+    def execute(_):
+        started.set()
+        release.wait(5)
+
+    server = robot.create_action_server("/fib", FIB, execute)
     goal = client.send_goal()
-    assert goal.acceptance.result(5)
+    assert started.wait(5)
     server.close()
     assert f"/fib {goal.id_text} still runs" in caplog.text
     release.set()
