@@ -11,7 +11,6 @@ import re
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
-from xml.sax.saxutils import quoteattr
 
 from rosglass.errors import ConversionError
 from rosglass.ros2.dds_options import DdsOptions, DiscoveryRange
@@ -79,7 +78,7 @@ def _general(options: DdsOptions) -> str:
     if options.discovery in (DiscoveryRange.LOCALHOST, DiscoveryRange.OFF):
         parts.append("<AllowMulticast>false</AllowMulticast>")
     interfaces = "".join(
-        f"<NetworkInterface {'address' if _ADDRESS.match(name) else 'name'}={quoteattr(name)}/>"
+        '<NetworkInterface {}="{}"/>'.format("address" if _ADDRESS.match(name) else "name", name)
         for name in options.interfaces
     )
     if interfaces:
@@ -100,7 +99,7 @@ def _discovery(options: DdsOptions, peers: Sequence[str]) -> str:
     others = [peer for peer in peers if not peer.startswith("127.") or ":" in peer]
     localhost = options.discovery is DiscoveryRange.LOCALHOST or len(others) < len(peers)
     # Asked for ever: a robot may be switched on hours after the cockpit.
-    named = "".join(f'<Peer Address={quoteattr(peer)} PruneDelay="inf"/>' for peer in others)
+    named = "".join(f'<Peer Address="{peer}" PruneDelay="inf"/>' for peer in others)
     around = f'<Peers AddLocalhost="{"true" if localhost else "default"}">{named}</Peers>'
     # How long it takes to find who comes later, or back; Cyclone DDS takes up to 30 s. A named peer
     # costs one packet for each port that a program may have there.
