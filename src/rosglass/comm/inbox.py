@@ -34,7 +34,7 @@ _log = logging.getLogger("rosglass.comm")
 INBOX_LIMIT = 256 * 1024 * 1024
 #: Bytes that a waiting sample takes up besides its data, about.
 _SAMPLE_SIZE = 500
-#: Seconds between two log lines about a consumer that is too slow.
+#: Seconds between two log lines about a consumer that is too slow, or one that fails.
 _LOG_EVERY = 10.0
 
 
@@ -65,6 +65,7 @@ class Inbox:
         self._calling = self._closed = False
         self._held = self._received = self._bytes = self._dropped = 0
         self._last = self._next_mark = self._next_log = -math.inf
+        self._failed, self._next_failure = 0, -math.inf
         self._meter = Meter()
 
     @property
@@ -223,7 +224,13 @@ class Inbox:
             self._executor.post(self._call_soon)
 
     def _log_failure(self) -> None:
-        _log.exception("callback of subscription %s failed", self._topic)
+        """Log what was just caught: a peer that sends rubbish must not fill the log with it."""
+        self._failed += 1
+        now = time.monotonic()
+        if now >= self._next_failure:
+            self._next_failure = now + _LOG_EVERY
+            often = f", {self._failed} times so far" if self._failed > 1 else ""
+            _log.exception("callback of subscription %s failed%s", self._topic, often)
 
 
 class ImmediateInbox(Inbox):

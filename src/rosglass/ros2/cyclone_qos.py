@@ -14,7 +14,6 @@ from rosglass.ros2.cyclone import INFINITY, library
 __all__ = ["Qos", "qos_of"]
 
 _AUTOMATIC, _MANUAL_BY_TOPIC = 0, 2
-_IGNORE_PARTICIPANT = 1
 _UNLIMITED = -1
 
 
@@ -39,10 +38,6 @@ class Qos:
     def set_user_data(self, data: bytes) -> None:
         """Attach bytes that everyone sees who discovers the entity."""
         library().dds_qset_userdata(self.address, data, len(data))
-
-    def ignore_own(self) -> None:
-        """Exchange nothing with endpoints of the same participant."""
-        library().dds_qset_ignorelocal(self.address, _IGNORE_PARTICIPANT)
 
     def set_history(self, depth: int | None) -> None:
         """Keep the newest `depth` samples, or all with None."""

@@ -35,9 +35,9 @@ __all__ = ["DdsReader", "DdsWriter", "SampleReader", "SampleWriter", "Taken", "t
 
 #: Samples that a reader holds at least until they are handed on, so that it is the subscription's
 #: inbox that drops what is too much, where it is counted.
-_MIN_DEPTH = 64
+_MIN_DEPTH = 128
 #: Samples per second above which a reader would lose some if it were looked at as rarely as others.
-_FAST = 1000
+_FAST = 2000
 #: Samples that are taken at once, and how often that is done in a row.
 _BATCH, _MOST = 64, 64
 #: Seconds that a write waits in the library before it comes back to see what has happened.
@@ -88,14 +88,16 @@ class SampleWriter:
         make_topic: Callable[[int, str, str], int] = cyclone.create_topic,
         patience: float | None = None,
     ) -> None:
-        self._place, self._patience = place, patience
+        self._place = place
+        self._patience = math.inf if patience is None else patience
+        self._slice = min(self._patience, _SLICE)
         self._lock = threading.Lock()
         self._closed = False
         self._topic = make_topic(participant.entity, topic, dds_type)
         try:
             policies = qos_of(qos, writer=True, user_data=user_data)
             if qos.reliability is Reliability.RELIABLE:
-                policies.wait_at_most(_SLICE)
+                policies.wait_at_most(self._slice)
             self.entity = cyclone.create_writer(participant.entity, self._topic, policies, place)
         except BaseException:
             cyclone.delete(self._topic)
@@ -122,10 +124,11 @@ class SampleWriter:
 
     def _insist(self, serdata: int) -> None:
         """Try again and again; in between, signals are handled, such as Ctrl-C."""
-        deadline = math.inf if self._patience is None else time.monotonic() + self._patience
-        while not send(self.entity, serdata, self._place):
-            if time.monotonic() >= deadline:
-                raise TimeoutError(f"{self._place}: the readers took nothing for too long")
+        deadline = time.monotonic() + self._patience - self._slice
+        while time.monotonic() < deadline:
+            if send(self.entity, serdata, self._place):
+                return
+        raise TimeoutError(f"{self._place}: the readers took nothing for too long")
 
     def close(self) -> None:
         """Delete it; a write that waits in another thread ends with an error."""

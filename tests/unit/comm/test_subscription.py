@@ -135,6 +135,14 @@ def test_a_failing_callback_is_logged_with_the_topic_and_the_next_sample_arrives
     assert "callback of subscription /t failed" in caplog.text
 
 
+def test_failures_are_not_logged_for_every_message(caplog):
+    def callback(thing):
+        raise RuntimeError("of the callback")
+
+    feed(subscription(callback=callback), *"abcdefghij")
+    assert caplog.text.count("callback of subscription /t failed") == 1
+
+
 def test_a_message_that_cannot_be_decoded_is_logged_and_the_next_one_arrives(caplog):
     seen = []
     feed(subscription(callback=seen.append), "bad", "good")

@@ -12,21 +12,25 @@ import dora
 import pyarrow as pa
 from summary import VALUES, summary, tell
 
-# {"port", "domain", "interfaces", "profile": "humble" or "rep2016", "publish": {topic: type},
-#  "subscribe": {topic: type}, "latched": bool, "count": how many messages to publish}
+# {"port", "domain", "interfaces", "profile": "humble" or "rep2016" over Zenoh, "dds" without port,
+#  "publish": {topic: type}, "subscribe": {topic: type}, "latched": bool, "count": how many messages
+#  to publish}
 plan = json.loads(sys.argv[1])
 with tempfile.NamedTemporaryFile("w", suffix=".json5", delete=False) as config:
     json.dump(
         {
             "mode": "peer",
-            "connect": {"endpoints": [f"tcp/127.0.0.1:{plan['port']}"]},
+            "connect": {"endpoints": [f"tcp/127.0.0.1:{plan.get('port')}"]},
             "listen": {"endpoints": ["tcp/127.0.0.1:0"]},
             "scouting": {"multicast": {"enabled": False}},
             "timestamping": {"enabled": True},
         },
         config,
     )
-transport = dora.Ros2Transport.zenoh(plan["profile"], config.name)
+if plan["profile"] == "dds":
+    transport = dora.Ros2Transport.dds()
+else:
+    transport = dora.Ros2Transport.zenoh(plan["profile"], config.name)
 context = dora.Ros2Context([plan["interfaces"]], transport=transport, domain_id=plan["domain"])
 Path(config.name).unlink()
 node = context.new_node("dora_node", "/dora", dora.Ros2NodeOptions())

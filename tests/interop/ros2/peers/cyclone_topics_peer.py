@@ -1,0 +1,157 @@
+"""Cyclone DDS's own Python API with real types: `cyclone_topics_peer.py PLAN`, see ``plan`` below.
+
+It writes and reads what the plan says until its standard input ends.
+"""
+# Annotations stay objects: cyclonedds makes its types of them.
+
+import json
+import sys
+import threading
+import time
+from dataclasses import dataclass
+
+from cyclonedds.core import Qos
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.idl import IdlStruct
+from cyclonedds.idl.types import float64, int32, sequence, uint8, uint32
+from cyclonedds.pub import DataWriter
+from cyclonedds.qos import Policy
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from cyclonedds.util import duration
+from summary import VALUES, summary, tell
+
+# What is in the plan: "domain"; types by topic to "publish" and "subscribe"; how many to publish in
+# "count", seconds between them in "period" and before them in "start"; "texts" to number them;
+# "rubbish" with the lengths of sequences to be sent as Strings. What is in "qos": "best_effort",
+# "latched", "depth" (0 keeps all), and seconds of "deadline", "lifespan" and "lease".
+plan = json.loads(sys.argv[1])
+given = plan.get("qos", {})
+
+
+@dataclass
+class String(IdlStruct, typename="std_msgs::msg::dds_::String_"):
+    data: str
+
+
+@dataclass
+class Int32(IdlStruct, typename="std_msgs::msg::dds_::Int32_"):
+    data: int32
+
+
+@dataclass
+class Vector3(IdlStruct, typename="geometry_msgs::msg::dds_::Vector3_"):
+    x: float64
+    y: float64
+    z: float64
+
+
+@dataclass
+class Twist(IdlStruct, typename="geometry_msgs::msg::dds_::Twist_"):
+    linear: Vector3
+    angular: Vector3
+
+
+@dataclass
+class Time(IdlStruct, typename="builtin_interfaces::msg::dds_::Time_"):
+    sec: int32
+    nanosec: uint32
+
+
+@dataclass
+class Header(IdlStruct, typename="std_msgs::msg::dds_::Header_"):
+    stamp: Time
+    frame_id: str
+
+
+@dataclass
+class Image(IdlStruct, typename="sensor_msgs::msg::dds_::Image_"):
+    header: Header
+    height: uint32
+    width: uint32
+    encoding: str
+    is_bigendian: uint8
+    step: uint32
+    data: sequence[uint8]
+
+
+@dataclass
+class Rubbish(IdlStruct, typename="std_msgs::msg::dds_::String_"):
+    length: uint32
+    words: sequence[uint32]
+
+
+TYPES = {
+    "std_msgs/msg/String": String,
+    "std_msgs/msg/Int32": Int32,
+    "geometry_msgs/msg/Twist": Twist,
+    "sensor_msgs/msg/Image": Image,
+}
+
+
+def value(kind: type, fields: dict) -> object:
+    """Return a sample with the fields, which are dicts inside."""
+    inner = {"linear": Vector3, "angular": Vector3, "header": Header, "stamp": Time}
+    return kind(
+        **{name: value(inner[name], x) if name in inner else x for name, x in fields.items()}
+    )
+
+
+def profile(writer: bool) -> Qos:
+    depth = given.get("depth", 10)
+    policies = [
+        Policy.Reliability.BestEffort
+        if given.get("best_effort")
+        else Policy.Reliability.Reliable(duration(seconds=1)),
+        Policy.Durability.TransientLocal if given.get("latched") else Policy.Durability.Volatile,
+        Policy.History.KeepLast(depth) if depth else Policy.History.KeepAll,
+        Policy.DataRepresentation(use_cdrv0_representation=True),
+    ]
+    if given.get("latched") and writer:
+        history = Policy.History.KeepLast(depth or 1)
+        policies.append(Policy.DurabilityService(0, history, -1, -1, -1))
+    if "deadline" in given:
+        policies.append(Policy.Deadline(duration(seconds=given["deadline"])))
+    if "lifespan" in given and writer:
+        policies.append(Policy.Lifespan(duration(seconds=given["lifespan"])))
+    if "lease" in given:
+        policies.append(Policy.Liveliness.Automatic(duration(seconds=given["lease"])))
+    return Qos(*policies)
+
+
+def subscribe(name: str, kind: type) -> None:
+    reader = DataReader(participant, Topic(participant, f"rt{name}", kind), qos=profile(False))
+    while True:
+        for sample in reader.take(100):
+            if isinstance(sample, kind):
+                tell(received=name, value=summary(sample))
+        time.sleep(0.002)
+
+
+def publish(name: str, type_name: str) -> None:
+    kind = Rubbish if "rubbish" in plan else TYPES[type_name]
+    writer = DataWriter(participant, Topic(participant, f"rt{name}", kind), qos=profile(True))
+    samples = [value(kind, VALUES.get(type_name, {"data": 7}))] if kind is not Rubbish else []
+    samples += [Rubbish(2**32 - 1 - size, [size] * size) for size in plan.get("rubbish", ())]
+    time.sleep(plan.get("start", 0))
+    count = plan.get("count", -1)
+    number = 0
+    while number != count:
+        for sample in samples:
+            if plan.get("texts"):
+                sample.data = f"{number}"
+            writer.write(sample)
+        number += 1
+        time.sleep(plan.get("period", 0.1))
+    tell(published=name)
+    kept.append(writer)
+
+
+participant = DomainParticipant(plan["domain"])
+kept: list[DataWriter] = []
+for topic, of_type in plan.get("subscribe", {}).items():
+    threading.Thread(target=subscribe, args=(topic, TYPES[of_type]), daemon=True).start()
+for topic, of_type in plan.get("publish", {}).items():
+    threading.Thread(target=publish, args=(topic, of_type), daemon=True).start()
+tell(ready=True)
+sys.stdin.read()

@@ -1,0 +1,355 @@
+"""Topics over DDS, both ways: Cyclone DDS's own Python API with real types, and dora-rs."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rosglass
+from rosglass.comm import IMMEDIATE, Durability, Duration, History, QoS, Reliability
+
+PEERS = Path(__file__).parent / "peers"
+STRING, INT32 = "std_msgs/msg/String", "std_msgs/msg/Int32"
+TWIST, IMAGE = "geometry_msgs/msg/Twist", "sensor_msgs/msg/Image"
+TYPES = [STRING, TWIST, IMAGE]
+KEEP_ALL = QoS(history=History.KEEP_ALL)
+BEST_EFFORT = QoS(reliability=Reliability.BEST_EFFORT)
+
+pytestmark = pytest.mark.peers
+
+
+@pytest.fixture
+def cyclone(start, dds_domain):
+    """Start Cyclone DDS's own API in the module's domain; ended after the test."""
+    started = []
+
+    def cyclone(**plan: Any) -> Any:
+        plan["domain"] = dds_domain
+        process = start(str(PEERS / "cyclone_topics_peer.py"), json.dumps(plan))
+        started.append(process)
+        process.event("ready")
+        return process
+
+    yield cyclone
+    for process in started:
+        process.end()
+
+
+@pytest.fixture(scope="module", params=["cyclone", "dora"])
+def both_ways(request, start, dds_domain, interfaces):
+    """A peer that publishes and subscribes to everything."""
+    script = {"cyclone": "cyclone_topics_peer.py", "dora": "dora_peer.py"}[request.param]
+    if request.param == "dora" and importlib.util.find_spec("dora") is None:
+        pytest.skip('dora-rs is not installed: pip install "rosglass[peers]"')
+    plan = {
+        "domain": dds_domain,
+        "profile": "dds",
+        "interfaces": str(interfaces),
+        "publish": {topic("from", name): name for name in TYPES},
+        "subscribe": {topic("to", name): name for name in TYPES},
+    }
+    process = start(str(PEERS / script), json.dumps(plan))
+    process.event("ready")
+    yield process
+    process.end()
+
+
+def topic(direction: str, type_name: str) -> str:
+    return f"/{direction}/{type_name.rpartition('/')[2].lower()}"
+
+
+def understood(sample: Any) -> bool:
+    try:
+        sample.type.validate(sample.data)
+    except rosglass.DecodeError:
+        return False
+    return True
+
+
+def linked(publisher: Any, wait_for: Any) -> Any:
+    """Wait until a publisher has a subscription, also on the wire."""
+    wait_for(publisher.subscription_count, what="a subscription")
+    time.sleep(0.2)
+    return publisher
+
+
+# -- with peers ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("type_name", TYPES)
+def test_we_receive_what_the_peer_publishes(dds_connect, both_ways, type_name, peer_values):
+    node = dds_connect("cockpit")
+    subscription = node.create_subscription(topic("from", type_name), type_name)
+    sample = subscription.wait(10)
+    assert sample is not None, subscription.problem or node.status()
+    sample.type.validate(sample.data)
+    received = peer_values.summary(sample.message().to_dict())
+    assert received == peer_values.summary(peer_values.VALUES[type_name])
+    assert 0 <= (sample.received - sample.sent).seconds < 2
+    following = subscription.wait(10)
+    assert following.publisher == sample.publisher
+    assert len(sample.publisher) == 16
+    assert [end.gid for end in node.publishers(subscription.topic)] == [sample.publisher]
+
+
+@pytest.mark.parametrize("type_name", TYPES)
+def test_the_peer_receives_what_we_publish(
+    dds_connect, both_ways, type_name, peer_values, wait_for
+):
+    publisher = dds_connect("cockpit").create_publisher(topic("to", type_name), type_name)
+    wait_for(publisher.subscription_count, what="the peer's subscription in our graph")
+    received: dict[str, Any] = {}
+
+    def arrived():
+        publisher.publish(peer_values.VALUES[type_name])
+        while not both_ways.events.empty():
+            event = both_ways.events.get()
+            received[event.get("received")] = event.get("value")
+        return publisher.topic in received
+
+    wait_for(arrived, what="our message at the peer")
+    assert received[publisher.topic] == peer_values.summary(peer_values.VALUES[type_name])
+
+
+def test_the_last_message_of_a_latched_peer_comes_late_but_comes(dds_connect, cyclone, wait_for):
+    plan = {"qos": {"latched": True, "depth": 2}, "texts": True, "count": 5, "period": 0}
+    process = cyclone(publish={"/latched": STRING}, **plan)
+    process.event("published")
+    node = dds_connect("late")
+    early = node.create_subscription("/latched", STRING)
+    latched = node.create_subscription("/latched", STRING, qos=QoS.latched(10))
+    wanted = [latched.wait(10).message().data for _ in range(2)]
+    assert wanted == ["3", "4"]
+    assert latched.wait(0.3) is None
+    assert early.wait(0) is None
+
+
+def test_our_last_latched_message_reaches_a_late_peer(dds_connect, cyclone):
+    publisher = dds_connect("cockpit").create_publisher("/map", STRING, QoS.latched(2))
+    for text in ("gone", "second", "last"):
+        publisher.publish(data=text)
+    process = cyclone(subscribe={"/map": STRING}, qos={"latched": True, "depth": 0})
+    received = [process.event("value")["data"] for _ in range(2)]
+    assert received == ["second", "last"]
+
+
+@pytest.mark.parametrize("qos", [{"best_effort": True}, {"depth": 0}, {"deadline": 1, "lease": 1}])
+def test_profiles_that_match_exchange_everything(dds_connect, cyclone, wait_for, qos):
+    ours = QoS(
+        reliability=Reliability.BEST_EFFORT if "best_effort" in qos else Reliability.RELIABLE,
+        history=History.KEEP_ALL,
+        deadline=Duration.from_seconds(1) if "deadline" in qos else None,
+        lease_duration=Duration.from_seconds(1) if "lease" in qos else None,
+    )
+    plan = {"texts": True, "count": 50, "period": 0.002, "start": 1.0}
+    process = cyclone(publish={"/a": STRING}, subscribe={"/b": STRING}, qos=qos, **plan)
+    node = dds_connect("cockpit")
+    subscription = node.create_subscription("/a", STRING, qos=ours)
+    publisher = linked(node.create_publisher("/b", STRING, ours), wait_for)
+    for number in range(50):
+        publisher.publish(data=str(number))
+        time.sleep(0.002)
+    expected = [str(number) for number in range(50)]
+    assert [process.event("value")["data"] for _ in expected] == expected
+    assert [subscription.wait(5).message().data for _ in expected] == expected
+
+
+@pytest.mark.parametrize(
+    ("offered", "requested", "policy"),
+    [
+        ({"best_effort": True}, QoS(), "reliability"),
+        ({}, QoS.latched(), "durability"),
+        ({}, QoS(deadline=Duration.from_seconds(1)), "deadline"),
+    ],
+)
+def test_profiles_that_do_not_match_are_explained(
+    dds_connect, cyclone, wait_for, offered, requested, policy
+):
+    cyclone(publish={"/odd": STRING}, qos=offered)
+    subscription = dds_connect("cockpit").create_subscription("/odd", STRING, qos=requested)
+    problem = wait_for(lambda: subscription.problem, what="an explanation")
+    assert policy in problem
+    assert "nothing is received" in problem
+    assert subscription.wait(0.3) is None
+
+
+def test_old_samples_are_not_delivered_after_their_lifespan(dds_connect, cyclone, wait_for):
+    brief = QoS(
+        depth=5,
+        durability=Durability.TRANSIENT_LOCAL,
+        lifespan=Duration.from_seconds(0.5),
+    )
+    publisher = dds_connect("cockpit").create_publisher("/brief", STRING, brief)
+    publisher.publish(data="old")
+    time.sleep(0.6)
+    process = cyclone(subscribe={"/brief": STRING}, qos={"latched": True})
+    wait_for(publisher.subscription_count)
+    publisher.publish(data="new")
+    assert process.event("value")["data"] == "new"
+
+
+def test_another_type_on_the_topic_is_named_and_not_received(dds_connect, cyclone, wait_for):
+    cyclone(publish={"/mixed": INT32})
+    cyclone(publish={"/mixed": STRING})
+    subscription = dds_connect("cockpit").create_subscription("/mixed", STRING)
+    problem = wait_for(lambda: INT32 in subscription.problem and subscription.problem)
+    assert STRING in problem
+    texts = {subscription.wait(5).message().data for _ in range(10)}
+    assert texts == {"Grüße, robot"}
+
+
+def test_rubbish_is_refused_and_disturbs_nobody(dds_connect, cyclone, caplog):
+    # Where a text should begin with its length, there is one beyond the end.
+    cyclone(publish={"/noisy": STRING}, rubbish=[0, 1, 50, 5000], period=0.02)
+    cyclone(publish={"/noisy": STRING}, period=0.02)
+    node = dds_connect("cockpit")
+    texts: list[str] = []
+    node.create_subscription("/noisy", STRING, lambda message: texts.append(message.data))
+    raw = node.create_subscription("/noisy", STRING, qos=100)
+    deadline = time.monotonic() + 10
+    while texts.count("Grüße, robot") < 20 and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert set(texts) == {"Grüße, robot"}
+    assert len(texts) >= 20
+    assert sum(not understood(sample) for sample in iter(raw.take, None)) > 10
+    told = [record for record in caplog.records if "/noisy" in record.getMessage()]
+    assert 1 <= len(told) <= 2
+
+
+def test_a_peer_that_is_killed_leaves_and_another_takes_over(dds_connect, cyclone):
+    subscription = dds_connect("cockpit").create_subscription("/relay", STRING)
+    first = cyclone(publish={"/relay": STRING}, period=0.01)
+    one = subscription.wait(10)
+    first.end()
+    while subscription.wait(0.5) is not None:
+        pass
+    cyclone(publish={"/relay": STRING}, period=0.01)
+    two = subscription.wait(10)
+    assert two is not None
+    assert two.publisher != one.publisher
+
+
+# -- between our own ------------------------------------------------------------------------------
+
+
+def test_several_publishers_in_and_outside_of_the_process(dds_connect, wait_for):
+    subscriber, one, two = (dds_connect(name) for name in ("hears", "one", "two"))
+    subscription = subscriber.create_subscription("/talk", STRING, qos=KEEP_ALL)
+    publishers = [
+        node.create_publisher("/talk", STRING, KEEP_ALL) for node in (one, two, two, subscriber)
+    ]
+    for publisher in publishers:
+        linked(publisher, wait_for)
+    for number in range(50):
+        for index, publisher in enumerate(publishers):
+            publisher.publish(data=f"{index} {number}")
+    heard: dict[bytes, list[str]] = {}
+    for _ in range(200):
+        sample = subscription.wait(5)
+        heard.setdefault(sample.publisher, []).append(sample.message().data)
+    assert len(heard) == 4
+    expected = {f"{index}": [f"{index} {number}" for number in range(50)] for index in range(4)}
+    assert sorted(heard.values()) == sorted(expected.values())
+    assert subscription.wait(0.2) is None
+
+
+def test_big_messages_arrive_whole_and_are_not_copied(dds_connect, wait_for):
+    subscription = dds_connect("screen").create_subscription("/camera", IMAGE, qos=KEEP_ALL)
+    publisher = linked(dds_connect("robot").create_publisher("/camera", IMAGE, KEEP_ALL), wait_for)
+    pixels = np.random.default_rng(1).integers(0, 256, 6_220_800, np.uint8)
+    fields = {"height": 1080, "width": 1920, "step": 5760, "encoding": "rgb8"}
+    for _ in range(3):
+        publisher.publish(data=pixels, **fields)
+    samples = [subscription.wait(10) for _ in range(3)]
+    for sample in samples:
+        assert isinstance(sample.data, memoryview)
+        assert sample.data.readonly
+        message = sample.message()
+        assert np.shares_memory(message.data, np.frombuffer(sample.data, np.uint8))
+        assert np.array_equal(message.data, pixels)
+        assert message.width == 1920
+
+
+def test_a_picture_outlives_the_node_that_received_it(dds_connect, wait_for):
+    screen = dds_connect("screen")
+    subscription = screen.create_subscription("/camera", IMAGE)
+    publisher = linked(dds_connect("robot").create_publisher("/camera", IMAGE), wait_for)
+    publisher.publish(data=np.arange(100_000, dtype=np.uint8))
+    pixels = subscription.wait(10).message().data
+    screen.close()
+    publisher.close()
+    assert np.array_equal(pixels, np.arange(100_000, dtype=np.uint8))
+
+
+def test_a_topic_is_passed_on_without_being_decoded(dds_connect, wait_for):
+    source, relay, sink = (dds_connect(name) for name in ("source", "relay", "sink"))
+    passed = relay.create_publisher("/out", IMAGE)
+    relay.create_subscription(
+        "/in", IMAGE, raw_callback=lambda sample: passed.publish_serialized(sample.data)
+    )
+    subscription = sink.create_subscription("/out", IMAGE)
+    linked(passed, wait_for)
+    publisher = linked(source.create_publisher("/in", IMAGE), wait_for)
+    publisher.publish(data=np.arange(200_000, dtype=np.uint8), encoding="mono8")
+    message = subscription.wait(10).message()
+    assert message.encoding == "mono8"
+    assert np.array_equal(message.data, np.arange(200_000, dtype=np.uint8))
+
+
+def test_a_node_hears_itself(dds_connect):
+    node = dds_connect("alone")
+    subscription = node.create_subscription("/echo", STRING)
+    publisher = node.create_publisher("/echo", STRING)
+    assert publisher.subscription_count() == 1
+    publisher.publish(data="hello")
+    sample = subscription.wait(5)
+    assert sample.message().data == "hello"
+    assert sample.publisher == node.publishers("/echo")[0].gid
+
+
+def test_nothing_is_lost_at_full_speed(dds_connect, wait_for):
+    subscription = dds_connect("hears").create_subscription("/fast", STRING, qos=KEEP_ALL)
+    publisher = linked(dds_connect("talks").create_publisher("/fast", STRING, KEEP_ALL), wait_for)
+    for number in range(10_000):
+        publisher.publish(data=str(number))
+    texts = [subscription.wait(5).message().data for _ in range(10_000)]
+    assert texts == [str(number) for number in range(10_000)]
+    assert subscription.statistics().dropped == 0
+
+
+def test_what_nobody_takes_is_dropped_and_counted(dds_connect, wait_for):
+    subscription = dds_connect("hears").create_subscription("/idle", STRING, qos=QoS(3))
+    publisher = linked(dds_connect("talks").create_publisher("/idle", STRING), wait_for)
+    for number in range(1000):
+        publisher.publish(data=str(number))
+        time.sleep(0.0005)
+    wait_for(lambda: subscription.statistics().received == 1000, what="all of them counted")
+    assert subscription.statistics().dropped == 997
+    texts = [subscription.take().message().data for _ in range(3)]
+    assert texts == ["997", "998", "999"]
+    assert subscription.take() is None
+
+
+def test_best_effort_is_fresh(dds_connect, wait_for):
+    got: list[int] = []
+    dds_connect("hears").create_subscription(
+        "/scan",
+        STRING,
+        raw_callback=lambda sample: got.append(sample.received_ns - sample.sent_ns),
+        qos=BEST_EFFORT,
+        executor=IMMEDIATE,
+    )
+    publisher = linked(
+        dds_connect("talks").create_publisher("/scan", STRING, BEST_EFFORT), wait_for
+    )
+    for _ in range(50):
+        publisher.publish(data="x")
+        time.sleep(0.005)
+    wait_for(lambda: len(got) == 50)
+    assert sorted(got)[25] < 50_000_000
