@@ -41,6 +41,12 @@ def fibonacci(goal):
     return {"sequence": sequence}
 
 
+@pytest.fixture(autouse=True)
+def quick(monkeypatch):
+    """Look ten times a second for what has no event."""
+    monkeypatch.setattr("rosglass.ros2.core._POLL", 0.1)
+
+
 @pytest.fixture
 def robot(connect):
     return connect("robot")

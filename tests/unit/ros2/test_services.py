@@ -27,6 +27,12 @@ def add(request):
     return {"sum": request.a + request.b}
 
 
+@pytest.fixture(autouse=True)
+def quick(monkeypatch):
+    """Look ten times a second for what has no event."""
+    monkeypatch.setattr("rosglass.ros2.core._POLL", 0.1)
+
+
 @pytest.fixture
 def robot(connect):
     return connect("robot")
