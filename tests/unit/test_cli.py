@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import rosglass
-from rosglass.cli import COMMANDS, main
+from rosglass.cli import COMMANDS, _split, main
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
@@ -44,3 +44,31 @@ def test_missing_extra_names_the_fix(
     monkeypatch.setattr("rosglass.cli.import_module", no_module)
     assert main(["router"]) == 1
     assert 'pip install "rosglass[zenoh]"' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("line", "ours", "told", "rest"),
+    [
+        ("run a.qml", "run a.qml", "", ""),
+        ("run a.qml -- -x --ros-args", "run a.qml", "", "-x --ros-args"),
+        ("run a.qml --ros-args -r a:=b", "run a.qml", "--ros-args -r a:=b", ""),
+        ("run --ros-args -r a:=b -- a.qml -- x", "run a.qml", "--ros-args -r a:=b --", "x"),
+        ("x --ros-args -- --ros-args -p b:=1", "x", "--ros-args -- --ros-args -p b:=1", ""),
+    ],
+)
+def test_ros_args_and_the_arguments_of_others_are_set_apart(
+    line: str, ours: str, told: str, rest: str
+) -> None:
+    assert _split(line.split()) == (ours.split(), told.split(), rest.split())
+
+
+def test_bad_ros_args_are_named(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["robot", "--url", "zenoh://127.0.0.1:9", "--ros-args", "-r", "a"]) == 1
+    assert "rosglass: --ros-args, argument 3: 'a' has no ':='" in capsys.readouterr().err
+
+
+def test_commands_that_are_no_nodes_take_no_ros_args(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as exit_info:
+        main(["router", "--ros-args", "-r", "a:=b"])
+    assert exit_info.value.code == 2
+    assert "router takes no --ros-args" in capsys.readouterr().err

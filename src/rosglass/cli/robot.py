@@ -43,6 +43,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="end when standard input closes, that is, with the program that started the robot",
     )
+    parser.set_defaults(ros_arguments=[])
 
 
 def run(args: argparse.Namespace) -> int:
@@ -60,12 +61,13 @@ def run(args: argparse.Namespace) -> int:
     signal.signal(signal.SIGTERM, lambda *_: end.set())
     if args.leash:
         threading.Thread(target=_follow_leash, args=(end,), daemon=True).start()
-    node = rosglass.connect(args.url, name=args.name)
+    node = rosglass.connect(args.url, name=args.name, arguments=args.ros_arguments)
     try:
         robot = Robot(node, options)
         try:
             node.on_status_change(_tell)
-            print(f"robot: simulated, node /{args.name} on {args.url}; Ctrl-C ends it", flush=True)
+            full = f"{node.namespace.rstrip('/')}/{node.name}"
+            print(f"robot: simulated, node {full} on {args.url}; Ctrl-C ends it", flush=True)
             _tell(node.status())
             robot.start()
             while not end.is_set() and not robot.wait(0.1):

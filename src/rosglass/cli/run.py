@@ -54,8 +54,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
         default=2.0,
         help="when to take the screenshot (default: %(default)s)",
     )
-    parser.set_defaults(arguments=[])
-    parser.epilog = "Arguments after -- are the interface's own, in Qt.application.arguments."
+    parser.set_defaults(arguments=[], ros_arguments=[])
+    parser.epilog = (
+        "What follows --ros-args is for ROS, as with ros2 run: -r chatter:=talk, -p speed:=1.5 and "
+        "the like. Arguments after -- are the interface's own, in Qt.application.arguments."
+    )
 
 
 def _seconds(text: str) -> float:
@@ -83,6 +86,7 @@ def run(args: argparse.Namespace) -> int:
             screenshot=args.screenshot,
             after=args.after,
             arguments=args.arguments,
+            ros_arguments=args.ros_arguments,
             verbose=args.verbose > 1,
         )
     except QmlError as error:
@@ -100,6 +104,7 @@ def show(
     screenshot: Path | None = None,
     after: float = 2.0,
     arguments: Sequence[str] = (),
+    ros_arguments: Sequence[str] = (),
     verbose: bool = False,
 ) -> int:
     """Show a QML file in a window until it is closed.
@@ -113,6 +118,8 @@ def show(
         screenshot: Where to save a picture of the window, after which the program ends.
         after: Seconds until the screenshot.
         arguments: What the interface finds in ``Qt.application.arguments``.
+        ros_arguments: What the node is told, ``--ros-args`` included; see
+            :func:`rosglass.connect`.
         verbose: Show what is logged for developers, too.
 
     Returns:
@@ -121,6 +128,7 @@ def show(
     Raises:
         QmlError: The file is missing or has errors.
         UnsupportedError: There is no display.
+        RosArgumentError: One of `ros_arguments` is not valid.
     """
     # Qt reads these when it is loaded.
     os.environ["QT_LOGGING_RULES"] = ";".join(
@@ -133,7 +141,18 @@ def show(
     # Nothing of what is made until the window is there becomes garbage.
     gc.disable()
     try:
-        return _show(file, url, name, watch, fullscreen, screenshot, after, arguments, verbose)
+        return _show(
+            file,
+            url,
+            name,
+            watch,
+            fullscreen,
+            screenshot,
+            after,
+            arguments,
+            ros_arguments,
+            verbose,
+        )
     finally:
         gc.enable()
         # PySide takes down what is left in any order at the end of the program, and may crash.
@@ -149,6 +168,7 @@ def _show(
     screenshot: Path | None,
     after: float,
     arguments: Sequence[str],
+    ros_arguments: Sequence[str],
     verbose: bool,
 ) -> int:
     from rosglass.qml.display import require_display
@@ -167,7 +187,8 @@ def _show(
     connected()
     app.setApplicationName(file.stem)
     app.setApplicationDisplayName(file.stem)
-    session = Session(url or os.environ.get("ROSGLASS_URL", ""), name)
+    address = url or os.environ.get("ROSGLASS_URL", "")
+    session = Session(address, name, arguments=ros_arguments)
     signals: list[int] = []
 
     def interrupted(number: int) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import re
 import threading
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from rosglass.comm.executor import Dispatcher
@@ -14,9 +15,10 @@ from rosglass.qml.executor import GuiExecutor
 from rosglass.qt import QtCore, Signal, is_alive
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from rosglass.comm.node import Handle, Node
+    from rosglass.ros2.arguments import Arguments
 
 __all__ = ["Session"]
 
@@ -30,10 +32,18 @@ _RETRY = 1000
 _PATIENCE = 3.0
 
 
-def _connect(url: str | None, name: str, namespace: str) -> Node:
+def _connect(url: str | None, name: str, namespace: str, arguments: Sequence[str] = ()) -> Node:
     from rosglass.connection import connect  # noqa: PLC0415 - not before someone connects
 
-    return connect(url, name, namespace)
+    return connect(url, name, namespace, arguments=arguments)
+
+
+def _parse(arguments: Sequence[str]) -> Arguments | None:
+    if not arguments:
+        return None
+    from rosglass.ros2.arguments import Arguments  # noqa: PLC0415 - few programs are told anything
+
+    return Arguments.parse(arguments)
 
 
 class Session(QtCore.QObject):
@@ -46,6 +56,10 @@ class Session(QtCore.QObject):
         url: Address of the robot; empty asks the environment when connecting.
         name: Node name that overrides the one that QML asks for; empty for none.
         connect: Makes a node of URL, name and namespace; for tests and embedding.
+        arguments: What the node is told, ``--ros-args`` included; see :func:`rosglass.connect`.
+
+    Raises:
+        RosArgumentError: One of `arguments` is not valid.
     """
 
     #: The node was asked for; :attr:`is_initialized` is true already.
@@ -68,9 +82,13 @@ class Session(QtCore.QObject):
         self,
         url: str = "",
         name: str = "",
-        connect: Callable[[str | None, str, str], Node] = _connect,
+        connect: Callable[..., Node] = _connect,
+        arguments: Sequence[str] = (),
     ) -> None:
         super().__init__()
+        if arguments:
+            connect = partial(connect, arguments=arguments)
+        self._told = _parse(arguments)
         self.executor = GuiExecutor()
         #: The node; None before it is there and after it is closed.
         self.node: Node | None = None
@@ -158,6 +176,9 @@ class Session(QtCore.QObject):
         from rosglass.ros2.names import validate_namespace, validate_node_name  # noqa: PLC0415
 
         name = self._forced_name or name
+        if self._told is not None:
+            name = self._told.node_name(name)
+            namespace = self._told.namespace(name, namespace)
         validate_node_name(name)
         validate_namespace(namespace)
         if self.is_initialized:

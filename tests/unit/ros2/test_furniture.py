@@ -1,0 +1,588 @@
+"""What every node has: parameters that others reach, its log, simulated time, renamed things."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from rosglass import Time, load
+from rosglass.comm import ClockChange, NodeName, ParameterDescriptor, ParameterType, Range
+from rosglass.errors import (
+    NodeClosedError,
+    ParameterError,
+    RosArgumentError,
+    ServiceUnavailableError,
+    TransitionError,
+)
+from rosglass.ros2 import Ros2Node
+from rosglass.ros2.arguments import Arguments
+from rosglass.ros2.lifecycle import State, Transition
+
+from .conftest import FakeMiddleware
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    from .conftest import FakeNetwork
+
+LOG, CLOCK = "rcl_interfaces/msg/Log", "rosgraph_msgs/msg/Clock"
+
+
+@pytest.fixture
+def start(network: FakeNetwork) -> Iterator[Callable[..., Ros2Node]]:
+    """Start a node with the furniture that connect() gives it, told with --ros-args."""
+    made: list[Ros2Node] = []
+
+    def start(
+        *arguments: str, name: str = "robot", namespace: str = "/", own_services: bool = True
+    ) -> Ros2Node:
+        told = Arguments.parse(["--ros-args", *arguments])
+        name = told.node_name(name)
+        namespace = told.namespace(name, namespace)
+        middleware = FakeMiddleware(network)
+        for other in network.middlewares[:-1]:
+            ends = (*other.requesters, *other.repliers)
+            middleware.known += [(end.key, end.info) for end in ends if not end.closed]
+        node = Ros2Node(
+            middleware, "fake://", name, namespace, None, told, own_services=own_services
+        )
+        node.fake = middleware
+        made.append(node)
+        return node
+
+    yield start
+    for node in made:
+        node.close()
+
+
+def received(node: Ros2Node, topic: str, kind: str) -> list[Any]:
+    messages: list[Any] = []
+    node.create_subscription(topic, kind, messages.append)
+    return messages
+
+
+# -- parameters --------------------------------------------------------------------------------
+
+
+def test_other_nodes_reach_a_nodes_parameters(start, node, eventually) -> None:
+    robot = start(namespace="/arm")
+    robot.parameters.declare("speed", 1.0, ParameterDescriptor(range=Range(0.0, 2.0)))
+    robot.parameters.declare("names", ["a"])
+    robot.parameters.declare("io.port", 5, ParameterDescriptor(read_only=True))
+    client = node.create_parameter_client("/arm/robot")
+    assert client.wait_for_server(5)
+    assert client.ready
+    describe = "start_type_description_service"
+    assert client.names() == ["io.port", "names", "speed", describe, "use_sim_time"]
+    assert client.names(["io"]) == client.names("io") == ["io.port"]
+    assert client.names(depth=1) == ["names", "speed", describe, "use_sim_time"]
+    assert client.get() == {
+        "io.port": 5,
+        "names": ["a"],
+        "speed": 1.0,
+        describe: True,
+        "use_sim_time": False,
+    }
+    assert client.get(["speed", "nix"]) == {"speed": 1.0, "nix": None}
+    assert client.get([]) == {}
+    described = client.describe(["speed", "nix"])
+    assert described["speed"].range == Range(0.0, 2.0)
+    assert described["nix"].type is ParameterType.NOT_SET
+
+    results = client.set({"speed": 1.5, "names": [], "io.port": 6, "nix": 1, "use_sim_time": "x"})
+    assert {n: r.successful for n, r in results.items()} == {
+        "speed": True,
+        "names": True,
+        "io.port": False,
+        "nix": False,
+        "use_sim_time": False,
+    }
+    assert results["io.port"].reason == "parameter 'io.port' is read-only"
+    assert robot.parameters.get("speed") == 1.5
+    assert robot.parameters.get("names") == []
+
+    assert client.set_atomically({"speed": 2.0, "names": ["b"]}).successful
+    result = client.set_atomically({"names": ["c"], "speed": 2.5})
+    assert result == (False, "parameter 'speed': 2.5 is outside 0.0 to 2.0")
+    assert robot.parameters.get("names") == ["b"]
+    assert client.set({}) == {}
+
+
+def test_the_services_have_ros_names_types_and_profiles(start, eventually) -> None:
+    robot = start(namespace="/arm")
+    ends = robot.fake.repliers
+    eventually(lambda: [end for end in ends if end.info.name.endswith("_atomically")])
+    offered = {end.info.name: end.info for end in ends if "parameter" in end.info.name}
+    assert {name: info.type for name, info in offered.items()} == {
+        "/arm/robot/describe_parameters": "rcl_interfaces/srv/DescribeParameters",
+        "/arm/robot/get_parameter_types": "rcl_interfaces/srv/GetParameterTypes",
+        "/arm/robot/get_parameters": "rcl_interfaces/srv/GetParameters",
+        "/arm/robot/list_parameters": "rcl_interfaces/srv/ListParameters",
+        "/arm/robot/set_parameters": "rcl_interfaces/srv/SetParameters",
+        "/arm/robot/set_parameters_atomically": "rcl_interfaces/srv/SetParametersAtomically",
+    }
+    assert {info.qos.depth for info in offered.values()} == {1000}
+    topics = {writer.what[0]: writer.what[3] for writer in robot.fake.writers}
+    assert topics.keys() == {"/rosout", "/parameter_events"}
+    assert topics["/parameter_events"].depth == 1000
+    assert topics["/rosout"].durability.value == "transient_local"
+    assert topics["/rosout"].lifespan.seconds == 10
+
+
+def test_types_are_described_unless_the_parameter_says_otherwise(start, eventually) -> None:
+    def offered(robot: Ros2Node) -> list[str]:
+        ends = robot.fake.repliers
+        eventually(lambda: [end for end in ends if end.info.name.endswith("_atomically")])
+        return [end.info.name for end in ends if "parameter" not in end.info.name]
+
+    assert offered(start()) == ["/robot/get_type_description"]
+    assert offered(start("-p", "start_type_description_service:=false", name="quiet")) == []
+
+
+def test_nothing_is_offered_without_own_services(start, node) -> None:
+    robot = start(own_services=False)
+    robot.parameters.declare("a", 1)
+    time.sleep(0.4)
+    assert not robot.fake.repliers
+    assert not robot.fake.writers
+    with pytest.raises(ServiceUnavailableError, match="/robot/list_parameters"):
+        node.create_parameter_client("/robot").names(timeout=0.05)
+
+
+def test_changes_can_be_watched(start, node, eventually) -> None:
+    robot, other = start(), start(name="other")
+    events: list[Any] = []
+    client = node.create_parameter_client(NodeName("/", "robot"))
+    assert client.wait_for_server(5)
+    watch = client.watch(events.append)
+    robot.parameters.declare("a", 1, ParameterDescriptor(dynamic_typing=True))
+    other.parameters.declare("a", 1)
+    client.set({"a": 2})
+    robot.parameters.undeclare("a")
+    eventually(lambda: len(events) == 3)
+    assert [(e.node, e.new, e.changed, e.deleted) for e in events] == [
+        ("/robot", {"a": 1}, {}, ()),
+        ("/robot", {}, {"a": 2}, ()),
+        ("/robot", {}, {}, ("a",)),
+    ]
+    watch.close()
+    robot.parameters.declare("b", 1)
+    time.sleep(0.05)
+    assert len(events) == 3
+
+
+def test_a_callback_that_waits_does_not_hold_up_the_parameters(start, node) -> None:
+    robot = start()
+    release = threading.Event()
+    robot._core.dispatcher.post(lambda: release.wait(5))
+    client = node.create_parameter_client("/robot")
+    assert client.get(["use_sim_time"], timeout=5) == {"use_sim_time": False}
+    release.set()
+
+
+def test_values_from_afar_are_validated(start, node) -> None:
+    robot = start()
+    robot.parameters.declare("a", 1)
+    robot.parameters.on_set(lambda values: "too much" if values["a"] > 5 else "")
+    client = node.create_parameter_client("/robot")
+    assert client.set({"a": 6})["a"] == (False, "too much")
+    assert client.set({"a": 5})["a"] == (True, "")
+
+
+def test_an_empty_list_for_a_parameter_that_is_not_there(start, node) -> None:
+    start()
+    client = node.create_parameter_client("/robot")
+    with pytest.raises(ParameterError, match="/robot does not know the types of nix"):
+        client.set({"nix": []})
+    with pytest.raises(ParameterError, match="a parameter is a bool"):
+        client.set({"nix": object()})
+
+
+def test_nodes_that_answer_all_or_nothing(connect, node) -> None:
+    # rclcpp's say nothing at all when one of the parameters is not declared.
+    robot = connect("robot")
+    values = {"a": 1, "b": 2}
+
+    def get(request: Any) -> dict[str, Any]:
+        known = all(name in values for name in request.names)
+        answer = [{"type": 2, "integer_value": values[n]} for n in request.names] if known else []
+        return {"values": answer}
+
+    robot.create_service_server("~/get_parameters", "rcl_interfaces/srv/GetParameters", get)
+    robot.create_service_server(
+        "~/list_parameters",
+        "rcl_interfaces/srv/ListParameters",
+        lambda _: {"result": {"names": list(values)}},
+    )
+    client = node.create_parameter_client("/robot")
+    assert client.get(["b", "nix", "a"]) == {"b": 2, "nix": None, "a": 1}
+    assert client.get(["nix"]) == {"nix": None}
+
+
+def test_parameter_files_of_another_node(start, node, tmp_path: Path) -> None:
+    robot = start(namespace="/arm")
+    robot.parameters.declare("a.b", 1.0)
+    robot.parameters.declare("c", "x", ParameterDescriptor(read_only=True))
+    client = node.create_parameter_client("/arm/robot")
+    file = tmp_path / "robot.yaml"
+    client.save(file)
+    assert file.read_text() == (
+        "/arm/robot:\n  ros__parameters:\n    a:\n      b: 1.0\n    c: x\n"
+        "    start_type_description_service: true\n    use_sim_time: false\n"
+    )
+    client.set({"a.b": 2.0})
+    assert len(client.load(file)) == 4
+    assert robot.parameters.get("a.b") == 1.0
+    file.write_text("/**: {ros__parameters: {a: {b: 3.0}, c: y, nix: 1}}")
+    with pytest.raises(ParameterError, match=r"/arm/robot refuses c: .*read-only; nix: .*declared"):
+        client.load(file)
+    assert robot.parameters.get("a.b") == 3.0
+    file.write_text("/other: {ros__parameters: {a: 1}}")
+    with pytest.raises(ParameterError, match="has no parameters for /arm/robot"):
+        client.load(file)
+
+
+def test_a_closed_client_says_so(start, node) -> None:
+    start()
+    client = node.create_parameter_client("/robot")
+    assert client.wait_for_server(5)
+    client.close()
+    client.close()
+    assert not client.ready
+    with pytest.raises(NodeClosedError, match="closed"):
+        client.get()
+    with pytest.raises(NodeClosedError, match="closed"):
+        client.watch(print)
+    assert "/robot" in repr(client)
+
+
+def test_a_closed_node_has_no_parameters(start) -> None:
+    robot = start()
+    robot.close()
+    with pytest.raises(NodeClosedError):
+        _ = robot.parameters
+
+
+# -- --ros-args --------------------------------------------------------------------------------
+
+
+def test_names_are_remapped_everywhere(start) -> None:
+    robot = start(
+        *("-r", "chatter:=talk", "-r", "~/state:=/state", "-r", "rosservice://add:=/plus"),
+        *("-r", "rostopic://add:=/sum", "-r", "__node:=arm", "-r", "__ns:=/left"),
+        own_services=False,
+    )
+    assert (robot.name, robot.namespace) == ("arm", "/left")
+    assert robot.resolve("chatter") == robot.resolve("/left/chatter") == "/left/talk"
+    assert robot.resolve("/chatter") == "/chatter"
+    publisher = robot.create_publisher("~/state", "std_msgs/msg/String")
+    assert publisher.topic == "/state"
+    assert robot.create_subscription("add", "std_msgs/msg/String").topic == "/sum"
+    kind = "example_interfaces/srv/AddTwoInts"
+    assert robot.create_service_client("add", kind).name == "/plus"
+    assert robot.create_service_server("add", kind, lambda _: None).name == "/plus"
+    assert repr(robot) == "<Ros2Node /left/arm on fake://>"
+
+
+def test_parameters_are_given_from_outside(start, tmp_path: Path) -> None:
+    file = tmp_path / "p.yaml"
+    file.write_text("/robot: {ros__parameters: {gains: {p: 2.0}}}\n/*: {ros__parameters: {n: 1}}")
+    robot = start("-p", "robot:rate:=30", "--params-file", str(file), own_services=False)
+    assert robot.parameters.declare("rate", 10) == 30
+    assert robot.parameters.declare("gains.p", 1.0) == 2.0
+    assert robot.parameters.overrides == {"rate": 30, "gains.p": 2.0, "n": 1}
+
+
+def test_rules_that_do_not_fit_the_node_are_refused(start) -> None:
+    with pytest.raises(RosArgumentError, match="cannot be applied"):
+        start("-r", f"a:={'x' * 240}", namespace="/" + "n" * 20)
+
+
+# -- logging -----------------------------------------------------------------------------------
+
+
+def test_the_log_goes_to_rosout_and_to_python(start, node, eventually, caplog) -> None:
+    robot = start(namespace="/arm")
+    messages = received(node, "/rosout", LOG)
+    with caplog.at_level(logging.INFO):
+        robot.logger.info("hello %s", "you")
+    robot.logger.debug("not shown")
+    robot.logger.getChild("drive.left").error("bad\0\udc80")
+    robot.logger.critical("x" * 100_000)
+    eventually(lambda: len(messages) == 3)
+    first = messages[0]
+    assert (first.name, first.level, first.msg) == ("arm.robot", 20, "hello you")
+    assert (first.function, first.file) == (
+        "test_the_log_goes_to_rosout_and_to_python",
+        __file__,
+    )
+    assert first.line > 0
+    assert abs(first.stamp.sec - time.time()) < 5
+    assert (messages[1].name, messages[1].level) == ("arm.robot.drive.left", 40)
+    assert messages[1].msg == "bad\\0\\udc80"
+    assert messages[2].level == 50
+    assert messages[2].msg.endswith("... (cut; 100000 characters)")
+    assert "hello you" in caplog.text
+
+
+def test_exceptions_are_logged_with_their_trace(start, node, eventually) -> None:
+    robot = start()
+    messages = received(node, "/rosout", LOG)
+    try:
+        raise RuntimeError("oops")
+    except RuntimeError:
+        robot.logger.exception("it failed")
+    eventually(lambda: messages)
+    assert "it failed\nTraceback" in messages[0].msg
+    assert "RuntimeError: oops" in messages[0].msg
+
+
+def test_levels_come_from_the_command_line(start) -> None:
+    robot = start("--log-level", "warn", "--log-level", "robot.drive:=debug", own_services=False)
+    assert not robot.logger.isEnabledFor(logging.INFO)
+    assert robot.logger.getChild("drive").isEnabledFor(logging.DEBUG)
+    assert robot.logger.getChild("drive.left").isEnabledFor(logging.DEBUG)
+    assert not robot.logger.getChild("arm").isEnabledFor(logging.INFO)
+    robot.logger.setLevel(logging.DEBUG)
+    assert robot.logger.getChild("arm").isEnabledFor(logging.DEBUG)
+    assert not start("--log-level", "robot:=error").logger.isEnabledFor(logging.WARNING)
+    assert robot.logger.getChild("arm") is robot.logger.getChild("arm")
+
+
+def test_logs_can_be_switched_off(start, node, caplog) -> None:
+    robot = start("--disable-rosout-logs", "--disable-stdout-logs")
+    messages = received(node, "/rosout", LOG)
+    robot.logger.error("nobody hears")
+    time.sleep(0.3)
+    assert not messages
+    assert "nobody hears" not in caplog.text
+    assert not [writer for writer in robot.fake.writers if writer.what[0] == "/rosout"]
+
+
+def test_a_flood_of_messages_is_bounded_and_counted(start, node, eventually) -> None:
+    robot = start()
+    messages = received(node, "/rosout", LOG)
+    robot.logger.propagate = False
+    begin = time.monotonic()
+    for number in range(5000):
+        robot.logger.info("%d", number)
+    assert time.monotonic() - begin < 2
+    eventually(lambda: messages and "log messages were left out" in messages[-1].msg)
+    robot.close()
+    assert len(messages) < 4000
+
+
+def test_logging_never_raises(start) -> None:
+    robot = start()
+    robot.logger.propagate = False  # pytest's own handler does raise
+    robot.logger.info("%d %d", "a")  # noqa: PLE1206 - that is the point
+    robot.logger.info(object())
+    robot.close()
+    robot.logger.info("after closing")
+
+
+def test_warnings_about_the_node_go_to_its_log(start, node, eventually) -> None:
+    robot = start()
+    messages = received(node, "/rosout", LOG)
+    _ = robot.logger
+
+    def fail(_: Any) -> None:
+        raise RuntimeError("oops")
+
+    robot.create_subscription("/x", "std_msgs/msg/String", fail)
+    node.create_publisher("/x", "std_msgs/msg/String").publish(data="a")
+    logging.getLogger("rosglass.comm").warning("not about this node")
+    eventually(lambda: messages)
+    assert messages[0].name == "rosglass.comm"
+    assert "/x" in messages[0].msg
+    assert not [message for message in messages if "not about" in message.msg]
+
+
+def test_closing_leaves_no_handlers_and_sends_what_waits(start, node, eventually) -> None:
+    before = list(logging.getLogger("rosglass").handlers)
+    robot = start()
+    messages = received(node, "/rosout", LOG)
+    eventually(lambda: "/rosout" in [writer.what[0] for writer in robot.fake.writers])
+    robot.logger.info("last words")
+    robot.close()
+    eventually(lambda: [message for message in messages if message.msg == "last words"])
+    assert logging.getLogger("rosglass").handlers == before
+    assert not robot.logger.handlers
+    assert not [t for t in threading.enumerate() if t.name.startswith("robot ")]
+
+
+# -- simulated time ----------------------------------------------------------------------------
+
+
+def tick(network: FakeNetwork, seconds: int) -> None:
+    """Let a simulator publish the time."""
+    data = load(CLOCK, ros=2).encode({"clock": {"sec": seconds}}, wire="cdr")
+    for middleware in network.middlewares:
+        for reader in middleware.readers:
+            if reader.topic == "/clock" and not reader.closed:
+                reader.receive(bytes(data))
+
+
+def test_time_follows_the_simulation_when_told(start, network) -> None:
+    robot = start("-p", "use_sim_time:=true")
+    assert robot.clock.is_simulated
+    assert robot.now() == Time(0)
+    tick(network, 42)
+    assert robot.now() == Time.from_parts(42, 0)
+    jumps: list[Any] = []
+    robot.clock.on_jump(jumps.append)
+    robot.parameters.set({"use_sim_time": False})
+    assert abs(robot.now().seconds - time.time()) < 5
+    assert [reader.closed for reader in robot.fake.readers if reader.topic == "/clock"] == [True]
+    robot.parameters.set({"use_sim_time": True})
+    assert robot.now() == Time(0)
+    robot.clock.sleep(0)
+    eventually_told = time.monotonic() + 5
+    while len(jumps) < 2 and time.monotonic() < eventually_told:
+        time.sleep(0.002)
+    assert [jump.change for jump in jumps] == [ClockChange.TO_SYSTEM, ClockChange.TO_SIMULATED]
+
+
+def test_time_can_be_switched_from_afar(start, node, network, eventually) -> None:
+    robot = start()
+    client = node.create_parameter_client("/robot")
+    assert client.set({"use_sim_time": True}, timeout=5)["use_sim_time"].successful
+    eventually(lambda: robot.clock.is_simulated)
+    tick(network, 7)
+    calls: list[Time] = []
+    robot.create_timer(2.0, lambda: calls.append(robot.now()))
+    tick(network, 9)
+    eventually(lambda: calls)
+    assert calls == [Time.from_parts(9, 0)]
+    assert "simulated" in repr(robot.clock)
+
+
+# -- lifecycle ---------------------------------------------------------------------------------
+
+
+class Camera:
+    """A node with a lifecycle, as rclcpp's are."""
+
+    LABELS = ("unknown", "unconfigured", "inactive", "active", "finalized")
+    WAYS = (
+        (1, "configure", 1, 2),
+        (3, "activate", 2, 3),
+        (4, "deactivate", 3, 2),
+        (2, "cleanup", 2, 1),
+        (5, "unconfigured_shutdown", 1, 4),
+        (6, "inactive_shutdown", 2, 4),
+        (7, "active_shutdown", 3, 4),
+    )
+
+    def __init__(self, node: Ros2Node) -> None:
+        self.state, self.fails = 1, False
+        kind = "lifecycle_msgs/srv/"
+        self.events = node.create_publisher(
+            "~/transition_event", "lifecycle_msgs/msg/TransitionEvent"
+        )
+        for name, service, answer in (
+            ("get_state", "GetState", lambda _: {"current_state": self.known(self.state)}),
+            ("change_state", "ChangeState", self.change),
+            (
+                "get_available_states",
+                "GetAvailableStates",
+                lambda _: {"available_states": [self.known(i) for i in range(5)]},
+            ),
+            (
+                "get_available_transitions",
+                "GetAvailableTransitions",
+                lambda _: self.ways(lambda way: way[2] == self.state),
+            ),
+            ("get_transition_graph", "GetAvailableTransitions", lambda _: self.ways(bool)),
+        ):
+            node.create_service_server(f"~/{name}", kind + service, answer)
+
+    def known(self, state: int) -> dict[str, Any]:
+        return {"id": state, "label": self.LABELS[state]}
+
+    def ways(self, wanted: Callable[[Any], bool]) -> dict[str, Any]:
+        return {
+            "available_transitions": [
+                {
+                    "transition": {"id": number, "label": label},
+                    "start_state": self.known(start),
+                    "goal_state": self.known(goal),
+                }
+                for number, label, start, goal in filter(wanted, self.WAYS)
+            ]
+        }
+
+    def change(self, request: Any) -> dict[str, Any]:
+        for number, label, start, goal in self.WAYS:
+            if (number, start) == (request.transition.id, self.state):
+                if self.fails:
+                    return {"success": False}
+                self.state = goal
+                self.events.publish(
+                    timestamp=5,
+                    transition={"id": number, "label": label},
+                    start_state=self.known(start),
+                    goal_state=self.known(goal),
+                )
+                return {"success": True}
+        return {"success": False}
+
+
+@pytest.fixture
+def camera(connect) -> Camera:
+    return Camera(connect("camera"))
+
+
+def test_a_lifecycle_node_is_driven(node, camera, eventually) -> None:
+    client = node.create_lifecycle_client("/camera")
+    assert client.wait_for_server(5)
+    assert client.ready
+    events: list[Any] = []
+    client.watch(events.append)
+    assert client.state() == State(1, "unconfigured")
+    assert [str(state) for state in client.available_states()][:2] == [
+        "unknown [0]",
+        "unconfigured [1]",
+    ]
+    assert client.available_transitions()[0] == Transition(
+        1, "configure", State(1, "unconfigured"), State(2, "inactive")
+    )
+    assert len(client.transition_graph()) == 7
+    assert client.configure() == State(2, "inactive")
+    assert client.change_state(3) == State(3, "active")
+    assert client.deactivate() == State(2, "inactive")
+    assert client.cleanup() == State(1, "unconfigured")
+    assert client.shutdown() == State(4, "finalized")
+    eventually(lambda: len(events) == 5)
+    assert events[0].time == Time(5)
+    assert events[0].transition.label == "configure"
+    assert events[-1].transition.goal == State(4, "finalized")
+
+
+def test_impossible_transitions_are_explained(node, camera) -> None:
+    client = node.create_lifecycle_client("/camera")
+    with pytest.raises(
+        TransitionError,
+        match=r"/camera cannot 'activate' now: it is unconfigured \[1\]; possible are: "
+        r"configure \[1\], unconfigured_shutdown \[5\]",
+    ):
+        client.activate()
+    camera.fails = True
+    with pytest.raises(TransitionError, match=r"/camera failed to configure, and is unconfigured"):
+        client.configure()
+    client.close()
+    client.close()
+    assert not client.ready
+    with pytest.raises(NodeClosedError):
+        client.state()
+
+
+def test_a_node_without_lifecycle_is_named(node) -> None:
+    client = node.create_lifecycle_client("/nobody")
+    with pytest.raises(ServiceUnavailableError, match="/nobody/get_available_transitions"):
+        client.activate(timeout=0.05)
