@@ -115,6 +115,7 @@ class Furniture(Member):
     def _plan(self) -> None:
         """Begin to offer what other nodes expect to find."""
         from rosglass.ros2.parameter_services import ParameterServices  # noqa: PLC0415
+        from rosglass.ros2.parameters import DESCRIBE_TYPES  # noqa: PLC0415
         from rosglass.ros2.type_descriptions import TypeDescriptionServer  # noqa: PLC0415
 
         try:
@@ -128,7 +129,9 @@ class Furniture(Member):
             if self._closed:
                 return
             self._made += [services, descriptions]
-        self._steps += [rosout.open, descriptions.open, *services.steps()]
+        self._steps += [rosout.open, *services.steps()]
+        if parameters.get(DESCRIBE_TYPES):
+            self._steps.insert(1, descriptions.open)
         self._step()
 
     def _step(self) -> None:
