@@ -359,19 +359,24 @@ def _path() -> str:
         raise UnsupportedError(
             f"cyclonedds {found.version} is installed, but {VERSION} is needed; {remedy}"
         )
-    if strange_version():
-        _log.warning(
-            "%s: services and actions of nodes that use Fast DDS or RustDDS cannot be called, nor "
-            "offered to them, and nobody has tried the rest; %s",
-            strange_version(),
-            remedy,
-        )
+    if strange := strange_version():
+        _warn(strange, remedy)
     if sys.maxsize < 2**32:
         raise UnsupportedError("DDS needs a 64-bit Python")
     for file in found.files or ():
         if file.name.startswith(("libddsc", "ddsc")) and file.suffix != ".lib":
             return str(file.locate())
     raise UnsupportedError(f"the package cyclonedds {VERSION} has no library in it; {remedy}")
+
+
+@cache
+def _warn(strange: str, remedy: str) -> None:
+    _log.warning(
+        "%s: services and actions of nodes that use Fast DDS or RustDDS cannot be called, nor "
+        "offered to them, and nobody has tried the rest; %s",
+        strange,
+        remedy,
+    )
 
 
 def _declare(loaded: Any) -> Any:
