@@ -90,7 +90,6 @@ class Arguments:
         logger_levels: The same for single loggers, by name.
         rosout: Whether log messages go to ``/rosout``.
         stdout: Whether log messages go to Python's log handlers, and so to the terminal.
-        enclave: Security enclave to announce; empty when not given.
         others: The arguments that are not ROS's, in order.
     """
 
@@ -99,7 +98,6 @@ class Arguments:
     logger_levels: Mapping[str, int] = field(default_factory=dict)
     rosout: bool = True
     stdout: bool = True
-    enclave: str = ""
     others: tuple[str, ...] = ()
     _assignments: tuple[_Assignment, ...] = ()
 
@@ -195,7 +193,6 @@ class _Parser:
         self._level: int | None = None
         self._levels: dict[str, int] = {}
         self._switches = dict.fromkeys(_SWITCHES, True)
-        self._enclave = ""
         self._others: list[str] = []
 
     def parse(self) -> Arguments:
@@ -218,7 +215,6 @@ class _Parser:
             self._levels,
             self._switches["rosout"],
             self._switches["stdout"],
-            self._enclave,
             tuple(self._others),
             tuple(self._assignments),
         )
@@ -254,7 +250,7 @@ class _Parser:
         elif option == "--log-level":
             self._log_level(value)
         elif option == "--enclave":
-            self._enclave = self._checked_enclave(value)
+            self._enclave(value)
         else:
             _log.warning("%s %s has no effect here: configure Python's logging", option, value)
 
@@ -376,9 +372,10 @@ class _Parser:
         else:
             raise self._error(f"--log-level {text!r} has no logger's name before ':='")
 
-    def _checked_enclave(self, text: str) -> str:
+    def _enclave(self, text: str) -> None:
         try:
             validate_namespace(text)
         except InvalidNameError as error:
             raise self._error(f"--enclave {text!r}: {error}") from None
-        return text
+        # Whoever names one expects encryption.
+        _log.warning("--enclave %s has no effect: this node's traffic is not secured", text)

@@ -257,4 +257,5 @@ def _end(timeout: float | None, where: str) -> float | None:
 
 
 def _left(end: float | None) -> float | None:
-    return None if end is None else max(0.0, end - time.monotonic())
+    # Rounded: people read it when the time is over.
+    return None if end is None else max(0.0, round(end - time.monotonic(), 2))

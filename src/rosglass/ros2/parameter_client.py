@@ -264,7 +264,8 @@ class _Deadline:
 
     def left(self) -> float | None:
         """Return the seconds that are left, None when there is no end."""
-        return None if self._end is None else max(0.0, self._end - time.monotonic())
+        # Rounded: people read it when the time is over.
+        return None if self._end is None else max(0.0, round(self._end - time.monotonic(), 2))
 
 
 def _is_empty(value: object) -> bool:

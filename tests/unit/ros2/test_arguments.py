@@ -228,8 +228,9 @@ def test_where_the_log_goes() -> None:
     assert parse("--disable-external-lib-logs") == Arguments()
 
 
-def test_the_enclave() -> None:
-    assert parse("-e", "/a/b").enclave == parse("--enclave=/a/b").enclave == "/a/b"
+def test_an_enclave_is_taken_with_a_warning(caplog: pytest.LogCaptureFixture) -> None:
+    assert parse("-e", "/a/b") == parse("--enclave=/a/b") == Arguments()
+    assert "--enclave /a/b has no effect: this node's traffic is not secured" in caplog.text
     with pytest.raises(RosArgumentError, match="--enclave 'a': namespace 'a' is not absolute"):
         parse("--enclave", "a")
 
