@@ -18,6 +18,7 @@ from rosglass.comm import EndpointKind
 from rosglass.errors import Error, NodeClosedError
 from rosglass.ros2 import cyclone, cyclone_builtin, cyclone_identity
 from rosglass.ros2.cyclone_events import Event, publication_matched
+from rosglass.ros2.cyclone_qos import qos_of
 from rosglass.ros2.dds_discovery_info import format_user_data
 from rosglass.ros2.dds_endpoints import SampleReader, SampleWriter, Taken
 from rosglass.ros2.dds_outbox import Outbox
@@ -162,6 +163,7 @@ class Ends:
         user_data = format_user_data({what: _new_id(participant.guid), "typehash": type_hash})
         qos = replace(qos, depth=max(qos.depth, _DEPTH))
         place = f"service {service}"
+        self._qos, self._received = replace(qos, depth=1), requests if server else replies
         self.writer = SampleWriter(
             participant,
             *(replies if server else requests),
@@ -177,14 +179,14 @@ class Ends:
                 cyclone_identity.prepare(self.writer.entity)
             self.reader = SampleReader(
                 participant,
-                *(requests if server else replies),
+                *self._received,
                 qos,
                 user_data,
                 place,
                 self._hand_on,
                 cyclone_identity.create_reading_topic,
                 cyclone_identity.origin,
-                on_matched,
+                self._matched,
             )
         except BaseException:
             self.writer.close()
@@ -195,14 +197,42 @@ class Ends:
         self.writers = Matched(
             self.reader.entity, cyclone.matched_publications, cyclone_builtin.matched_publication
         )
+        self._probing = threading.Lock()
+        self._probe: list[int] = []
         self.outbox = Outbox(participant.pump, self.writer.entity, in_order=not server)
         participant.pump.watch(self.writer.entity, Event.PUBLICATION_MATCHED, self._on_event)
         participant.add_endpoint(node, self.reader.guid, writer=False)
         participant.add_endpoint(node, self.writer.guid, writer=True)
 
     def start(self) -> None:
-        """Let what is received be handed on."""
+        """Let what is received be handed on, and matches be told."""
         self._started.set()
+        self._matched()
+
+    def probe(self, wanted: bool) -> None:
+        """Have a second reader for a while, or no more.
+
+        A writer tells a reader that it discovers where its samples begin. When it discovered ours
+        before we discovered it, that was lost, and Cyclone DDS drops the writer's next sample; what
+        it tells the second reader counts for both.
+        """
+        with self._probing:
+            for entity in self._probe:
+                cyclone.delete(entity)
+            self._probe.clear()
+            if not wanted or self.closed:
+                return
+            participant = self._participant.entity
+            topic = cyclone.create_topic(participant, *self._received)
+            self._probe.append(topic)
+            policies = qos_of(self._qos, writer=False)
+            reader = cyclone.create_reader(participant, topic, policies, self._service)
+            self._probe.insert(0, reader)
+
+    def visit(self, act: Callable[[], None] | None) -> None:
+        """Call `act` some thirty times a second on the participant's pump; None ends that."""
+        if not self.closed:
+            self._participant.pump.visit(self.reader.entity, act)
 
     def strangers(self) -> list[EndpointInfo]:
         """Return the peers in the graph that do not use Cyclone DDS."""
@@ -235,6 +265,7 @@ class Ends:
         for end in (self.reader, self.writer):
             self._participant.remove_endpoint(end.guid)
         self.reader.close()
+        self.probe(False)
         self.outbox.close()
         self.writer.close()
         self._participant.pump.forget(self.writer.entity)
@@ -244,12 +275,19 @@ class Ends:
         if self._started.wait(_START):
             self._on_taken(taken)
 
+    def _matched(self) -> None:
+        if self._started.is_set() and not self.closed:
+            try:
+                self._on_matched()
+            except Error as error:
+                _log.warning("%s: %s", self._service, error)
+
     def _on_event(self) -> None:
         if self.closed:
             return
         with suppress(NodeClosedError):
             if publication_matched(self.writer.entity).change:
-                self._on_matched()
+                self._matched()
         self.outbox.retry()
 
 

@@ -11,11 +11,11 @@ import logging
 import secrets
 import struct
 import threading
+import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rosglass.errors import (
-    Error,
     NodeClosedError,
     ServiceError,
     TimeoutError,  # noqa: A004 - the field's own word
@@ -47,6 +47,10 @@ _PREFIX = 12
 _REPLY_PATIENCE = 3.0
 #: Seconds that closing waits for replies that are on their way.
 _FAREWELL = 0.5
+#: Seconds from when a server is matched until its first reply is sure to arrive: Cyclone DDS drops
+#: what it gets of another vendor's writer before that one's first heartbeat, and a request may be
+#: answered sooner than that. Cyclone DDS's own writers send both at once.
+_SETTLING = 0.2
 _REMEDY = "start it with RMW_IMPLEMENTATION=rmw_cyclonedds_cpp, or use zenoh:// with rmw_zenoh_cpp"
 
 
@@ -77,6 +81,8 @@ class DdsRequester(Requester):
         self._calls: dict[int, int] = {}
         self._by_sequence: dict[int, int] = {}
         self._sequence = 0
+        #: Since when servers are linked.
+        self._since: dict[str | bytes, float] = {}
         self._ends = Ends(
             participant,
             graph,
@@ -101,7 +107,7 @@ class DdsRequester(Requester):
         names = names_of(strangers)
         if reason := cyclone_identity.reading_problem():
             return f"{names} cannot be called: {reason}; {_REMEDY}"
-        if Scheme.HEADER in self._schemes():
+        if Scheme.HEADER in self._schemes()[0]:
             return (
                 f"{names} and a server on Cyclone DDS offer {self._service} in ways that exclude "
                 "each other: only the former is called; end one of them"
@@ -124,7 +130,11 @@ class DdsRequester(Requester):
             self._fail(number, "its server takes no requests")
 
         self._ends.outbox.put(
-            lambda: self._send(number, data), float("inf") if timeout is None else timeout, expired
+            lambda: self._send(number, data),
+            float("inf") if timeout is None else timeout,
+            expired,
+            # A signal's exception in the main thread must not spoil the count of what was sent.
+            now=self._route() is not Scheme.IDENTITY or not _in_main_thread(),
         )
         return number
 
@@ -155,18 +165,20 @@ class DdsRequester(Requester):
         with self._lock:
             if number not in self._calls:
                 return True
-            if self._sequence < 0:
-                raise ServiceError(f"the client of {self._service} is broken; make another one")
+            if scheme is Scheme.IDENTITY and self._sequence < 0:
+                raise ServiceError(
+                    f"a request on {self._service} was interrupted, and nobody knows which replies "
+                    "belong to later ones; make another client"
+                )
+            sequence, self._sequence = self._sequence, -1
             try:
                 self._ends.writer.write(parts)
-            except TimeoutError:
-                return False
-            except (NodeClosedError, UnsupportedError):
+            except (NodeClosedError, TimeoutError, UnsupportedError) as error:
+                self._sequence = sequence  # nothing was sent
+                if isinstance(error, TimeoutError):
+                    return False
                 raise
-            except Error:
-                self._sequence = -1  # nobody knows whether a number was used
-                raise
-            self._sequence += 1
+            self._sequence = sequence + 1 if sequence >= 0 else -1
             if scheme is Scheme.IDENTITY:
                 self._calls[number] = self._sequence
                 self._by_sequence[self._sequence] = number
@@ -214,23 +226,44 @@ class DdsRequester(Requester):
 
     def _route(self) -> Scheme | None:
         """Return how to send requests; None when no server is linked."""
-        schemes = self._schemes()
+        schemes, _ = self._schemes()
         if Scheme.IDENTITY in schemes and not cyclone_identity.reading_problem():
             # Servers on Cyclone DDS find such requests too short, mostly; the others would
             # take a header for arguments.
             return Scheme.IDENTITY
         return Scheme.HEADER if Scheme.HEADER in schemes else None
 
-    def _schemes(self) -> set[Scheme]:
-        """Return what the linked servers speak."""
+    def _schemes(self) -> tuple[set[Scheme], bool]:
+        """Return what the linked servers speak, and whether there will be more of them soon."""
         answering = {_server_of(found) for found in self._ends.writers.all()}
-        return {
-            scheme_of(found.guid)
-            for found in self._ends.readers.all()
-            if _server_of(found) in answering
-        }
+        linked = [found for found in self._ends.readers.all() if _server_of(found) in answering]
+        schemes, soon, now = set(), False, time.monotonic()
+        with self._lock:
+            before, self._since = self._since, {}
+            for found in linked:
+                server, scheme = _server_of(found), scheme_of(found.guid)
+                self._since[server] = since = before.get(server, now)
+                if scheme is Scheme.HEADER or now - since >= _SETTLING:
+                    schemes.add(scheme)
+                else:
+                    soon = True
+        return schemes, soon
 
     def _on_matched(self) -> None:
+        _, soon = self._schemes()
+        if soon:
+            self._ends.probe(True)
+            self._ends.visit(self._settle)
+        self._tell()
+
+    def _settle(self) -> None:
+        """See whether a new server can be called now."""
+        if not self._schemes()[1]:
+            self._ends.probe(False)
+            self._ends.visit(None)
+            self._tell()
+
+    def _tell(self) -> None:
         if self.changed is not None:
             self.changed()
 
@@ -307,10 +340,12 @@ class DdsReplier(Replier):
             text = "%s did not get its reply: its reader of replies is not found, or takes nothing"
             self._ends.name(answer.client.guid, text, who)
 
-        # See create_writing_topic() for what the main thread must not do.
-        free = threading.current_thread() is not threading.main_thread()
         self._ends.outbox.put(
-            lambda: self._answer(answer, data), _REPLY_PATIENCE, expired, now=free
+            lambda: self._answer(answer, data),
+            _REPLY_PATIENCE,
+            expired,
+            # See create_writing_topic() for what the main thread must not do.
+            now=not _in_main_thread(),
         )
 
     def close(self) -> None:
@@ -375,6 +410,10 @@ class DdsReplier(Replier):
             return any(found.guid == answer.reader for found in readers)
         client = _client_of(answer.client)
         return any(_client_of(found) == client for found in readers)
+
+
+def _in_main_thread() -> bool:
+    return threading.current_thread() is threading.main_thread()
 
 
 def _server_of(found: Discovered) -> str | bytes:
