@@ -1,0 +1,305 @@
+"""DDS nodes come and go: nothing is left behind, and nothing hangs, whatever happens meanwhile."""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import rosglass
+from rosglass.comm import IMMEDIATE, History, QoS
+from rosglass.errors import Error, NodeClosedError, UnsupportedError
+
+STRING, IMAGE = "std_msgs/msg/String", "sensor_msgs/msg/Image"
+KEEP_ALL = QoS(history=History.KEEP_ALL)
+
+pytestmark = pytest.mark.peers
+
+
+def resources() -> tuple[int, int, int]:
+    """Threads, file descriptors and kilobytes of this process."""
+    gc.collect()
+    tasks, files = os.listdir("/proc/self/task"), os.listdir("/proc/self/fd")  # noqa: PTH208
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return len(tasks), len(files), pages * os.sysconf("SC_PAGE_SIZE") // 1024
+
+
+def program(text: str, domain: int) -> subprocess.Popen[str]:
+    """Start a program that connects to `domain` as `node`."""
+    head = f"import os, sys, time, rosglass\nnode = rosglass.connect('dds://?domain={domain}')\n"
+    return subprocess.Popen(
+        [sys.executable, "-c", head + text],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+def test_a_thousand_topics_leave_nothing_behind(dds_connect):
+    node = dds_connect("busy")
+    heard: list[str] = []
+
+    def once() -> None:
+        subscription = node.create_subscription("/t", STRING, lambda m: heard.append(m.data))
+        publisher = node.create_publisher("/t", STRING)
+        publisher.publish(data="x")
+        publisher.close()
+        subscription.close()
+
+    for _ in range(200):
+        once()
+    threads, files, memory = resources()
+    for _ in range(1000):
+        once()
+    after = resources()
+    assert (after[0], after[1]) == (threads, files)
+    assert after[2] - memory < 3_000
+    assert node.publishers("/t") == []
+
+
+def test_a_hundred_nodes_leave_nothing_behind(dds_domain):
+    def once() -> None:
+        with rosglass.connect(f"dds://?domain={dds_domain}", "brief") as node:
+            node.create_subscription("/t", STRING, lambda _: None)
+            node.create_publisher("/t", STRING).publish(data="x")
+
+    for _ in range(20):
+        once()
+    threads, files, memory = resources()
+    for _ in range(100):
+        once()
+    after = resources()
+    assert (after[0], after[1]) == (threads, files)
+    assert after[2] - memory < 2_000
+
+
+def test_closing_while_samples_arrive(dds_connect, wait_for):
+    talker, stop = dds_connect("talker"), threading.Event()
+    publisher = talker.create_publisher("/flood", STRING)
+    count = [0]
+
+    def flood() -> None:
+        while not stop.is_set():
+            publisher.publish(data="x")
+
+    def hear(_: Any) -> None:
+        count[0] += 1
+
+    thread = threading.Thread(target=flood)
+    thread.start()
+    try:
+        for number in range(20):
+            node = dds_connect(f"hears{number}")
+            executor = IMMEDIATE if number % 2 else None
+            made = [
+                node.create_subscription("/flood", STRING, raw_callback=hear, executor=executor)
+                for _ in range(3)
+            ]
+            before = count[0]
+            wait_for(lambda least=before + 10: count[0] > least, what="samples")
+            if number % 3:
+                made[0].close()
+            node.close()
+    finally:
+        stop.set()
+        thread.join(10)
+    assert not thread.is_alive()
+
+
+def test_a_subscription_can_be_closed_from_its_own_callback(dds_connect, wait_for):
+    node = dds_connect("once")
+    heard: list[str] = []
+
+    def hear(sample: Any) -> None:
+        heard.append(sample.message().data)
+        subscription.close()
+
+    subscription = node.create_subscription(
+        "/t", STRING, raw_callback=hear, executor=IMMEDIATE, qos=KEEP_ALL
+    )
+    publisher = node.create_publisher("/t", STRING, KEEP_ALL)
+    for number in range(100):
+        publisher.publish(data=str(number))
+    wait_for(lambda: heard)
+    time.sleep(0.1)
+    assert heard == ["0"]
+
+
+def test_a_node_can_be_closed_from_a_callback(dds_connect, wait_for):
+    talker, node = dds_connect("talker"), dds_connect("quits")
+    node.create_subscription("/t", STRING, raw_callback=lambda _: node.close(), executor=IMMEDIATE)
+    publisher = talker.create_publisher("/t", STRING)
+    wait_for(publisher.subscription_count)
+    threads = resources()[0]
+
+    def gone() -> bool:
+        publisher.publish(data="x")
+        return resources()[0] < threads
+
+    wait_for(gone, what="the node's threads to end")
+    with pytest.raises(NodeClosedError):
+        node.create_publisher("/t", STRING)
+
+
+@pytest.fixture
+def stuck(dds_connect, dds_domain, wait_for):
+    """A publisher whose only reader does not answer any more, but has not left either."""
+    reader = program(f"node.create_subscription('/big', '{IMAGE}')\ntime.sleep(60)", dds_domain)
+    publisher = dds_connect("talker").create_publisher("/big", IMAGE, KEEP_ALL)
+    wait_for(publisher.subscription_count)
+    time.sleep(0.2)
+    reader.send_signal(signal.SIGSTOP)
+    yield publisher
+    reader.kill()
+    reader.wait()
+
+
+def test_a_publisher_that_waits_for_its_readers_stops_nobody_and_can_be_closed(stuck, wait_for):
+    raised: list[Error] = []
+    sent = [0]
+
+    def publish() -> None:
+        try:
+            while True:
+                stuck.publish_serialized(data)
+                sent[0] += 1
+        except Error as error:
+            raised.append(error)
+
+    data = stuck.type.encode(data=bytes(300_000))
+    thread = threading.Thread(target=publish, daemon=True)
+    thread.start()
+
+    def waits() -> bool:
+        before = sent[0]
+        time.sleep(0.3)
+        return sent[0] == before
+
+    wait_for(waits, what="the publisher to wait")
+    began = time.monotonic()
+    for _ in range(20):
+        time.sleep(0.005)
+    assert time.monotonic() - began < 0.5, "other threads wait, too"
+    stuck.close()
+    thread.join(3)
+    assert not thread.is_alive()
+    assert isinstance(raised[0], NodeClosedError)
+
+
+def test_control_c_ends_a_program_that_waits_for_readers(dds_domain):
+    text = f"""
+from rosglass.comm import History, QoS
+subscriber = rosglass.connect('dds://?domain={dds_domain}')
+publisher = node.create_publisher('/big', '{IMAGE}', QoS(history=History.KEEP_ALL))
+print('ready', flush=True)
+data = publisher.type.encode(data=bytes(300_000))
+sys.stdin.readline()
+print('publishing', flush=True)
+while True:
+    publisher.publish_serialized(data)
+"""
+    reader = program(f"node.create_subscription('/big', '{IMAGE}')\ntime.sleep(60)", dds_domain)
+    process = program(text, dds_domain)
+    assert process.stdout is not None
+    assert process.stdin is not None
+    assert process.stdout.readline() == "ready\n"
+    time.sleep(1.0)
+    reader.send_signal(signal.SIGSTOP)
+    print(file=process.stdin, flush=True)
+    assert process.stdout.readline() == "publishing\n"
+    time.sleep(1.0)
+    process.send_signal(signal.SIGINT)
+    told, _ = process.communicate(timeout=15)
+    reader.kill()
+    reader.wait()
+    assert "KeyboardInterrupt" in told
+    assert process.returncode == -signal.SIGINT
+
+
+@pytest.mark.parametrize(
+    ("end", "code"), [("", 0), ("sys.exit(3)", 3), ("raise KeyboardInterrupt", -signal.SIGINT)]
+)
+def test_a_program_that_closes_nothing_ends_cleanly(dds_domain, end, code):
+    text = f"""
+heard = []
+node.create_subscription('/t', '{STRING}', heard.append)
+publisher = node.create_publisher('/t', '{STRING}')
+while not heard:
+    publisher.publish(data='x')
+    time.sleep(0.01)
+keep = node.create_subscription('/big', '{IMAGE}')
+node.create_publisher('/big', '{IMAGE}').publish(data=bytes(100_000))
+picture = keep.wait(5).message().data
+"""
+    process = program(text + end, dds_domain)
+    told, _ = process.communicate(timeout=20)
+    assert process.returncode == code, told
+    if not end.startswith("raise"):
+        assert told == ""
+
+
+def test_a_fork_is_told_to_connect_anew_and_leaves_the_parent_alone(dds_domain):
+    text = f"""
+publisher = node.create_publisher('/t', '{STRING}')
+subscription = node.create_subscription('/t', '{STRING}')
+child = os.fork()
+if not child:
+    for attempt in (
+        lambda: publisher.publish(data='x'),
+        lambda: node.create_publisher('/u', '{STRING}'),
+        lambda: rosglass.connect('dds://?domain={dds_domain}'),
+    ):
+        try:
+            attempt()
+        except rosglass.Error as error:
+            print(type(error).__name__, flush=True)
+    node.close()
+    sys.exit(0)
+print('child', os.waitpid(child, 0)[1], flush=True)
+publisher.publish(data='parent')
+print(subscription.wait(5).message().data, flush=True)
+"""
+    process = program(text, dds_domain)
+    told, _ = process.communicate(timeout=20)
+    assert told.split("\n")[:5] == [
+        NodeClosedError.__name__,
+        NodeClosedError.__name__,
+        UnsupportedError.__name__,
+        "child 0",
+        "parent",
+    ]
+    assert process.returncode == 0
+
+
+def test_a_peer_that_is_killed_in_the_middle_of_big_messages(dds_connect, dds_domain):
+    text = f"""
+publisher = node.create_publisher('/big', '{IMAGE}')
+while True:
+    publisher.publish(data=bytes(6_000_000))
+"""
+    subscription = dds_connect("hears").create_subscription("/big", IMAGE)
+    for _ in range(2):
+        process = program(text, dds_domain)
+        for _ in range(3):
+            sample = subscription.wait(10)
+            assert sample is not None
+            sample.type.validate(sample.data)
+        process.kill()
+        process.wait()
+        while subscription.wait(0.3) is not None:
+            pass
+
+
+def test_a_second_configuration_of_the_domain_is_refused(dds_connect, dds_domain):
+    dds_connect("first")
+    with pytest.raises(UnsupportedError, match="other settings"):
+        rosglass.connect(f"dds://?domain={dds_domain}&range=localhost", "second")
