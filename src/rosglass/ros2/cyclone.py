@@ -129,8 +129,9 @@ _PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
 GONE = -9
 #: What a call returns that waited for as long as it may.
 TIMEOUT = -10
-#: What it returns for an entity that was deleted, whose number means nothing, or something else.
-_WRONG_ENTITY = (-3, -12)
+#: What it returns for an entity that was deleted, whose number means nothing, or something else, or
+#: to which not even a domain is left.
+_WRONG_ENTITY = (-3, -4, -12)
 #: Return codes (``dds/ddsrt/retcode.h``): words, and the error that a caller can handle.
 _CODES: dict[int, tuple[str, type[Error]]] = {
     -2: ("it is not supported", UnsupportedError),
@@ -266,7 +267,7 @@ def delete(entity: int) -> None:
 def guid(entity: int) -> bytes:
     """Return the 16 bytes that identify a participant, reader or writer in the domain."""
     buffer = ctypes.create_string_buffer(16)
-    check(library().dds_get_guid(entity, buffer), "dds_get_guid", f"entity {entity}")
+    check_alive(library().dds_get_guid(entity, buffer), "dds_get_guid", f"entity {entity}")
     return buffer.raw
 
 
