@@ -91,6 +91,6 @@ case $purpose in
     make_venv .venv "$python" dev
     touch .venv/.rosglass-dev
     [ -x /usr/bin/python3 ] || fail "/usr/bin/python3 is missing" "the RViz environment needs Debian's own Python 3"
-    make_venv .venv-system /usr/bin/python3 zenoh,images,test,peers --system-site-packages ;;
+    make_venv .venv-system /usr/bin/python3 zenoh,dds,bags,completion,images,test,peers --system-site-packages ;;
 esac
 say "set-up complete"

@@ -4,25 +4,30 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 import threading
+import time
 from math import isfinite
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from rosglass.comm import ConnectionState
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable
 
     from rosglass.comm import Node, Status
 
-__all__ = ["add_connection_options", "connect", "seconds"]
+__all__ = ["add_connection_options", "connect", "end_event", "natural", "seconds", "settle", "wait"]
 
+_T = TypeVar("_T")
 #: Seconds after which a command says what it is waiting for.
 _PATIENCE = 2.0
+#: Seconds without news after which the graph counts as known.
+_QUIET = {"zenoh": 0.3, "dds": 0.7}
 
 
-def add_connection_options(parser: argparse.ArgumentParser) -> None:
+def add_connection_options(parser: argparse.ArgumentParser, *, timeout: float = 10.0) -> None:
     """Declare the options that say which robot is meant."""
     group = parser.add_argument_group("connection")
     group.add_argument(
@@ -31,40 +36,90 @@ def add_connection_options(parser: argparse.ArgumentParser) -> None:
         help="address of the robot, e.g. zenoh://192.168.1.5:7447 or dds://?domain=5; default: "
         "ROSGLASS_URL, or what ROS 2's own variables say",
     )
-    group.add_argument("--name", default="", help="node name; default: one that nobody else has")
+    group.add_argument(
+        "--node-name", default="", metavar="NAME", help="default: one that nobody else has"
+    )
     group.add_argument(
         "--timeout",
         type=seconds,
-        default=10.0,
+        default=timeout,
         metavar="SECONDS",
         help="how long to wait for the robot to answer (default: %(default)g)",
     )
+    parser.set_defaults(ros_arguments=[])
 
 
-def connect(args: argparse.Namespace, command: str, arguments: Sequence[str] = ()) -> Node:
+def connect(args: argparse.Namespace, *, own_services: bool = False) -> Node:
     """Join the graph that the options name, and wait until somebody answers.
 
     Says on standard error what it waits for, when that takes a while. Over DDS, where nobody has
-    to answer, it returns at once.
+    to answer, it returns after a moment.
 
     Args:
         args: The command's options.
-        command: The command's name, for the node's.
-        arguments: ``--ros-args`` and what belongs to them.
+        own_services: Whether the node shows parameters and the like to others.
 
     Raises:
         Error: As :func:`rosglass.connect`; ConnectionLostError when nobody answers in time.
     """
     import rosglass
 
-    name = args.name or f"rosglass_{command}_{os.getpid()}"
-    node = rosglass.connect(args.url or None, name=name, arguments=list(arguments))
+    node = rosglass.connect(
+        args.url or None,
+        name=args.node_name or f"rosglass_{args.command}_{os.getpid()}",
+        arguments=args.ros_arguments,
+        own_services=own_services,
+    )
     try:
-        _wait(node, args.timeout)
+        _wait_for_connection(node, args.timeout)
     except BaseException:
         node.close()
         raise
     return node
+
+
+def settle(node: Node, least: float = 0.0) -> None:
+    """Wait until the graph is known: no news for a moment.
+
+    Args:
+        node: Whose graph.
+        least: Seconds to wait at least.
+    """
+    began = moved = time.monotonic()
+
+    def touch() -> None:
+        nonlocal moved
+        moved = time.monotonic()
+
+    quiet = _QUIET.get(node.url.partition(":")[0], 0.5)
+    with node.on_graph_change(touch):
+        while time.monotonic() < min(max(moved + quiet, began + least), began + 5.0):
+            time.sleep(0.05)
+
+
+def wait(node: Node, look: Callable[[], _T], timeout: float) -> _T:
+    """Return the first true value of `look`, asked after each change of the graph.
+
+    After `timeout` seconds its last value is returned, true or not.
+    """
+    changed = threading.Event()
+    deadline = time.monotonic() + timeout
+    with node.on_graph_change(changed.set):
+        while True:
+            value = look()
+            left = deadline - time.monotonic()
+            if value or left <= 0:
+                return value
+            changed.wait(min(left, 0.2))
+            changed.clear()
+
+
+def end_event() -> threading.Event:
+    """Return an event that Ctrl-C and SIGTERM set, so that a command can end in good order."""
+    end = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: end.set())
+    return end
 
 
 def seconds(text: str) -> float:
@@ -78,13 +133,21 @@ def seconds(text: str) -> float:
     return value
 
 
-def _wait(node: Node, timeout: float) -> None:
+def natural(text: str) -> int:
+    """Read a count of 1 or more; for options."""
+    if not (text.isascii() and text.isdigit() and 0 < int(text[:10]) < 2**31):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of 1 or more")
+    return int(text)
+
+
+def _wait_for_connection(node: Node, timeout: float) -> None:
     from rosglass.errors import ConnectionLostError
 
     connected = threading.Event()
 
     def look(status: Status) -> None:
-        if status.state is ConnectionState.CONNECTED:
+        # Over DDS there may be nobody yet, and no way to tell that from a wrong address.
+        if status.state is ConnectionState.CONNECTED or node.url.startswith("dds:"):
             connected.set()
 
     with node.on_status_change(look):

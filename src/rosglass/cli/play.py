@@ -92,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: end.set())
         with (
-            connect(args, "play", args.arguments) as node,
+            connect(args) as node,
             Player(
                 node,
                 bag,

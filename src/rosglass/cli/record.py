@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     end = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: end.set())
-    with connect(args, "record", args.arguments) as node:
+    with connect(args) as node:
         recorder = Recorder(
             node,
             path,

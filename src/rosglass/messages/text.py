@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rosglass.messages.message import Message
     from rosglass.messages.schema import Member
 
-__all__ = ["plain", "short", "to_dict", "to_json", "to_yaml"]
+__all__ = ["finite", "plain", "short", "to_dict", "to_json", "to_yaml"]
 
 _SHOWN = 6
 _LONGEST = 60
@@ -57,18 +57,19 @@ def plain(value: Any) -> Any:
 def to_json(message: Message, indent: int | None = None) -> str:
     """Return the message as strict JSON."""
     dumped: str = import_module("json").dumps(
-        _finite(plain(to_dict(message))), indent=indent, ensure_ascii=False, allow_nan=False
+        finite(plain(to_dict(message))), indent=indent, ensure_ascii=False, allow_nan=False
     )
     return dumped
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
+    """Return a value of :func:`plain` with words for numbers that JSON does not have."""
     if isinstance(value, float) and not math.isfinite(value):
         return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
     if isinstance(value, dict):
-        return {key: _finite(inner) for key, inner in value.items()}
+        return {key: finite(inner) for key, inner in value.items()}
     if isinstance(value, list):
-        return [_finite(inner) for inner in value]
+        return [finite(inner) for inner in value]
     return value
 
 

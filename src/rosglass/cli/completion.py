@@ -1,0 +1,96 @@
+"""Tab completion: of options, and of names that the robot and the library know.
+
+The ``argcomplete`` package (PyPI; ROS 2's own tools use it) asks the shell and the parser; here is
+what it offers for names.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Iterable
+
+    from rosglass.comm import Node
+
+__all__ = ["SHELLS", "complete", "is_completing", "offer", "script"]
+
+SHELLS = ("bash", "zsh", "fish", "tcsh")
+#: Seconds that Tab may take to look around in the graph.
+_PATIENCE = 1.5
+
+
+def complete(argument: argparse.Action, what: str) -> None:
+    """Let Tab complete an argument.
+
+    Args:
+        argument: As returned by ``add_argument``.
+        what: ``topics``, ``services``, ``actions``, ``nodes``, ``messages``, ``interfaces`` (all
+            kinds of types), ``service_types`` or ``action_types``.
+    """
+    argument.completer = _Completer(what)  # type: ignore[attr-defined]
+
+
+def is_completing() -> bool:
+    """Return whether the shell asks what could follow, instead of running a command."""
+    return "_ARGCOMPLETE" in os.environ
+
+
+def offer(parser: argparse.ArgumentParser) -> None:
+    """Answer the shell, and end the program."""
+    import argcomplete
+
+    argcomplete.autocomplete(parser)
+
+
+def script(shell: str) -> str:
+    """Return what a shell has to read so that Tab works."""
+    from argcomplete.shell_integration import shellcode
+
+    return str(shellcode(["rosglass"], shell=shell))
+
+
+class _Completer:
+    def __init__(self, what: str) -> None:
+        self._what = what
+
+    def __call__(self, prefix: str, parsed_args: argparse.Namespace, **_: Any) -> Iterable[str]:
+        """Return the names that may be meant; whatever goes wrong, Tab offers nothing."""
+        try:
+            return [name for name in self._names(parsed_args) if name.startswith(prefix)]
+        except Exception:  # nothing may be printed into the line that is being typed
+            return []
+
+    def _names(self, args: argparse.Namespace) -> Iterable[str]:
+        kinds = {"messages": "msg", "service_types": "srv", "action_types": "action"}
+        if self._what in kinds or self._what == "interfaces":
+            from rosglass.messages import default_library
+
+            return default_library().names(2, kinds.get(self._what))
+        return self._ask(args)
+
+    def _ask(self, args: argparse.Namespace) -> Iterable[str]:
+        import rosglass
+        from rosglass.cli.connecting import wait
+
+        url = getattr(args, "url", "") or None
+        with rosglass.connect(url, own_services=False) as node:
+
+            def others() -> list[str]:
+                me = node.resolve(node.name)
+                return [name for name in _look(node, self._what) if name != me]
+
+            wait(node, others, _PATIENCE)
+            return others()
+
+
+def _look(node: Node, what: str) -> Iterable[str]:
+    if what == "topics":
+        return node.topics()
+    if what == "services":
+        return node.services()
+    if what == "actions":
+        return node.actions()
+    return [found.full for found in node.nodes()]

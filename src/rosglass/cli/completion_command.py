@@ -1,0 +1,27 @@
+"""``rosglass completion``: make Tab complete commands, options and names."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rosglass.cli.completion import SHELLS, script
+
+if TYPE_CHECKING:
+    import argparse
+
+__all__ = ["configure", "run"]
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's options."""
+    parser.add_argument("shell", choices=SHELLS, help="which shell")
+    parser.epilog = (
+        'For bash, put this into ~/.bashrc: eval "$(rosglass completion bash)". '
+        "Topics, services, actions and nodes are asked from the robot that ROSGLASS_URL names."
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print what the shell has to read."""
+    print(script(args.shell))
+    return 0

@@ -1,0 +1,63 @@
+"""Publishers, subscriptions, servers and clients, as people and programs read them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rosglass.comm import EndpointInfo
+
+__all__ = ["describe", "problems", "short"]
+
+
+def describe(end: EndpointInfo) -> dict[str, Any]:
+    """Return an endpoint as JSON has it."""
+    qos = end.qos
+    return {
+        "kind": end.kind.value,
+        "name": end.name,
+        "node": str(end.node),
+        "type": end.type,
+        "qos": {
+            "reliability": qos.reliability.value,
+            "durability": qos.durability.value,
+            "history": qos.history.value,
+            "depth": qos.depth,
+            "deadline": None if qos.deadline is None else qos.deadline.seconds,
+            "lifespan": None if qos.lifespan is None else qos.lifespan.seconds,
+            "liveliness": qos.liveliness.value,
+            "lease_duration": None if qos.lease_duration is None else qos.lease_duration.seconds,
+        },
+        "type_hash": end.type_hash,
+        "gid": end.gid.hex(),
+    }
+
+
+def problems(ends: Sequence[EndpointInfo]) -> list[str]:
+    """Say which of a topic's endpoints do not match each other, and why."""
+    from rosglass.comm import EndpointKind
+
+    found = []
+    sources = [end for end in ends if end.kind is EndpointKind.PUBLISHER]
+    sinks = [end for end in ends if end.kind is EndpointKind.SUBSCRIPTION]
+    if len({end.type for end in ends}) > 1:
+        told = "; ".join(f"{end.node} has {end.type}" for end in ends)
+        found.append(f"types differ: {told}")
+    for sink in sinks:
+        for source in sources:
+            conflict = sink.qos.incompatibility(source.qos)
+            if conflict:
+                found.append(f"{sink.node} may get nothing from {source.node}: {conflict}")
+            hashes = {end.type_hash for end in (sink, source)} - {""}
+            if source.type == sink.type and len(hashes) > 1:
+                found.append(f"{sink.node} and {source.node} define {sink.type} differently")
+    return found
+
+
+def short(value: object) -> str:
+    """Return a value of :func:`describe` in one line."""
+    if not isinstance(value, dict):
+        return str(value)
+    return ", ".join(f"{key} {inner}" for key, inner in value.items() if inner is not None)

@@ -1,0 +1,117 @@
+"""``rosglass interface``: look at types of messages, services and actions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rosglass.cli.completion import complete
+from rosglass.cli.connecting import add_connection_options, connect
+from rosglass.cli.output import Style, add_output_options, note, print_json, template
+from rosglass.cli.subcommands import Subcommands
+
+if TYPE_CHECKING:
+    import argparse
+
+    from rosglass.messages import ActionType, MessageType, ServiceType
+
+__all__ = ["configure", "run"]
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Declare what can be done with types."""
+    add = Subcommands(parser).add
+    sub = add("show", "show the definition of a type, asking the robot if need be", _show)
+    complete(sub.add_argument("type", help="e.g. geometry_msgs/msg/Twist"), "interfaces")
+    sub.add_argument("--no-comments", action="store_true", help="leave out comments")
+    sub.add_argument(
+        "--template", action="store_true", help="show an empty message in YAML, to fill in"
+    )
+    _finish(sub)
+    sub = add("list", "list the types that are known on this machine", _list)
+    sub.add_argument("text", nargs="?", default="", help="only names that contain it")
+    sub.add_argument("--kind", choices=("msg", "srv", "action"), help="only these")
+    sub.add_argument("--ros1", action="store_true", help="ROS 1's types")
+    add_output_options(sub)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do it."""
+    return int(args.handler(args))
+
+
+def _finish(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--ros1", action="store_true", help="the type as in ROS 1")
+    add_output_options(parser)
+    add_connection_options(parser, timeout=5.0)
+
+
+def _list(args: argparse.Namespace) -> int:
+    from rosglass.messages import default_library
+
+    names = default_library().names(1 if args.ros1 else 2, args.kind)
+    found = [name for name in names if args.text.lower() in name.lower()]
+    if args.json:
+        print_json(found)
+        return 0
+    for name in found:
+        print(name)
+    if not found:
+        note(f"no type's name contains {args.text!r}")
+    return 0 if found else 1
+
+
+def _show(args: argparse.Namespace) -> int:
+    found = _find(args)
+    definition = found.definition
+    source = definition.source
+    parts = getattr(found, "parts", {"": found})
+    if args.template:
+        for name, part in parts.items():
+            print(f"# {name}\n{template(part)}" if name else template(part))
+        return 0
+    if args.json:
+        print_json(
+            {
+                "name": found.name, "ros": found.ros, "text": definition.text,
+                "hash": found.md5 if found.ros == 1 else found.rihs01,
+                "source": {"provider": source.provider, "file": source.file},
+                "fields": {name: _fields(part) for name, part in parts.items()},
+            }
+        )  # fmt: skip
+        return 0
+    style = Style(args)
+    print(style(f"# {found.name}, from {source.provider}", "dim"))
+    for line in definition.text.rstrip("\n").split("\n"):
+        code, mark, comment = line.partition("#")
+        if args.no_comments:
+            if code.strip():
+                print(code.rstrip())
+        else:
+            print(code + style(mark + comment, "dim"))
+    return 0
+
+
+def _fields(part: MessageType) -> list[dict[str, str]]:
+    return [
+        {"name": f.name, "type": str(f.type), "unit": f.unit, "comment": f.comment}
+        for f in part.fields
+    ]
+
+
+def _find(args: argparse.Namespace) -> MessageType | ServiceType | ActionType:
+    import os
+
+    from rosglass.errors import TypeNotFoundError, UnsupportedError
+    from rosglass.messages import load
+
+    try:
+        return load(args.type, 1 if args.ros1 else 2)
+    except TypeNotFoundError as error:
+        if args.ros1 or not (args.url or os.environ.get("ROSGLASS_URL")):
+            hint = "or say where the robot is: --url zenoh://robot:7447"
+            raise TypeNotFoundError(f"{error}; {hint}") from error
+    try:
+        with connect(args) as node:
+            return node.fetch_type(args.type, timeout=args.timeout)
+    except UnsupportedError as error:
+        raise TypeNotFoundError(f"{args.type}: {error}") from error

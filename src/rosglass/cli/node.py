@@ -1,0 +1,93 @@
+"""``rosglass node``: look at nodes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rosglass.cli.completion import complete
+from rosglass.cli.connecting import add_connection_options, connect, settle, wait
+from rosglass.cli.endpoints import describe
+from rosglass.cli.output import Style, add_output_options, note, print_json
+from rosglass.cli.subcommands import Subcommands
+
+if TYPE_CHECKING:
+    import argparse
+
+    from rosglass.comm import Node
+
+__all__ = ["configure", "run"]
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Declare what can be done with nodes."""
+    add = Subcommands(parser).add
+    _finish(add("list", "list the nodes there are", _list))
+    sub = add("info", "show what a node publishes, subscribes, offers and calls", _info)
+    complete(sub.add_argument("node"), "nodes")
+    sub.add_argument("--hidden", action="store_true", help="show what belongs to actions, too")
+    _finish(sub)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do it."""
+    return int(args.handler(args))
+
+
+def _finish(parser: argparse.ArgumentParser) -> None:
+    add_output_options(parser)
+    add_connection_options(parser)
+
+
+def _others(node: Node) -> list[str]:
+    """Return the names of all nodes but the one that this command is."""
+    me = node.resolve(node.name)
+    return [name.full for name in node.nodes() if name.full != me]
+
+
+def _list(args: argparse.Namespace) -> int:
+    with connect(args) as node:
+        settle(node)
+        found = _others(node)
+    if args.json:
+        print_json(found)
+        return 0
+    for name in found:
+        print(name)
+    if not found:
+        note("there are no other nodes here; rosglass doctor looks why")
+    return 0
+
+
+def _info(args: argparse.Namespace) -> int:
+    from rosglass.ros2.names import hidden
+
+    style = Style(args)
+    with connect(args) as node:
+        name = "/" + args.node.lstrip("/")
+        wait(node, lambda: name in _others(node), args.timeout)
+        settle(node)
+        if name not in _others(node):
+            return _unknown(node, name)
+        ends = [end for end in node.endpoints(name) if args.hidden or not hidden(end.name)]
+    if args.json:
+        print_json({"node": name, "endpoints": [describe(end) for end in ends]})
+        return 0
+    print(style(name, "bold"))
+    kinds: dict[str, list[str]] = {}
+    for end in ends:
+        kinds.setdefault(end.kind.value, []).append(f"{end.name} [{end.type}]")
+    for kind, lines in kinds.items():
+        print(style(f"  {kind}s:", "cyan"))
+        for line in sorted(set(lines)):
+            print(f"    {line}")
+    return 0
+
+
+def _unknown(node: Node, name: str) -> int:
+    import difflib
+
+    names = _others(node)
+    close = difflib.get_close_matches(name, names, 3, 0.5)
+    told = f"Did you mean {' or '.join(close)}?" if close else f"There are: {', '.join(names)}"
+    note(f"there is no node {name}. {told}")
+    return 1

@@ -1,0 +1,152 @@
+"""How commands print: colours where a person looks, JSON where a program does."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Iterable, Sequence
+
+    from rosglass.messages import MessageType
+
+__all__ = [
+    "SHOWN",
+    "Style",
+    "add_output_options",
+    "fields",
+    "note",
+    "print_json",
+    "table",
+    "template",
+    "to_json",
+    "to_yaml",
+]
+
+#: Elements of an array that are shown, unless all are asked for.
+SHOWN = 20
+_CODES = {"bold": 1, "dim": 2, "red": 31, "green": 32, "yellow": 33, "cyan": 36}
+
+
+def add_output_options(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--json`` and ``--color``."""
+    group = parser.add_argument_group("output")
+    group.add_argument("--json", action="store_true", help="print JSON, for programs")
+    group.add_argument(
+        "--color",
+        choices=("auto", "always", "never"),
+        default="auto",
+        help="auto: only on a terminal, and not with NO_COLOR set (default: %(default)s)",
+    )
+
+
+class Style:
+    """Colours text, or leaves it as it is."""
+
+    def __init__(self, args: argparse.Namespace) -> None:
+        wanted = getattr(args, "color", "auto")
+        plain = not sys.stdout.isatty() or bool(os.environ.get("NO_COLOR"))
+        self._on = wanted == "always" or (wanted == "auto" and not plain)
+
+    def __call__(self, text: object, *kinds: str) -> str:
+        """Return `text` as ``bold``, ``dim``, ``red``, ``green``, ``yellow`` or ``cyan``."""
+        if not self._on or not kinds:
+            return str(text)
+        codes = ";".join(str(_CODES[kind]) for kind in kinds)
+        return f"\033[{codes}m{text}\033[0m"
+
+
+def note(text: str) -> None:
+    """Tell the person in front of it something that is no result."""
+    print(f"rosglass: {text}", file=sys.stderr, flush=True)
+
+
+def print_json(value: object) -> None:
+    """Print a value as JSON on several lines."""
+    print(json.dumps(value, indent=2, ensure_ascii=False, default=str), flush=True)
+
+
+def fields(value: Any, limit: int | None = SHOWN) -> Any:
+    """Return a message, or a field of one, as dicts, lists and plain values, long arrays cut.
+
+    Args:
+        value: The message or field.
+        limit: Elements of an array to keep; None for all. A longer one becomes its first
+            elements and a text that says how many there are.
+    """
+    from rosglass.messages.text import plain
+
+    if hasattr(value, "_schema__"):
+        value = value.to_dict()
+    return plain(value) if limit is None else _cut(value, limit)
+
+
+def template(message_type: MessageType) -> str:
+    """Return an empty message of the type as one line of YAML."""
+    import yaml
+
+    text: str = yaml.safe_dump(
+        fields(message_type.create(), 3), default_flow_style=True, sort_keys=False, width=2**31
+    )
+    return text.strip()
+
+
+def to_yaml(value: object) -> str:
+    """Return what :func:`fields` returned as YAML; lists of numbers take one line."""
+    import yaml
+
+    class Dumper(yaml.SafeDumper):
+        def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 - PyYAML's signature
+            return True
+
+    def sequence(dumper: Any, items: list[Any]) -> Any:
+        flow = not any(isinstance(item, (dict, list)) for item in items)
+        return dumper.represent_sequence("tag:yaml.org,2002:seq", items, flow_style=flow)
+
+    Dumper.add_representer(list, sequence)
+    dumped: str = yaml.dump(
+        value, Dumper=Dumper, sort_keys=False, default_flow_style=False, allow_unicode=True,
+        width=2**31,
+    )  # fmt: skip
+    return dumped.removesuffix("...\n")
+
+
+def to_json(value: object) -> str:
+    """Return what :func:`fields` returned as strict JSON, in one line."""
+    from rosglass.messages.text import finite
+
+    return json.dumps(finite(value), ensure_ascii=False, allow_nan=False)
+
+
+def table(rows: Iterable[Sequence[str]], indent: str = "") -> list[str]:
+    """Return rows as lines with aligned columns."""
+    found = [list(row) for row in rows]
+    widths = [max(map(len, column)) for column in zip(*found, strict=True)]
+    return [
+        indent + "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip()
+        for row in found
+    ]
+
+
+def _cut(value: Any, limit: int) -> Any:
+    from rosglass.messages.text import plain
+
+    if hasattr(value, "_schema__"):
+        value = value.to_dict()
+    if isinstance(value, dict):
+        return {key: _cut(inner, limit) for key, inner in value.items()}
+    if isinstance(value, str):
+        text: str = plain(value)
+        # A robot's description is a string of 100 kB.
+        return text if len(text) <= 100 * limit else f"{text[: 100 * limit]}... {len(text)} in all"
+    if not hasattr(value, "__len__"):
+        return value
+    count = len(value)
+    few = value[:limit]
+    items = plain(few)
+    if isinstance(few, list):
+        items = [_cut(item, limit) for item in few]
+    return items if count <= limit else [*items, f"... {count} in all"]

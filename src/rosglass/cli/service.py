@@ -1,0 +1,123 @@
+"""``rosglass service``: look at services, call them."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from rosglass.cli.completion import complete
+from rosglass.cli.connecting import add_connection_options, connect, settle, wait
+from rosglass.cli.endpoints import describe, short
+from rosglass.cli.output import (
+    Style,
+    add_output_options,
+    fields,
+    note,
+    print_json,
+    template,
+    to_json,
+    to_yaml,
+)
+from rosglass.cli.subcommands import Subcommands
+from rosglass.cli.values import parse_fields, split_type
+
+if TYPE_CHECKING:
+    import argparse
+
+__all__ = ["configure", "run"]
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Declare what can be done with services."""
+    add = Subcommands(parser).add
+    sub = add("list", "list the services there are", _list)
+    sub.add_argument("-t", "--types", action="store_true", help="show their types")
+    sub.add_argument("--hidden", action="store_true", help="show those of actions, too")
+    _finish(sub)
+    sub = add("info", "show who offers and uses a service", _info)
+    complete(sub.add_argument("service"), "services")
+    _finish(sub)
+    sub = add("call", "call a service and print its response", _call)
+    complete(sub.add_argument("service"), "services")
+    complete(
+        sub.add_argument(
+            "rest", nargs="*", metavar="[TYPE] VALUES", help="values as YAML: '{a: 1, b: 2}'"
+        ),
+        "service_types",
+    )
+    _finish(sub)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do it."""
+    return int(args.handler(args))
+
+
+def _finish(parser: argparse.ArgumentParser) -> None:
+    add_output_options(parser)
+    add_connection_options(parser)
+
+
+def _list(args: argparse.Namespace) -> int:
+    from rosglass.ros2.names import hidden
+
+    style = Style(args)
+    with connect(args) as node:
+        settle(node)
+        found = {s: k for s, k in node.services().items() if args.hidden or not hidden(s)}
+    if args.json:
+        print_json([{"service": name, "types": types} for name, types in found.items()])
+        return 0
+    for name, types in found.items():
+        print(name + (style(f" [{', '.join(types)}]", "dim") if args.types else ""))
+    if not found:
+        note("there are no services here; rosglass doctor looks why")
+    return 0
+
+
+def _info(args: argparse.Namespace) -> int:
+    style = Style(args)
+    with connect(args) as node:
+        name = node.resolve(args.service)
+        wait(node, lambda: node.service_servers(name), args.timeout)
+        settle(node)
+        ends = [*node.service_servers(name), *node.service_clients(name)]
+    if not ends:
+        note(f"nobody offers or calls {name}; rosglass service list shows what there is")
+        return 1
+    if args.json:
+        print_json({"service": name, "endpoints": [describe(end) for end in ends]})
+        return 0
+    print(f"{style(name, 'bold')} [{', '.join(sorted({end.type for end in ends}))}]")
+    for end in ends:
+        print(f"  {end.kind.value} {style(end.node, 'cyan')}")
+        for key in ("type", "type_hash", "gid"):
+            if describe(end)[key]:
+                print(f"    {key}: {short(describe(end)[key])}")
+    return 0
+
+
+def _call(args: argparse.Namespace) -> int:
+    from rosglass.errors import ServiceUnavailableError
+
+    type_name, text = split_type(args.rest)
+    style = Style(args)
+    deadline = time.monotonic() + args.timeout
+    with connect(args) as node:
+        name = node.resolve(args.service)
+        with node.create_service_client(name, type_name) as client:
+            wait(node, lambda: client.type is not None, args.timeout)
+            if client.type is None:
+                raise ServiceUnavailableError(client.problem or f"nobody offers {name}")
+            request = client.type.request
+            values = parse_fields(text, request.name, template(request))
+            began = time.monotonic()
+            response = client.call(values, timeout=max(deadline - began, 1.0))
+            took = time.monotonic() - began
+    found = fields(response, None if args.json else 100)
+    if args.json:
+        print(to_json(found))
+        return 0
+    print(to_yaml(found).rstrip("\n"))
+    print(style(f"# {name} answered in {took * 1e3:.1f} ms", "dim"))
+    return 0

@@ -1,0 +1,224 @@
+"""``rosglass topic``: look at topics, listen to them, publish on them."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from rosglass.cli.completion import complete
+from rosglass.cli.connecting import (
+    add_connection_options,
+    connect,
+    end_event,
+    natural,
+    seconds,
+    settle,
+    wait,
+)
+from rosglass.cli.endpoints import describe, problems, short
+from rosglass.cli.output import Style, add_output_options, note, print_json, template
+from rosglass.cli.subcommands import Subcommands
+from rosglass.cli.topic_echo import echo
+from rosglass.cli.topic_rates import measure
+from rosglass.cli.values import parse_fields, profile, split_type
+
+if TYPE_CHECKING:
+    import argparse
+
+    from rosglass.comm import Node
+
+__all__ = ["configure", "run"]
+
+#: Samples of which hz, bw and delay keep account.
+_WINDOW = 10_000
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Declare what can be done with topics."""
+    add = Subcommands(parser).add
+    sub = add("list", "list the topics there are", _list)
+    sub.add_argument("-t", "--types", action="store_true", help="show their types")
+    sub.add_argument("--hidden", action="store_true", help="show hidden ones, too")
+    _finish(sub)
+    sub = add("info", "show who publishes and subscribes to a topic, and how", _info)
+    complete(sub.add_argument("topic"), "topics")
+    _finish(sub)
+    sub = add("echo", "print the messages of a topic", echo)
+    complete(sub.add_argument("topic"), "topics")
+    complete(sub.add_argument("type", nargs="?", help="default: what is published"), "messages")
+    sub.add_argument("-f", "--field", metavar="PATH", help="print one field, as pose.position.x")
+    sub.add_argument("-n", "--count", type=natural, help="end after so many messages")
+    sub.add_argument("--once", dest="count", action="store_const", const=1, help="one is enough")
+    sub.add_argument("--full", action="store_true", help="print every element of long arrays")
+    sub.add_argument("--raw", action="store_true", help="print the bytes, in hexadecimal")
+    sub.add_argument("--stamps", action="store_true", help="print when messages were received")
+    _qos(sub, "best_available")
+    _finish(sub)
+    for name, summary in (
+        ("hz", "measure how often a topic's messages come"),
+        ("bw", "measure how many bytes a topic takes"),
+        ("delay", "measure how old stamped messages are when they come"),
+    ):
+        sub = add(name, summary, measure)
+        complete(sub.add_argument("topic"), "topics")
+        sub.add_argument(
+            "-w", "--window", type=natural, default=_WINDOW, help="messages to look at"
+        )
+        sub.add_argument("-d", "--duration", type=seconds, help="end after so many seconds")
+        sub.set_defaults(what=name)
+        _qos(sub, "best_available")
+        _finish(sub)
+    sub = add("pub", "publish messages on a topic", _publish)
+    complete(sub.add_argument("topic"), "topics")
+    complete(
+        sub.add_argument(
+            "rest", nargs="*", metavar="[TYPE] VALUES", help="values as YAML: '{data: hello}'"
+        ),
+        "messages",
+    )
+    sub.add_argument("-r", "--rate", type=float, default=1.0, metavar="HZ", help="default: 1")
+    sub.add_argument("-n", "--count", type=natural, help="end after so many messages")
+    sub.add_argument("--once", dest="count", action="store_const", const=1, help="one is enough")
+    sub.add_argument(
+        "-w",
+        "--wait",
+        type=int,
+        metavar="N",
+        help="wait for so many subscriptions first; with --once 1 unless told otherwise",
+    )
+    sub.add_argument(
+        "--keep-alive", type=seconds, default=0.5, metavar="SECONDS",
+        help="stay so long after the last message, so that it arrives (default: %(default)g)",
+    )  # fmt: skip
+    _qos(sub, "default")
+    _finish(sub)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do it."""
+    return int(args.handler(args))
+
+
+def _finish(parser: argparse.ArgumentParser) -> None:
+    add_output_options(parser)
+    add_connection_options(parser)
+
+
+def _qos(parser: argparse.ArgumentParser, default: str) -> None:
+    group = parser.add_argument_group("quality of service")
+    group.add_argument(
+        "--qos",
+        default=default,
+        metavar="PROFILE",
+        help="default, sensor_data, latched, best_available, ... (default: %(default)s)",
+    )
+    group.add_argument("--depth", type=natural, help="samples to keep")
+
+
+def _list(args: argparse.Namespace) -> int:
+    from rosglass.ros2.names import hidden
+
+    style = Style(args)
+    with connect(args) as node:
+        settle(node)
+        found = {t: k for t, k in node.topics().items() if args.hidden or not hidden(t)}
+        counts = {t: (len(node.publishers(t)), len(node.subscriptions(t))) for t in found}
+    if args.json:
+        print_json(
+            [
+                {"topic": t, "types": kinds, "publishers": counts[t][0],
+                 "subscriptions": counts[t][1]}
+                for t, kinds in found.items()
+            ]
+        )  # fmt: skip
+        return 0
+    for topic, kinds in found.items():
+        several = style(f"  {len(kinds)} types!", "red") if len(kinds) > 1 else ""
+        shown = style(f" [{', '.join(kinds)}]", "dim") if args.types else several
+        print(topic + shown)
+    if not found:
+        note(f"there are no topics on {args.url or 'this graph'}; rosglass doctor looks why")
+    return 0
+
+
+def _info(args: argparse.Namespace) -> int:
+    style = Style(args)
+    with connect(args) as node:
+        topic = node.resolve(args.topic)
+        wait(node, lambda: node.publishers(topic) or node.subscriptions(topic), args.timeout)
+        settle(node)
+        ends = [*node.publishers(topic), *node.subscriptions(topic)]
+        if not ends:
+            return _unknown(node, topic)
+    if args.json:
+        print_json({"topic": topic, "endpoints": [describe(end) for end in ends]})
+        return 0
+    print(f"{style(topic, 'bold')} [{', '.join(sorted({end.type for end in ends}))}]")
+    for line in problems(ends):
+        print(style(f"  {line}", "red"))
+    for end in ends:
+        print(f"  {end.kind.value} {style(end.node, 'cyan')}")
+        for key, value in describe(end).items():
+            if key not in ("kind", "name", "node") and value:
+                print(f"    {key}: {short(value)}")
+    return 0
+
+
+def _publish(args: argparse.Namespace) -> int:
+    from rosglass.errors import Error
+
+    if not 0 < args.rate <= 10_000:
+        raise Error(f"--rate {args.rate:g} must be above 0 and at most 10000")
+    type_name, text = split_type(args.rest)
+    end = end_event()
+    with connect(args) as node:
+        topic = node.resolve(args.topic)
+        if type_name is None:
+            type_name = _announced(node, topic, args.timeout)
+        publisher = node.create_publisher(topic, type_name, profile(args))
+        values = parse_fields(text, publisher.type.name, template(publisher.type))
+        message = publisher.type.create(values)
+        wanted = args.wait if args.wait is not None else int(args.count == 1)
+        if not wait(node, lambda: publisher.subscription_count() >= wanted, args.timeout):
+            there = publisher.subscription_count()
+            note(f"{topic}: {there} of {wanted} subscriptions within {args.timeout:g} s; "
+                 "nothing was published")  # fmt: skip
+            return 1
+        sent, due = 0, time.monotonic()
+        while not end.is_set():
+            publisher.publish(message)
+            sent += 1
+            if not args.json:
+                print(f"{sent}: {message}", flush=True)
+            if sent == args.count:
+                break
+            due += 1 / args.rate
+            end.wait(max(0.0, due - time.monotonic()))
+        end.wait(args.keep_alive)
+        if args.json:
+            print_json({"topic": topic, "type": type_name, "sent": sent})
+    return 0
+
+
+def _announced(node: Node, topic: str, timeout: float) -> str:
+    from rosglass.errors import TypeNotFoundError
+
+    def types() -> list[str]:
+        ends = [*node.subscriptions(topic), *node.publishers(topic)]
+        return sorted({end.type for end in ends})
+
+    found = wait(node, types, timeout)
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise TypeNotFoundError(f"{topic} has several types, say which: {', '.join(found)}")
+    raise TypeNotFoundError(f"nobody uses {topic} yet: say its type, e.g. std_msgs/msg/String")
+
+
+def _unknown(node: Node, topic: str) -> int:
+    import difflib
+
+    close = difflib.get_close_matches(topic, node.topics(), 3, 0.6)
+    hint = f" Did you mean {' or '.join(close)}?" if close else ""
+    note(f"nobody publishes or subscribes to {topic}.{hint}")
+    return 1
