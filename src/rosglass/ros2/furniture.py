@@ -46,6 +46,9 @@ class Furniture(Member):
         self._made: list[Handle] = []
         self._steps: deque[Callable[[], None]] = deque()
         self._joined = self._closed = False
+        for name, level in core.arguments.logger_levels.items():
+            if name.partition(".")[0] == "rosglass":
+                logging.getLogger(name).setLevel(level)
         if "use_sim_time" in core.arguments.parameters(core.name.full):
             _ = self.parameters
         if offered:

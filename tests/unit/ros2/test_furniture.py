@@ -354,6 +354,12 @@ def test_levels_come_from_the_command_line(start) -> None:
     assert robot.logger.getChild("arm") is robot.logger.getChild("arm")
 
 
+def test_the_librarys_own_loggers_have_levels_too(start) -> None:
+    logger = logging.getLogger("rosglass.test.levels")
+    start("--log-level", "rosglass.test.levels:=debug", own_services=False)
+    assert logger.level == logging.DEBUG
+
+
 def test_logs_can_be_switched_off(start, node, caplog) -> None:
     robot = start("--disable-rosout-logs", "--disable-stdout-logs")
     messages = received(node, "/rosout", LOG)
