@@ -10,6 +10,6 @@ for script in $(grep -l __main__ benchmarks/*.py); do
     *) python=.venv/bin/python ;;
   esac
   printf '\n==> %s\n' "$script"
-  "$python" "$script" || missed+=("$script")
+  scripts/private_network.sh "$python" "$script" || missed+=("$script")
 done
 [ ${#missed[@]} -eq 0 ] || { printf '\nmissed a target or failed: %s\n' "${missed[*]}" >&2; exit 1; }

@@ -96,15 +96,25 @@ def wait_for_fixture() -> Callable[..., Any]:
 
 
 @pytest.fixture(scope="module")
-def start() -> Iterator[Callable[..., Process]]:
-    """Start Python with the given arguments; killed when the module's tests are done."""
+def start_program() -> Iterator[Callable[..., Process]]:
+    """Start a program with the given arguments; killed when the module's tests are done."""
     started: list[Process] = []
 
-    def start(*arguments: str, env: dict[str, str] | None = None) -> Process:
-        process = Process([sys.executable, "-W", "ignore", *arguments], env)
+    def start_program(*command: str, env: dict[str, str] | None = None) -> Process:
+        process = Process(command, env)
         started.append(process)
         return process
 
-    yield start
+    yield start_program
     for process in started:
         process.end()
+
+
+@pytest.fixture(scope="module")
+def start(start_program: Callable[..., Process]) -> Callable[..., Process]:
+    """Start Python with the given arguments; killed when the module's tests are done."""
+
+    def start(*arguments: str, env: dict[str, str] | None = None) -> Process:
+        return start_program(sys.executable, "-W", "ignore", *arguments, env=env)
+
+    return start

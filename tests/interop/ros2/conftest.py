@@ -6,7 +6,9 @@ import importlib.util
 import json
 import os
 import random
+import shutil
 import socket
+import subprocess
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -92,6 +94,19 @@ def dds_connect(dds_domain: int) -> Iterator[Callable[..., Node]]:
     yield connect
     for node in nodes:
         node.close()
+
+
+@pytest.fixture(scope="session")
+def fastdds_program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build the Fast DDS peer; peers/fastdds_peer.cpp says what it does."""
+    program = tmp_path_factory.mktemp("fastdds") / "fastdds_peer"
+    source = PEERS / "fastdds_peer.cpp"
+    compiler = shutil.which("g++")
+    if compiler is None or not Path("/usr/include/fastdds").is_dir():
+        pytest.skip("Fast DDS is not installed: sudo apt-get install g++ libfastrtps-dev")
+    command = [compiler, "-std=c++17", str(source), "-o", str(program), "-lfastrtps", "-lfastcdr"]
+    subprocess.run(command, check=True)
+    return program
 
 
 @pytest.fixture(scope="session")

@@ -243,3 +243,36 @@ def test_we_see_the_node_of_dora(start, interfaces, dds_domain, dds_connect, wai
     wait_for(lambda: "/dora/dora_node/get_parameters" in node.services())
     assert node.services()["/dora/dora_node/get_parameters"] == ["rcl_interfaces/srv/GetParameters"]
     assert [end.node for end in node.service_servers("/dora/dora_node/get_parameters")] == [dora]
+
+
+@pytest.fixture
+def fastdds(fastdds_program, start_program, dds_domain):
+    """A Fast DDS process with a writer, a reader and a service server, but no ROS nodes."""
+    process = start_program(str(fastdds_program), str(dds_domain))
+    process.event("ready")
+    string = "std_msgs::msg::dds_::String_"
+    assert process.popen.stdin is not None
+    for line in (
+        f"pub one rt/from/fast {string} latched",
+        f"sub two rt/to/fast {string} best_effort",
+        "server three add example_interfaces::srv::dds_::AddTwoInts",
+    ):
+        process.popen.stdin.write(line + "\n")
+        process.popen.stdin.flush()
+        process.event("made")
+    yield process
+    process.end()
+
+
+def test_what_fast_dds_has_shows_under_its_participant(fastdds, dds_connect, wait_for):
+    node = dds_connect("cockpit")
+    wait_for(lambda: "/add" in node.services() and "/to/fast" in node.topics())
+    wait_for(lambda: node.publishers("/from/fast"))
+    (publisher,) = node.publishers("/from/fast")
+    (subscription,) = node.subscriptions("/to/fast")
+    (server,) = node.service_servers("/add")
+    assert {publisher.node, subscription.node, server.node} == {publisher.node}
+    assert publisher.node == NodeName("/_dds", publisher.gid[:12].hex())
+    assert (publisher.type, server.type) == (STRING, "example_interfaces/srv/AddTwoInts")
+    assert publisher.qos.durability is Durability.TRANSIENT_LOCAL
+    assert subscription.qos.reliability is Reliability.BEST_EFFORT
