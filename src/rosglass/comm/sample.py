@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.time import Time
 
@@ -48,6 +48,9 @@ class Sample(NamedTuple):
     def sent(self) -> Time | None:
         """:attr:`sent_ns` as a Time; None when the world does not say."""
         return None if self.sent_ns is None else Time(self.sent_ns)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Sample, (bytes(self.data), *self[1:])
 
     def message(self) -> Message:
         """Return the message; fields are decoded when they are read.

@@ -175,6 +175,9 @@ class _Block:
 
     serdata: int
 
+    #: A view has a hash when what it is of has one, and then it is that of the same bytes.
+    __hash__ = object.__hash__
+
     def __del__(self) -> None:
         keeping().ddsi_serdata_unref(self.serdata)
 

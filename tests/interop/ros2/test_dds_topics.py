@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import pickle
 import time
 from pathlib import Path
 from typing import Any
@@ -274,6 +275,9 @@ def test_big_messages_arrive_whole_and_are_not_copied(dds_connect, wait_for):
         assert np.shares_memory(message.data, np.frombuffer(sample.data, np.uint8))
         assert np.array_equal(message.data, pixels)
         assert message.width == 1920
+    kept = pickle.loads(pickle.dumps(samples[0]))
+    assert kept == samples[0]
+    assert hash(kept.data) == hash(samples[0].data)
 
 
 def test_a_picture_outlives_the_node_that_received_it(dds_connect, wait_for):

@@ -15,8 +15,7 @@ from rosglass.errors import (
 )
 
 pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
-cyclone = pytest.importorskip("rosglass.ros2.cyclone")
-cyclone_qos = pytest.importorskip("rosglass.ros2.cyclone_qos")
+from rosglass.ros2 import cyclone, cyclone_qos
 
 PROFILES = [
     QoS(),
