@@ -45,7 +45,7 @@ os._exit(int(failed))
 _PREFIX = re.compile(r"^\d+\.\d+ \[\w*\]\s+\S+?: ")
 _PLACE = re.compile(r" \((?:CYCLONEDDS_URI\+\d+ )?line \d+\)$")
 _NO_INTERFACE = re.compile(r"(\S+): does not match an available interface")
-_NO_INDEX = "free participant index"
+_NO_INDEX, _CROWD = "free participant index", "120 programs of this machine"
 
 
 @dataclass
@@ -131,14 +131,14 @@ def _create(domain: int, config: str) -> int | None:
     if code >= 0:
         return code
     problem = _trial(domain, config)
-    if _NO_INDEX in problem and "<Peer " not in config:
-        code = _create_quietly(domain, f"{config},{ANY_PORTS}")
+    if _NO_INDEX in problem:
+        problem = f"{_CROWD} are in it already ({problem})"
+        # Those who are to find it without multicast know no other ports.
+        if not any(part in config for part in ("<Peer ", "<AllowMulticast>false")):
+            code = _create_quietly(domain, f"{config},{ANY_PORTS}")
     if code < 0:
         _refuse(domain, config, problem or f"its code is {code}")
-    _log.warning(
-        "120 programs of this machine are in DDS domain %d: this one is found by multicast only",
-        domain,
-    )
+    _log.warning("DDS domain %d: %s, so this one is found by multicast only", domain, problem)
     return code
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib.metadata
 import multiprocessing
 import os
+import socket
+from contextlib import suppress
 
 import pytest
 
@@ -94,6 +96,31 @@ def test_a_domain_that_someone_else_in_this_process_uses_is_joined_with_a_warnin
         assert len(cyclone.guid(participant)) == 16
     finally:
         cyclone.delete(others)
+
+
+@pytest.fixture
+def crowded():
+    """Take every port that the programs of a domain have on this machine."""
+    taken = []
+    for port in range(7400 + 250 * 57 + 10, 7400 + 250 * 57 + 250):
+        one = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        taken.append(one)
+        with suppress(OSError):
+            one.bind(("0.0.0.0", port))
+    yield
+    for one in taken:
+        one.close()
+
+
+def test_one_program_too_many_is_found_by_multicast(crowded, caplog):
+    with join("dds://?domain=57"):
+        assert "120 programs of this machine are in it already" in caplog.text
+        assert "found by multicast only" in caplog.text
+
+
+def test_one_program_too_many_is_refused_where_nobody_could_find_it(crowded):
+    with pytest.raises(rosglass.ConnectionLostError, match="120 programs of this machine"):
+        join("dds://?domain=57&range=localhost")
 
 
 class Package:
