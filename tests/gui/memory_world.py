@@ -62,6 +62,8 @@ class MemoryPublisher(Publisher):
         self.node, self.topic, self.type, self.qos = node, topic, type, qos
         self.kept: list[bytes] = []
         self.closed = False
+        #: For how many nanoseconds the network holds back what is sent.
+        self.held_back = 0
         node.world.publishers.append(self)
         node.world.changed()
 
@@ -83,7 +85,8 @@ class MemoryPublisher(Publisher):
         if subscription.type is None:
             subscription.set_type(self.type)
         now = Time.now().nanoseconds
-        subscription.deliver(Sample(data, "cdr", self.type, now, now, b"me", sequence))
+        sent = now - self.held_back
+        subscription.deliver(Sample(data, "cdr", self.type, now, sent, b"me", sequence))
 
     def subscription_count(self) -> int:
         return sum(s.topic == self.topic for s in self.node.world.subscriptions)

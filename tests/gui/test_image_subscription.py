@@ -306,3 +306,26 @@ def test_a_sink_that_is_destroyed_ends_the_subscription(
         wait(10)
     wait(lambda: not sub.property("subscribed"))
     assert sub.property("videoSink") is None
+
+
+@pytest.mark.parametrize("timeout", [2000, 0])
+def test_pictures_that_a_silent_link_kept_back_are_not_live(
+    running: Any, camera: Any, wait: Any, timeout: int
+) -> None:
+    root = load(running, f'topic: "/cam"; timeout: {timeout}')
+    sub = root.property("sub")
+    wait(lambda: sub.property("subscribed"))
+    camera.publish(picture(RED))
+    wait(lambda: colour(root) == RED)
+    camera.held_back = 10 * 10**9
+    camera.publish(picture(BLUE))
+    if timeout:
+        wait(300)
+        assert colour(root) == RED
+    else:
+        # It was asked to leave pictures on the screen, and says that this one is old.
+        wait(lambda: colour(root) == BLUE)
+        assert sub.property("stale")
+    camera.held_back = 0
+    camera.publish(picture(BLUE))
+    wait(lambda: colour(root) == BLUE and not sub.property("stale"))

@@ -9,8 +9,10 @@ from typing import Any
 
 import pytest
 
-from rosglass.comm import ConnectionState, QoS
+from rosglass import load as load_type
+from rosglass.comm import ConnectionState, QoS, Sample
 from rosglass.comm.qos import Durability, Reliability
+from rosglass.messages import OpaqueType
 
 TEXT = "std_msgs/msg/String"
 
@@ -201,8 +203,6 @@ def test_an_element_may_destroy_itself_in_its_handler(running: Any, chat: Any, w
 def test_a_destroyed_element_is_left_alone_and_holds_nothing(
     running: Any, chat: Any, wait: Any, caplog: Any, capfd: Any
 ) -> None:
-    from rosglass.comm.sample import Sample
-
     root = running.load(
         """QtObject {
             id: root
@@ -437,3 +437,57 @@ def test_every_property_reads_back(running: Any) -> None:
         True,
         0,
     ]
+
+
+def deliver(running: Any, sent: float, received: float, text: str = "x") -> None:
+    """Let the robot's message arrive; times in seconds before now."""
+    (sub,) = running.world.subscriptions
+    kind = load_type(TEXT)
+    sub.set_type(kind)
+    now = time.time_ns()
+    stamps = (now - int(received * 1e9), now - int(sent * 1e9))
+    sub.deliver(Sample(kind.encode({"data": text}), "cdr", kind, *stamps, b"robot", -1))
+
+
+def test_what_a_silent_link_kept_back_is_shown_but_not_as_live(running: Any, wait: Any) -> None:
+    root = load(running, 'topic: "/chat"; messageType: "std_msgs/msg/String"; throttleRate: 0')
+    sub = root.property("sub")
+    wait(lambda: sub.property("subscribed"))
+    # The robot's clock is a minute ahead, which says nothing about how old a message is.
+    deliver(running, -60, 0, "live")
+    wait(lambda: root.property("shown") == "live" and not sub.property("stale"))
+    deliver(running, -50, 0, "kept back")
+    wait(lambda: root.property("shown") == "kept back")
+    assert sub.property("stale")
+    deliver(running, -60, 0, "live again")
+    wait(lambda: root.property("shown") == "live again" and not sub.property("stale"))
+
+
+def test_what_nobody_can_decode_is_not_shown(running: Any, wait: Any, caplog: Any) -> None:
+    root = load(running)
+    sub = root.property("sub")
+    wait(lambda: sub.property("subscribed"))
+    (received,) = running.world.subscriptions
+    received.set_problem("/robot publishes p/msg/Secret, which cannot be decoded")
+    received.deliver(Sample(b"....", "cdr", OpaqueType("p/msg/Secret"), 1, 1, b"robot", 1))
+    wait(lambda: "cannot be decoded" in sub.property("problem"))
+    assert root.property("shown") == "none"
+    assert sub.property("stale")
+    assert "Traceback" not in caplog.text
+
+
+def test_a_topic_much_faster_than_it_is_shown_may_come_some_messages_at_a_time(
+    running: Any, chat: Any, wait: Any
+) -> None:
+    root = load(running, 'topic: "/chat"; throttleRate: 5')
+    sub = root.property("sub")
+    wait(lambda: sub.property("subscribed"))
+    (received,) = running.world.subscriptions
+
+    def patient() -> bool:
+        chat.publish(data="x")
+        return received.patient
+
+    wait(patient)
+    sub.setProperty("throttleRate", 0)
+    wait(lambda: not received.patient)

@@ -17,13 +17,13 @@ class Source:
         return ""
 
     def attend(self) -> None:
-        """Follow :attr:`Subscription.watched`, which has just changed."""
+        """Hand on samples as they come from now on, if :attr:`Subscription.watched`."""
 
     def refresh(self) -> None:
         """Deliver, in the calling thread, what waits to be delivered."""
 
     def inform(self) -> None:
-        """Tell the listeners of the subscription's events soon: there is a new one."""
+        """Look at the subscription soon, without waiting: listeners or patience are new."""
 
     def lost(self) -> int:
         """Return how many samples were sent and have not arrived."""

@@ -84,6 +84,7 @@ class Subscription(Handle):
         self._decodes = callback is not None and raw_callback is None
         self._watchers = threading.Lock()
         self._waiting, self._watched_at = 0, -math.inf
+        self._patient = False
         self._problem = ""
         call = raw_callback
         if call is None and callback is not None:
@@ -138,9 +139,9 @@ class Subscription(Handle):
 
     @property
     def watched(self) -> bool:
-        """Whether somebody is called back or waits, or did so a moment ago."""
+        """Whether somebody waits for samples, to take them or to be called, or did so just now."""
         recent = time.monotonic() - self._watched_at < _MEMORY
-        return self._called or self._waiting > 0 or recent
+        return (self._called and not self._patient) or self._waiting > 0 or recent
 
     @property
     def last_arrival(self) -> float:
@@ -233,6 +234,21 @@ class Subscription(Handle):
         finally:
             self._inbox.dismiss(wake)
             self._watch(-1)
+
+    @property
+    def patient(self) -> bool:
+        """Whether callbacks may come late; see :meth:`set_patient`."""
+        return self._patient
+
+    def set_patient(self, patient: bool) -> None:
+        """Say whether callbacks may come a tenth of a second late, for some samples at a time.
+
+        For callbacks that look at a fast topic now and then: receiving takes a fraction of the time
+        where the middleware need not hand on each sample by itself.
+        """
+        if patient != self._patient:
+            self._patient = patient
+            self.source.inform()
 
     def set_inbox_limit(self, limit: int) -> None:
         """Bound the memory of an inbox that keeps all; 256 MiB unless set.

@@ -116,6 +116,11 @@ class ImageStream(Handle):
         choice = self._choice
         return len(self._node.publishers(choice.topic)) if choice is not None else 0
 
+    def lateness(self, sample: Sample) -> float:
+        """Return by how many seconds a picture was kept back on its way."""
+        subscription = self._subscription
+        return 0.0 if subscription is None else subscription.lateness(sample).seconds
+
     def statistics(self) -> StreamStatistics:
         """Return the counts as of now."""
         with self._wake:

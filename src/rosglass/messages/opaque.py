@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Any
+from typing import Any, NoReturn
 
 from rosglass.errors import InvalidNameError, TypeNotFoundError
 from rosglass.interfaces.names import join_name, split_name
@@ -65,11 +65,17 @@ class OpaqueType(MessageType):
     def __reduce__(self) -> tuple[Any, ...]:
         return OpaqueType, (self.name, self._hash, self.reason)
 
+    def _codec_for(self, *_: Any) -> NoReturn:
+        raise self._unknown()
+
     def __getattr__(self, name: str) -> Any:
         # All that a definition gives is made from attributes that an opaque type does not have.
         if name.startswith("__"):
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        raise TypeNotFoundError(
+        raise self._unknown()
+
+    def _unknown(self) -> TypeNotFoundError:
+        return TypeNotFoundError(
             f"there is no definition of {self.name}, so that its messages are only bytes: "
             f"{self.reason}"
         )

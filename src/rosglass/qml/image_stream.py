@@ -36,12 +36,14 @@ class Picture:
         video: The ``QVideoFrame``; None when nobody wants one.
         image: The ``QImage``; None when nobody wants one.
         received: When it arrived.
+        late: Seconds that it was kept back on its way.
     """
 
     frame: Frame
     video: Any
     image: QtGui.QImage | None
     received: Time
+    late: float = 0.0
 
 
 class Viewer(Protocol):
@@ -175,10 +177,11 @@ class SharedStream(QtCore.QObject):
             frame = convert(image, accept, sample.received)
             picture = to_image(frame)
             video = VideoFrame().finish(frame) if wants_video else None
+        late = self.stream.lateness(sample)
         with self._lock:
             waiting = self._pending is not None
             self._overtaken += waiting
-            self._pending = Picture(frame, video, picture, sample.received)
+            self._pending = Picture(frame, video, picture, sample.received, late)
         if not waiting:
             self._session.executor.post(self._present)
 

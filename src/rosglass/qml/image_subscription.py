@@ -67,7 +67,7 @@ class ImageTransportSubscription(TopicElement):
         self._have: tuple[Node, str, str] | None = None
         self._frame: Any = None
         self._looks: tuple[str, bool, bool] = ("", False, False)
-        self._shown_at = 0.0
+        self._shown_at = self._late = 0.0
         self._blank = True
         self._values: dict[str, Any] = dict(_START)
         #: Whether it takes video frames; otherwise it takes images.
@@ -221,6 +221,8 @@ class ImageTransportSubscription(TopicElement):
         """Show a picture; called by the stream on the GUI thread."""
         if not is_alive(self) or not is_alive(self._sink):
             return
+        if self._timeout and picture.late > self._timeout / 1000:
+            return  # what a silent link kept back would be taken off the screen at once
         if self.wants_video:
             if picture.video is None:
                 return
@@ -229,7 +231,7 @@ class ImageTransportSubscription(TopicElement):
             if picture.image is None:
                 return
             self._sink.present(picture.image)
-        self._shown_at = time.monotonic()
+        self._shown_at, self._late = time.monotonic(), picture.late
         self._frame, self._blank, self._suspect = picture.frame, False, False
         looks = (picture.frame.encoding, picture.frame.has_alpha, picture.frame.is_color)
         if looks != self._looks:
@@ -259,7 +261,7 @@ class ImageTransportSubscription(TopicElement):
         if self._frame is None:
             return True
         timeout = self._timeout or DEFAULT_TIMEOUT
-        return time.monotonic() - self._shown_at > timeout / 1000
+        return time.monotonic() - self._shown_at + self._late > timeout / 1000
 
     def _judge(self) -> None:
         super()._judge()

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 __all__ = ["DEFAULT_QOS", "Subscription"]
 
 _log = logging.getLogger("rosglass.qml")
+#: A topic that comes so much faster than it is shown is received some messages at a time.
+_MUCH_FASTER, _HARDLY_FASTER = 3.0, 1.5
 #: What ``Ros2.QoS()`` gives: matches every publisher, keeps only the newest message.
 DEFAULT_QOS = QoS(depth=1, reliability=Reliability.BEST_EFFORT)
 
@@ -102,7 +104,7 @@ class Subscription(TopicElement):
         self._timeout: int | None = None
         self._sample: Sample | None = None
         self._value: QJSValue | None = None
-        self._shown_at = 0.0
+        self._shown_at = self._late = 0.0
         self._age, self._frequency, self._bandwidth, self._dropped = -1.0, 0.0, 0.0, 0
         self._inner_problem = ""
         self._feed: _Feed | None = None
@@ -358,15 +360,18 @@ class Subscription(TopicElement):
         except DecodeError as error:
             self._say(f"{self._resolved}: a malformed message was refused: {error}")
             return
+        except TypeNotFoundError:
+            return  # only bytes; the subscription's own problem says why
         name = sample.type.definition.name
         new_type = name != self._found_type and not self._wanted_type
         self._found_type = name
         self._sample, self._value = sample, None
         self._shown_at = time.monotonic()
+        self._late = self._lateness(sample)
         self._age = 0.0
         self._suspect = False
         # Every getter answers for the new message before the first signal is sent.
-        was_stale, self._stale = self._stale, False
+        was_stale, self._stale = self._stale, self._is_old()
         if new_type:
             self.messageTypeChanged.emit()
         self.messageChanged.emit()
@@ -374,10 +379,15 @@ class Subscription(TopicElement):
             return
         self._say("")
         self.ageChanged.emit()
-        if was_stale:
+        if was_stale != self._stale:
             self.staleChanged.emit()
         if is_alive(self) and self._has_listeners():
             self.newMessage.emit(self._get_message())
+
+    def _lateness(self, sample: Sample) -> float:
+        """Return by how many seconds a message was kept back on its way."""
+        subscription = self._feed.subscription if self._feed is not None else None
+        return 0.0 if subscription is None else subscription.lateness(sample).seconds
 
     def _has_listeners(self) -> bool:
         """Return whether anybody listens to newMessage; if not, its value need not be built."""
@@ -401,7 +411,8 @@ class Subscription(TopicElement):
         if self._sample is None:
             return True
         timeout = self._get_timeout()
-        return timeout > 0 and time.monotonic() - self._shown_at > timeout / 1000
+        # A link that was silent may hand on what is new only here.
+        return timeout > 0 and time.monotonic() - self._shown_at + self._late > timeout / 1000
 
     def _trust_again(self) -> None:
         # Who latched the message is there: had it changed, the new one would have come.
@@ -430,6 +441,9 @@ class Subscription(TopicElement):
             frequency, bandwidth = statistics.frequency, statistics.bandwidth
             # Thinning out a topic is what throttling is for; only what was wanted can be lost.
             dropped = statistics.dropped if self._throttle == 0 else 0
+            enough = _HARDLY_FASTER if subscription.patient else _MUCH_FASTER
+            fast = frequency > enough * self._throttle
+            subscription.set_patient(self._throttle > 0 and fast)
             if self._inner_problem != subscription.problem:
                 self._inner_problem = subscription.problem
                 self.problemChanged.emit()

@@ -132,7 +132,7 @@ class Reading(Member, Source):
             reader.flush()
 
     def inform(self) -> None:
-        """Tell the listeners soon."""
+        """Look at the subscription soon."""
         self._core.wake()
 
     def lost(self) -> int:
@@ -155,8 +155,8 @@ class Reading(Member, Source):
         except Error as error:
             self.subscription.set_problem(str(error))
         self._tell(publishers)
+        self.attend()
         if idle:
-            self.attend()
             self._tell_losses()
 
     def close(self) -> None:
