@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.comm import NodeName, QoS
+    from rosglass.interfaces import Definition
     from rosglass.ros2.dds_options import DdsOptions
     from rosglass.ros2.graph import Graph
     from rosglass.ros2.middleware import OnReply, OnRequest, OnSample
@@ -28,6 +29,7 @@ class DdsMiddleware(Middleware):
     """A participant in a DDS domain."""
 
     matches_qos = True
+    describes_types = True
 
     def __init__(self, options: DdsOptions) -> None:
         self._options = options
@@ -122,6 +124,14 @@ class DdsMiddleware(Middleware):
         kind = EndpointKind.SERVICE_SERVER
         self._show(EndpointInfo(kind, service, type_name, node, qos, type_hash, replier.gid))
         return replier
+
+    def describe_type(self, endpoint: EndpointInfo, timeout: float) -> Definition | None:
+        """Return the definition that an endpoint announces by XTypes."""
+        from rosglass.ros2.dds_types import announced_definition  # noqa: PLC0415 - rarely needed
+
+        provider = f"wire {endpoint.node} (TypeLookup)"
+        entity = self._joined().entity
+        return announced_definition(entity, endpoint.gid, provider, timeout)
 
     def poll(self) -> None:
         """Do nothing: everything has events."""

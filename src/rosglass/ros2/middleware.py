@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rosglass.comm import EndpointInfo, NodeName, QoS, Status
+    from rosglass.interfaces import Definition
     from rosglass.ros2.graph import Graph
 
 __all__ = [
@@ -199,6 +200,8 @@ class Middleware(ABC):
     """
 
     matches_qos: bool
+    #: Whether :meth:`describe_type` can tell anything.
+    describes_types: bool = False
 
     @abstractmethod
     def open(self, graph: Graph, changed: Callable[[], None]) -> None:
@@ -272,6 +275,20 @@ class Middleware(ABC):
     ) -> Replier:
         """Announce a service server; arguments as in :meth:`create_requester`."""
         raise UnsupportedError(f"{type(self).__name__} has no services")
+
+    def describe_type(self, endpoint: EndpointInfo, timeout: float) -> Definition | None:
+        """Return the definition of a message that a publisher or subscription itself announces.
+
+        Waits for its answer; called on a thread of its own.
+
+        Returns:
+            None when it announces none.
+
+        Raises:
+            TimeoutError: It does not answer within `timeout` seconds.
+            DefinitionError: What it announces is no message of ROS 2.
+        """
+        return None
 
     @abstractmethod
     def poll(self) -> None:

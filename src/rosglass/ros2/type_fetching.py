@@ -23,18 +23,19 @@ from rosglass.errors import (
     NodeClosedError,
     TypeNotFoundError,
 )
-from rosglass.interfaces import TypeCache, cache_folder, rihs01, split_name
+from rosglass.interfaces import TypeCache, announced_hashes, cache_folder, rihs01, split_name
 from rosglass.ros2.announced import nodes_of
 from rosglass.ros2.core import Member
+from rosglass.ros2.type_clients import TypeClients
 from rosglass.ros2.type_descriptions import (
     ACTION_PARTS,
     SERVICE,
-    TYPE,
     WrongHashError,
     compose_action,
     is_hash,
     read_answer,
 )
+from rosglass.ros2.type_lookup import Lookup
 from rosglass.ros2.type_wants import Ask, Trial, Want, spelled
 
 if TYPE_CHECKING:
@@ -45,7 +46,6 @@ if TYPE_CHECKING:
     from rosglass.comm import EndpointInfo
     from rosglass.interfaces import InterfaceDefinition
     from rosglass.ros2.core import Core
-    from rosglass.ros2.service_client import Ros2ServiceClient
     from rosglass.ros2.type_wants import AnyType
 
     Users = Mapping[str, Sequence[EndpointInfo]]
@@ -60,9 +60,8 @@ _TIMEOUT, _HEDGE = 5.0, 1.0
 _GRACE = 1.0
 #: Seconds until a node that did not answer is asked again: at first, and at most (it doubles).
 _AGAIN, _RARELY = 5.0, 60.0
-#: Seconds for which a definition that nobody asks for any more is still fetched, and an unused
-#: connection to a node is kept.
-_INTEREST, _LINGER = 30.0, 5.0
+#: Seconds for which a definition that nobody asks for any more is still fetched.
+_INTEREST = 30.0
 #: Questions on their way at once, and definitions fetched in all: more come only from a graph gone
 #: wild.
 _MAX_ASKED, _MAX_FETCHED = 16, 2000
@@ -83,7 +82,7 @@ class TypeFetcher(Member):
         self._lock = threading.Lock()
         self._wants: dict[tuple[str, str, str], Want] = {}
         self._answers: deque[tuple[Want, bytes | str, Future[Any]]] = deque()
-        self._clients: dict[str, tuple[Ros2ServiceClient, float]] = {}
+        self._clients = TypeClients(core)
         self._cache = TypeCache(cache_folder())
         self._posted = self._closed = False
         self._since = time.monotonic()
@@ -158,12 +157,12 @@ class TypeFetcher(Member):
                 return
             self._closed = True
             wants, self._wants = list(self._wants.values()), {}
-            clients, self._clients = list(self._clients.values()), {}
         for want in wants:
             for promise in want.promises:
                 promise.fail(NodeClosedError(f"node {self._core.name} was closed"))
-        for client, _ in clients:
-            client.close()
+            if want.lookup is not None:
+                want.lookup.join()
+        self._clients.close()
         self._core.remove(self)
 
     def _want(self, name: str, type_hash: str, node: str) -> Want | None:
@@ -217,7 +216,7 @@ class TypeFetcher(Member):
                     return
                 except Exception:
                     _log.exception("fetching %s failed", want.name)
-        self._close_idle(now)
+        self._clients.close_idle(now)
 
     def _advance(self, want: Want, users: Users, now: float) -> None:
         """Do what can be done now to get a definition."""
@@ -273,12 +272,12 @@ class TypeFetcher(Member):
             self._settle(want, DefinitionConflictError(f"{name}: {problem}"), problem)
         elif want.promises and now - self._since > _GRACE and self._fulfil(want, name, ""):
             pass  # nobody announces another version: what the library has is right
-        elif name in users or want.endpoints:
+        elif (name in users or want.endpoints) and not self._looked_up(want, name, users):
             self._give_up(
                 want,
                 f"{nodes_of(users.get(name, want.endpoints))} announces no type hash and sends no "
-                "definitions (ROS 2 Humble and older, or a program that is not built on rcl); "
-                "add the definition with Library.add_path()",
+                "definitions (ROS 2 Humble and older, or a program that is not built on rcl)"
+                f"{_told(want)}; add the definition with Library.add_path()",
                 now,
             )
         return ""
@@ -347,7 +346,23 @@ class TypeFetcher(Member):
                 self._core.types.library.add_version(stored)
                 self._arrived(want, stored)
                 return
-        self._give_up(want, self._reasons(want, mute), now)
+        if not self._looked_up(want, name, users):
+            self._give_up(want, self._reasons(want, mute), now)
+
+    def _looked_up(self, want: Want, name: str, users: Users) -> bool:
+        """Ask the middleware itself; returns whether it has answered well, or may still do so."""
+        if want.lookup is None or want.lookup.age > _RARELY:
+            endpoints = (*want.endpoints, *users.get(name, ()))
+            want.lookup = Lookup(self._core.middleware, name, endpoints, self._kick)
+        found = want.lookup.found
+        if want.lookup.done and found is not None:
+            if found.name == name and want.hash in ("", *announced_hashes(found)):
+                self._core.types.library.add_version(found)
+                self._arrived(want, found)
+                return True
+            want.lookup.found = None
+            want.lookup.problem = f"TypeLookup tells of {found.name} with the hash {rihs01(found)}"
+        return not want.lookup.done
 
     def _reasons(self, want: Want, mute: Sequence[str]) -> str:
         reasons = [f"{trial.node}: {trial.reason}" for trial in want.tried.values()]
@@ -359,7 +374,7 @@ class TypeFetcher(Member):
             )
         if not reasons:
             return "no other node in the graph uses this version of it"
-        return f"asked for its definition: {'; '.join(reasons)}"
+        return f"asked for its definition: {'; '.join(reasons)}{_told(want)}"
 
     def _ask(self, want: Want, key: bytes | str, server: EndpointInfo, name: str) -> None:
         ask = Ask(server, name)
@@ -368,7 +383,7 @@ class TypeFetcher(Member):
             return
         request = {"type_name": name, "type_hash": want.hash, "include_type_sources": True}
         try:
-            call = self._client(server.name).call_async(request, timeout=_TIMEOUT)
+            call = self._clients.get(server.name).call_async(request, timeout=_TIMEOUT)
         except NodeClosedError:
             raise
         except Error as error:
@@ -378,30 +393,6 @@ class TypeFetcher(Member):
         self._asked += 1
         self._core.timers.after(_HEDGE, self._kick)
         call.add_done_callback(lambda done: self._on_answer(want, key, done))
-
-    def _client(self, service: str) -> Ros2ServiceClient:
-        from rosglass.ros2.service_client import Ros2ServiceClient  # noqa: PLC0415
-
-        known = self._clients.get(service)
-        client = Ros2ServiceClient(self._core, service, TYPE) if known is None else known[0]
-        with self._lock:
-            closed = self._closed
-            if not closed:
-                self._clients[service] = (client, time.monotonic())
-        if closed:
-            client.close()
-        return client
-
-    def _close_idle(self, now: float) -> None:
-        with self._lock:
-            idle = [
-                service
-                for service, (client, used) in self._clients.items()
-                if not client.pending and now - used > _LINGER
-            ]
-            clients = [self._clients.pop(service)[0] for service in idle]
-        for client in clients:
-            client.close()
 
     def _on_answer(self, want: Want, key: bytes | str, call: Future[Any]) -> None:
         """Take an answer in the thread that brings it, to look at it in the next round."""
@@ -492,3 +483,8 @@ class TypeFetcher(Member):
         with self._lock:
             if self._wants.get(want.key) is want:
                 del self._wants[want.key]
+
+
+def _told(want: Want) -> str:
+    problem = "" if want.lookup is None else want.lookup.problem
+    return f"; {problem}" if problem else ""

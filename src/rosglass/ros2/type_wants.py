@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from rosglass.comm import EndpointInfo, Promise
     from rosglass.messages import ActionType, MessageType, ServiceType
+    from rosglass.ros2.type_lookup import Lookup
 
 __all__ = ["AnyType", "Ask", "Trial", "Want", "spelled"]
 
@@ -52,6 +53,7 @@ class Want:
         problem: Why it cannot be had; empty while there is hope.
         looked: Whether the library was asked for the version that the graph has.
         stored: Whether the cache on disk was.
+        lookup: What the middleware itself was asked.
     """
 
     def __init__(self, name: str, type_hash: str, node: str) -> None:
@@ -64,6 +66,7 @@ class Want:
         self.tried: dict[bytes | str, Trial] = {}
         self.problem = ""
         self.looked = self.stored = False
+        self.lookup: Lookup | None = None
 
     @property
     def key(self) -> tuple[str, str, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -210,3 +211,64 @@ def test_the_cache_serves_the_next_program(robot, cockpit, wait_for, tmp_path, m
     assert sample.message().name == "Grüße"
     assert subscription.type.definition.source.provider == "cache, from /robot"
     assert subscription.type.rihs01 == first.rihs01
+
+
+# -- types that DDS endpoints announce themselves --------------------------------------------------
+
+
+@pytest.fixture
+def cyclone(start, dds_domain) -> Any:
+    """Cyclone DDS's own Python writers: no ROS node, no type hashes."""
+    pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
+    process = start(str(PEER.with_name("xtypes_peer.py")), json.dumps({"domain": dds_domain}))
+    process.event("ready")
+    yield process
+    process.end()
+
+
+@pytest.mark.peers
+def test_types_that_endpoints_announce_themselves(cyclone, dds_connect, wait_for) -> None:
+    node = dds_connect("cockpit")
+    subscription = node.create_subscription("/state")
+    sample = wait_for(subscription.take, 15, what=lambda: subscription.problem)
+    part = {"a": 1, "xyz": [1.0, 2.0, 3.0]}
+    told = json.dumps(sample.message().to_dict(), default=lambda array: array.tolist())
+    assert json.loads(told) == {
+        "state": 3,
+        "flag": True,
+        "parts": [part, part],
+        "few": [part],
+        "one": part,
+        "pair": [part, part],
+        "name": "hi",
+        "short": "abc",
+        "names": ["x", "yz"],
+        "raw": [1, 255],
+        "letter": 65,
+        "small": -2,
+        "big": 2**63,
+        "wide": 0.5,
+    }
+    definition = subscription.type.definition
+    assert "TypeLookup" in definition.source.provider
+    assert definition.name == STATE
+    assert str(next(f.type for f in definition.fields if f.name == "short")) == "string<=5"
+    assert node.fetch_type(STATE).definition is definition
+
+
+@pytest.mark.peers
+@pytest.mark.parametrize(
+    ("topic", "complaint"),
+    [
+        ("/with_enum", "field color.* an enumeration, which ROS 2 does not have"),
+        ("/rows", "field rows.* sequences of sequences are not ROS 2's"),
+        ("/mutable", "mutable and derived structs are not ROS 2's"),
+        ("/maybe", "field a.* optional fields are not ROS 2's"),
+    ],
+)
+def test_announced_types_that_ros_does_not_have(
+    topic, complaint, cyclone, dds_connect, wait_for
+) -> None:
+    node = dds_connect("cockpit")
+    subscription = node.create_subscription(topic)
+    wait_for(lambda: re.search(complaint, subscription.problem), what=lambda: subscription.problem)
