@@ -43,9 +43,8 @@ class DdsMiddleware(Middleware):
     def open(self, graph: Graph, changed: Callable[[], None]) -> None:
         """Join the domain."""
         self._graph, self._changed = graph, changed
-        participant = Participant(self._options)
+        self._participant = participant = Participant(self._options)
         self._discovery = DdsDiscovery(participant, graph, self._options.humble, changed)
-        self._participant = participant
         changed()
 
     def status(self) -> Status:
