@@ -72,6 +72,8 @@ class Publisher(Handle):
 
         Raises:
             ConversionError: These are no such bytes, or the sample is of another type.
+            UnsupportedError: The world cannot carry big-endian bytes, and without a definition
+                they cannot be turned round.
             NodeClosedError: The publisher is closed.
         """
 

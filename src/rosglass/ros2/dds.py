@@ -29,6 +29,8 @@ class DdsMiddleware(Middleware):
     """A participant in a DDS domain."""
 
     matches_qos = True
+    # Cyclone labels every payload as little endian, but knows no types whose bytes to swap.
+    keeps_byte_order = False
     describes_types = True
 
     def __init__(self, options: DdsOptions) -> None:

@@ -197,9 +197,11 @@ class Middleware(ABC):
 
     Attributes:
         matches_qos: Whether a writer and a reader with incompatible profiles exchange nothing.
+        keeps_byte_order: Whether big-endian payloads arrive as such.
     """
 
     matches_qos: bool
+    keeps_byte_order: bool = True
     #: Whether :meth:`describe_type` can tell anything.
     describes_types: bool = False
 

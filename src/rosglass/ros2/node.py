@@ -131,7 +131,7 @@ class Ros2Node(Node):
         """Return a client; see :meth:`rosglass.comm.Node.create_service_client`."""
         self._core.check_open()
         self._core.types.ensure(type)
-        profile = QoS.services() if qos is None else _profile(qos)
+        profile = _service_profile(qos)
         return Ros2ServiceClient(self._core, self._core.resolve(name, "service"), type, profile)
 
     def create_service_server(
@@ -146,7 +146,7 @@ class Ros2Node(Node):
         """Offer a service; see :meth:`rosglass.comm.Node.create_service_server`."""
         self._core.check_open()
         self._core.types.ensure(type)
-        profile = QoS.services() if qos is None else _profile(qos)
+        profile = _service_profile(qos)
         full = self._core.resolve(name, "service")
         return Ros2ServiceServer(self._core, full, type, callback, profile, executor)
 
@@ -290,6 +290,11 @@ class Ros2Node(Node):
 
     def _node_name(self, node: str | NodeName) -> str:
         return node.full if isinstance(node, NodeName) else self._core.expand(node)
+
+
+def _service_profile(qos: QoS | None) -> QoS:
+    usual = QoS.services()
+    return usual if qos is None else _profile(qos).for_subscription((usual,))
 
 
 def _profile(qos: QoS | int) -> QoS:

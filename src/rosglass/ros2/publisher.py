@@ -18,7 +18,12 @@ from rosglass.comm import (
     PublisherEvents,
     Sample,
 )
-from rosglass.errors import ConversionError, NodeClosedError
+from rosglass.errors import (
+    ConversionError,
+    NodeClosedError,
+    TypeNotFoundError,
+    UnsupportedError,
+)
 from rosglass.ros2.announced import similar
 from rosglass.ros2.core import Member
 from rosglass.ros2.matching import conflict_events, words
@@ -102,11 +107,22 @@ class Ros2Publisher(Publisher, Member):
             raise ConversionError(
                 "", bytes(data), "CDR bytes with their 4-byte encapsulation header", self.type.name
             )
-        if type(payload) is bytes:
+        if not payload[1] & 1 and not self._core.middleware.keeps_byte_order:
+            self._write(self._as_little_endian(payload))
+        elif type(payload) is bytes:
             self._write(payload)
         else:
             # Copied by the middleware: the caller may reuse its buffer at once.
             self._write_parts((payload,))
+
+    def _as_little_endian(self, payload: bytes | memoryview) -> bytes:
+        try:
+            return self.type.encode(self.type.decode(payload, wire="cdr").copy(), wire="cdr")
+        except TypeNotFoundError as error:
+            raise UnsupportedError(
+                f"{self.topic}: big-endian bytes cannot be passed on over DDS, and turning them "
+                f"round needs the type's definition: {error}"
+            ) from error
 
     def assert_liveliness(self) -> None:
         """Show that the publisher is alive; see :meth:`rosglass.comm.Publisher`."""

@@ -188,6 +188,14 @@ def test_what_is_available_is_decided_by_who_is_there(node, middleware, robot):
     assert node.create_subscription("/x", STRING, qos=QoS.system_default()).qos == QoS()
 
 
+def test_services_are_reliable_and_volatile_whatever_is_available(node, middleware):
+    for create in (node.create_service_client, node.create_service_server):
+        more = (id,) if create == node.create_service_server else ()
+        create("/s", "std_srvs/srv/Trigger", *more, qos=QoS.best_available(5))
+    ends = (*middleware.requesters, *middleware.repliers)
+    assert {end.info.qos for end in ends if end.info.name == "/s"} == {QoS(depth=5)}
+
+
 def test_a_publisher_takes_the_limits_that_subscriptions_ask_for(node, asker):
     asker(qos=replace(MANUAL, deadline=Duration.from_seconds(2)))
     publisher = node.create_publisher("/t", STRING, QoS.best_available())
@@ -507,6 +515,20 @@ def test_a_sample_of_another_type_is_not_passed_on(node, middleware):
     assert all(writer.written == [] for writer in middleware.writers)
 
 
+def test_big_endian_bytes_are_turned_round_where_they_cannot_be_passed_on(node, middleware):
+    kind = rosglass.load(TWIST)
+    big = kind.encode({"linear": {"x": 2.0}}, byteorder="big")
+    node.create_publisher("/t", kind).publish_serialized(big)
+    middleware.keeps_byte_order = False
+    node.create_publisher("/t", kind).publish_serialized(bytearray(big))
+    kept, turned = (writer.written[0] for writer in middleware.writers[-2:])
+    assert kept == big
+    assert turned == kind.encode({"linear": {"x": 2.0}})
+    opaque = node.create_publisher("/t", OpaqueType(TWIST))
+    with pytest.raises(rosglass.UnsupportedError, match=r"/t: big-endian bytes .*only bytes"):
+        opaque.publish_serialized(big)
+
+
 def test_an_opaque_type_without_hash_takes_every_version(node, middleware, eventually):
     subscription = node.create_subscription("/t", OpaqueType(SECRET))
     reader = middleware.readers[0]
@@ -555,6 +577,20 @@ def test_publishers_with_different_versions_are_all_understood(
     reader.receive(theirs.encode({"old": 2}), theirs.rihs01)
     assert subscription.take().message().new == 1
     assert subscription.take().message().old == 2
+
+
+def test_a_robot_that_comes_back_with_another_version_is_understood(
+    versions, middleware, eventually
+):
+    node, ours, theirs = versions
+    key = middleware.appear(PUBLISHER, "/t", "pkg/msg/T", ours.rihs01)
+    subscription = node.create_subscription("/t")
+    eventually(lambda: subscription.type == ours)
+    middleware.graph.remove(key)
+    middleware.appear(PUBLISHER, "/t", "pkg/msg/T", theirs.rihs01)
+    eventually(lambda: subscription.type == theirs)
+    assert middleware.readers[-1].type_hash == theirs.rihs01
+    assert subscription.problem == ""
 
 
 def test_a_version_that_nobody_announced_is_understood_when_it_comes(
