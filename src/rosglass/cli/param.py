@@ -150,24 +150,13 @@ def _dump(args: argparse.Namespace) -> int:
 
 
 def _load(args: argparse.Namespace) -> int:
-    from rosglass.ros2.parameter_files import read
-
-    file = read(args.file)
     with connect(args) as node, node.create_parameter_client(args.node) as client:
-        values = file.for_node(client.node)
-        if not values:
-            others = ", ".join(dict.fromkeys(name for name, _ in file.entries)) or "nobody"
-            note(f"{args.file} has nothing for {client.node}; it has entries for {others}")
-            return 1
-        results = client.set(values, timeout=args.timeout)
+        names = client.load(args.file, timeout=args.timeout)
     if args.json:
-        print_json({name: result._asdict() for name, result in results.items()})
-    refused = {name: result for name, result in results.items() if not result.successful}
-    for name, result in refused.items():
-        note(f"{args.node} refuses to set {name}: {result.reason or 'it gives no reason'}")
-    if not args.json:
-        print(f"{len(results) - len(refused)} of {len(results)} parameters set")
-    return 1 if refused else 0
+        print_json(names)
+    else:
+        print(f"{len(names)} parameters of {client.node} set: {', '.join(names)}")
+    return 0
 
 
 def _unknown(client: ParameterClient, args: argparse.Namespace) -> int:

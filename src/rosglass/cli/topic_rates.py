@@ -50,14 +50,16 @@ def measure(args: argparse.Namespace) -> int:
         until = None if args.duration is None else time.monotonic() + args.duration
         with Reasons(node, subscription, args.timeout) as reasons:
             shown = -1
-            while not end.is_set() and not failure:
+            while not end.is_set():
                 left = 1.0 if until is None else until - time.monotonic()
                 if left <= 0:
                     break
                 end.wait(min(1.0, left))
                 with lock:
-                    samples = list(seen)
+                    samples = [s for s in seen if s.delay is not None or not wants_stamp]
                 total = subscription.statistics().received
+                if failure:
+                    break
                 if total == shown or len(samples) < 2:
                     reasons.tell()
                     if shown > 0 and total == shown:
@@ -113,7 +115,7 @@ def _show_bandwidth(samples: list[_Seen]) -> dict[str, Any]:
 
 
 def _show_delay(samples: list[_Seen]) -> dict[str, Any]:
-    delays = [s.delay for s in samples if s.delay is not None]
+    delays = [sample.delay or 0.0 for sample in samples]
     found = {
         "mean": statistics.fmean(delays), "min": min(delays), "max": max(delays),
         "std_dev": statistics.pstdev(delays), "window": len(delays),

@@ -1,0 +1,269 @@
+"""The commands that look at a robot and talk to it, on real middleware."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from rosglass.comm import GoalStatus, QoS
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from rosglass.comm import Node, ServerGoal
+
+FIBONACCI = "example_interfaces/action/Fibonacci"
+
+
+BOTH = pytest.mark.parametrize("robot", ["zenoh", "dds"], indirect=True)
+
+
+@pytest.fixture(scope="module")
+def robot(request: pytest.FixtureRequest) -> Any:
+    """A node with one of everything; yields it."""
+    import rosglass
+
+    if getattr(request, "param", "zenoh") == "zenoh":
+        url = request.getfixturevalue("router").url
+    else:
+        url = f"dds://?domain={request.getfixturevalue('dds_domain')}"
+    with rosglass.connect(url, "robot", "/lab") as node:
+        node.create_publisher("map", "nav_msgs/msg/OccupancyGrid", QoS.latched()).publish(
+            info={"width": 500, "height": 2}, data=[7] * 1000
+        )
+        node.create_publisher("mixed", "std_msgs/msg/String")
+        node.create_subscription("mixed", "std_msgs/msg/Bool", lambda _: None)
+        node.create_publisher("weak", "std_msgs/msg/String", QoS.sensor_data())
+        node.create_subscription("weak", "std_msgs/msg/String", lambda _: None)
+        node.create_service_server(
+            "add",
+            "example_interfaces/srv/AddTwoInts",
+            lambda request: {"sum": request.a + request.b},
+        )
+
+        def count(goal: ServerGoal) -> dict[str, Any]:
+            for number in range(goal.goal.order):
+                goal.publish_feedback(sequence=[number])
+                if goal.wait_for_cancel(0.02):
+                    break
+            return {"sequence": list(range(goal.goal.order))}
+
+        node.create_action_server("count", FIBONACCI, count)
+        node.parameters.declare("speed", 1.5)
+        end = threading.Event()
+        chatter = node.create_publisher("chatter", "geometry_msgs/msg/PointStamped")
+        plain = node.create_publisher("plain", "std_msgs/msg/Bool")
+
+        def talk() -> None:
+            number = 0
+            while not end.wait(0.05):
+                number += 1
+                now = node.now()
+                plain.publish(data=True)
+                stamp = {"sec": now.nanoseconds // 10**9, "nanosec": now.nanoseconds % 10**9}
+                chatter.publish(header={"stamp": stamp}, point={"x": number})
+
+        thread = threading.Thread(target=talk)
+        thread.start()
+        yield node
+        end.set()
+        thread.join()
+
+
+@pytest.fixture
+def run(robot: Node) -> Any:
+    def run(*arguments: str, timeout: float = 30, **env: str) -> tuple[int, str, str]:
+        done = subprocess.run(
+            [sys.executable, "-m", "rosglass", *arguments],
+            env=os.environ | {"ROSGLASS_URL": robot.url} | env,
+            capture_output=True, text=True, timeout=timeout, check=False,
+        )  # fmt: skip
+        return done.returncode, done.stdout, done.stderr
+
+    return run
+
+
+@BOTH
+def test_lists(run: Any) -> None:
+    code, out, err = run("topic", "list", "-t")
+    assert code == 0, err
+    assert "/lab/map [nav_msgs/msg/OccupancyGrid]" in out
+    assert "_action" not in out
+    assert "/lab/count/_action/status" in run("topic", "list", "--hidden")[1]
+    assert run("node", "list")[1].splitlines() == ["/lab/robot"]
+    assert "/lab/add" in run("service", "list")[1].splitlines()
+    assert json.loads(run("action", "list", "--json")[1]) == [
+        {"action": "/lab/count", "types": [FIBONACCI]}
+    ]
+
+
+def test_what_does_not_match_is_shown(run: Any) -> None:
+    _, out, _ = run("topic", "info", "/lab/mixed")
+    assert "types differ" in out
+    _, out, _ = run("topic", "info", "/lab/weak")
+    assert "reliability: reliable requested, best effort offered" in out
+    found = json.loads(run("topic", "info", "/lab/map", "--json")[1])
+    assert found["endpoints"][0]["qos"]["durability"] == "transient_local"
+    code, _, err = run("topic", "info", "/lab/mapp", "--timeout", "0.5")
+    assert code == 1
+    assert "Did you mean /lab/map" in err
+
+
+@BOTH
+def test_echo_cuts_long_arrays_and_gets_latched_messages(run: Any) -> None:
+    code, out, _ = run("topic", "echo", "/lab/map", "--once")
+    assert code == 0
+    assert "'... 1000 in all'" in out
+    assert out.count("7") < 100
+    _, out, _ = run("topic", "echo", "/lab/map", "--once", "--full", "--json")
+    assert json.loads(out)["data"] == [7] * 1000
+    _, out, _ = run("topic", "echo", "/lab/chatter", "-f", "point.x", "-n", "2")
+    first, second = map(float, out.split())
+    assert second == first + 1
+    _, out, _ = run("topic", "echo", "/lab/chatter", "--once", "--raw")
+    assert out.startswith("00010000")
+
+
+@pytest.mark.parametrize("what", ["hz", "bw", "delay"])
+def test_measurements(run: Any, what: str) -> None:
+    code, out, err = run("topic", what, "/lab/chatter", "-d", "1.5", "--json")
+    assert code == 0, err
+    found = json.loads(out.splitlines()[-1])
+    if what == "hz":
+        assert 10 < found["rate"] < 30
+    elif what == "bw":
+        assert 400 < found["bytes_per_second"] < 1600
+    else:
+        assert 0 <= found["mean"] < 1
+
+
+def test_delay_of_what_has_no_stamp(run: Any) -> None:
+    code, _, err = run("topic", "delay", "/lab/plain", "-d", "1")
+    assert code == 1
+    assert "/lab/plain: its messages have no header.stamp" in err
+
+
+def test_publishing(run: Any, robot: Node) -> None:
+    heard = []
+    with robot.create_subscription("/hello", "std_msgs/msg/String", lambda m: heard.append(m.data)):
+        code, out, err = run("topic", "pub", "/hello", "{data: hi}", "--once")
+        assert code == 0, err
+        assert "hi" in out
+        assert heard == ["hi"]
+        code, _, err = run("topic", "pub", "/hello", "{data: [1]}", "--once")
+        assert code == 1
+        assert "data: expected" in err
+        code, _, err = run("topic", "pub", "/hello", "nonsense", "--once")
+        assert code == 1
+        assert "YAML such as '{data: ''}'" in err
+    code, _, err = run("topic", "pub", "/quiet", "std_msgs/msg/Bool", "--once", "--timeout", "1")
+    assert code == 1
+    assert "0 of 1 subscriptions" in err
+
+
+@BOTH
+def test_calling(run: Any) -> None:
+    code, out, err = run("service", "call", "/lab/add", "{a: 2, b: 3}")
+    assert code == 0, err
+    assert out.startswith("sum: 5\n")
+    kind = "example_interfaces/srv/AddTwoInts"
+    _, out, _ = run("service", "call", "/lab/add", kind, "{a: 2}", "--json")
+    assert json.loads(out) == {"sum": 2}
+    code, _, err = run("service", "call", "/lab/add", "{c: 2}")
+    assert code == 1
+    assert "c: expected a field" in err
+    code, _, err = run("service", "call", "/lab/nope", kind, "{}", "--timeout", "1")
+    assert code == 1
+    assert "/lab/nope" in err
+
+
+@BOTH
+def test_sending_goals(run: Any, robot: Node) -> None:
+    code, out, err = run("action", "send", "/lab/count", "{order: 3}", "--feedback")
+    assert code == 0, err
+    assert "feedback:\n  sequence: [2]" in out
+    assert "result:\n  sequence: [0, 1, 2]" in out
+    assert "succeeded" in out
+    process = subprocess.Popen(
+        [sys.executable, "-m", "rosglass", "action", "send", "/lab/count", "{order: 1000}"],
+        env=os.environ | {"ROSGLASS_URL": robot.url, "PYTHONUNBUFFERED": "1"},
+        stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert process.stdout is not None
+    for line in process.stdout:
+        if GoalStatus.EXECUTING.value in line:
+            break
+    process.send_signal(signal.SIGINT)
+    out = process.communicate(timeout=20)[0]
+    assert "canceled" in out
+    assert process.returncode == 1
+
+
+@BOTH
+def test_parameters(run: Any, robot: Node, tmp_path: Path) -> None:
+    assert "  speed" in run("param", "list", "/lab/robot")[1]
+    assert run("param", "get", "/lab/robot", "speed")[1] == "1.5\n"
+    file = tmp_path / "robot.yaml"
+    assert run("param", "dump", "/lab/robot", "-o", str(file))[0] == 0
+    assert run("param", "set", "/lab/robot", "speed", "2.5")[0] == 0
+    assert robot.parameters.get("speed") == 2.5
+    code, _, err = run("param", "set", "/lab/robot", "speed", "fast")
+    assert code == 1
+    assert "refuses to set speed" in err
+    code, _, err = run("param", "load", "/lab/robot", str(file))
+    assert code == 0, err
+    assert robot.parameters.get("speed") == 1.5
+    code, _, err = run("param", "get", "/lab/robot", "sped")
+    assert code == 1
+    assert "Did you mean speed" in err
+    code, _, err = run("param", "get", "/lab/nobody", "x", "--timeout", "1")
+    assert code == 1
+    assert "/lab/nobody" in err
+
+
+def test_doctor(run: Any) -> None:
+    code, out, err = run("doctor", "--json")
+    assert code == 0, out + err
+    found = json.loads(out)
+    texts = [finding["text"] for finding in found if finding["level"] == "warning"]
+    assert any("types differ" in text for text in texts)
+    code, out, _ = run("doctor", ROSGLASS_URL="zenoh://127.0.0.1:1", timeout=40)
+    assert code == 1
+    assert "rosglass router" in out
+
+
+def test_completion(run: Any, tmp_path: Path) -> None:
+    file = tmp_path / "offered"
+    for line, expected in (
+        ("rosglass topic ec", "echo"),
+        ("rosglass topic echo /lab/ma", "/lab/map"),
+        ("rosglass interface show geometry_msgs/msg/Twi", "geometry_msgs/msg/Twist"),
+        ("rosglass param list /lab/", "/lab/robot"),
+    ):
+        run(
+            COMP_LINE=line, COMP_POINT=str(len(line)), _ARGCOMPLETE="1",
+            _ARGCOMPLETE_STDOUT_FILENAME=str(file),
+        )  # fmt: skip
+        assert expected in file.read_text().split("\v")[0].split() + file.read_text().split("\v")
+    assert "rosglass" in run("completion", "bash")[1]
+
+
+def test_waiting_says_for_what(robot: Node) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "rosglass", "topic", "echo", "/lab/nothing"],
+        env=os.environ | {"ROSGLASS_URL": robot.url},
+        stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    time.sleep(4)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=10)
+    assert "nobody publishes" in err
+    assert process.returncode == 0
