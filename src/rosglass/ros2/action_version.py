@@ -14,7 +14,7 @@ from rosglass.ros2.action_types import (
     assemble,
     part,
 )
-from rosglass.ros2.announced import Announced, choose, mismatches, missing
+from rosglass.ros2.announced import Announced, choose, mismatches, missing, rivals
 
 if TYPE_CHECKING:
     from rosglass.comm import EndpointInfo
@@ -87,6 +87,8 @@ class ActionVersion:
             for version, name in self._parts():
                 effect = "its feedback is lost" if name == FEEDBACK else "it gets no goals"
                 problems += mismatches(version, self._peers(name), "offers", effect)
+            servers = [peer for peer in self._peers(SEND_GOAL) if self._send_goal.fits(peer)]
+            problems += rivals(servers, self._name)
         return problems
 
     def _discover(self) -> None:

@@ -14,7 +14,16 @@ if TYPE_CHECKING:
     from rosglass.interfaces.definition import InterfaceDefinition
     from rosglass.ros2.core import Core
 
-__all__ = ["Announced", "choose", "identity", "mismatches", "missing", "nodes_of", "similar"]
+__all__ = [
+    "Announced",
+    "choose",
+    "identity",
+    "mismatches",
+    "missing",
+    "nodes_of",
+    "rivals",
+    "similar",
+]
 
 
 class _Type(Protocol):
@@ -168,6 +177,14 @@ def mismatches(
                 f"{announced.hash}): {effect}; add the robot's definition to the library"
             ] = None
     return list(problems)
+
+
+def rivals(servers: Sequence[EndpointInfo], name: str) -> list[str]:
+    """Say that several nodes offer the same, which does not stop anybody but ends badly."""
+    if len({server.node for server in servers}) < 2:
+        return []
+    told = "each carries out what it is asked, and the first answer is taken; end all but one"
+    return [f"{nodes_of(servers)} all offer {name}: {told}"]
 
 
 def identity(peer: EndpointInfo) -> bytes | str:

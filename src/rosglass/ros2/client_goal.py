@@ -49,7 +49,7 @@ _DEPTH = 10
 #: Seconds that a goal's server may be out of the graph before the goal counts as lost.
 _GRACE = 5.0
 #: The same while this program itself is cut off, when nothing can be said of the server.
-_OUTAGE = 15.0
+_OUTAGE = 10.0
 #: Seconds after which a result is asked for again, when asking failed or an end was announced.
 _AGAIN = 1.0
 #: The same for an end that was announced, from then on.

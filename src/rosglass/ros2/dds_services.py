@@ -25,7 +25,7 @@ from rosglass.ros2 import cyclone_identity
 from rosglass.ros2.dds_discovery_info import parse_user_data
 from rosglass.ros2.dds_identity import UNKNOWN_GUID, Identity, Origin
 from rosglass.ros2.dds_service_ends import Ends, Scheme, names_of, scheme_of
-from rosglass.ros2.middleware import Replier, Requester, RequestId
+from rosglass.ros2.middleware import SERVER_LEFT, Replier, Requester, RequestId
 
 if TYPE_CHECKING:
     from rosglass.comm import NodeName, QoS
@@ -154,7 +154,7 @@ class DdsRequester(Requester):
         """Send a request; return whether nothing more is to be done for it."""
         scheme = self._route()
         if scheme is None:
-            self._fail(number, "its server went away")
+            self._fail(number, SERVER_LEFT)
             return True
         parts: tuple[bytes | bytearray | memoryview, ...] = (data,)
         if scheme is Scheme.HEADER:

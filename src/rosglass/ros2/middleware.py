@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from rosglass.ros2.graph import Graph
 
 __all__ = [
+    "CALL_DROPPED",
+    "SERVER_LEFT",
     "Middleware",
     "OnReply",
     "OnRequest",
@@ -112,6 +114,11 @@ class Reader(Handle):
         return None
 
 
+#: What a requester gives as the reason when nobody will answer any more; by all other reasons
+#: somebody said no.
+SERVER_LEFT, CALL_DROPPED = "its server went away", "its server ended the call without a reply"
+
+
 class OnReply(Protocol):
     """Takes the reply to a request; called on the middleware's thread, must return at once."""
 
@@ -121,7 +128,7 @@ class OnReply(Protocol):
         Args:
             number: What :meth:`Requester.send` returned for the request.
             data: The response with its encapsulation header; None when there is none.
-            error: Why there is none.
+            error: Why there is none, :data:`SERVER_LEFT` and :data:`CALL_DROPPED` among others.
         """
 
 

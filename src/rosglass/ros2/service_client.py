@@ -21,8 +21,17 @@ from rosglass.errors import (
     TimeoutError,  # noqa: A004 - the field's own word
     UnsupportedError,
 )
-from rosglass.ros2.announced import Announced, choose, identity, mismatches, nodes_of, similar
+from rosglass.ros2.announced import (
+    Announced,
+    choose,
+    identity,
+    mismatches,
+    nodes_of,
+    rivals,
+    similar,
+)
 from rosglass.ros2.core import Member
+from rosglass.ros2.middleware import CALL_DROPPED, SERVER_LEFT
 from rosglass.ros2.readiness import Readiness
 from rosglass.ros2.requests import Link, Request
 
@@ -273,7 +282,8 @@ class Ros2ServiceClient(ServiceClient, Member):
             call.fulfil(message)
 
     def _refusal(self, entry: Request, error: str) -> Error:
-        if entry.servers and not entry.servers & self.server_ids():
+        gone = entry.servers and not entry.servers & self.server_ids()
+        if gone or error in (SERVER_LEFT, CALL_DROPPED):
             return self._loss(entry)
         return ServiceError(f"the call of {self.name} failed: {error or 'there is no response'}")
 
@@ -399,6 +409,7 @@ class Ros2ServiceClient(ServiceClient, Member):
         problems = [text for text in problems if text]
         if not problems:
             problems = mismatches(self._announced, servers, "offers", "it cannot be called")
+            problems += rivals(self._fitting(servers), self.name)
         if not problems and self.trouble:
             problems.append(self.trouble)
         return problems

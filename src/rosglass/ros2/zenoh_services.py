@@ -24,7 +24,15 @@ import zenoh
 
 from rosglass.comm import EndpointKind
 from rosglass.errors import ConnectionLostError, NodeClosedError
-from rosglass.ros2.middleware import OnReply, OnRequest, Replier, Requester, RequestId
+from rosglass.ros2.middleware import (
+    CALL_DROPPED,
+    SERVER_LEFT,
+    OnReply,
+    OnRequest,
+    Replier,
+    Requester,
+    RequestId,
+)
 from rosglass.ros2.zenoh_endpoints import Declaration, Owner, direct
 from rosglass.ros2.zenoh_keys import HUMBLE_HASH, NO_ATTACHMENT, Attachment, gid_of, topic_key
 
@@ -131,7 +139,7 @@ class ZenohRequester(Declaration, Requester):
             self._calls[number] = call
         if not servers:
             # Zenoh would end the query without a word.
-            self._fail(number, "its server went away")
+            self._fail(number, SERVER_LEFT)
             return number
         note = Attachment(number, time.time_ns(), self._gid).encode()
 
@@ -168,14 +176,14 @@ class ZenohRequester(Declaration, Requester):
             if gid in call.servers:
                 call.servers.discard(gid)
                 if not call.servers:
-                    self._fail(number, "its server went away")
+                    self._fail(number, SERVER_LEFT)
 
     def poll(self) -> None:
         """End the calls that can get no reply any more; called about once a second."""
         if self._session is not None:
             self._session.is_closed()  # entering Zenoh, Python lets go of callbacks it dropped
         while self._ended:
-            self._fail(self._ended.popleft(), "its server ended the call without a reply")
+            self._fail(self._ended.popleft(), CALL_DROPPED)
         now = time.monotonic()
         for number, call in tuple(self._calls.items()):
             if now > call.deadline:

@@ -12,7 +12,7 @@ import rosglass
 from rosglass.comm import Dispatcher, EndpointKind, Executor, Promise
 from rosglass.interfaces import Library
 from rosglass.ros2 import Ros2Node
-from rosglass.ros2.middleware import RequestId
+from rosglass.ros2.middleware import CALL_DROPPED, SERVER_LEFT, RequestId
 
 SERVER, CLIENT = EndpointKind.SERVICE_SERVER, EndpointKind.SERVICE_CLIENT
 ADD, TRIGGER, SET = (
@@ -318,12 +318,21 @@ def test_a_server_that_comes_back_soon_keeps_its_calls(client, requester, middle
     assert call.result(0).sum == 3
 
 
+@pytest.mark.parametrize("reason", [SERVER_LEFT, CALL_DROPPED])
+def test_a_middleware_that_knows_that_nobody_will_answer(client, requester, reason):
+    requester.linked = True
+    call = client.call_async()
+    requester.reply(1, None, reason)
+    with pytest.raises(rosglass.ConnectionLostError, match="went away before it answered"):
+        call.result(0)
+
+
 def test_a_middleware_that_ends_the_call_of_a_server_that_went(client, requester, middleware):
     requester.linked = True
     key = middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01, gid=b"1" * 16)
     call = client.call_async()
     middleware.graph.remove(key)
-    requester.reply(1, None, "its server went away")
+    requester.reply(1, None, "somehow")
     with pytest.raises(rosglass.ConnectionLostError, match="went away before it answered"):
         call.result(0)
 
@@ -435,6 +444,15 @@ def test_the_version_that_the_server_announces_is_taken(middleware, tmp_path, ev
         assert client.call_async({"c": 1}).cancel()
         assert f"/robot has another definition of {ADD} ({theirs.rihs01}, ours is" in fixed.problem
         assert "add the robot's definition to the library" in fixed.problem
+
+
+def test_several_servers_are_named_and_called(client, connect, eventually, caplog):
+    for name in ("one", "two"):
+        connect(name).create_service_server("/add", ADD, add)
+    told = "/one, /two all offer /add: each carries out what it is asked"
+    eventually(lambda: told in client.problem)
+    assert client.call({"a": 1}).sum == 1
+    eventually(lambda: caplog.text.count(told) == 1)
 
 
 # -- readiness -----------------------------------------------------------------------------------

@@ -1,0 +1,281 @@
+"""Services and actions between our own processes, over every middleware."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import random
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+import rosglass
+from rosglass.comm import CancelAnswer, GoalStatus
+from rosglass.ros2.router import Router
+
+HERE = Path(__file__).parent
+EXAMPLES = HERE.parents[2] / "examples"
+ADD, TRIGGER = "example_interfaces/srv/AddTwoInts", "std_srvs/srv/Trigger"
+FIBONACCI = "example_interfaces/action/Fibonacci"
+WORLDS = {"zenoh": "zenoh", "zenoh client": "zenoh", "dds": "cyclonedds"}
+
+
+@pytest.fixture(scope="module", params=list(WORLDS))
+def new_url(request, router):
+    """Return addresses in one world, each in a domain of its own."""
+    if importlib.util.find_spec(WORLDS[request.param]) is None:
+        pytest.skip(f'needs pip install "rosglass[{request.param.split()[0]}]"')
+    domains = random.SystemRandom().sample(range(1, 101), 10)
+
+    def new_url():
+        domain = domains.pop()
+        if request.param == "dds":
+            return f"dds://?domain={domain}"
+        mode = "client" if request.param.endswith("client") else "peer"
+        return f"{router.url}?domain={domain}&mode={mode}"
+
+    return new_url
+
+
+@pytest.fixture(scope="module")
+def url(new_url):
+    return new_url()
+
+
+@pytest.fixture(scope="module")
+def run_peer(start):
+    def run_peer(what, url, name="peer"):
+        plan = {"url": url, "do": what, "name": name}
+        return start(str(HERE / "peers" / "services_peer.py"), json.dumps(plan))
+
+    return run_peer
+
+
+@pytest.fixture(scope="module")
+def server(url, run_peer):
+    process = run_peer("offer", url)
+    process.event("ready")
+    yield process
+    process.end()
+
+
+@pytest.fixture
+def node(url):
+    with rosglass.connect(url, "cockpit") as node:
+        yield node
+
+
+def count(goal):
+    sequence = [0]
+    while len(sequence) < goal.goal.order and not goal.wait_for_cancel(0.02):
+        sequence.append(len(sequence))
+        goal.publish_feedback(sequence=sequence)
+    return {"sequence": sequence}
+
+
+def test_calls_in_every_way(node, server):
+    client = node.create_service_client("/add")
+    assert client.wait_for_server(10), client.problem
+    assert client.type.name == ADD
+    assert client.call({"a": 1, "b": 2}).sum == 3
+    calls = [client.call_async({"a": value, "b": 1}) for value in range(100)]
+    assert [call.result(10).sum for call in calls] == list(range(1, 101))
+    assert client.problem == ""
+
+
+def test_a_callback_that_fails(node, server):
+    client = node.create_service_client("/fail", TRIGGER)
+    assert client.wait_for_server(10), client.problem
+    with pytest.raises((rosglass.ServiceError, rosglass.TimeoutError)):
+        client.call(timeout=1)
+
+
+def test_goals_in_every_way(node, server):
+    client = node.create_action_client("/count", FIBONACCI)
+    feedback, statuses = [], []
+    goal = client.send_goal(
+        {"order": 5},
+        on_feedback=lambda message: feedback.append(len(message.sequence)),
+        on_status_change=statuses.append,
+    )
+    status, result = goal.result(10)
+    assert status is GoalStatus.SUCCEEDED, client.problem
+    assert list(result.sequence) == [0, 1, 2, 3, 4]
+    assert feedback == [2, 3, 4, 5]
+    assert statuses[0] is GoalStatus.ACCEPTED
+    assert statuses[-1] is GoalStatus.SUCCEEDED
+    with pytest.raises(rosglass.GoalRejectedError):
+        client.send_goal({"order": 1000}).result(10)
+    goals = [client.send_goal({"order": 900}) for _ in range(3)]
+    assert all(goal.acceptance.result(10) for goal in goals)
+    assert goals[0].cancel().result(10) == CancelAnswer((goals[0].id,))
+    assert goals[0].result(10).status is GoalStatus.CANCELED
+    earlier = client.cancel_before(goals[1].accepted).result(10)
+    assert earlier.accepted == (goals[1].id,)
+    assert client.cancel_all().result(10).accepted == (goals[2].id,)
+    assert {goal.result(10).status for goal in goals} == {GoalStatus.CANCELED}
+
+
+def test_the_other_way_round(node, url, run_peer):
+    """The other program calls before we offer anything, and is answered when we do."""
+    peer = run_peer("use", url, "user")
+    time.sleep(0.3)
+    node.create_service_server("/my/add", ADD, lambda request: {"sum": request.a + request.b})
+    node.create_action_server("/my/count", FIBONACCI, count)
+    assert peer.event("sums") == list(range(1, 21))
+    assert peer.event("goal") == ["succeeded", [0, 1, 2, 3], [2, 3, 4]]
+    peer.end()
+
+
+def test_the_status_of_goals_is_there_for_late_listeners(node, url, wait_for):
+    node.create_action_server("/late", FIBONACCI, count)
+    client = node.create_action_client("/late", FIBONACCI)
+    goal = client.send_goal({"order": 2})
+    assert goal.result(10).status is GoalStatus.SUCCEEDED
+    with rosglass.connect(url, "late") as other:
+        topic, kind = "/late/_action/status", "action_msgs/msg/GoalStatusArray"
+        subscription = other.create_subscription(topic, kind, qos=rosglass.QoS.latched())
+        sample = subscription.wait(10)
+        assert sample is not None, subscription.problem
+        entry = sample.message().status_list[0]
+        assert (bytes(entry.goal_info.goal_id.uuid), entry.status) == (goal.id, 4)
+        assert other.actions()["/late"] == [FIBONACCI]
+
+
+def test_a_server_that_is_killed_at_work(new_url, run_peer):
+    """Its calls and goals end soon, with an error, and the client is ready for the next server."""
+    url = new_url()
+    server = run_peer("offer", url, "victim")
+    server.event("ready")
+    with rosglass.connect(url, "cockpit") as node:
+        client = node.create_service_client("/never", TRIGGER)
+        actions = node.create_action_client("/count", FIBONACCI)
+        assert client.wait_for_server(10), client.problem
+        assert actions.wait_for_server(10), actions.problem
+        call, goal = client.call_async(timeout=60), actions.send_goal({"order": 900}, timeout=60)
+        server.event("asked")
+        assert goal.acceptance.result(10)
+        server.end()
+        # Zenoh notices at once. DDS waits 10 s to hear of a participant again; and where nobody
+        # else is left, the node itself may be cut off, which a goal may outlive.
+        dds = url.startswith("dds")
+        with pytest.raises(rosglass.ConnectionLostError, match="went away"):
+            call.result(17 if dds else 5)
+        with pytest.raises(rosglass.ConnectionLostError, match="went away"):
+            goal.result(15 if dds else 8)
+        assert goal.status is GoalStatus.LOST
+        assert not client.ready
+        again = run_peer("offer", url, "victim")
+        again.event("ready")
+        assert actions.send_goal({"order": 2}).result(10).status is GoalStatus.SUCCEEDED
+        again.end()
+
+
+def test_closing_a_server_tells_its_clients(node, url):
+    with rosglass.connect(url, "closing") as other:
+        other.create_action_server("/closing", FIBONACCI, count)
+        client = node.create_action_client("/closing", FIBONACCI)
+        goal = client.send_goal({"order": 900})
+        assert goal.acceptance.result(10), client.problem
+        time.sleep(0.2)  # the request for the result is on its way
+    assert goal.result(10).status is GoalStatus.ABORTED
+
+
+def test_ctrl_c_ends_a_call(url, server, run_peer, wait_for):
+    caller = run_peer("wait", url, "caller")
+    caller.event("waiting")
+    server.event("asked")
+    os.kill(caller.pid, signal.SIGINT)
+    assert caller.event("interrupted", timeout=5) < 2
+    assert caller.popen.wait(5) == 0
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
+def test_clients_stay_behind_when_a_process_forks(node, server):
+    client = node.create_service_client("/add", ADD)
+    assert client.call({"a": 1}).sum == 1
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            client.call({"a": 1})
+        except rosglass.NodeClosedError as error:
+            os.write(writing, str(error).encode())
+        finally:
+            os._exit(0)
+    os.close(writing)
+    with os.fdopen(reading) as pipe:
+        assert "does not work after a fork" in pipe.read()
+    os.waitpid(child, 0)
+    assert client.call({"a": 2}).sum == 2
+
+
+@pytest.mark.parametrize("mode", ["peer", "client"])
+def test_a_goal_survives_a_router_that_is_restarted(free_port, run_peer, wait_for, mode):
+    listen = f"tcp/127.0.0.1:{free_port}"
+    url = f"zenoh://127.0.0.1:{free_port}?mode={mode}"
+    with Router(listen):
+        server = run_peer("offer", url, "survivor")
+        server.event("ready")
+        node = rosglass.connect(url, "cockpit")
+        actions = node.create_action_client("/count", FIBONACCI)
+        add = node.create_service_client("/add", ADD)
+        feedback = []
+        goal = actions.send_goal(
+            {"order": 150}, on_feedback=lambda message: feedback.append(len(message.sequence))
+        )
+        assert goal.acceptance.result(10), actions.problem
+        wait_for(lambda: feedback, what="feedback")
+    time.sleep(0.5)
+    with Router(listen):
+        status, result = goal.result(15)
+        assert status is GoalStatus.SUCCEEDED
+        assert len(result.sequence) == 150
+        assert feedback[-1] == 150
+        assert len(set(feedback)) == len(feedback)
+        assert add.call({"a": 1, "b": 1}).sum == 2
+        node.close()
+    server.end()
+
+
+@pytest.mark.parametrize(
+    ("server", "client", "told"),
+    [
+        (
+            "service_server.py",
+            "service_client.py",
+            ["1 + 2 = 3", "20 + 22 = 42", "in asyncio: [0, 2, 4, 6, 8]"],
+        ),
+        (
+            "action_server.py",
+            "action_client.py",
+            [
+                "so far: [0, 1, 1]",
+                "so far: [0, 1, 1, 2]",
+                "so far: [0, 1, 1, 2, 3]",
+                "so far: [0, 1, 1, 2, 3, 5]",
+                "succeeded [0, 1, 1, 2, 3, 5]",
+                "cancelling 1 goal ",
+                "canceled",
+                "the server of /fibonacci does not accept goal ",
+            ],
+        ),
+    ],
+    ids=["services", "actions"],
+)
+def test_the_examples(url, start, wait_for, server, client, told):
+    serving = start(str(EXAMPLES / server), url)
+    wait_for(lambda: "ready; Ctrl-C ends it\n" in serving.output, what=serving.output)
+    using = start(str(EXAMPLES / client), url)
+    assert using.popen.wait(30) == 0, using.output
+    lines = [line.rstrip("\n") for line in using.output]
+    if server == "action_server.py":
+        assert lines[-1].startswith(told[-1])
+        lines, told = lines[:-1], told[:-1]
+    assert lines == told
+    os.kill(serving.pid, signal.SIGINT)
+    assert serving.popen.wait(5) == 0
+    assert serving.output[-1] == "bye\n"
