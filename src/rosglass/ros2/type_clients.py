@@ -6,7 +6,7 @@ import threading
 import time
 from typing import TYPE_CHECKING
 
-from rosglass.ros2.type_descriptions import TYPE
+from rosglass.ros2.type_descriptions import service_type
 
 if TYPE_CHECKING:
     from rosglass.ros2.core import Core
@@ -39,7 +39,10 @@ class TypeClients:
         from rosglass.ros2.service_client import Ros2ServiceClient  # noqa: PLC0415 - when needed
 
         known = self._known.get(service)
-        client = Ros2ServiceClient(self._core, service, TYPE) if known is None else known[0]
+        if known is None:
+            client = Ros2ServiceClient(self._core, service, service_type())
+        else:
+            client = known[0]
         with self._lock:
             closed = self._closed
             if not closed:

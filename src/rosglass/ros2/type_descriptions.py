@@ -29,25 +29,25 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from rosglass.interfaces import Definition, InterfaceDefinition
-    from rosglass.messages import Message
+    from rosglass.messages import Message, ServiceType
     from rosglass.ros2.core import Core
     from rosglass.ros2.types import Types
 
 __all__ = [
     "ACTION_PARTS",
     "SERVICE",
-    "TYPE",
     "TypeDescriptionServer",
     "WrongHashError",
     "compose_action",
     "describe",
     "is_hash",
     "read_answer",
+    "service_type",
 ]
 
-#: The service's name below the node's, and its type.
+#: The service's name below the node's.
 SERVICE = "get_type_description"
-TYPE = "type_description_interfaces/srv/GetTypeDescription"
+_TYPE = "type_description_interfaces/srv/GetTypeDescription"
 #: What of an action is in the graph, with hashes; the action itself is not.
 ACTION_PARTS = ("_SendGoal", "_GetResult", "_FeedbackMessage")
 
@@ -58,6 +58,15 @@ _VERBATIM = "rosglass"
 _HASH = re.compile(r"RIHS[0-9]{2}_[0-9a-f]{64}")
 #: Largest answer that is read, in bytes; those of real types have less than a hundredth of it.
 _MAX_ANSWER = 8 << 20
+
+
+def service_type() -> ServiceType:
+    """Return the type of the service, whatever the node's own library has."""
+    from rosglass.messages import ServiceType, load  # noqa: PLC0415 - numpy
+
+    found = load(_TYPE)
+    assert isinstance(found, ServiceType)
+    return found
 
 
 def is_hash(text: object) -> bool:
@@ -83,7 +92,8 @@ class TypeDescriptionServer(Handle):
 
         core = self._core
         name = f"{core.name.full}/{SERVICE}"
-        server = Ros2ServiceServer(core, name, TYPE, self._answer, executor=core.own_dispatcher)
+        kind = service_type()
+        server = Ros2ServiceServer(core, name, kind, self._answer, executor=core.own_dispatcher)
         self._server = server
         if self._closed:
             server.close()

@@ -13,7 +13,7 @@ import pytest
 
 import rosglass
 from rosglass.errors import TypeNotFoundError
-from rosglass.interfaces import Library
+from rosglass.interfaces import Library, MemoryProvider
 from rosglass.messages import OpaqueType
 
 if TYPE_CHECKING:
@@ -211,6 +211,31 @@ def test_the_cache_serves_the_next_program(robot, cockpit, wait_for, tmp_path, m
     assert sample.message().name == "Grüße"
     assert subscription.type.definition.source.provider == "cache, from /robot"
     assert subscription.type.rihs01 == first.rihs01
+
+
+# -- peers that send no definitions ----------------------------------------------------------------
+
+
+@pytest.mark.peers
+@pytest.mark.parametrize(
+    ("kind", "complaint"),
+    [
+        ("sdk", "/sdk/talker0 has no get_type_description service"),
+        ("dora-humble", "/dora/dora_node announces no type hash and sends no definitions"),
+    ],
+)
+def test_peers_that_send_none(kind, complaint, router, start_peer, wait_for) -> None:
+    process = start_peer(kind, router, publish={"/words": "std_msgs/msg/String"}, domain=9)
+    with rosglass.connect(
+        f"{router.url}?domain=9", "bare", library=Library(MemoryProvider())
+    ) as node:
+        samples: list[Any] = []
+        subscription = node.create_subscription("/words", raw_callback=samples.append)
+        wait_for(lambda: complaint in subscription.problem, 20, what=lambda: subscription.problem)
+        assert isinstance(wait_for(lambda: samples)[0].type, OpaqueType)
+        with pytest.raises(TypeNotFoundError, match=complaint):
+            node.fetch_type("std_msgs/msg/String")
+    process.end()
 
 
 # -- types that DDS endpoints announce themselves --------------------------------------------------

@@ -1,0 +1,161 @@
+"""What a node tells others about types: ~/get_type_description."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+import rosglass
+from rosglass.errors import NodeClosedError
+from rosglass.interfaces import (
+    ActionDefinition,
+    Library,
+    MemoryProvider,
+    add_type_sources,
+    announced_hashes,
+    parse_message,
+    parse_type_description,
+    rihs01,
+    type_description,
+)
+from rosglass.messages import MessageType
+from rosglass.ros2.type_descriptions import TypeDescriptionServer, compose_action, describe
+from rosglass.ros2.types import Types
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+TRIGGER = "type_description_interfaces/srv/GetTypeDescription"
+GO = "my_msgs/action/Go"
+SUFFIXES = ("_SendGoal", "_GetResult", "_FeedbackMessage")
+
+
+@pytest.fixture
+def library() -> Library:
+    library = Library()
+    library.add_text("my_msgs/msg/Part", "uint8 KEPT=1 # yes\nint8 a")
+    library.add_text("my_msgs/srv/Ask", "my_msgs/Part part\n---\nbool yes")
+    library.add_text(GO, "uint8 FAST=1\nuint8 speed\n---\nint8 b\n---\nfloat32 left")
+    return library
+
+
+@pytest.fixture
+def types(library: Library) -> Types:
+    return Types(library, "fake://")
+
+
+@pytest.fixture
+def ask(connect: Callable[..., Any], library: Library) -> Callable[..., Any]:
+    """Ask a node over the (fake) network, as other nodes do."""
+    server = connect("robot")
+    server._core.types._library = library
+    offered = TypeDescriptionServer(server._core)
+    offered.open()
+    client = connect("asker").create_service_client("/robot/get_type_description", TRIGGER)
+
+    def ask(name: str, type_hash: str = "", **more: Any) -> Any:
+        return client.call({"type_name": name, "type_hash": type_hash, **more})
+
+    ask.node = server  # type: ignore[attr-defined]
+    ask.offered = offered  # type: ignore[attr-defined]
+    return ask
+
+
+@pytest.mark.parametrize(
+    "name", ["my_msgs/msg/Part", "my_msgs/Part", "my_msgs/srv/Ask", GO, f"{GO}_SendGoal"]
+)
+def test_by_name_and_by_hash(name: str, ask: Callable[..., Any], library: Library) -> None:
+    definition = library.definition(name)
+    for type_hash in ("", *announced_hashes(definition)):
+        answer = ask(name, type_hash)
+        assert answer.successful
+        assert answer.failure_reason == ""
+        told = answer.type_description.to_dict()
+        assert told == type_description(definition)
+        sources = [source.to_dict() for source in answer.type_sources]
+        found = add_type_sources(parse_type_description(told), sources, verbatim=True)
+        assert rihs01(found) == rihs01(definition)
+
+
+def test_texts_come_when_they_are_asked_for(ask: Callable[..., Any]) -> None:
+    assert ask("my_msgs/srv/Ask").type_sources[0].encoding == "srv"
+    (text,) = (s for s in ask("my_msgs/srv/Ask").type_sources if s.type_name == "my_msgs/msg/Part")
+    assert text.raw_file_contents == "uint8 KEPT=1 # yes\nint8 a"
+    assert len(ask("my_msgs/srv/Ask", include_type_sources=False).type_sources) == 0
+    # The constants of a goal are in the text of its action only.
+    names = [s.type_name for s in ask(f"{GO}_SendGoal").type_sources]
+    assert names.count(GO) == 1
+
+
+def test_types_in_use_need_no_name(ask: Callable[..., Any]) -> None:
+    """A type that no library has, given as an object; rcl is asked by the hash alone, too."""
+    kind = MessageType(parse_message("int64 secret", "my_msgs/Secret"))
+    assert not ask("", kind.rihs01).successful
+    ask.node.create_publisher("/secret", kind)  # type: ignore[attr-defined]
+    for name in ("", "my_msgs/msg/Secret", "other_msgs/msg/Spelling"):
+        answer = ask(name, kind.rihs01)
+        assert answer.successful
+        assert answer.type_description.type_description.type_name == "my_msgs/msg/Secret"
+
+
+@pytest.mark.parametrize(
+    ("name", "type_hash", "reason"),
+    [
+        ("my_msgs/msg/Other", "", "/robot: no definition of my_msgs/msg/Other"),
+        ("my_msgs/msg/Part", "RIHS01_" + "0" * 64, "/robot: no definition .* has the hash"),
+        ("my_msgs/msg/Part", "md5:abc", "/robot: .* is no RIHS01 hash"),
+        ("../../etc/passwd", "", "/robot: .* is not a type name"),
+        ("", "RIHS01_" + "0" * 64, "/robot: no type with the hash .* is in use"),
+        ("", "", "/robot: neither a type's name nor its hash"),
+    ],
+)
+def test_failures_have_a_reason(
+    name: str, type_hash: str, reason: str, ask: Callable[..., Any]
+) -> None:
+    answer = ask(name, type_hash)
+    assert not answer.successful
+    assert re.match(reason, answer.failure_reason)
+    assert answer.type_description.to_dict()["type_description"]["type_name"] == ""
+
+
+def test_closing(ask: Callable[..., Any]) -> None:
+    offered = ask.offered  # type: ignore[attr-defined]
+    offered.close()
+    offered.close()
+    with pytest.raises(rosglass.Error):
+        ask("my_msgs/msg/Part")
+    node = ask.node  # type: ignore[attr-defined]
+    node.close()
+    with pytest.raises(NodeClosedError):
+        TypeDescriptionServer(node._core).open()
+
+
+def test_a_bare_library_is_no_obstacle(connect: Callable[..., Any]) -> None:
+    """The node's own services need types that its library may not have."""
+    server = connect("robot")
+    server._core.types._library = Library(MemoryProvider())
+    TypeDescriptionServer(server._core).open()
+    client = connect("asker").create_service_client("/robot/get_type_description", TRIGGER)
+    assert "no definition" in client.call({"type_name": "std_msgs/msg/String"}).failure_reason
+
+
+def test_every_part_of_an_action_is_checked(library: Library, types: Types) -> None:
+    parts = {
+        suffix: parse_type_description(
+            describe(types, f"{GO}{suffix}", "", sources=False)["type_description"]
+        )
+        for suffix in SUFFIXES
+    }
+    action = compose_action(GO, parts)
+    assert isinstance(action, ActionDefinition)
+    assert rihs01(action) == rihs01(library.definition(GO))
+    other = Library()
+    other.add_text(GO, "uint8 speed\n---\nint8 b\n---\nfloat64 left")
+    mixed = parts | {"_FeedbackMessage": other.definition(f"{GO}_GetResult")}
+    with pytest.raises(rosglass.Error, match="do not mention my_msgs/action/Go_Feedback"):
+        compose_action(GO, mixed)
+    mixed = parts | {"_GetResult": other.definition("std_srvs/srv/Trigger")}
+    with pytest.raises(rosglass.Error, match="do not mention my_msgs/action/Go_Result"):
+        compose_action(GO, mixed)
