@@ -41,8 +41,8 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
-    "BagError",
     "ActionType",
+    "BagError",
     "ConnectionLostError",
     "ConversionError",
     "CyclicTypeError",
@@ -86,7 +86,17 @@ _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 
 #: Reached as attributes, too: `rosglass.comm.IMMEDIATE`.
-_PACKAGES = ("bags", "comm", "connection", "errors", "interfaces", "images", "messages", "qml", "ros2")
+_PACKAGES = (
+    "bags",
+    "comm",
+    "connection",
+    "errors",
+    "interfaces",
+    "images",
+    "messages",
+    "qml",
+    "ros2",
+)
 
 
 def __getattr__(name: str) -> object:
