@@ -264,7 +264,8 @@ class Ros2ActionClient(ActionClient, Member):
             self._speak(self._version.types)
         problem = "; ".join(self._conflicts())
         if problem and problem != self._warned:
-            _log.warning("%s: %s", self.name, problem)
+            level = logging.INFO if self._version.pending else logging.WARNING
+            _log.log(level, "%s: %s", self.name, problem)
         self._warned = problem
         self._readiness.update()
         with self._lock:

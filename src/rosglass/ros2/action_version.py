@@ -50,6 +50,7 @@ class ActionVersion:
         self._fixed = wanted is not None and not isinstance(wanted, str)
         self.types: ActionTypes | None = None
         self._choice = self._missing = self._failure = ""
+        self._fetching = False
         self._send_goal: Announced[ServiceType]
         self._get_result: Announced[ServiceType]
         self._feedback: Announced[MessageType]
@@ -76,6 +77,14 @@ class ActionVersion:
             self._failure = str(error)
         return self.types is not before
 
+    @property
+    def pending(self) -> bool:
+        """Whether a definition is being fetched from the robot."""
+        types = self.types
+        return self._fetching or (
+            types is not None and any(version.pending for version, _ in self._parts())
+        )
+
     def conflicts(self) -> list[str]:
         """Say what a person has to mend."""
         types = self.types
@@ -98,14 +107,14 @@ class ActionVersion:
         example = f"create_action_client({self._name!r}, {{}})"
         name, self._choice = choose(names, current, example)
         if not name or name == current:
-            self._missing = ""
+            self._missing, self._fetching = "", False
             return
         try:
             found = self._core.types.action(name)
         except Error as error:
-            self._missing, _ = missing(self._core, name, "", servers, error)
+            self._missing, self._fetching = missing(self._core, name, "", servers, error)
         else:
-            self._missing = ""
+            self._missing, self._fetching = "", False
             self._begin(found)
 
     def _begin(self, action: ActionType) -> None:

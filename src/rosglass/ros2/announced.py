@@ -53,6 +53,7 @@ class Announced(Generic[_T]):
         hashes: The hashes that peers announce it by; see
             :func:`rosglass.interfaces.hashes.announced_hashes`.
         failure: Why the announced version cannot be had, in words; empty when all is well.
+        pending: Whether it is being fetched from the robot.
     """
 
     def __init__(
@@ -63,6 +64,7 @@ class Announced(Generic[_T]):
         self.type: _T | None = None
         self.hash, self.hashes = "", frozenset[str]()
         self.failure = ""
+        self.pending = False
         if given is not None:
             self._take(given)
 
@@ -82,7 +84,7 @@ class Announced(Generic[_T]):
         hashes = {peer.type_hash for peer in peers if peer.type == name and peer.type_hash}
         current = self.type if self.type is not None and self.type.name == name else None
         if current is not None and (len(hashes) != 1 or hashes <= self.hashes):
-            self._failed, self.failure = None, ""
+            self._clear()
             return False
         wanted = (name, hashes.pop() if len(hashes) == 1 else "")
         if wanted == self._failed and not retry:
@@ -90,10 +92,10 @@ class Announced(Generic[_T]):
         try:
             found = self._load(*wanted)
         except Error as error:
-            self.failure, pending = missing(self._core, *wanted, peers, error)
-            self._failed = None if pending else wanted
+            self.failure, self.pending = missing(self._core, *wanted, peers, error)
+            self._failed = None if self.pending else wanted
             return False
-        self._failed, self.failure = None, ""
+        self._clear()
         self._take(found)
         return True
 
@@ -104,6 +106,9 @@ class Announced(Generic[_T]):
             and peer.type == self.type.name
             and (not peer.type_hash or peer.type_hash in self.hashes)
         )
+
+    def _clear(self) -> None:
+        self._failed, self.failure, self.pending = None, "", False
 
     def _take(self, found: _T) -> None:
         hashes = announced_hashes(found.definition)

@@ -339,7 +339,8 @@ class Ros2ServiceClient(ServiceClient, Member):
         servers = self._servers()
         problem = "; ".join(self._conflicts(servers))
         if problem and problem != self._warned and not self._quiet:
-            _log.warning("%s: %s", self.name, problem)
+            level = logging.INFO if self._announced.pending else logging.WARNING
+            _log.log(level, "%s: %s", self.name, problem)
         self._warned = problem
         self._readiness.update()
         if self._queue:
