@@ -39,6 +39,9 @@ __all__ = ["Library"]
 #: ROS 1's md5 sum of those who take any type.
 ANY_HASH = "*"
 
+#: Unknown types of which it is remembered what to say: looking for similar names takes long.
+_MAX_EXPLAINED = 1000
+
 #: Environment variable with the names of preferred providers.
 PREFER_VARIABLE = "ROSGLASS_PREFER_DEFINITIONS"
 
@@ -73,6 +76,7 @@ class Library:
         self._lock = threading.RLock()
         self._loaded: dict[tuple[int, str, str], InterfaceDefinition] = {}
         self._resolvers: dict[int, Resolver] = {}
+        self._explained: dict[tuple[str, int], str] = {}
         self._versions = Versions(lambda name: self._find(name, 2, self._chain, check=False))
         self._preferred: list[str] = []
         if prefer:
@@ -167,6 +171,7 @@ class Library:
             if self._folders not in self._chain:
                 self._chain.append(self._folders)
             self._folders.add(path)
+            self._explained.clear()
 
     def add_text(
         self, name: str, text: str, ros: int = 2, source: str = "wire", *, encoding: str = ""
@@ -211,6 +216,7 @@ class Library:
         """
         check_definition(definition)
         with self._lock:
+            self._explained.clear()
             for nested in _nested(definition).values():
                 self._add_one(nested)
             self._add_one(definition)
@@ -233,6 +239,7 @@ class Library:
             DefinitionError: Something that it needs is missing.
         """
         with self._lock:
+            self._explained.clear()
             return self._versions.add(definition)
 
     def version(self, name: str, hash: str = "") -> InterfaceDefinition | None:
@@ -418,6 +425,15 @@ class Library:
             self._wire.add(definition)
 
     def _not_found(self, name: str, ros: int) -> str:
+        """Explain that a type is unknown, in the same words until something is added."""
+        text = self._explained.get((name, ros))
+        if text is None:
+            if len(self._explained) >= _MAX_EXPLAINED:
+                self._explained.clear()
+            text = self._explained[name, ros] = self._explain(name, ros)
+        return text
+
+    def _explain(self, name: str, ros: int) -> str:
         import difflib  # noqa: PLC0415 - only needed to explain an error
 
         looked = [text for text in (p.describe(ros) for p in self._chain) if text]

@@ -31,6 +31,7 @@ class DdsMiddleware(Middleware):
     matches_qos = True
     # Cyclone labels every payload as little endian, but knows no types whose bytes to swap.
     keeps_byte_order = False
+    announces_requests = True
     describes_types = True
 
     def __init__(self, options: DdsOptions) -> None:

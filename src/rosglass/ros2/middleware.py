@@ -209,6 +209,8 @@ class Middleware(ABC):
 
     matches_qos: bool
     keeps_byte_order: bool = True
+    #: Whether a service's hash in the graph may be that of its request's type.
+    announces_requests: bool = False
     #: Whether :meth:`describe_type` can tell anything.
     describes_types: bool = False
 

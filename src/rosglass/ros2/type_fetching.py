@@ -374,7 +374,13 @@ class TypeFetcher(Member):
             )
         if not reasons:
             return "no other node in the graph uses this version of it"
-        return f"asked for its definition: {'; '.join(reasons)}{_told(want)}"
+        told = f"asked for its definition: {'; '.join(reasons)}{_told(want)}"
+        if self._core.middleware.announces_requests and "/msg/" not in want.name:
+            told += (
+                ". Over DDS, ROS 2 nodes announce a service by the hash of its request, and do not "
+                "find its type by that when asked: add the definition with Library.add_path()"
+            )
+        return told
 
     def _ask(self, want: Want, key: bytes | str, server: EndpointInfo, name: str) -> None:
         ask = Ask(server, name)

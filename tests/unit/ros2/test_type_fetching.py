@@ -300,6 +300,20 @@ def test_what_nodes_answer_is_told(join: Callable[..., Ros2Node]) -> None:
     assert "/second has no get_type_description service" in told
 
 
+def test_why_dds_nodes_do_not_know_their_services(join: Callable[..., Ros2Node]) -> None:
+    """rcl looks types up by the service's own hash, which nobody announces over DDS."""
+    answer(join("robot", serves=False), lambda _: NO)
+    user = join("cockpit", serves=False)
+    use(user, ASK, hash_of(ASK + "_Request"), "robot", EndpointKind.SERVICE_SERVER)
+    with pytest.raises(TypeNotFoundError, match="it answered") as caught:
+        user.fetch_type(ASK)
+    assert "Over DDS" not in str(caught.value)
+    user.fake.announces_requests = True
+    user._fetcher._wants.clear()
+    with pytest.raises(TypeNotFoundError, match="Over DDS, ROS 2 nodes announce a service by"):
+        user.fetch_type(ASK)
+
+
 def test_a_node_that_does_not_answer_holds_nobody_up(join: Callable[..., Ros2Node]) -> None:
     silent = join("a_silent", serves=False)
     answer(silent, lambda _: rosglass.comm.Promise(cancellable=True))
