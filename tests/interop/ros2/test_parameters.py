@@ -147,7 +147,7 @@ def test_doras_parameters(
     assert "type-stable" in results["count"].reason
     dora.ask(get="speed")
     assert dora.event("value") == 2.5
-    # dora answers with a list of results, which is not what the service's type says.
+    # dora does not implement it, and says so in a list, which is no answer of that service.
     with pytest.raises(ServiceError, match="SetParametersAtomically_Response"):
         client.set_atomically({"speed": 3.5})
     dora.ask(set=["speed", 9.5])
