@@ -314,6 +314,30 @@ def test_why_dds_nodes_do_not_know_their_services(join: Callable[..., Ros2Node])
         user.fetch_type(ASK)
 
 
+def test_answers_as_rcl_gives_them(join: Callable[..., Ros2Node]) -> None:
+    """By the hash alone, with implied types among the sources, and texts as rosidl makes them."""
+    types = Types(robot_library("uint8 IDLE=0\t# \u00e4\nuint8 state 3\nmy_msgs/Part[] parts"), "")
+    known = {}
+    for name in (STATE, ASK):
+        told = told_by(types.library, name)
+        for source in told["type_sources"]:
+            text = source["raw_file_contents"]
+            lines = (str(line.encode())[2:-1] for line in text.splitlines())
+            source["raw_file_contents"] = "\n".join(lines)[: len(text)]
+        known[hash_of(name, types.library)] = {**told, "extra_information": []}
+    robot = join("robot", serves=False)
+    answer(robot, lambda request: known.get(request.type_hash, NO))
+    user = join("cockpit", serves=False)
+    for name in (STATE, ASK):
+        use(user, name, hash_of(name, types.library), "robot")
+    state = user.fetch_type(STATE)
+    assert state.constants["IDLE"] == 0
+    assert state.definition.constants[0].comment == "\u00e4"
+    assert state().state == 3
+    assert state.rihs01 == hash_of(STATE, types.library)
+    assert user.fetch_type(ASK).rihs01 == hash_of(ASK)
+
+
 def test_a_node_that_does_not_answer_holds_nobody_up(join: Callable[..., Ros2Node]) -> None:
     silent = join("a_silent", serves=False)
     answer(silent, lambda _: rosglass.comm.Promise(cancellable=True))
