@@ -7,7 +7,7 @@ import json
 import logging
 import threading
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import zenoh
 
@@ -51,6 +51,8 @@ if TYPE_CHECKING:
     from rosglass.ros2.zenoh_shm import SharedMemory
 
 __all__ = ["ZenohMiddleware"]
+
+_Kind = TypeVar("_Kind", bound=Declaration)
 
 _log = logging.getLogger("rosglass.ros2")
 #: Tokens that are not understood are logged up to so many.
@@ -192,9 +194,7 @@ class ZenohMiddleware(Middleware):
             return
         if self._refused:
             self._open()
-        with self._lock:
-            declared = list(self._declared.values())
-        for declaration in declared:
+        for declaration in self._of(Declaration):  # type: ignore[type-abstract]
             declaration.poll()
 
     def close(self) -> None:
@@ -291,23 +291,27 @@ class ZenohMiddleware(Middleware):
                 self._strange.add(key)
                 _log.warning("ignoring a graph token that is not understood: %s: %s", key, error)
             return
-        if token.endpoint is None:
+        endpoint = token.endpoint
+        if endpoint is None:
             self._graph.put_node(key, token.node)
-        else:
-            self._graph.put_endpoint(key, token.endpoint)
+            return
+        self._graph.put_endpoint(key, endpoint)
+        if endpoint.kind is EndpointKind.SERVICE_CLIENT and not endpoint.type_hash:
+            for replier in self._of(ZenohReplier):
+                replier.client_came(endpoint)
 
     def _hide(self, key: str) -> None:
         if self._graph is None:
             return
         self._graph.remove(key)
         if key.split("/", 6)[5:6] == ["SS"]:
-            for requester in self._requesters():
+            for requester in self._of(ZenohRequester):
                 requester.server_left(gid_of(key))
 
-    def _requesters(self) -> list[ZenohRequester]:
+    def _of(self, kind: type[_Kind]) -> list[_Kind]:
         with self._lock:
             declared = list(self._declared.values())
-        return [one for one in declared if isinstance(one, ZenohRequester)]
+        return [one for one in declared if isinstance(one, kind)]
 
     def _opened_graph(self) -> Graph:
         if self._graph is None:

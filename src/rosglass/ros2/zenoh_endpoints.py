@@ -17,7 +17,7 @@ import zenoh.ext
 from rosglass.comm import ConnectionState, Durability, Handle, History, Reliability
 from rosglass.errors import ConnectionLostError, NodeClosedError
 from rosglass.ros2.middleware import Writer
-from rosglass.ros2.zenoh_keys import ATTACHMENT_FULL, HUMBLE_HASH, gid_of, topic_key
+from rosglass.ros2.zenoh_keys import ATTACHMENT_FULL, HUMBLE_HASH, gid_of, topic_key, without_hash
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -39,6 +39,8 @@ __all__ = [
 _log = logging.getLogger("rosglass.ros2")
 #: Seconds between the heartbeats that let subscriptions notice a lost last sample (rmw_zenoh's).
 _HEARTBEAT = 0.5
+#: Part of the names of an action's topics.
+_ACTION = "/_action/"
 #: Seconds that closing waits for another thread's write, or question.
 _PATIENCE = 1.0
 
@@ -251,6 +253,10 @@ class ZenohWriter(Declaration, Writer):
         if new and session is not None:
             try:
                 self._keep(self._declare_publishers(session, new))
+                if _ACTION in self._topic and HUMBLE_HASH in new:
+                    # dora-rs looks for an action's topics by the hash, too; others do not.
+                    second = without_hash(self.token, self._type_hash)
+                    self._keep([session.liveliness().declare_token(second)])
             except zenoh.ZError as error:
                 raise self._error(error) from error
 

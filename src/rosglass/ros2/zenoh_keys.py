@@ -37,6 +37,7 @@ __all__ = [
     "gid_of",
     "graph_key",
     "topic_key",
+    "without_hash",
 ]
 
 #: What Humble, which has no type hashes, writes in their place.
@@ -62,6 +63,12 @@ _NUMBER_OF: dict[object, str] = {
     for table in (_RELIABILITY, _DURABILITY, _HISTORY, _LIVELINESS)
     for number, value in table.items()
 }
+_DEFAULTS = (
+    Reliability.RELIABLE,
+    Durability.VOLATILE,
+    History.KEEP_LAST,
+    Liveliness.AUTOMATIC,
+)
 #: Depth that an empty field stands for (RMW_ZENOH_DEFAULT_HISTORY_DEPTH).
 _DEFAULT_DEPTH = 42
 _NS = 1_000_000_000
@@ -161,21 +168,28 @@ def gid_of(key: str) -> bytes:
     return xxhash.xxh3_128_intdigest(key.encode()).to_bytes(16, "little")
 
 
-def encode_qos(qos: QoS) -> str:
-    """Return the part of a token that says the quality of service.
+def without_hash(key: str, type_hash: str) -> str:
+    """Return the key of a token as Humble, which has no type hashes, writes it."""
+    return key.replace(f"/{type_hash}/", f"/{HUMBLE_HASH}/")
 
-    The first three policies are always written out: what an empty field means has changed between
-    versions of rmw_zenoh.
+
+def encode_qos(qos: QoS) -> str:
+    """Return the part of a token that says the quality of service, as released rmw_zenoh does.
+
+    What is the default is left out: dora-rs finds services and actions by the whole token.
     """
-    liveliness = "" if qos.liveliness is Liveliness.AUTOMATIC else _NUMBER_OF[qos.liveliness]
+
+    def number(policy: object) -> str:
+        return "" if policy in _DEFAULTS else _NUMBER_OF[policy]
+
     return ":".join(
         (
-            _NUMBER_OF[qos.reliability],
-            _NUMBER_OF[qos.durability],
-            f"{_NUMBER_OF[qos.history]},{qos.depth}",
+            number(qos.reliability),
+            number(qos.durability),
+            f"{number(qos.history)},{qos.depth}",
             _encode_duration(qos.deadline),
             _encode_duration(qos.lifespan),
-            f"{liveliness},{_encode_duration(qos.lease_duration)}",
+            f"{number(qos.liveliness)},{_encode_duration(qos.lease_duration)}",
         )
     )
 

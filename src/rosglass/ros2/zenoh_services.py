@@ -34,7 +34,14 @@ from rosglass.ros2.middleware import (
     RequestId,
 )
 from rosglass.ros2.zenoh_endpoints import Declaration, Owner, direct
-from rosglass.ros2.zenoh_keys import HUMBLE_HASH, NO_ATTACHMENT, Attachment, gid_of, topic_key
+from rosglass.ros2.zenoh_keys import (
+    HUMBLE_HASH,
+    NO_ATTACHMENT,
+    Attachment,
+    gid_of,
+    topic_key,
+    without_hash,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -286,6 +293,10 @@ class ZenohReplier(Declaration, Replier):
         self._on_request = on_request
         self._waiting: weakref.WeakSet[_Held] = weakref.WeakSet()
         self._warned = False
+        self._session: zenoh.Session | None = None
+        # What clients look for that know no hashes.
+        self._second = without_hash(token, type_hash)
+        self._needed = False
 
     @property
     def problem(self) -> str:  # type: ignore[override]
@@ -295,10 +306,29 @@ class ZenohReplier(Declaration, Replier):
 
     def declare(self, session: zenoh.Session) -> list[Any]:
         """Declare a queryable for each name of the type's definition; Humble has none."""
-        return [
+        self._session = session
+        queryables = [
             session.declare_queryable(key, direct(self._on_query), complete=True)
             for key in self._keys.values()
         ]
+        for client in self._graph.endpoints(EndpointKind.SERVICE_CLIENT, self._service):
+            self.client_came(client)
+        return queryables
+
+    def client_came(self, client: EndpointInfo) -> None:
+        """Show the server once more, as one without hash, to clients that look for such a one.
+
+        Those of Humble's rmw_zenoh find it anyway; those of dora-rs compare the hash.
+        """
+        ours = client.name == self._service and client.type == self._type_name
+        if not ours or client.type_hash or self._second == self.token or self._session is None:
+            return
+        with self._lock:
+            if self._needed or self._closed:
+                return
+            self._needed = True
+        with suppress(zenoh.ZError):  # the session is closed
+            self._keep([self._session.liveliness().declare_token(self._second)])
 
     def reply(self, request: RequestId, data: bytes | bytearray) -> None:
         """Answer a request; a client that is gone is no error."""

@@ -117,15 +117,15 @@ def test_malformed_tokens_are_refused(key, told):
 @pytest.mark.parametrize(
     ("qos", "text"),
     [
-        (QoS(), "1:2:1,10:,:,:,,"),
-        (QoS.latched(), "1:1:1,1:,:,:,,"),
-        (QoS.sensor_data(), "2:2:1,5:,:,:,,"),
-        (QoS(history=History.KEEP_ALL), "1:2:2,10:,:,:,,"),
-        (QoS(deadline=Duration(1_500_000_000)), "1:2:1,10:1,500000000:,:,,"),
-        (QoS(lifespan=Duration(2)), "1:2:1,10:,:0,2:,,"),
+        (QoS(), "::,10:,:,:,,"),
+        (QoS.latched(), ":1:,1:,:,:,,"),
+        (QoS.sensor_data(), "2::,5:,:,:,,"),
+        (QoS(history=History.KEEP_ALL), "::2,10:,:,:,,"),
+        (QoS(deadline=Duration(1_500_000_000)), "::,10:1,500000000:,:,,"),
+        (QoS(lifespan=Duration(2)), "::,10:,:0,2:,,"),
         (
             QoS(liveliness=Liveliness.MANUAL_BY_TOPIC, lease_duration=Duration(3_000_000_000)),
-            "1:2:1,10:,:,:3,3,0",
+            "::,10:,:,:3,3,0",
         ),
     ],
 )

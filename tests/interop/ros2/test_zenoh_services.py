@@ -1,0 +1,250 @@
+"""Services and actions over Zenoh with dora-rs and zenoh-ros2-sdk, both ways."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import threading
+import time
+from concurrent.futures import Future
+from pathlib import Path
+
+import pytest
+
+import rosglass
+from rosglass.comm import GoalStatus
+from rosglass.errors import ConnectionLostError, TimeoutError  # noqa: A004
+from rosglass.interfaces import Library, rihs01, type_description
+
+PEERS = Path(__file__).parent / "peers"
+ADD, FIBONACCI = "example_interfaces/srv/AddTwoInts", "example_interfaces/action/Fibonacci"
+NODES = {"dora": "/dora/dora_node", "sdk": "/sdk/server_add"}
+KINDS = ["dora-humble", "dora-rep2016", "sdk"]
+DORAS = KINDS[:2]
+pytestmark = pytest.mark.peers
+
+# What dora needs to know, with the types that ROS makes of each.
+_SERVICE = ("", "_Request", "_Response", "_Event")
+_INSTALLED = {
+    ADD: _SERVICE,
+    "action_msgs/srv/CancelGoal": _SERVICE,
+    FIBONACCI: (
+        "",
+        "_Goal",
+        "_Result",
+        "_Feedback",
+        "_FeedbackMessage",
+        *(f"_SendGoal{part}" for part in _SERVICE),
+        *(f"_GetResult{part}" for part in _SERVICE),
+    ),
+    "action_msgs/msg/GoalInfo": ("",),
+    "action_msgs/msg/GoalStatus": ("",),
+    "action_msgs/msg/GoalStatusArray": ("",),
+    "builtin_interfaces/msg/Time": ("",),
+    "service_msgs/msg/ServiceEventInfo": ("",),
+    "unique_identifier_msgs/msg/UUID": ("",),
+}
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory):
+    """A prefix such as ROS installs, with the services and actions of these tests."""
+    prefix, library = tmp_path_factory.mktemp("zenoh_services"), Library()
+    for name, suffixes in _INSTALLED.items():
+        package, kind, base = name.split("/")
+        home = prefix / "share" / package
+        for folder in ("msg", "srv", "action"):
+            (home / folder).mkdir(parents=True, exist_ok=True)
+        definition = library.definition(name)
+        (home / kind / f"{base}.{kind}").write_text(definition.text.partition("\n====")[0])
+        hashes = [
+            {"type_name": name + suffix, "hash_string": rihs01(library.definition(name + suffix))}
+            for suffix in suffixes
+        ]
+        described = {"type_description_msg": type_description(definition), "type_hashes": hashes}
+        (home / kind / f"{base}.json").write_text(json.dumps(described))
+        (home / "package.xml").write_text(
+            f'<package format="3"><name>{package}</name><version>1.0.0</version><description/>'
+            '<maintainer email="a@example.org">a</maintainer><license>MIT</license></package>'
+        )
+    return prefix
+
+
+@pytest.fixture(scope="module")
+def run_peer(start, router, installed):
+    """Start a peer, which does what it is told in a domain of its own."""
+
+    def run_peer(kind, **plan):
+        script, _, profile = kind.partition("-")
+        module = {"dora": "dora", "sdk": "zenoh_ros2_sdk"}[script]
+        if importlib.util.find_spec(module) is None:
+            pytest.skip(f'{module} is not installed: pip install "rosglass[peers]"')
+        port = int(router.listen.rpartition(":")[2])
+        plan |= {"port": port, "domain": 11, "interfaces": str(installed), "profile": profile}
+        # dora takes the domain of its data keys and its type descriptions from here only.
+        env = os.environ | {"ROS_DOMAIN_ID": "11", "AMENT_PREFIX_PATH": str(installed)}
+        process = start(str(PEERS / f"{script}_services_peer.py"), json.dumps(plan), env=env)
+        process.event("ready")
+        return process
+
+    return run_peer
+
+
+@pytest.fixture
+def node(connect):
+    return connect("cockpit", "?domain=11")
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def kind(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def server(kind, run_peer):
+    process = run_peer(kind, do="serve")
+    yield process
+    process.end()
+
+
+@pytest.mark.parametrize("given", [ADD, None], ids=["type given", "type discovered"])
+def test_we_call_the_peer(node, server, given):
+    client = node.create_service_client("/add", given)
+    assert client.wait_for_server(10), client.problem
+    assert client.type.name == ADD
+    assert client.call({"a": 2, "b": 40}).sum == 42
+    assert [client.call({"a": value, "b": -1}).sum for value in range(20)] == list(range(-1, 19))
+    assert client.problem == ""
+
+
+def test_five_in_flight_answered_in_reverse_order(node, server):
+    client = node.create_service_client("/hold", ADD)
+    assert client.wait_for_server(10), client.problem
+    calls = [client.call_async({"a": value, "b": 100}) for value in range(5)]
+    assert client.pending == 5
+    server.event("held")
+    assert [call.result(5).sum for call in calls] == [100, 101, 102, 103, 104]
+    assert client.pending == 0
+
+
+def test_a_call_that_is_never_answered_ends_at_its_time(node, server):
+    client = node.create_service_client("/never", ADD)
+    assert client.wait_for_server(10), client.problem
+    before = time.monotonic()
+    with pytest.raises(TimeoutError, match=r"did not answer within 0\.5 s"):
+        client.call({"a": 1}, timeout=0.5)
+    assert time.monotonic() - before < 0.8
+    assert client.pending == 0
+
+
+def test_the_peers_service_is_in_our_graph(node, kind, server, wait_for):
+    (found,) = wait_for(lambda: node.service_servers("/add"))
+    assert str(found.node) == NODES[kind.partition("-")[0]]
+    assert found.type == ADD
+    assert found.type_hash == ("" if kind == "dora-humble" else rosglass.load(ADD).rihs01)
+    assert node.services()["/add"] == [ADD]
+
+
+@pytest.mark.parametrize("answers", ["at once", "later"])
+def test_the_peer_calls_us(node, kind, run_peer, answers):
+    """Later: when the callback, and the thread that called it, are long gone."""
+    waiting = []
+
+    def add(request):
+        total = {"sum": request.a + request.b}
+        if answers == "at once":
+            return total
+        promise = Future()
+        waiting.append(threading.Timer(0.2, promise.set_result, [total]))
+        waiting[-1].start()
+        return promise
+
+    service = f"/ours_{answers[-2:]}"
+    server = node.create_service_server(service, ADD, add)
+    process = run_peer(kind, do="call", service=service, pairs=[[1, 2], [-5, 5], [2**40, 1]])
+    assert [process.event("sum") for _ in range(3)] == [3, 0, 2**40 + 1]
+    assert server.problem == ""
+    process.end()
+    for timer in waiting:
+        timer.join()
+
+
+def test_the_peer_is_told_when_our_callback_fails(node, kind, run_peer):
+    def fail(request):
+        raise ValueError("the arm is off")
+
+    node.create_service_server("/broken", ADD, fail)
+    process = run_peer(kind, do="call", service="/broken", pairs=[[1, 2]])
+    assert process.event("failed", timeout=8)
+    process.end()
+
+
+def test_a_peer_that_is_killed_in_mid_call(node, kind, run_peer, wait_for):
+    process = run_peer(kind, do="serve", suffix="2")
+    client = node.create_service_client("/add2", ADD)
+    assert client.wait_for_server(10), client.problem
+    before = time.monotonic()
+    with pytest.raises(ConnectionLostError, match="went away before it answered"):
+        client.call({"a": -2}, timeout=10)
+    assert time.monotonic() - before < 2
+    assert process.popen.wait(5) == 1
+    wait_for(lambda: not client.ready, 1)
+    # The one that comes after it serves the same client.
+    again = run_peer(kind, do="serve", suffix="2")
+    assert client.call({"a": 1, "b": 1}, timeout=10).sum == 2
+    again.end()
+
+
+def count(goal):
+    sequence = [0]
+    while len(sequence) < goal.goal.order and not goal.wait_for_cancel(0.05):
+        sequence.append(len(sequence))
+        goal.publish_feedback(sequence=sequence)
+    return {"sequence": sequence}
+
+
+@pytest.fixture(scope="module", params=DORAS)
+def dora(request):
+    return request.param
+
+
+def test_we_send_goals_to_dora(node, dora, run_peer):
+    process = run_peer(dora, do="serve action")
+    client = node.create_action_client("/count")
+    assert client.wait_for_server(10), client.problem
+    feedback = []
+    goal = client.send_goal({"order": 5}, on_feedback=lambda m: feedback.append(len(m.sequence)))
+    status, result = goal.result(10)
+    assert status is GoalStatus.SUCCEEDED
+    assert list(result.sequence) == [0, 1, 2, 3, 4]
+    assert feedback == [2, 3, 4, 5]
+    goal = client.send_goal({"order": 100})
+    goal.cancel()
+    status, result = goal.result(10)
+    assert status is GoalStatus.CANCELED
+    assert 0 < len(result.sequence) < 100
+    assert [process.event("status") for _ in range(2)] == ["succeeded", "canceled"]
+    process.end()
+
+
+def test_dora_sends_us_goals(node, dora, run_peer, wait_for):
+    ended = []
+
+    def work(goal):
+        result = count(goal)
+        ended.append((goal.is_cancel_requested, len(result["sequence"])))
+        return result
+
+    accept = {"accept": lambda goal: goal.order < 1000}
+    server = node.create_action_server("/count", FIBONACCI, work, **accept)
+    process = run_peer(dora, do="send goals", goals=[[5, False], [5000, False], [100, True]])
+    assert process.event("status") == "succeeded"
+    assert process.event("rejected") == 5000
+    assert process.event("cancelled") == 0
+    wait_for(lambda: len(ended) == 2)
+    assert ended[0] == (False, 5)
+    assert ended[1][0]
+    assert ended[1][1] < 100
+    server.close()
+    process.end()
