@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING
 from rosglass.comm import Liveliness
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
-    from rosglass.comm import EndpointInfo, Handle
-    from rosglass.ros2.core import Core
+    from rosglass.comm import EndpointInfo, Handle, Timers
     from rosglass.ros2.middleware import Reader
     from rosglass.ros2.repeats import Repeats
 
@@ -27,12 +26,13 @@ class Liveness:
     """Tells the publishers that are alive from those that are only there.
 
     Args:
-        core: Whose timers are used, and who is woken when somebody's time is over.
+        timers: Run the next look.
         repeats: Knows the last sample of each publisher.
+        look: Called when it is time to :meth:`follow` again.
     """
 
-    def __init__(self, core: Core, repeats: Repeats) -> None:
-        self._core, self._repeats = core, repeats
+    def __init__(self, timers: Timers, repeats: Repeats, look: Callable[[], None]) -> None:
+        self._timers, self._repeats, self._look = timers, repeats, look
         self._signs: dict[bytes, tuple[tuple[int, int], float]] = {}
         self._timer: Handle | None = None
 
@@ -58,7 +58,7 @@ class Liveness:
             silent = [endpoint for endpoint, _ in manual[: max(0, len(there) - alive)]]
         self.close()
         pause = min(lease for _, lease in manual) / 2
-        self._timer = self._core.timers.after(pause, self._core.wake)
+        self._timer = self._timers.after(pause, self._look)
         return [endpoint for endpoint in there if endpoint not in silent]
 
     def close(self) -> None:

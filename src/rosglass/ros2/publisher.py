@@ -56,8 +56,9 @@ class Ros2Publisher(Publisher, Member):
         self._closed = False
         self._process = os.getpid()
         self._problem = ""
+        self._known: list[EndpointInfo] | None = None
         self._big = False
-        self.events: PublisherEvents = PublisherEvents(core.dispatcher, core.wake)
+        self.events: PublisherEvents = PublisherEvents(core.dispatcher, self._look)
         self._lock = threading.Lock()
         self._watchdogs: dict[str, Watchdog] = {}
         self._missed = self._lost = 0
@@ -71,6 +72,7 @@ class Ros2Publisher(Publisher, Member):
         if self._writer.gid:
             core.local_gids.add(self._writer.gid)
         core.add(self)
+        core.wake()
         self._writer.match(self._matching(self._subscriptions()))
 
     # -- sending ---------------------------------------------------------------------------------
@@ -184,6 +186,9 @@ class Ros2Publisher(Publisher, Member):
         if not moved or self._closed:
             return
         subscriptions = self._subscriptions()
+        if subscriptions == self._known:
+            return  # what changed in the graph is elsewhere
+        self._known = subscriptions
         matching = self._matching(subscriptions)
         self._writer.match(matching)
         self._say(self._problems(subscriptions))
@@ -205,6 +210,10 @@ class Ros2Publisher(Publisher, Member):
         self._writer.close()
         self._core.local_gids.discard(self._writer.gid)
         self._core.remove(self)
+
+    def _look(self) -> None:
+        self._known = None
+        self._core.wake()
 
     def _subscriptions(self) -> list[EndpointInfo]:
         return self._core.graph.endpoints(_SUBSCRIPTION, self.topic)

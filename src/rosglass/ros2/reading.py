@@ -81,7 +81,7 @@ class Reading(Member, Source):
             wanted,
             subscription.type,
             not subscription.decodes,
-            core.wake,
+            self.inform,
         )
         self._repeats = Repeats()
         self._lock = threading.Lock()
@@ -89,16 +89,17 @@ class Reading(Member, Source):
         self._reader: Reader | None = None
         self._eager = True
         self._closed = False
+        self._known: list[EndpointInfo] | None = None
         self._alone = True
         self._lost_before = self._told_lost = self._missed = 0
         self._deadline: Watchdog | None = None
-        self._liveness = Liveness(core, self._repeats)
+        self._liveness = Liveness(core.timers, self._repeats, self.inform)
         subscription.source, subscription.on_close = self, self.close
         subscription.set_qos(self._wanted.for_subscription(self._offers(self._publishers())))
         if self._types.type is not None:
             self._read(self._types.type)
         core.add(self)
-        core.wake()
+        self.inform()
 
     # -- what the subscription asks --------------------------------------------------------------
 
@@ -133,6 +134,7 @@ class Reading(Member, Source):
 
     def inform(self) -> None:
         """Look at the subscription soon."""
+        self._known = None
         self._core.wake()
 
     def lost(self) -> int:
@@ -148,6 +150,9 @@ class Reading(Member, Source):
         if self._closed:
             return
         publishers = self._publishers()
+        if publishers == self._known and not idle:
+            return  # what changed in the graph is elsewhere
+        self._known = publishers
         try:
             self._update(publishers, idle)
         except NodeClosedError:
