@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 from rosglass.comm import Handle
-from rosglass.errors import UnsupportedError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -254,6 +253,7 @@ class Middleware(ABC):
         can be understood is for the caller to say.
         """
 
+    @abstractmethod
     def create_requester(
         self,
         node: NodeName,
@@ -273,8 +273,8 @@ class Middleware(ABC):
             qos: Profile of requests and replies.
             on_reply: Takes the replies.
         """
-        raise UnsupportedError(f"{type(self).__name__} has no services")
 
+    @abstractmethod
     def create_replier(
         self,
         node: NodeName,
@@ -285,7 +285,6 @@ class Middleware(ABC):
         on_request: OnRequest,
     ) -> Replier:
         """Announce a service server; arguments as in :meth:`create_requester`."""
-        raise UnsupportedError(f"{type(self).__name__} has no services")
 
     def describe_type(self, endpoint: EndpointInfo, timeout: float) -> Definition | None:
         """Return the definition of a message that a publisher or subscription itself announces.
