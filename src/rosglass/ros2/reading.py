@@ -86,8 +86,10 @@ class Reading(Member, Source):
         self._repeats = Repeats()
         self._lock = threading.Lock()
         self._attention = threading.Lock()
+        self._unattended = False
         self._reader: Reader | None = None
-        self._eager = True
+        #: The reader, while nobody waits for its samples.
+        self._lazy: Reader | None = None
         self._closed = False
         self._known: list[EndpointInfo] | None = None
         self._alone = True
@@ -117,19 +119,25 @@ class Reading(Member, Source):
 
     def attend(self) -> None:
         """Let the middleware hand on samples as they come only while somebody waits for them."""
-        with self._attention:
-            reader, eager = self._reader, self.subscription.watched
-            if reader is None or eager == self._eager:
-                return
-            self._eager = eager
-            reader.set_eager(eager)
-        if eager:
-            reader.flush()
+        self._unattended = True
+        # Never waits for its turn: handing on may end up in here again. Whoever has it looks again.
+        while self._unattended and self._attention.acquire(False):
+            try:
+                self._unattended = False
+                reader, eager = self._reader, self.subscription.watched
+                if reader is None or eager == (reader is not self._lazy):
+                    continue
+                self._lazy = None if eager else reader
+                reader.set_eager(eager)
+                if eager:
+                    reader.flush()
+            finally:
+                self._attention.release()
 
     def refresh(self) -> None:
         """Have handed on what the middleware holds back."""
-        reader = self._reader
-        if reader is not None and not self._eager:
+        reader = self._lazy
+        if reader is not None:
             reader.flush()
 
     def inform(self) -> None:
@@ -163,6 +171,8 @@ class Reading(Member, Source):
         self.attend()
         if idle:
             self._tell_losses()
+        if self._closed:  # meanwhile, by another thread
+            self._stop_watching()
 
     def close(self) -> None:
         """Stop receiving."""
@@ -170,12 +180,11 @@ class Reading(Member, Source):
             if self._closed:
                 return
             self._closed = True
-            reader, self._reader = self._reader, None
+            reader, self._reader, self._lazy = self._reader, None, None
         self.subscription.close()
         if reader is not None:
             reader.close()
-        self._watch_deadline(published=False)
-        self._liveness.close()
+        self._stop_watching()
         self._core.remove(self)
 
     def _publishers(self) -> list[EndpointInfo]:
@@ -221,8 +230,7 @@ class Reading(Member, Source):
             else "it is received without that guarantee"
         )
         return [
-            f"quality of service offered by {publisher.node} does not match ("
-            f"{words(conflicts)}): "
+            f"quality of service offered by {publisher.node} does not match ({words(conflicts)}): "
             f"{effect}; ask for no more than it offers"
             for publisher, conflicts in self._conflicts(publishers).items()
         ]
@@ -254,12 +262,10 @@ class Reading(Member, Source):
             self.subscription.qos,
             self._receiver(),
         )
-        with self._attention:
-            with self._lock:
-                old, self._reader = self._reader, reader
-                if self._closed:
-                    self._reader = None
-            self._eager = True
+        with self._lock:
+            old, self._reader = self._reader, reader
+            if self._closed:
+                self._reader = None
         if old is not None:
             self._lost_before += old.lost()
             old.close()
@@ -319,6 +325,10 @@ class Reading(Member, Source):
             self._deadline = None
         if wanted and self._deadline is None and limit is not None:
             self._deadline = Watchdog(self._core.timers, limit, self._last_arrival, self._miss)
+
+    def _stop_watching(self) -> None:
+        self._watch_deadline(published=False)
+        self._liveness.close()
 
     def _last_arrival(self) -> float:
         self.refresh()

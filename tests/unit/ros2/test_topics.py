@@ -411,6 +411,29 @@ def test_callbacks_get_samples_as_they_come(node, middleware):
     assert all(reader.eager for reader in middleware.readers)
 
 
+def test_patient_callbacks_get_samples_late_and_may_look_themselves(node, middleware, eventually):
+    seen = []
+
+    def callback(sample):
+        seen.append(sample.data)
+        assert subscription.wait(0) is None
+
+    subscription = node.create_subscription(
+        "/t", STRING, raw_callback=callback, executor=IMMEDIATE, qos=QoS.best_available()
+    )
+    (reader,) = middleware.readers
+    subscription.set_patient(True)
+    eventually(lambda: not reader.eager)
+    reader.waiting = [HELLO]
+    subscription.statistics()
+    assert seen == [HELLO]
+    eventually(lambda: not reader.eager)
+    reader.waiting = [HELLO]
+    subscription.set_patient(False)
+    eventually(lambda: len(seen) == 2)
+    assert reader.eager
+
+
 # -- bytes that nobody understands ---------------------------------------------------------------
 
 
