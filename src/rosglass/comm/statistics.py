@@ -83,13 +83,13 @@ class Meter:
         start, count, before = self._marks[0] if self._marks else (last, received, size)
         frequency = bandwidth = 0.0
         age = now - last
-        if received > count:
+        if received > count and last > start:
             period = (last - start) / (received - count)
-            # Once the next sample is overdue, let the figures fall instead of showing a dead rate.
-            span = last - start + max(0.0, age - 1.5 * period)
-            if span > 0:
-                frequency = (received - count) / span
-                bandwidth = (size - before) / span
+            # Once the next sample is overdue, let the figures fall instead of showing a dead rate:
+            # as if there had been no more than the last 30.
+            recent = min(received - count, _MARKS - 1)
+            frequency = recent / (recent * period + max(0.0, age - 1.5 * period))
+            bandwidth = (size - before) / (received - count) * frequency
         ways = sorted(way for way, _ in self._took)
         return Statistics(
             received,

@@ -276,3 +276,18 @@ def test_rates_hold_for_samples_that_come_some_at_a_time(monkeypatch):
     assert now.frequency == pytest.approx(1000, rel=0.01)
     assert now.bandwidth == pytest.approx(10_000, rel=0.01)
     assert now.received == 3000
+
+
+@pytest.mark.parametrize("rate", [2, 20, 1000])
+def test_rates_fall_at_once_when_samples_stop(monkeypatch, rate):
+    clock = [100.0]
+    monkeypatch.setattr("rosglass.comm.inbox.time.monotonic", lambda: clock[0])
+    sub = subscription(QoS(depth=1))
+    for _ in range(3 * rate):
+        clock[0] += 1 / rate
+        sub.deliver(sample(bytes(10)))
+    assert sub.statistics().frequency == pytest.approx(rate, rel=0.01)
+    clock[0] += 10
+    stopped = sub.statistics()
+    assert stopped.frequency < 3
+    assert stopped.bandwidth == pytest.approx(10 * stopped.frequency)
