@@ -44,6 +44,8 @@ _BATCH, _MOST = 64, 64
 _SLICE = 0.1
 #: Seconds that the pump waits for a thread that is handing samples on.
 _SOON = 0.001
+#: Seconds that the first samples of a reader wait for it to be made.
+_PATIENCE = 5.0
 #: Writers that a reader remembers; more come only from a robot that restarts for days.
 _MAX_WRITERS = 1024
 
@@ -343,6 +345,7 @@ class DdsReader(Reader):
     ) -> None:
         self._participant, self._on_sample = participant, on_sample
         self._writers: dict[int, tuple[bytes, str]] = {}
+        self._made = threading.Event()
         self._reader = SampleReader(
             participant,
             topic_name(topic),
@@ -352,6 +355,7 @@ class DdsReader(Reader):
             f"topic {topic}",
             self._hand_on,
         )
+        self._made.set()
         self.gid = self._reader.guid
         participant.add_endpoint(node, self.gid, writer=False)
 
@@ -386,6 +390,8 @@ class DdsReader(Reader):
 
     def _identify(self, handle: int) -> tuple[bytes, str]:
         """Return a writer's identity and type hash; both empty when it is gone already."""
+        # What is latched comes before the constructor has returned.
+        self._made.wait(_PATIENCE)
         found = cyclone_builtin.matched_publication(self._reader.entity, handle)
         if found is None:
             return b"", ""
