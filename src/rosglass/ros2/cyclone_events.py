@@ -23,6 +23,8 @@ __all__ = [
     "subscription_matched",
 ]
 
+#: Conditions that are told at once at most.
+_KEYS = 64
 _S = TypeVar("_S", bound=ctypes.Structure)
 
 
@@ -146,7 +148,8 @@ class Waitset:
             lib.dds_create_guardcondition(participant), "dds_create_guardcondition", "waitset"
         )
         self.attach(self._guard, 0)
-        self._keys = (c_uint64 * 64)()
+        self._keys = (c_uint64 * _KEYS)()
+        self._wait = lib.dds_waitset_wait
 
     def attach(self, entity: int, key: int) -> None:
         """Be woken by a condition, or by an entity with a status mask; `key` must not be 0."""
@@ -154,13 +157,15 @@ class Waitset:
 
     def wait(self, timeout: float | None) -> list[int]:
         """Return the keys of what holds, empty after `timeout` seconds or :meth:`wake`."""
-        lib, keys = library(), self._keys
-        span = INFINITY if timeout is None else round(timeout * 1e9)
-        count = lib.dds_waitset_wait(self._entity, keys, len(keys), span)
-        found = keys[: min(check(count, "dds_waitset_wait", "waitset"), len(keys))]
+        keys = self._keys
+        span = INFINITY if timeout is None else int(timeout * 1e9)
+        count = self._wait(self._entity, keys, _KEYS, span)
+        if count < 0:
+            check(count, "dds_waitset_wait", "waitset")
+        found: list[int] = keys[:count]  # no more than there are
         if 0 in found:
-            lib.dds_take_guardcondition(self._guard, ctypes.byref(c_bool()))
-            return [key for key in found if key]
+            library().dds_take_guardcondition(self._guard, ctypes.byref(c_bool()))
+            found = [key for key in found if key]
         return found
 
     def wake(self) -> None:

@@ -17,23 +17,31 @@ from rosglass.errors import NodeClosedError, UnsupportedError
 from rosglass.ros2.cyclone import TIMEOUT, check_alive, keeping, library
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
-__all__ = ["COPIED", "Batch", "discard", "payload", "sample", "send"]
+__all__ = ["COPIED", "Batch", "Taken", "discard", "payload", "sample", "send"]
 
 #: Payloads up to this size in bytes are copied: a view costs more than that.
 COPIED = 16 * 1024
 
 _ANY_STATE = 0x7F
 _SDK_DATA = 2
+#: Payload, time stamp and handle of the writer, what was told besides.
+Taken = tuple["bytes | memoryview", int, int, Any]
 #: ``dds_sample_info_t``: valid_data, source_timestamp, publication_handle of its 64 bytes.
 _INFO = struct.Struct("=12x?3xq8xQ24x")
+#: What ctypes.string_at() does, in one step.
+_copy: Callable[[int, int], bytes] = ctypes.PYFUNCTYPE(ctypes.py_object, c_void_p, c_ssize_t)(
+    ("PyBytes_FromStringAndSize", ctypes.pythonapi)
+)
 
 
 class Batch:
     """Room for the samples that one call takes from a reader; not for several threads at once.
 
     Args:
+        describe: Returns what to tell besides of a sample, by the address of its serdata; called
+            while it is still there.
         size: Samples at most.
 
     Attributes:
@@ -41,41 +49,52 @@ class Batch:
             samples that were left.
     """
 
-    def __init__(self, size: int = 64) -> None:
-        self._size = size
+    def __init__(self, describe: Callable[[int], Any] | None = None, size: int = 64) -> None:
+        self._describe, self._size = describe, size
         self.full = False
         self._serdata = (c_void_p * size)()
         self._infos = (c_ubyte * (_INFO.size * size))()
         self._addresses = memoryview(self._serdata).cast("B").cast("Q")
-        self._info_view = memoryview(self._infos).cast("B")
+        self._told = memoryview(self._infos).cast("B")
         self._at = ctypes.addressof(self._serdata), ctypes.addressof(self._infos)
+        # Its lock is held by no thread that calls us, and for no longer than this takes.
+        self._take = keeping().dds_takecdr
 
-    def take(self, reader: int, place: str) -> Iterable[tuple[int, tuple[bool, int, int]]]:
-        """Take what a reader (or read condition) holds, the oldest first.
+    def take(self, reader: int, place: str) -> list[Taken]:
+        """Take what a reader holds, the oldest first.
 
         Args:
             reader: The reader.
             place: What it is for, in errors.
 
         Returns:
-            For each sample the address of its serdata, to be given to :func:`payload` or
-            :func:`discard`, and: whether it has data (it has none when it only tells that a writer
-            is gone), the writer's time stamp in nanoseconds since the Unix epoch, and the handle of
-            the writer. Empty when there is nothing.
+            For each sample its payload, as :func:`payload` returns it, the writer's time stamp in
+            nanoseconds since the Unix epoch, the handle of the writer, and what `describe` said.
+            Without those that only tell that a writer is gone.
 
         Raises:
             NodeClosedError: The reader was deleted.
         """
-        serdata, infos = self._at
-        # Its lock is held by no thread that calls us, and for no longer than this takes.
-        count = keeping().dds_takecdr(reader, serdata, self._size, infos, _ANY_STATE)
+        count = self._take(reader, self._at[0], self._size, self._at[1], _ANY_STATE)
         self.full = count == self._size
         if count <= 0:
             check_alive(count, "dds_takecdr", place)
-            return ()
-        addresses: list[int] = self._addresses[:count].tolist()
-        told: Any = _INFO.iter_unpack(self._info_view[: count * _INFO.size])
-        return zip(addresses, told, strict=True)
+            return []
+        infos: Iterable[tuple[bool, int, int]]
+        if count == 1:
+            addresses, infos = [self._addresses[0]], [_INFO.unpack_from(self._told)]
+        else:
+            addresses = self._addresses[:count].tolist()
+            infos = _INFO.iter_unpack(self._told[: count * _INFO.size])
+        taken = []
+        describe = self._describe
+        for serdata, (valid, sent, writer) in zip(addresses, infos, strict=True):
+            if valid:
+                told = None if describe is None else describe(serdata)
+                taken.append((payload(serdata), sent, writer, told))
+            else:
+                discard(serdata)
+        return taken
 
 
 def payload(serdata: int) -> bytes | memoryview:
@@ -88,14 +107,13 @@ def payload(serdata: int) -> bytes | memoryview:
     size: int = lib.ddsi_serdata_size(serdata)
     # From here on there are two references: the one handed over, and the one for the bytes.
     lib.ddsi_serdata_to_ser_ref(serdata, 0, size, byref(part))
+    lib.ddsi_serdata_unref(serdata)
     if size > COPIED:
-        lib.ddsi_serdata_unref(serdata)
         block = _block(size).from_address(part.base)
         block.serdata = serdata
         return memoryview(block).cast("B").toreadonly()
-    data = ctypes.string_at(part.base, size)
+    data = _copy(part.base, size)
     lib.ddsi_serdata_to_ser_unref(serdata, byref(part))
-    lib.ddsi_serdata_unref(serdata)
     return data
 
 

@@ -19,7 +19,7 @@ from rosglass.ros2.cyclone_events import (
     subscription_matched,
 )
 from rosglass.ros2.cyclone_qos import qos_of
-from rosglass.ros2.cyclone_samples import Batch, discard, payload, sample, send
+from rosglass.ros2.cyclone_samples import Batch, Taken, discard, sample, send
 from rosglass.ros2.dds_discovery_info import format_user_data, hash_of
 from rosglass.ros2.middleware import Reader, Writer
 from rosglass.ros2.names import mangle_type
@@ -38,8 +38,8 @@ __all__ = ["DdsReader", "DdsWriter", "SampleReader", "SampleWriter", "Taken", "t
 _MIN_DEPTH = 128
 #: Samples per second above which a reader would lose some if it were looked at as rarely as others.
 _FAST = 2000
-#: Samples that are taken at once, and how often that is done in a row.
-_BATCH, _MOST = 64, 64
+#: Batches that are taken in a row.
+_MOST = 64
 #: Seconds that a write waits in the library before it comes back to see what has happened.
 _SLICE = 0.1
 #: Seconds that the pump waits for a thread that is handing samples on.
@@ -48,9 +48,6 @@ _SOON = 0.001
 _PATIENCE = 5.0
 #: Writers that a reader remembers; more come only from a robot that restarts for days.
 _MAX_WRITERS = 1024
-
-#: Payload, time stamp of the writer, handle of the writer, what the reader's `describe` said.
-Taken = tuple["bytes | memoryview", int, int, Any]
 
 
 def topic_name(name: str) -> str:
@@ -180,13 +177,13 @@ class SampleReader:
         on_matched: Callable[[], None] | None = None,
     ) -> None:
         self._participant, self._place, self._on_taken = participant, place, on_taken
-        self._describe, self._on_matched = describe, on_matched
+        self._on_matched = on_matched
         self._closed = False
         self._eager = True
         self._lost = self._count = 0
         self._visited = 0.0
         self._busy = threading.Lock()
-        self._batch = Batch(_BATCH)
+        self._batch = Batch(describe)
         policies = qos_of(qos, writer=False, user_data=user_data)
         if qos.history is History.KEEP_LAST:
             policies.set_history(max(qos.depth, _MIN_DEPTH))
@@ -250,41 +247,29 @@ class SampleReader:
             with suppress(NodeClosedError):
                 if subscription_matched(self.entity).change:
                     self._on_matched()
-        if not self._busy.acquire(timeout=_SOON):
+        busy = self._busy
+        if not (busy.acquire(False) or busy.acquire(True, _SOON)):
             return True
         try:
             return self._hand_on(1)
         finally:
-            self._busy.release()
+            busy.release()
 
     def _hand_on(self, batches: int) -> bool:
         """Hand on so many batches at most; return whether there may be more."""
         for _ in range(batches):
             if self._closed:
                 return False
-            taken = self._take()
+            try:
+                taken = self._batch.take(self.entity, self._place)
+            except NodeClosedError:
+                return False
             if taken:
                 self._count += len(taken)
                 self._on_taken(taken)
             if not self._batch.full:
                 return False
         return True
-
-    def _take(self) -> list[Taken]:
-        try:
-            found = self._batch.take(self.entity, self._place)
-        except NodeClosedError:
-            return []
-        taken: list[Taken] = []
-        describe = self._describe
-        for serdata, (valid, sent, writer) in found:
-            if valid:
-                # While the address is still this sample's.
-                told = None if describe is None else describe(serdata)
-                taken.append((payload(serdata), sent, writer, told))
-            else:
-                discard(serdata)
-        return taken
 
 
 class DdsWriter(Writer):

@@ -92,7 +92,7 @@ class Pump:
             self._do(self._turn)
 
     def _turn(self) -> None:
-        again = [self._again.popleft() for _ in range(len(self._again))]
+        again = [self._again.popleft() for _ in range(len(self._again))] if self._again else None
         woken = self._waitset.wait(0.0 if again else self._interval if self._idle else None)
         for entity in dict.fromkeys((*woken, *again)) if again else woken:
             act = self._acts.get(entity)
