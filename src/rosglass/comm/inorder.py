@@ -44,3 +44,7 @@ class InOrder:
                 job()
             except Exception:
                 _log.exception("a job failed")
+            except BaseException:  # Ctrl-C: the next one to come goes on
+                with self._lock:
+                    self._busy = False
+                raise

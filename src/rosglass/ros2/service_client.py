@@ -13,6 +13,7 @@ from rosglass.comm import Call, EndpointKind, QoS, ServiceClient
 from rosglass.comm.promise import check_timeout
 from rosglass.errors import (
     ConnectionLostError,
+    ConversionError,
     DecodeError,
     Error,
     NodeClosedError,
@@ -155,8 +156,9 @@ class Ros2ServiceClient(ServiceClient, Member):
                 "of its own"
             )
         timeout = check_timeout(timeout, self.name)
-        entry = self._start(request, timeout)
+        entry = self._enter(request, timeout)
         try:
+            self._flush()
             if timeout is not None:
                 try:
                     return entry.call.result(timeout)
@@ -173,7 +175,10 @@ class Ros2ServiceClient(ServiceClient, Member):
     ) -> Call:
         """Call and return at once; see :meth:`rosglass.comm.ServiceClient.call_async`."""
         timeout = check_timeout(timeout, self.name)
-        entry = self._start(request, timeout, alarm=True)
+        entry = self._enter(request, timeout)
+        if timeout is not None:
+            entry.timer = self._core.timers.after(timeout, lambda: self._expire(entry, timeout))
+        self._flush()
         return entry.call
 
     def withdraw(self, call: Call) -> bool:
@@ -185,11 +190,17 @@ class Ros2ServiceClient(ServiceClient, Member):
             self._queue.remove(entry)
         return call.cancel()
 
-    def _start(self, value: Any, timeout: float | None, *, alarm: bool = False) -> Request:
+    def _enter(self, value: Any, timeout: float | None) -> Request:
+        """Put a request into the queue."""
         self._check_open()
         kind = self._announced.type
         # Encoded, or copied, now: the caller may change it while it waits for the server.
-        taken = copy.deepcopy(value) if kind is None else kind.request.encode(value)
+        if kind is not None:
+            taken = kind.request.encode(value)
+        elif value is None or hasattr(value, "to_dict") or isinstance(value, dict):
+            taken = copy.deepcopy(value)
+        else:
+            raise ConversionError("", value, "a message or a dict of fields", self.name)
         call = Call(
             f"{self.name} has not answered, and the call goes on: no response",
             self._core.dispatcher,
@@ -205,9 +216,6 @@ class Ros2ServiceClient(ServiceClient, Member):
         if closed:
             self._check_open()
         call.add_done_callback(lambda _: self._ended(entry))
-        if alarm and timeout is not None:
-            entry.timer = self._core.timers.after(timeout, lambda: self._expire(entry, timeout))
-        self._flush()
         return entry
 
     def _flush(self) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import concurrent.futures
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -86,3 +88,9 @@ def test_callbacks_run_where_they_should():
     assert late.result(5) is promise
     home.close()
     elsewhere.close()
+
+
+def test_asyncio_is_imported_only_by_those_who_use_it():
+    code = "import rosglass.ros2, sys; print('asyncio' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"

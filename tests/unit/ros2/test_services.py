@@ -364,6 +364,8 @@ def test_the_type_is_discovered(node, robot, eventually):
     call = client.call_async(request)
     wrong = client.call_async({"a": "text"})
     request["a"] = 100
+    with pytest.raises(rosglass.ConversionError, match="a message or a dict of fields, got 7"):
+        client.call_async(7)
     with pytest.raises(rosglass.ServiceUnavailableError, match="no server offers /add on fake"):
         client.call(timeout=0.02)
     robot.create_service_server("/add", ADD, add)
