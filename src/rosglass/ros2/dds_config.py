@@ -27,6 +27,8 @@ _SIZES = (
     "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize>",
     '<SocketReceiveBufferSize min="default" max="10MB"/>',
 )
+#: Fast DDS 2.9 notices no reader, writer or participant of ours that goes without this.
+_KEYS = "<GenerateKeyhash>true</GenerateKeyhash>"
 #: Programs per machine that others can find by asking its ports; beyond, the ports are those of
 #: the next domain (RTPS 2.5, section 9.6.2).
 _LAST_INDEX = 119
@@ -62,7 +64,7 @@ def domain_config(options: DdsOptions) -> str:
                 f"CYCLONEDDS_URI without <{said[0]}>, as the URL chooses that; leave out one",
             )
     ours = (
-        f"<CycloneDDS><Domain>{_general(options)}<Internal>{_SIZES[1]}</Internal>"
+        f"<CycloneDDS><Domain>{_general(options)}<Internal>{_SIZES[1]}{_KEYS}</Internal>"
         f"{_discovery(options, addresses(options.peers))}{_END}"
     )
     return ",".join(part for part in (ours, options.config) if part)

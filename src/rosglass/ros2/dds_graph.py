@@ -78,6 +78,10 @@ class DdsGraph:
         """How many other participants are in the domain."""
         return len(self._participants) - (self._own in self._participants)
 
+    def prefixes(self) -> list[bytes]:
+        """Return what the GUIDs of each participant begin with, our own included."""
+        return list(self._participants)
+
     @property
     def humble(self) -> bool:
         """Whether those who speak ROS 2 here all use Humble's wide identities."""

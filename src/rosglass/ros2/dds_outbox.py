@@ -14,8 +14,6 @@ from rosglass.errors import Error, NodeClosedError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rosglass.ros2.dds_pump import Pump
-
 __all__ = ["Outbox"]
 
 _log = logging.getLogger("rosglass.ros2")
@@ -28,16 +26,15 @@ class _Item(NamedTuple):
 
 
 class Outbox:
-    """Sends at once what can be sent, and tries the rest again on a participant's pump.
+    """Sends at once what can be sent, and keeps the rest to be tried again.
 
     Args:
-        pump: The pump, which watches `entity`, and calls :meth:`retry` on its events.
-        entity: Cyclone's number for the writer that it is for.
+        wake: Called when there is something for :meth:`retry`, with whether it can be done at once.
         in_order: Whether nothing overtakes anything.
     """
 
-    def __init__(self, pump: Pump, entity: int, *, in_order: bool) -> None:
-        self._pump, self._entity, self._in_order = pump, entity, in_order
+    def __init__(self, wake: Callable[[bool], None], *, in_order: bool) -> None:
+        self._wake, self._in_order = wake, in_order
         self._lock = threading.Lock()
         self._items: deque[_Item] = deque()
         self._closed = False
@@ -55,7 +52,7 @@ class Outbox:
         Args:
             attempt: Sends it; returns False to be called again a little later.
             patience: Seconds after which it is given up.
-            expired: Called then, on the pump's thread.
+            expired: Called then.
             now: Whether to try it in the calling thread; what it raises comes out of here then.
         """
         if now and not (self._in_order and self._items) and attempt():
@@ -64,10 +61,10 @@ class Outbox:
             if self._closed:
                 return
             self._items.append(_Item(attempt, time.monotonic() + patience, expired))
-        self._pump.visit(self._entity, self.retry if now else None)
+        self._wake(not now)
 
-    def retry(self) -> None:
-        """Try again what is left; on the pump's thread."""
+    def retry(self) -> bool:
+        """Try again what is left; returns whether there is still something. For one thread."""
         with self._lock:
             items = list(self._items)
         for item in items:
@@ -76,11 +73,10 @@ class Outbox:
                     self._items.remove(item)
             elif self._in_order:
                 break
-        if items and not self._closed:
-            self._pump.visit(self._entity, self.retry if self._items else None)
+        return bool(self._items)
 
     def drain(self, seconds: float) -> None:
-        """Wait until nothing is left, at most so long; not on the pump's thread."""
+        """Wait until nothing is left, at most so long; not in the thread that retries."""
         until = time.monotonic() + seconds
         while self._items and time.monotonic() < until:
             time.sleep(0.005)

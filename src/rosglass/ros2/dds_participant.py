@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from typing import TYPE_CHECKING
 
 from rosglass.ros2 import cyclone
@@ -12,7 +13,7 @@ from rosglass.ros2.dds_domain import Domain
 from rosglass.ros2.dds_pump import Pump
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from rosglass.comm import NodeName
     from rosglass.ros2.dds_options import DdsOptions
@@ -29,9 +30,11 @@ class Participant:
     Attributes:
         entity: Cyclone's number for it.
         guid: Its 16 bytes of identity.
+        born: Monotonic time when it joined the domain.
         pump: Where everything that arrives is handed on.
         on_nodes: Called with all nodes whenever they or their endpoints change, never twice at a
             time; what announces them sets it.
+        others: Returns the GUIDs of the participants found so far; what finds them sets it.
 
     Raises:
         ConnectionLostError: This machine has no network interface to use, or no free port.
@@ -41,6 +44,7 @@ class Participant:
 
     def __init__(self, options: DdsOptions) -> None:
         self.on_nodes: Callable[[tuple[NodeEntities, ...]], None] = lambda _: None
+        self.others: Callable[[], Iterable[bytes]] = tuple
         self._nodes: dict[NodeName, int] = {}
         self._endpoints: dict[bytes, tuple[NodeName, bool]] = {}
         self._lock = threading.Lock()
@@ -50,6 +54,7 @@ class Participant:
             qos = Qos()
             qos.set_user_data(PARTICIPANT_USER_DATA)
             self.entity = cyclone.create_participant(options.domain, qos)
+            self.born = time.monotonic()
             self.guid = cyclone.guid(self.entity)
             self.pump = Pump(self.entity, f"DDS domain {options.domain}")
         except BaseException:

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import itertools
 import logging
+import math
 import threading
+import time
 from contextlib import suppress
 from dataclasses import replace
 from enum import Enum
@@ -51,6 +53,13 @@ _PREFIX = 12
 _DEPTH = 1000
 #: Seconds that sending waits in the caller's thread for readers that take nothing.
 _PATIENCE = 0.01
+#: Seconds from when a writer of another vendor is matched until its first sample is sure to arrive;
+#: see :meth:`Ends._start_probe`. Cyclone DDS's own writers need none.
+_SETTLING = 0.2
+#: Seconds after joining the domain when everybody on a usual network has answered, and when the
+#: endpoints of all who have are known: some tell of them only with their next heartbeat, each
+#: second. A client that finds a server before the server knows it loses its first request.
+_ANSWERED, _SYNCHRONIZED = 0.1, 1.2
 #: Seconds that the first samples wait for their receiver to be made.
 _START = 5.0
 #: Peers whose rubbish is logged, once each.
@@ -122,7 +131,8 @@ class Matched:
 class Ends:
     """The reader and the writer of a service's client or server.
 
-    Whatever the profile says, they hold many samples: a request or a reply is nothing to lose.
+    A server's writer comes into being a little later when the participant has only just joined.
+    Whatever the profile says, both hold many samples: a request or a reply is nothing to lose.
 
     Args:
         participant: Who they belong to.
@@ -133,7 +143,7 @@ class Ends:
         type_hash: Its RIHS01 hash.
         qos: Profile of requests and replies.
         on_taken: Takes what the reader receives, from :meth:`start` on.
-        on_matched: Called, on the participant's pump, when peers came or went.
+        on_matched: Called, on the participant's pump mostly, when peers came, went or settled.
         server: Whether they are a server's.
     """
 
@@ -151,88 +161,60 @@ class Ends:
         *,
         server: bool,
     ) -> None:
-        self._participant, self._graph, self._service = participant, graph, service
+        self._participant, self._graph, self._node = participant, graph, node
+        self._service, self._place = service, f"service {service}"
         self._kind = EndpointKind.SERVICE_CLIENT if server else EndpointKind.SERVICE_SERVER
         self._on_taken, self._on_matched = on_taken, on_matched
         self._started = threading.Event()
         self._named: set[bytes] = set()
+        self._since: dict[bytes, float] = {}
+        self._probing = threading.Lock()
+        self._probe: list[int] = []
         self.closed = False
         requests = f"rq{service}Request", mangle_type(f"{type_name}_Request")
         replies = f"rr{service}Reply", mangle_type(f"{type_name}_Response")
+        self._received, self._sent = (requests, replies) if server else (replies, requests)
         what = "serviceid" if server else "clientid"
-        user_data = format_user_data({what: _new_id(participant.guid), "typehash": type_hash})
-        qos = replace(qos, depth=max(qos.depth, _DEPTH))
-        place = f"service {service}"
-        self._qos, self._received = replace(qos, depth=1), requests if server else replies
-        self.writer = SampleWriter(
+        self._user_data = format_user_data({what: _new_id(participant.guid), "typehash": type_hash})
+        self._qos = replace(qos, depth=max(qos.depth, _DEPTH))
+        self.outbox = Outbox(self._wake, in_order=not server)
+        self.writer: SampleWriter | None = None
+        self.readers: Matched | None = None
+        self.reader = SampleReader(
             participant,
-            *(replies if server else requests),
-            qos,
-            user_data,
-            place,
-            # Requests need no identity beyond that which every sample has.
-            cyclone_identity.create_writing_topic if server else cyclone.create_topic,
-            _PATIENCE,
-        )
-        try:
-            if server:
-                cyclone_identity.prepare(self.writer.entity)
-            self.reader = SampleReader(
-                participant,
-                *self._received,
-                qos,
-                user_data,
-                place,
-                self._hand_on,
-                cyclone_identity.create_reading_topic,
-                cyclone_identity.origin,
-                self._matched,
-            )
-        except BaseException:
-            self.writer.close()
-            raise
-        self.readers = Matched(
-            self.writer.entity, cyclone.matched_subscriptions, cyclone_builtin.matched_subscription
+            *self._received,
+            self._qos,
+            self._user_data,
+            self._place,
+            self._hand_on,
+            cyclone_identity.create_reading_topic,
+            cyclone_identity.origin,
+            self._matched,
         )
         self.writers = Matched(
             self.reader.entity, cyclone.matched_publications, cyclone_builtin.matched_publication
         )
-        self._probing = threading.Lock()
-        self._probe: list[int] = []
-        self.outbox = Outbox(participant.pump, self.writer.entity, in_order=not server)
-        participant.pump.watch(self.writer.entity, Event.PUBLICATION_MATCHED, self._on_event)
         participant.add_endpoint(node, self.reader.guid, writer=False)
-        participant.add_endpoint(node, self.writer.guid, writer=True)
+        self._server = server
+        if not server or self._synced():
+            try:
+                self._open()
+            except BaseException:
+                self.close()
+                raise
 
     def start(self) -> None:
         """Let what is received be handed on, and matches be told."""
         self._started.set()
         self._matched()
+        if self.writer is None:
+            self._wake(False)
 
-    def probe(self, wanted: bool) -> None:
-        """Have a second reader for a while, or no more.
-
-        A writer tells a reader that it discovers where its samples begin. When it discovered ours
-        before we discovered it, that was lost, and Cyclone DDS drops the writer's next sample; what
-        it tells the second reader counts for both.
-        """
-        with self._probing:
-            for entity in self._probe:
-                cyclone.delete(entity)
-            self._probe.clear()
-            if not wanted or self.closed:
-                return
-            participant = self._participant.entity
-            topic = cyclone.create_topic(participant, *self._received)
-            self._probe.append(topic)
-            policies = qos_of(self._qos, writer=False)
-            reader = cyclone.create_reader(participant, topic, policies, self._service)
-            self._probe.insert(0, reader)
-
-    def visit(self, act: Callable[[], None] | None) -> None:
-        """Call `act` some thirty times a second on the participant's pump; None ends that."""
-        if not self.closed:
-            self._participant.pump.visit(self.reader.entity, act)
+    def settled(self, writer: bytes) -> bool:
+        """Return whether what a matched writer sends is sure to arrive, also the first sample."""
+        if scheme_of(writer) is Scheme.HEADER:
+            return True
+        return time.monotonic() - self._since.get(writer, math.inf) >= _SETTLING
 
     def strangers(self) -> list[EndpointInfo]:
         """Return the peers in the graph that do not use Cyclone DDS."""
@@ -262,13 +244,49 @@ class Ends:
         if self.closed:
             return
         self.closed = True
-        for end in (self.reader, self.writer):
-            self._participant.remove_endpoint(end.guid)
+        self._participant.remove_endpoint(self.reader.guid)
         self.reader.close()
-        self.probe(False)
         self.outbox.close()
-        self.writer.close()
-        self._participant.pump.forget(self.writer.entity)
+        with self._probing:
+            self._end_probe()
+            writer = self.writer
+        if writer is not None:
+            self._participant.remove_endpoint(writer.guid)
+            writer.close()
+            self._participant.pump.forget(writer.entity)
+
+    def _open(self) -> None:
+        """Create the writer."""
+        writer = SampleWriter(
+            self._participant,
+            *self._sent,
+            self._qos,
+            self._user_data,
+            self._place,
+            # Requests need no identity beyond that which every sample has.
+            cyclone_identity.create_writing_topic if self._server else cyclone.create_topic,
+            _PATIENCE,
+        )
+        with self._probing:
+            if self.closed:
+                writer.close()
+                return
+            if self._server:
+                cyclone_identity.prepare(writer.entity)
+            self.readers = Matched(
+                writer.entity, cyclone.matched_subscriptions, cyclone_builtin.matched_subscription
+            )
+            self.writer = writer
+        self._participant.pump.watch(writer.entity, Event.PUBLICATION_MATCHED, self._on_event)
+        self._participant.add_endpoint(self._node, writer.guid, writer=True)
+
+    def _synced(self) -> bool:
+        """Return whether clients that find this server now will be known here by then, too."""
+        age = time.monotonic() - self._participant.born
+        if age >= _SYNCHRONIZED:
+            return True
+        others = self._participant.others()
+        return age >= _ANSWERED and all(scheme_of(guid) is Scheme.HEADER for guid in others)
 
     def _hand_on(self, taken: list[Taken]) -> None:
         # The first may come while their receiver is being made.
@@ -276,19 +294,83 @@ class Ends:
             self._on_taken(taken)
 
     def _matched(self) -> None:
-        if self._started.is_set() and not self.closed:
-            try:
-                self._on_matched()
-            except Error as error:
-                _log.warning("%s: %s", self._service, error)
+        """Look who came or went, and tell."""
+        if not self._started.is_set() or self.closed:
+            return
+        strangers = {
+            found.guid for found in self.writers.all() if scheme_of(found.guid) is Scheme.IDENTITY
+        }
+        with self._probing:
+            new = not strangers <= self._since.keys()
+            now, before = time.monotonic(), self._since
+            self._since = {guid: before.get(guid, now) for guid in strangers}
+            if new and not self.closed:
+                self._start_probe()
+        if new:
+            self._wake(False)
+        try:
+            self._on_matched()
+        except Error as error:
+            _log.warning("%s: %s", self._service, error)
+
+    def _start_probe(self) -> None:
+        """Have a second reader for a while.
+
+        A writer tells a reader that it discovers where its samples begin. When it discovered ours
+        before we discovered it, that was lost, and Cyclone DDS drops the writer's next sample; what
+        it tells the second reader counts for both.
+        """
+        self._end_probe()
+        try:
+            participant = self._participant.entity
+            self._probe.append(cyclone.create_topic(participant, *self._received))
+            policies = qos_of(replace(self._qos, depth=1), writer=False)
+            reader = cyclone.create_reader(participant, self._probe[0], policies, self._place)
+            self._probe.insert(0, reader)
+        except Error as error:
+            _log.warning("%s: the first sample of another may be lost: %s", self._service, error)
+
+    def _end_probe(self) -> None:
+        for entity in self._probe:
+            cyclone.delete(entity)
+        self._probe.clear()
+
+    def _wake(self, at_once: bool) -> None:
+        """Look on the pump's thread what there is to do, now or up to 30 ms later."""
+        if self.closed:
+            return
+        if at_once and self.writer is not None:
+            self._participant.pump.visit(self.writer.entity, None)
+        else:
+            self._participant.pump.visit(self.reader.entity, self._look)
 
     def _on_event(self) -> None:
-        if self.closed:
+        if self.closed or self.writer is None:
             return
         with suppress(NodeClosedError):
             if publication_matched(self.writer.entity).change:
                 self._matched()
-        self.outbox.retry()
+        if self.outbox.retry():
+            self._wake(False)
+
+    def _look(self) -> None:
+        """Do what is due; on the pump's thread, until nothing is left to be done."""
+        if self.closed:
+            return
+        unsettled = not all(self.settled(guid) for guid in self._since)
+        if not unsettled and self._probe:
+            with self._probing:
+                self._end_probe()
+            self._matched()
+        if self.writer is None and self._synced():
+            try:
+                self._open()
+            except Error as error:
+                _log.error("%s cannot be offered: %s", self._service, error)
+                self._participant.pump.visit(self.reader.entity, None)
+                return
+        if not (self.outbox.retry() or unsettled or self.writer is None):
+            self._participant.pump.visit(self.reader.entity, None)
 
 
 def names_of(peers: Iterable[EndpointInfo]) -> str:

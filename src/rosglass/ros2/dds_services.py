@@ -11,7 +11,6 @@ import logging
 import secrets
 import struct
 import threading
-import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -47,10 +46,6 @@ _PREFIX = 12
 _REPLY_PATIENCE = 3.0
 #: Seconds that closing waits for replies that are on their way.
 _FAREWELL = 0.5
-#: Seconds from when a server is matched until its first reply is sure to arrive: Cyclone DDS drops
-#: what it gets of another vendor's writer before that one's first heartbeat, and a request may be
-#: answered sooner than that. Cyclone DDS's own writers send both at once.
-_SETTLING = 0.2
 _REMEDY = "start it with RMW_IMPLEMENTATION=rmw_cyclonedds_cpp, or use zenoh:// with rmw_zenoh_cpp"
 
 
@@ -81,8 +76,6 @@ class DdsRequester(Requester):
         self._calls: dict[int, int] = {}
         self._by_sequence: dict[int, int] = {}
         self._sequence = 0
-        #: Since when servers are linked.
-        self._since: dict[str | bytes, float] = {}
         self._ends = Ends(
             participant,
             graph,
@@ -92,10 +85,12 @@ class DdsRequester(Requester):
             type_hash,
             qos,
             self._on_replies,
-            self._on_matched,
+            self._tell,
             server=False,
         )
-        self.gid = self._ends.writer.guid
+        assert self._ends.writer is not None
+        self._writer = self._ends.writer
+        self.gid = self._writer.guid
         self._ends.start()
 
     @property
@@ -107,7 +102,7 @@ class DdsRequester(Requester):
         names = names_of(strangers)
         if reason := cyclone_identity.reading_problem():
             return f"{names} cannot be called: {reason}; {_REMEDY}"
-        if Scheme.HEADER in self._schemes()[0]:
+        if Scheme.HEADER in self._schemes():
             return (
                 f"{names} and a server on Cyclone DDS offer {self._service} in ways that exclude "
                 "each other: only the former is called; end one of them"
@@ -172,7 +167,7 @@ class DdsRequester(Requester):
                 )
             sequence, self._sequence = self._sequence, -1
             try:
-                self._ends.writer.write(parts)
+                self._writer.write(parts)
             except (NodeClosedError, TimeoutError, UnsupportedError) as error:
                 self._sequence = sequence  # nothing was sent
                 if isinstance(error, TimeoutError):
@@ -198,7 +193,7 @@ class DdsRequester(Requester):
         number = None
         if origin is not None and origin.related is not None:
             guid, sequence = origin.related
-            if guid in (self._ends.writer.guid, self._ends.reader.guid):
+            if guid in (self.gid, self._ends.reader.guid):
                 with self._lock:
                     number = self._by_sequence.pop(sequence, None)
         elif scheme_of(server) is Scheme.IDENTITY:
@@ -226,42 +221,19 @@ class DdsRequester(Requester):
 
     def _route(self) -> Scheme | None:
         """Return how to send requests; None when no server is linked."""
-        schemes, _ = self._schemes()
+        schemes = self._schemes()
         if Scheme.IDENTITY in schemes and not cyclone_identity.reading_problem():
             # Servers on Cyclone DDS find such requests too short, mostly; the others would
             # take a header for arguments.
             return Scheme.IDENTITY
         return Scheme.HEADER if Scheme.HEADER in schemes else None
 
-    def _schemes(self) -> tuple[set[Scheme], bool]:
-        """Return what the linked servers speak, and whether there will be more of them soon."""
-        answering = {_server_of(found) for found in self._ends.writers.all()}
-        linked = [found for found in self._ends.readers.all() if _server_of(found) in answering]
-        schemes, soon, now = set(), False, time.monotonic()
-        with self._lock:
-            before, self._since = self._since, {}
-            for found in linked:
-                server, scheme = _server_of(found), scheme_of(found.guid)
-                self._since[server] = since = before.get(server, now)
-                if scheme is Scheme.HEADER or now - since >= _SETTLING:
-                    schemes.add(scheme)
-                else:
-                    soon = True
-        return schemes, soon
-
-    def _on_matched(self) -> None:
-        _, soon = self._schemes()
-        if soon:
-            self._ends.probe(True)
-            self._ends.visit(self._settle)
-        self._tell()
-
-    def _settle(self) -> None:
-        """See whether a new server can be called now."""
-        if not self._schemes()[1]:
-            self._ends.probe(False)
-            self._ends.visit(None)
-            self._tell()
+    def _schemes(self) -> set[Scheme]:
+        """Return what the linked servers speak."""
+        ends = self._ends
+        answering = {_server_of(found) for found in ends.writers.all() if ends.settled(found.guid)}
+        asked = () if ends.readers is None else ends.readers.all()
+        return {scheme_of(found.guid) for found in asked if _server_of(found) in answering}
 
     def _tell(self) -> None:
         if self.changed is not None:
@@ -387,15 +359,16 @@ class DdsReplier(Replier):
 
     def _answer(self, answer: _Answer, data: bytes | bytearray) -> bool:
         """Send a reply; return whether nothing more is to be done for it."""
-        if not self._hears(answer):
+        writer = self._ends.writer
+        if writer is None or not self._hears(answer):
             # A reply to a reader that is not matched yet would be lost.
             return answer.client not in self._ends.writers.all()
         try:
             if answer.identity is None:
                 view = memoryview(data)
                 parts = (view[:_ENCAPSULATION], answer.header, view[_ENCAPSULATION:])
-                self._ends.writer.write(parts)
-            elif not cyclone_identity.write(self._ends.writer, answer.identity, data):
+                writer.write(parts)
+            elif not cyclone_identity.write(writer, answer.identity, data):
                 who = self._ends.who(answer.client.guid)
                 text = "%s did not get its reply: Cyclone DDS sent it without identity; %s"
                 self._ends.name(answer.client.guid, text, who, _REMEDY)
@@ -405,7 +378,7 @@ class DdsReplier(Replier):
 
     def _hears(self, answer: _Answer) -> bool:
         """Return whether the client's reader of replies is matched."""
-        readers = self._ends.readers.all()
+        readers = [] if self._ends.readers is None else self._ends.readers.all()
         if answer.reader:
             return any(found.guid == answer.reader for found in readers)
         client = _client_of(answer.client)
