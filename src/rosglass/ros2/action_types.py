@@ -66,9 +66,10 @@ CANCEL_REASONS = {
 #: Stands for every goal in a request to cancel.
 NO_ID = bytes(16)
 
-_UUID = parse_message("uint8[16] uuid", "unique_identifier_msgs/msg/UUID")
-_TIME = parse_message("int32 sec\nuint32 nanosec", "builtin_interfaces/msg/Time")
-_BUILT_IN = {definition.name: definition for definition in (_UUID, _TIME)}
+_BUILT_IN = {
+    "unique_identifier_msgs/msg/UUID": "uint8[16] uuid",
+    "builtin_interfaces/msg/Time": "int32 sec\nuint32 nanosec",
+}
 
 
 @dataclass(frozen=True)
@@ -152,6 +153,7 @@ def _service(action: ActionType, suffix: str) -> ServiceDefinition:
 
 
 def _complete(definition: Definition) -> Definition:
-    needed = {field.type.name for field in definition.fields}
-    built_in = {name: part for name, part in _BUILT_IN.items() if name in needed}
-    return replace(definition, nested={**definition.nested, **built_in})
+    """Return a derived message with the definitions of what actions themselves add to it."""
+    names = {field.type.name for field in definition.fields} & _BUILT_IN.keys()
+    added = {name: parse_message(_BUILT_IN[name], name) for name in names}
+    return replace(definition, nested={**definition.nested, **added})

@@ -5,8 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointKind, Node, NodeName, QoS, Subscription
-from rosglass.ros2.action_client import Ros2ActionClient
-from rosglass.ros2.action_server import Ros2ActionServer
 from rosglass.ros2.arguments import NO_ARGUMENTS
 from rosglass.ros2.core import Core
 from rosglass.ros2.furniture import Furniture
@@ -154,6 +152,8 @@ class Ros2Node(Node):
         """Return a client; see :meth:`rosglass.comm.Node.create_action_client`."""
         self._core.check_open()
         self._core.types.ensure(type)
+        from rosglass.ros2.action_client import Ros2ActionClient  # noqa: PLC0415 - few need it
+
         return Ros2ActionClient(self._core, self.resolve(name), type)
 
     def create_action_server(
@@ -169,6 +169,8 @@ class Ros2Node(Node):
         """Offer an action; see :meth:`rosglass.comm.Node.create_action_server`."""
         self._core.check_open()
         self._core.types.ensure(type)
+        from rosglass.ros2.action_server import Ros2ActionServer  # noqa: PLC0415 - few need it
+
         full = self.resolve(name)
         return Ros2ActionServer(self._core, full, type, execute, accept, cancel, executor)
 
