@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+import rosglass
+from rosglass.comm import Sample
 from rosglass.errors import UnsupportedError
 from rosglass.images import choose
 
@@ -45,3 +48,16 @@ def test_nothing_published_yet_is_no_error() -> None:
 def test_what_cannot_be_shown_is_named(preferred: str, published: dict, reason: str) -> None:
     with pytest.raises(UnsupportedError, match=reason):
         choose("/cam", preferred, published)
+
+
+def test_pictures_stay_where_they_were_received() -> None:
+    choice = choose("/cam", "raw", BOTH)
+    assert choice is not None
+    kind = rosglass.load(RAW)
+    pixels = np.arange(60_000, dtype=np.uint8)
+    fields = {"height": 200, "width": 300, "step": 300, "encoding": "mono8"}
+    block = bytearray(kind.encode(data=pixels, **fields))
+    read = choice.transport.reader(kind, "cdr")
+    picture = read(Sample(memoryview(block).toreadonly(), "cdr", kind, 1))
+    assert np.shares_memory(np.asarray(picture.data), np.frombuffer(block, np.uint8))
+    assert np.array_equal(picture.data, pixels)
