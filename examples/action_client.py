@@ -12,7 +12,7 @@ import rosglass
 
 def show(feedback) -> None:
     """Show how far it is; runs on the node's own thread."""
-    print("so far:", feedback.sequence.tolist())
+    print(f"so far: {feedback.sequence.tolist()}")
 
 
 with rosglass.connect(sys.argv[1] if len(sys.argv) > 1 else None, "student") as node:
@@ -24,12 +24,12 @@ with rosglass.connect(sys.argv[1] if len(sys.argv) > 1 else None, "student") as 
         status, result = goal.result()
     except rosglass.ServiceUnavailableError as error:
         sys.exit(f"is examples/action_server.py running? {error}")
-    print(status.value, result.sequence.tolist())
+    print(f"{status.value} {result.sequence.tolist()}")
 
     goal = client.send_goal({"order": 30})
     if goal.acceptance.result(timeout=5):
         answer = goal.cancel().result(timeout=5)
-        print("cancelling", len(answer.accepted), "goal", answer.reason)
+        print(f"cancelling {len(answer.accepted)} goal {answer.reason}")
     print(goal.result(timeout=5).status.value)
 
     try:

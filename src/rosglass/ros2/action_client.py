@@ -202,6 +202,12 @@ class Ros2ActionClient(ActionClient, Member):
         ends = self._ends
         return ends is not None and ends.send_goal.withdraw(call)
 
+    def flush(self) -> None:
+        """Take the feedback and status that have arrived and wait to be taken."""
+        ends = self._ends
+        if ends is not None:
+            ends.flush()
+
     def forget(self, goal: Ros2ClientGoal) -> None:
         """Let a goal go that has ended."""
         with self._lock:

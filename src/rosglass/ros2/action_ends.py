@@ -79,6 +79,11 @@ class ActionEnds(Handle):
             for topic, kind in ((FEEDBACK, types.feedback), (STATUS, types.status))
         ]
 
+    def flush(self) -> None:
+        """Take what has arrived on the topics and waits to be taken, in the calling thread."""
+        for reader in self._readers:
+            reader.flush()
+
     def close(self) -> None:
         """Listen and talk no longer; calls that have not ended fail."""
         for end in (*self.services, *self._readers):

@@ -395,7 +395,12 @@ class Ros2ClientGoal(ClientGoal):
             self._end(GoalStatus.LOST, error)
             return
         self._asking, self._asked = call, time.monotonic()
-        call.add_done_callback(lambda _: self._jobs.add(lambda: self._take_result(call)))
+        call.add_done_callback(lambda _: self._came(call))
+
+    def _came(self, call: Call) -> None:
+        """Take the end, after the feedback that came before it on another way."""
+        self._client.flush()
+        self._jobs.add(lambda: self._take_result(call))
 
     def _take_result(self, call: Call) -> None:
         if call is not self._asking:

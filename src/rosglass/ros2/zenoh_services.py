@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import zenoh
 
-from rosglass.comm import EndpointKind
+from rosglass.comm import ConnectionState, EndpointKind
 from rosglass.errors import ConnectionLostError, NodeClosedError
 from rosglass.ros2.middleware import (
     CALL_DROPPED,
@@ -57,6 +57,8 @@ _log = logging.getLogger("rosglass.ros2")
 _MARGIN = 5.0
 #: Seconds for calls that may take for ever, such as those for an action's result.
 _FOREVER = 10 * 365 * 86400.0
+#: Seconds that a reply may take to come after its server has left: news of the graph are quicker.
+_LINGER = 0.5
 #: Bytes above which a payload is sent by a thread of its own: it may have to wait for the link.
 _BIG = 32_000
 
@@ -69,11 +71,13 @@ class _Call:
         cancel: Ends the query.
         servers: Identities of the servers that were asked and have not refused.
         deadline: Monotonic time after which nobody waits for the reply.
+        left: Whether all servers have left since.
     """
 
     cancel: zenoh.CancellationToken
     servers: set[bytes]
     deadline: float
+    left: bool = False
 
 
 class ZenohRequester(Declaration, Requester):
@@ -128,8 +132,11 @@ class ZenohRequester(Declaration, Requester):
         return list(self._queriers.values())
 
     def ready(self) -> bool:
-        """Return whether a server is in the graph, and queries reach it."""
-        return bool(self._route()[1])
+        """Return whether a server is in the graph, and queries reach it.
+
+        Not while the link is silent: what is sent then arrives, if ever, when it is out of date.
+        """
+        return bool(self._route()[1]) and self._owner.status().state is ConnectionState.CONNECTED
 
     def send(self, data: bytes | bytearray, timeout: float | None) -> int:
         """Send a request; see :meth:`rosglass.ros2.middleware.Requester.send`."""
@@ -178,12 +185,12 @@ class ZenohRequester(Declaration, Requester):
             call.cancel.cancel()  # type: ignore[no-untyped-call]
 
     def server_left(self, gid: bytes) -> None:
-        """End the calls that waited for this server alone; called when it leaves the graph."""
-        for number, call in tuple(self._calls.items()):
+        """Give up the calls that waited for this server alone; called when it leaves the graph."""
+        for call in tuple(self._calls.values()):
             if gid in call.servers:
                 call.servers.discard(gid)
                 if not call.servers:
-                    self._fail(number, SERVER_LEFT)
+                    call.left, call.deadline = True, time.monotonic() + _LINGER
 
     def poll(self) -> None:
         """End the calls that can get no reply any more; called about once a second."""
@@ -193,7 +200,9 @@ class ZenohRequester(Declaration, Requester):
             self._fail(self._ended.popleft(), CALL_DROPPED)
         now = time.monotonic()
         for number, call in tuple(self._calls.items()):
-            if now > call.deadline:
+            if now > call.deadline and call.left:
+                self._fail(number, SERVER_LEFT)
+            elif now > call.deadline:
                 self.forget(number)
 
     def close(self) -> None:

@@ -93,7 +93,7 @@ def test_a_callback_that_fails(node, server):
         client.call(timeout=1)
 
 
-def test_goals_in_every_way(node, server):
+def test_goals_in_every_way(node, server, wait_for):
     client = node.create_action_client("/count", FIBONACCI)
     feedback, statuses = [], []
     goal = client.send_goal(
@@ -104,9 +104,9 @@ def test_goals_in_every_way(node, server):
     status, result = goal.result(10)
     assert status is GoalStatus.SUCCEEDED, client.problem
     assert list(result.sequence) == [0, 1, 2, 3, 4]
-    assert feedback == [2, 3, 4, 5]
+    wait_for(lambda: statuses[-1] is GoalStatus.SUCCEEDED, what=statuses)
     assert statuses[0] is GoalStatus.ACCEPTED
-    assert statuses[-1] is GoalStatus.SUCCEEDED
+    assert feedback == [2, 3, 4, 5]
     with pytest.raises(rosglass.GoalRejectedError):
         client.send_goal({"order": 1000}).result(10)
     goals = [client.send_goal({"order": 900}) for _ in range(3)]
@@ -142,7 +142,7 @@ def test_the_status_of_goals_is_there_for_late_listeners(node, url, wait_for):
         assert sample is not None, subscription.problem
         entry = sample.message().status_list[0]
         assert (bytes(entry.goal_info.goal_id.uuid), entry.status) == (goal.id, 4)
-        assert other.actions()["/late"] == [FIBONACCI]
+        wait_for(lambda: other.actions().get("/late") == [FIBONACCI], what=other.actions())
 
 
 def test_a_server_that_is_killed_at_work(new_url, run_peer):
@@ -247,18 +247,15 @@ def test_a_goal_survives_a_router_that_is_restarted(free_port, run_peer, wait_fo
         (
             "service_server.py",
             "service_client.py",
-            ["1 + 2 = 3", "20 + 22 = 42", "in asyncio: [0, 2, 4, 6, 8]"],
+            ["1 + 2 = 3\n", "20 + 22 = 42\n", "in asyncio: [0, 2, 4, 6, 8]\n"],
         ),
         (
             "action_server.py",
             "action_client.py",
             [
-                "so far: [0, 1, 1]",
-                "so far: [0, 1, 1, 2]",
-                "so far: [0, 1, 1, 2, 3]",
-                "so far: [0, 1, 1, 2, 3, 5]",
+                *["so far:"] * 4,
                 "succeeded [0, 1, 1, 2, 3, 5]",
-                "cancelling 1 goal ",
+                "cancelling 1 goal",
                 "canceled",
                 "the server of /fibonacci does not accept goal ",
             ],
@@ -266,16 +263,16 @@ def test_a_goal_survives_a_router_that_is_restarted(free_port, run_peer, wait_fo
     ],
     ids=["services", "actions"],
 )
-def test_the_examples(url, start, wait_for, server, client, told):
+def test_the_examples(new_url, start, wait_for, server, client, told):
+    url = new_url()
     serving = start(str(EXAMPLES / server), url)
     wait_for(lambda: "ready; Ctrl-C ends it\n" in serving.output, what=serving.output)
     using = start(str(EXAMPLES / client), url)
     assert using.popen.wait(30) == 0, using.output
-    lines = [line.rstrip("\n") for line in using.output]
-    if server == "action_server.py":
-        assert lines[-1].startswith(told[-1])
-        lines, told = lines[:-1], told[:-1]
-    assert lines == told
+    # The lines of two threads may be mixed up, but nothing is missing.
+    wait_for(lambda: told[-1] in "".join(using.output), what=using.output)
+    shown = "".join(using.output)
+    assert {text: shown.count(text) for text in told} == {text: told.count(text) for text in told}
     os.kill(serving.pid, signal.SIGINT)
     assert serving.popen.wait(5) == 0
-    assert serving.output[-1] == "bye\n"
+    wait_for(lambda: serving.output[-1] == "bye\n", what=serving.output)

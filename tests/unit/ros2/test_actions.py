@@ -392,6 +392,19 @@ def test_feedback_of_others_and_after_the_end_is_not_told(client, peer, eventual
     eventually(lambda: told == [("two", [2]), ("one", [1])])
 
 
+def test_feedback_that_waits_is_taken_before_the_end(client, peer, eventually):
+    told = []
+    goal = client.send_goal(
+        on_feedback=lambda m: told.append(list(m.sequence)), on_done=told.append
+    )
+    peer.answer()
+    eventually(lambda: peer.asked)
+    message = {"goal_id": {"uuid": goal.id}, "feedback": {"sequence": [1]}}
+    peer.feedback.waiting.append(peer.types["FeedbackMessage"].encode(message))
+    peer.result(goal, 4)
+    eventually(lambda: told == [[1], goal])
+
+
 def test_a_sample_that_comes_twice_is_told_once(client, peer, eventually):
     told = []
     goal = client.send_goal(on_feedback=lambda m: told.append(list(m.sequence)))

@@ -55,6 +55,8 @@ def use():
     client.wait_for_server(10)
     goal = client.send_goal({"order": 4}, on_feedback=lambda m: feedback.append(len(m.sequence)))
     status, result = goal.result(10)
+    while len(feedback) < 3:
+        time.sleep(0.01)
     tell(goal=[status.value, list(map(int, result.sequence)), feedback])
 
 
