@@ -77,10 +77,12 @@ def test_a_recording_is_read_by_others_and_played_by_us(
     times: list[int] = []
     listener.create_subscription("/talk", STRING, lambda message: heard.append(message.data))
     listener.create_subscription(
-        "/clock", "rosgraph_msgs/msg/Clock", lambda m: times.append(m.clock.nanosec)
+        "/clock", "rosgraph_msgs/msg/Clock", lambda m: times.append(m.clock.nanosec), QoS.clock()
     )
     grid = listener.create_subscription("/map", GRID, qos=QoS.latched())
-    secret = listener.create_subscription("/secret", OpaqueType("secret_msgs/msg/X"), qos=20)
+    secret = listener.create_subscription(
+        "/secret", OpaqueType("secret_msgs/msg/X"), qos=QoS.sensor_data().with_depth(20)
+    )
     with (
         open_bag(recording) as bag,
         Player(node, bag, rate=3.0, clock=50, remap={"/chatter": "/talk"}) as player,
