@@ -9,8 +9,8 @@ of its own with some entries replaced:
 - Receiving: ``from_ser`` is given the packet; what it says is noted under the new sample's address.
 - Sending: a sample that is marked begins with its inline QoS. ``get_size`` leaves that out;
   ``to_ser_ref``, asked for the bytes that follow a submessage's header, returns the inline QoS with
-  them and sets the header's flag for it. The library does the rest: fragments, retransmissions,
-  several networks.
+  them and sets the header's flag for it; ``to_ser_unref`` gives them back. The library does the
+  rest: fragments, retransmissions, several networks.
 
 That takes private layouts, those of Cyclone DDS 11.0.1 on 64-bit Linux. They are tested once, on
 memory of our own, before anything relies on them; where that fails, :func:`reading_problem` and
@@ -45,6 +45,8 @@ from rosglass.ros2.cyclone_samples import COPIED, payload
 from rosglass.ros2.dds_identity import Identity, Origin, inline_qos, read_origin
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rosglass.ros2.dds_endpoints import SampleWriter
 
 __all__ = [
@@ -62,7 +64,7 @@ _log = logging.getLogger("rosglass.ros2")
 #: ``ddsi_sertype.serdata_ops``, and the entries of ``ddsi_serdata_ops`` that are replaced.
 _OPS_OF_TYPE = 8
 _OPS = 17
-_GET_SIZE, _FROM_SER, _TO_SER_REF = 1, 2, 7
+_GET_SIZE, _FROM_SER, _TO_SER_REF, _TO_SER_UNREF = 1, 2, 7, 8
 _SDK_DATA = 2
 #: ``ddsi_rdata``: rmsg, nextfrag, min, maxp1, submsg_zoff, payload_zoff, keyhash_zoff; and where
 #: the packet begins that a ``ddsi_rmsg`` holds.
@@ -74,12 +76,12 @@ _XMSG = struct.Struct("=QQi4xQ")
 _XMSG_ROOM = 128
 _XMSG_KIND, _XMSG_DATA = 24, 112
 _XMSG_KINDS = (1, 2, 3)
-#: What an xmsg of INFO_TS and DATA, or DATA_FRAG, has before its payload: by its size, the latter's
-#: id and octetsToInlineQos.
-_FORMS = {36: (0x15, 16), 48: (0x16, 28)}
-#: ``ddsi_xmsg_data``: where INFO_SRC, INFO_DST, INFO_TS begin, with their ids, and then the rest.
-_INFOS = ((0, 0x0C), (24, 0x0E), (40, 0x09))
-_SUBMESSAGES, _SUBMESSAGE = 40, 52
+#: What an xmsg has before its payload, by whether that begins the sample and by its size: where the
+#: header of DATA or DATA_FRAG begins (a sample's first follows INFO_TS), its id, octetsToInlineQos.
+_FORMS = {(True, 36): (12, 0x15, 16), (True, 48): (12, 0x16, 28), (False, 36): (0, 0x16, 28)}
+#: ``ddsi_xmsg_data``: where INFO_SRC and INFO_DST begin, with their ids, and then the rest.
+_INFOS = ((0, 0x0C), (24, 0x0E))
+_SUBMESSAGES = 40
 _INLINE_QOS = 0x02
 #: Begins a sample with inline QoS, the payload's own header coming after that: an encapsulation
 #: header with options that nobody uses, and the first parameter.
@@ -95,10 +97,13 @@ _from_ser_type = c_void_p, c_void_p, c_int, c_void_p, c_size_t
 _FromSer, _FromSerFree = PYFUNCTYPE(*_from_ser_type), CFUNCTYPE(*_from_ser_type)
 _GetSize = PYFUNCTYPE(c_uint32, c_void_p)
 _ToSerRef = PYFUNCTYPE(c_void_p, c_void_p, c_size_t, c_size_t, c_void_p)
+_ToSerUnref = PYFUNCTYPE(None, c_void_p, c_void_p)
 
 _lock = threading.Lock()
 _origins: dict[int, Origin] = {}
 _told = threading.local()
+#: Fragments with inline QoS that the library is sending, by their address.
+_fragments: dict[int, Any] = {}
 #: By the address of the type that points to them; the address may be another type's later.
 _tables: dict[int, Any] = {}
 
@@ -132,19 +137,21 @@ def origin(serdata: int) -> Origin | None:
     return _origins.pop(serdata, None)
 
 
-def write(writer: SampleWriter, identity: Identity, data: bytes | bytearray) -> bool:
+def write(
+    writer: SampleWriter, identity: Identity, parts: Sequence[bytes | bytearray | memoryview]
+) -> bool:
     """Send a payload with inline QoS that relates it to another sample.
 
     Args:
         writer: One that :func:`prepare` was applied to.
         identity: What it relates to.
-        data: The payload with its encapsulation header.
+        parts: The payload in one piece or several; it begins with the encapsulation header.
 
     Returns:
         Whether it went out with inline QoS; not so if nobody outside this process is matched.
     """
     _told.identity = False
-    writer.write((_MARK, inline_qos(identity), data))
+    writer.write((_MARK, inline_qos(identity), *parts))
     return bool(_told.identity)
 
 
@@ -281,6 +288,7 @@ class _Writing(_Hook):
     def replace(self, originals: Any) -> dict[int, Any]:
         original_size = _GetSize(originals[_GET_SIZE])
         original_ref = _ToSerRef(originals[_TO_SER_REF])
+        original_unref = _ToSerUnref(originals[_TO_SER_UNREF])
 
         def get_size(serdata: int) -> int:
             size: int = original_size(serdata)
@@ -290,19 +298,38 @@ class _Writing(_Hook):
             kept: int = original_ref(serdata, offset, size, part)
             try:
                 if self._marked(serdata):
-                    first = serdata + self._header
-                    if offset == 0 and _flag(part):
-                        first, size = first + len(_MARK), size + _QOS_SIZE
-                        _told.identity = True
-                    else:
-                        first += _BEFORE + offset
-                    c_void_p.from_address(part).value = first
-                    c_size_t.from_address(part + 8).value = size
+                    self._give(serdata + self._header, offset, size, part)
             except Exception:
                 _log.exception("a DDS sample cannot be sent with its identity")
             return kept
 
-        return {_GET_SIZE: _GetSize(get_size), _TO_SER_REF: _ToSerRef(to_ser_ref)}
+        def to_ser_unref(serdata: int, part: int) -> None:
+            _fragments.pop(c_void_p.from_address(part).value or 0, None)
+            original_unref(serdata, part)
+
+        return {
+            _GET_SIZE: _GetSize(get_size),
+            _TO_SER_REF: _ToSerRef(to_ser_ref),
+            _TO_SER_UNREF: _ToSerUnref(to_ser_unref),
+        }
+
+    @staticmethod
+    def _give(marked: int, offset: int, size: int, part: int) -> None:
+        """Fill in where the bytes are that follow a submessage's header, and how many."""
+        begin = marked + _BEFORE + offset
+        if _flag(part, first=offset == 0):
+            _told.identity = True
+            if offset == 0:
+                begin = marked + len(_MARK)
+            else:
+                # Each fragment has it: RustDDS looks at the last one that it gets.
+                qos = string_at(marked + len(_MARK), _QOS_SIZE)
+                held = ctypes.create_string_buffer(qos + string_at(begin, size), _QOS_SIZE + size)
+                begin = ctypes.addressof(held)
+                _fragments[begin] = held
+            size += _QOS_SIZE
+        c_void_p.from_address(part).value = begin
+        c_size_t.from_address(part + 8).value = size
 
     def test(self, sertype: int) -> None:
         self._measure(sertype)
@@ -311,16 +338,19 @@ class _Writing(_Hook):
         serdata = _make(sertype, _MARK + qos + data)
         lib = keeping()
         _expect(lib.ddsi_serdata_size(serdata), len(data))
-        # What is sent within this process has no header to be flagged.
-        _expect(_bytes_of(serdata, 0, len(data), 0), data)
-        _expect(_bytes_of(serdata, 4, 8, 0), data[4:])
-        submessages = bytes(12) + struct.pack("=BBHHH16x", 0x15, 5, 0, 0, 16)
-        held = bytearray(_SUBMESSAGES) + submessages
-        for at, name in _INFOS:
-            held[at] = name
-        packet = (c_ubyte * len(held)).from_buffer(held)
-        _expect(_bytes_of(serdata, 0, len(data), ctypes.addressof(packet)), qos + data)
-        _expect(held[_SUBMESSAGE + 1], 5 | _INLINE_QOS)
+        # What stays within this process has no header to be flagged.
+        _expect(_bytes_of(serdata, 0, len(data), None), data)
+        _expect(_bytes_of(serdata, 4, 8, None), data[4:])
+        for first, wanted in ((True, qos + data), (False, qos + data[4:])):
+            place, name, to_qos = _FORMS[first, 36]
+            held = bytearray(_SUBMESSAGES + 36)
+            for at, info in _INFOS:
+                held[at] = info
+            struct.pack_into("=BBHHH", held, _SUBMESSAGES + place, name, 5, 0, 0, to_qos)
+            offset = 0 if first else 4
+            _expect(_bytes_of(serdata, offset, len(data) - offset, held), wanted)
+            _expect(held[_SUBMESSAGES + place + 1], 5 | _INLINE_QOS)
+        _expect(_fragments, {})
         lib.ddsi_serdata_unref(serdata)
 
     def _measure(self, sertype: int) -> None:
@@ -356,15 +386,16 @@ def _note(serdata: int, fragments: int) -> None:
     _origins[serdata] = found
 
 
-def _flag(part: int) -> bool:
+def _flag(part: int, *, first: bool) -> bool:
     """Say in a submessage's header that inline QoS follows; returns False when there is no header.
 
     Args:
         part: Where the library wants the payload's address; an xmsg's refd_payload_iov, unless the
             sample is about to be copied for a reader in this process.
+        first: Whether the payload begins the sample.
     """
     room, size, parameters, referred = _XMSG.unpack(string_at(part - _XMSG.size, _XMSG.size))
-    form = _FORMS.get(size)
+    form = _FORMS.get((first, size))
     if form is None or room != _XMSG_ROOM or parameters or referred:
         return False
     if c_uint32.from_address(part + _XMSG_KIND).value not in _XMSG_KINDS:
@@ -375,10 +406,11 @@ def _flag(part: int) -> bool:
     held = string_at(data, _SUBMESSAGES + size)
     if any(held[at] != name for at, name in _INFOS):
         return False
-    name, flags, to_qos = struct.unpack_from("=BB4xH", held, _SUBMESSAGE)
-    if (name, to_qos) != form or flags & _INLINE_QOS:
+    place = _SUBMESSAGES + form[0]
+    name, flags, to_qos = struct.unpack_from("=BB4xH", held, place)
+    if (name, to_qos) != form[1:] or flags & _INLINE_QOS:
         return False
-    c_ubyte.from_address(data + _SUBMESSAGE + 1).value = flags | _INLINE_QOS
+    c_ubyte.from_address(data + place + 1).value = flags | _INLINE_QOS
     return True
 
 
@@ -390,14 +422,15 @@ def _make(sertype: int, data: bytes) -> int:
     return int(made)
 
 
-def _bytes_of(serdata: int, offset: int, size: int, packet: int) -> bytes:
-    """Return what is sent of a sample behind the headers at `packet`; 0 for none."""
+def _bytes_of(serdata: int, offset: int, size: int, packet: bytearray | None) -> bytes:
+    """Return what is sent of a sample behind the headers in `packet`, if any."""
     room = ctypes.create_string_buffer(_XMSG.size + _XMSG_DATA + 8)
     part = ctypes.addressof(room) + _XMSG.size
-    if packet:
+    if packet is not None:
+        headers = (c_ubyte * len(packet)).from_buffer(packet)
         _XMSG.pack_into(room, 0, _XMSG_ROOM, 36, 0, 0)
         c_uint32.from_address(part + _XMSG_KIND).value = 1
-        c_void_p.from_address(part + _XMSG_DATA).value = packet
+        c_void_p.from_address(part + _XMSG_DATA).value = ctypes.addressof(headers)
     lib = keeping()
     lib.ddsi_serdata_to_ser_ref(serdata, offset, size, part)
     data = string_at(c_void_p.from_address(part).value or 0, c_size_t.from_address(part + 8).value)

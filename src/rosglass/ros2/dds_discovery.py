@@ -77,7 +77,7 @@ class DdsDiscovery:
         self._reader = SampleReader(
             participant, TOPIC, TYPE, READER_QOS, b"", _PLACE, self._on_entities
         )
-        participant.others = self._seen.prefixes
+        participant.seen = self._seen
         participant.on_nodes = self._on_nodes
         self._on_nodes(participant.nodes())
 

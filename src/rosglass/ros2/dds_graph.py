@@ -7,6 +7,7 @@ they belong to. Either may come first. Everything here is bookkeeping; nothing n
 from __future__ import annotations
 
 import re
+import time
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -62,9 +63,13 @@ class DdsGraph:
     Args:
         graph: The graph to fill.
         own: GUID of our own participant.
+
+    Attributes:
+        moved: Monotonic time when the last of the others' readers and writers was found.
     """
 
     def __init__(self, graph: Graph, own: bytes) -> None:
+        self.moved = 0.0
         self._graph, self._own = graph, own[:_PREFIX]
         self._participants: dict[bytes, _Participant] = {}
         self._endpoints: dict[bytes, EndpointInfo] = {}
@@ -153,6 +158,7 @@ class DdsGraph:
             return
         if found.guid[:_PREFIX] == self._own and found.guid in self._endpoints:
             return
+        self.moved = time.monotonic()
         carried = demangle_topic(found.topic)
         if carried is None:
             return  # not of ROS 2

@@ -13,9 +13,10 @@ from rosglass.ros2.dds_domain import Domain
 from rosglass.ros2.dds_pump import Pump
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable
 
     from rosglass.comm import NodeName
+    from rosglass.ros2.dds_graph import DdsGraph
     from rosglass.ros2.dds_options import DdsOptions
 
 __all__ = ["Participant"]
@@ -34,7 +35,7 @@ class Participant:
         pump: Where everything that arrives is handed on.
         on_nodes: Called with all nodes whenever they or their endpoints change, never twice at a
             time; what announces them sets it.
-        others: Returns the GUIDs of the participants found so far; what finds them sets it.
+        seen: What is seen of the others; what follows them sets it.
 
     Raises:
         ConnectionLostError: This machine has no network interface to use, or no free port.
@@ -44,7 +45,7 @@ class Participant:
 
     def __init__(self, options: DdsOptions) -> None:
         self.on_nodes: Callable[[tuple[NodeEntities, ...]], None] = lambda _: None
-        self.others: Callable[[], Iterable[bytes]] = tuple
+        self.seen: DdsGraph | None = None
         self._nodes: dict[NodeName, int] = {}
         self._endpoints: dict[bytes, tuple[NodeName, bool]] = {}
         self._lock = threading.Lock()

@@ -11,6 +11,7 @@ import logging
 import math
 import threading
 import time
+from collections import Counter
 from contextlib import suppress
 from dataclasses import replace
 from enum import Enum
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from rosglass.ros2.dds_participant import Participant
     from rosglass.ros2.graph import Graph
 
-__all__ = ["Ends", "Matched", "Scheme", "names_of", "scheme_of"]
+__all__ = ["Ends", "Matched", "Scheme", "in_this_process", "names_of", "scheme_of"]
 
 _log = logging.getLogger("rosglass.ros2")
 
@@ -56,16 +57,20 @@ _PATIENCE = 0.01
 #: Seconds from when a writer of another vendor is matched until its first sample is sure to arrive;
 #: see :meth:`Ends._start_probe`. Cyclone DDS's own writers need none.
 _SETTLING = 0.2
-#: Seconds after joining the domain when everybody on a usual network has answered, and when the
-#: endpoints of all who have are known: some tell of them only with their next heartbeat, each
-#: second. A client that finds a server before the server knows it loses its first request.
-_ANSWERED, _SYNCHRONIZED = 0.1, 1.2
+#: Seconds after joining the domain when everybody on a usual network has answered, and when others
+#: than Cyclone DDS have begun to tell of their endpoints: some do with their next heartbeat, each
+#: second. RustDDS then tells of ten a second, so they are known when it has been quiet for a while,
+#: or after a time that is long enough. A client that finds a server before the server knows it
+#: loses its first request.
+_ANSWERED, _HEARTBEAT, _QUIET, _PATIENT = 0.1, 1.2, 0.3, 4.0
 #: Seconds that the first samples wait for their receiver to be made.
 _START = 5.0
 #: Peers whose rubbish is logged, once each.
 _MAX_NAMED = 100
 
 _numbers = itertools.count(1)
+#: What the GUIDs of this process's participants with services begin with, and how often.
+_here: Counter[bytes] = Counter()
 
 
 class Scheme(Enum):
@@ -195,6 +200,7 @@ class Ends:
             self.reader.entity, cyclone.matched_publications, cyclone_builtin.matched_publication
         )
         participant.add_endpoint(node, self.reader.guid, writer=False)
+        _here[participant.guid[:_PREFIX]] += 1
         self._server = server
         if not server or self._synced():
             try:
@@ -244,6 +250,7 @@ class Ends:
         if self.closed:
             return
         self.closed = True
+        _here[self._participant.guid[:_PREFIX]] -= 1
         self._participant.remove_endpoint(self.reader.guid)
         self.reader.close()
         self.outbox.close()
@@ -282,11 +289,12 @@ class Ends:
 
     def _synced(self) -> bool:
         """Return whether clients that find this server now will be known here by then, too."""
-        age = time.monotonic() - self._participant.born
-        if age >= _SYNCHRONIZED:
-            return True
-        others = self._participant.others()
-        return age >= _ANSWERED and all(scheme_of(guid) is Scheme.HEADER for guid in others)
+        now, seen = time.monotonic(), self._participant.seen
+        age = now - self._participant.born
+        if seen is None or age < _ANSWERED or age >= _PATIENT:
+            return age >= _ANSWERED
+        strangers = any(scheme_of(guid) is Scheme.IDENTITY for guid in seen.prefixes())
+        return not strangers or (age >= _HEARTBEAT and now - seen.moved >= _QUIET)
 
     def _hand_on(self, taken: list[Taken]) -> None:
         # The first may come while their receiver is being made.
@@ -371,6 +379,11 @@ class Ends:
                 return
         if not (self.outbox.retry() or unsettled or self.writer is None):
             self._participant.pump.visit(self.reader.entity, None)
+
+
+def in_this_process(guid: bytes) -> bool:
+    """Return whether a reader or writer of a service belongs to this process."""
+    return _here[guid[:_PREFIX]] > 0
 
 
 def names_of(peers: Iterable[EndpointInfo]) -> str:

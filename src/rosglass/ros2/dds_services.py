@@ -23,7 +23,7 @@ from rosglass.errors import (
 from rosglass.ros2 import cyclone_identity
 from rosglass.ros2.dds_discovery_info import parse_user_data
 from rosglass.ros2.dds_identity import UNKNOWN_GUID, Identity, Origin
-from rosglass.ros2.dds_service_ends import Ends, Scheme, names_of, scheme_of
+from rosglass.ros2.dds_service_ends import Ends, Scheme, in_this_process, names_of, scheme_of
 from rosglass.ros2.middleware import SERVER_LEFT, Replier, Requester, RequestId
 
 if TYPE_CHECKING:
@@ -191,21 +191,26 @@ class DdsRequester(Requester):
 
     def _take(self, server: bytes, data: bytes | memoryview, origin: Origin | None) -> None:
         number = None
-        if origin is not None and origin.related is not None:
-            guid, sequence = origin.related
-            if guid in (self.gid, self._ends.reader.guid):
-                with self._lock:
-                    number = self._by_sequence.pop(sequence, None)
-        elif scheme_of(server) is Scheme.IDENTITY:
-            if not cyclone_identity.reading_problem():
-                text = "ignoring replies of %s, which do not say what they answer"
-                self._ends.name(server, text, self._ends.who(server))
-        elif (header := _read_header(data)) is None:
-            text = "ignoring a reply of %s, which is too short for its header: %d bytes"
-            self._ends.name(server, text, self._ends.who(server), len(data))
-        elif header[0] == self._id:
-            number = header[1]
-            data = _without_header(data)
+        related = None if origin is None else origin.related
+        ours = related is not None and related.guid in (self.gid, self._ends.reader.guid)
+        if related is not None and not ours:
+            pass  # somebody else's
+        elif scheme_of(server) is Scheme.HEADER:
+            header = _read_header(data)
+            if header is None:
+                # Within this process, what says that a reply is for someone else is not told.
+                if not in_this_process(server):
+                    text = "ignoring a reply of %s, which is too short for its header: %d bytes"
+                    self._ends.name(server, text, self._ends.who(server), len(data))
+            elif header[0] == self._id:
+                number = header[1]
+                data = _without_header(data)
+        elif related is not None:
+            with self._lock:
+                number = self._by_sequence.pop(related.sequence, None)
+        elif not cyclone_identity.reading_problem():
+            text = "ignoring replies of %s, which do not say what they answer"
+            self._ends.name(server, text, self._ends.who(server))
         if number is None:
             return
         with self._lock:
@@ -222,18 +227,23 @@ class DdsRequester(Requester):
     def _route(self) -> Scheme | None:
         """Return how to send requests; None when no server is linked."""
         schemes = self._schemes()
-        if Scheme.IDENTITY in schemes and not cyclone_identity.reading_problem():
-            # Servers on Cyclone DDS find such requests too short, mostly; the others would
-            # take a header for arguments.
-            return Scheme.IDENTITY
+        if schemes.get(Scheme.IDENTITY) is not None and not cyclone_identity.reading_problem():
+            # Servers on Cyclone DDS find such requests too short, mostly; the others would take
+            # a header for arguments: nothing is sent while they are about to be ready.
+            return Scheme.IDENTITY if schemes[Scheme.IDENTITY] else None
         return Scheme.HEADER if Scheme.HEADER in schemes else None
 
-    def _schemes(self) -> set[Scheme]:
-        """Return what the linked servers speak."""
+    def _schemes(self) -> dict[Scheme, bool]:
+        """Return what the linked servers speak, and whether their replies are sure to arrive."""
         ends = self._ends
-        answering = {_server_of(found) for found in ends.writers.all() if ends.settled(found.guid)}
-        asked = () if ends.readers is None else ends.readers.all()
-        return {scheme_of(found.guid) for found in asked if _server_of(found) in answering}
+        answering = {_server_of(found): ends.settled(found.guid) for found in ends.writers.all()}
+        schemes: dict[Scheme, bool] = {}
+        for found in () if ends.readers is None else ends.readers.all():
+            settled = answering.get(_server_of(found))
+            if settled is not None:
+                scheme = scheme_of(found.guid)
+                schemes[scheme] = settled or schemes.get(scheme, False)
+        return schemes
 
     def _tell(self) -> None:
         if self.changed is not None:
@@ -246,14 +256,14 @@ class _Answer:
 
     Attributes:
         client: The writer of the request.
-        header: What its payload began with, where replies begin with it, too.
-        identity: The request's identity, where replies carry that.
+        identity: The request's identity.
+        header: What its payload began with, where the reply's is to begin with it, too.
         reader: The client's reader of replies, where it told.
     """
 
     client: Discovered
+    identity: Identity
     header: bytes = b""
-    identity: Identity | None = None
     reader: bytes = b""
 
 
@@ -344,7 +354,8 @@ class DdsReplier(Replier):
                 self._ends.name(client.guid, text, self._ends.who(client.guid), len(data))
                 return
             kept = bytes(data[_ENCAPSULATION : _ENCAPSULATION + _HEADER])
-            answer = _Answer(client, kept)
+            sequence = 0 if origin is None else origin.sequence
+            answer = _Answer(client, Identity(client.guid, sequence), kept)
             self._on_request(RequestId(client.guid, header[1], answer), _without_header(data))
         elif origin is None:
             text = "cannot answer %s: %s; %s"
@@ -354,7 +365,7 @@ class DdsReplier(Replier):
             given = origin.related
             reader = b"" if given is None or given.guid == UNKNOWN_GUID else given.guid
             identity = Identity(reader or client.guid, origin.sequence)
-            answer = _Answer(client, identity=identity, reader=reader)
+            answer = _Answer(client, identity, reader=reader)
             self._on_request(RequestId(client.guid, origin.sequence, answer), data)
 
     def _answer(self, answer: _Answer, data: bytes | bytearray) -> bool:
@@ -363,18 +374,30 @@ class DdsReplier(Replier):
         if writer is None or not self._hears(answer):
             # A reply to a reader that is not matched yet would be lost.
             return answer.client not in self._ends.writers.all()
+        parts: tuple[bytes | bytearray | memoryview, ...] = (data,)
+        if answer.header:
+            view = memoryview(data)
+            parts = (view[:_ENCAPSULATION], answer.header, view[_ENCAPSULATION:])
         try:
-            if answer.identity is None:
-                view = memoryview(data)
-                parts = (view[:_ENCAPSULATION], answer.header, view[_ENCAPSULATION:])
+            if answer.header and not self._heard_by_strangers():
                 writer.write(parts)
-            elif not cyclone_identity.write(writer, answer.identity, data):
+            elif not cyclone_identity.write(writer, answer.identity, parts) and not answer.header:
                 who = self._ends.who(answer.client.guid)
                 text = "%s did not get its reply: Cyclone DDS sent it without identity; %s"
                 self._ends.name(answer.client.guid, text, who, _REMEDY)
         except TimeoutError:
             return False
         return True
+
+    def _heard_by_strangers(self) -> bool:
+        """Return whether clients get replies that have to say that they are not for them.
+
+        RustDDS's fail when they get one that carries no identity.
+        """
+        if cyclone_identity.writing_problem() or self._ends.readers is None:
+            return False
+        readers = self._ends.readers.all()
+        return any(scheme_of(found.guid) is Scheme.IDENTITY for found in readers)
 
     def _hears(self, answer: _Answer) -> bool:
         """Return whether the client's reader of replies is matched."""

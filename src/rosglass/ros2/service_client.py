@@ -418,9 +418,9 @@ class Ros2ServiceClient(ServiceClient, Member):
         problems = [text for text in problems if text]
         if not problems:
             problems = mismatches(self._announced, servers, "offers", "it cannot be called")
-            problems += rivals(self._fitting(servers), self.name)
-        if not problems and self.trouble:
-            problems.append(self.trouble)
+            # The middleware knows better what becomes of several servers.
+            others = rivals(self._fitting(servers), self.name)
+            problems += [self.trouble] if self.trouble and not problems else others
         return problems
 
     def _absence(self) -> str:

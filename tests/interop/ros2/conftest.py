@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
 import json
 import os
@@ -97,15 +98,19 @@ def dds_connect(dds_domain: int) -> Iterator[Callable[..., Node]]:
 
 
 @pytest.fixture(scope="session")
-def fastdds_program(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Build the Fast DDS peer; peers/fastdds_peer.cpp says what it does."""
-    program = tmp_path_factory.mktemp("fastdds") / "fastdds_peer"
+def fastdds_program(request: pytest.FixtureRequest) -> Path:
+    """Build the Fast DDS peer, unless it was before; peers/fastdds_peer.cpp says what it does."""
     source = PEERS / "fastdds_peer.cpp"
     compiler = shutil.which("g++")
     if compiler is None or not Path("/usr/include/fastdds").is_dir():
         pytest.skip("Fast DDS is not installed: sudo apt-get install g++ libfastrtps-dev")
-    command = [compiler, "-std=c++17", str(source), "-o", str(program), "-lfastrtps", "-lfastcdr"]
-    subprocess.run(command, check=True)
+    version = hashlib.sha256(source.read_bytes()).hexdigest()[:16]
+    program = request.config.cache.mkdir("fastdds") / f"fastdds_peer_{version}"
+    if not program.exists():
+        made = program.with_name(f"{program.name}_{os.getpid()}")
+        command = [compiler, "-std=c++17", str(source), "-o", str(made)]
+        subprocess.run([*command, "-lfastrtps", "-lfastcdr"], check=True)
+        made.rename(program)
     return program
 
 

@@ -1,0 +1,326 @@
+"""A client and server of two services over DDS, of any kind: `dds_services_peer.py PLAN`.
+
+It offers `/<name>/add` (example_interfaces/srv/AddTwoInts) and `/<name>/blob`
+(blob_interfaces/srv/Blob), and calls them where it is told to on standard input. It never answers
+additions of a = -1. Its types need annotations that are evaluated.
+"""
+
+import json
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+from summary import tell
+
+# The plan: "kind" (below), "domain", "name", "serve" (which of "add" and "blob" it offers), "call"
+# (services that it calls), "interfaces" (a prefix with the types), "fastdds" (that program).
+plan = json.loads(sys.argv[1])
+NEVER = -1
+ADD, BLOB = "example_interfaces::srv::dds_::AddTwoInts", "blob_interfaces::srv::dds_::Blob"
+
+
+def blob(size: int) -> bytes:
+    return bytes(range(251)) * (size // 251) + bytes(size % 251)
+
+
+def answer(kind: str, request: Any) -> Any:
+    """Return the response, None for none: sums, and bytes in reverse."""
+    if kind == "blob":
+        return request[::-1]
+    a, b = request
+    tell(got=[a, b])
+    return None if a == NEVER else a + b
+
+
+class Rosglass:
+    def __init__(self) -> None:
+        import rosglass
+
+        self.node = rosglass.connect(f"dds://?domain={plan['domain']}", plan["name"])
+        self.types = {
+            "add": "example_interfaces/srv/AddTwoInts",
+            "blob": "blob_interfaces/srv/Blob",
+        }
+        self.clients: dict[str, Any] = {}
+
+    def serve(self, kind: str) -> None:
+        def serve(request: Any) -> Any:
+            given = bytes(request.data) if kind == "blob" else (request.a, request.b)
+            response = answer(kind, given)
+            if response is None:
+                return Future()
+            return {"data" if kind == "blob" else "sum": response}
+
+        name = f"/{plan['name']}/{kind}"
+        self.node.create_service_server(name, self.types[kind], serve)
+
+    def open(self, service: str, kind: str) -> None:
+        client = self.node.create_service_client(service, self.types[kind])
+        assert client.wait_for_server(10), client.problem
+        self.clients[service] = client
+
+    def call(self, service: str, kind: str, requests: list[Any]) -> list[Any]:
+        def value(given: Any) -> dict[str, Any]:
+            return {"data": given} if kind == "blob" else dict(zip("ab", given, strict=True))
+
+        calls = [self.clients[service].call_async(value(given)) for given in requests]
+        done = [call.result(10) for call in calls]
+        return [bytes(r.data) if kind == "blob" else r.sum for r in done]
+
+
+class Dora:
+    def __init__(self) -> None:
+        import dora
+        import pyarrow
+
+        self.arrow = pyarrow
+        transport = dora.Ros2Transport.dds()
+        context = dora.Ros2Context(
+            [plan["interfaces"]], transport=transport, domain_id=plan["domain"]
+        )
+        self.node = context.new_node(plan["name"], "/dora", dora.Ros2NodeOptions())
+        self.qos = dora.Ros2QosPolicies(reliable=True, keep_last=10)
+        self.types = {"add": "example_interfaces/AddTwoInts", "blob": "blob_interfaces/Blob"}
+        self.clients: dict[str, Any] = {}
+
+    def serve(self, kind: str) -> None:
+        name = f"/{plan['name']}/{kind}"
+        server = self.node.create_service_server(name, self.types[kind], self.qos)
+
+        def work() -> None:
+            while True:
+                taken = server.take_request(1.0)
+                if taken is None:
+                    continue
+                number, request = taken
+                given = request.to_pylist()[0]
+                data = bytes(given["data"]) if kind == "blob" else (given["a"], given["b"])
+                response = answer(kind, data)
+                if response is not None:
+                    server.send_response(number, self._value(kind, response, "sum"))
+
+        threading.Thread(target=work, daemon=True).start()
+
+    def open(self, service: str, kind: str) -> None:
+        self.clients[service] = self.node.create_service_client(service, self.types[kind], self.qos)
+
+    def call(self, service: str, kind: str, requests: list[Any]) -> list[Any]:
+        answers = []
+        for given in requests:
+            value = given if kind == "blob" else dict(zip("ab", given, strict=True))
+            reply = self.clients[service].call(self._value(kind, value), 10.0).to_pylist()[0]
+            answers.append(bytes(reply["data"]) if kind == "blob" else reply["sum"])
+        return answers
+
+    def _value(self, kind: str, value: Any, name: str = "") -> Any:
+        if kind == "blob":
+            octets = self.arrow.list_(self.arrow.uint8())
+            kind_of = self.arrow.struct([("data", octets)])
+            return self.arrow.array([{"data": list(value)}], type=kind_of)
+        return self.arrow.array([{name: value} if name else value])
+
+
+class Cyclone:
+    """The Python API of Cyclone DDS, with the header that rmw_cyclonedds writes."""
+
+    def __init__(self) -> None:
+        from cyclonedds.core import Qos
+        from cyclonedds.domain import DomainParticipant
+        from cyclonedds.idl import IdlStruct
+        from cyclonedds.idl.types import int64, sequence, uint8, uint64
+        from cyclonedds.pub import DataWriter
+        from cyclonedds.qos import Policy
+        from cyclonedds.sub import DataReader
+        from cyclonedds.topic import Topic
+        from cyclonedds.util import duration
+
+        @dataclass
+        class AddRequest(IdlStruct, typename=f"{ADD}_Request_"):
+            client: uint64
+            number: int64
+            a: int64
+            b: int64
+
+        @dataclass
+        class AddResponse(IdlStruct, typename=f"{ADD}_Response_"):
+            client: uint64
+            number: int64
+            sum: int64
+
+        @dataclass
+        class BlobRequest(IdlStruct, typename=f"{BLOB}_Request_"):
+            client: uint64
+            number: int64
+            data: sequence[uint8]
+
+        @dataclass
+        class BlobResponse(IdlStruct, typename=f"{BLOB}_Response_"):
+            client: uint64
+            number: int64
+            data: sequence[uint8]
+
+        self.types = {"add": (AddRequest, AddResponse), "blob": (BlobRequest, BlobResponse)}
+        self.topic, self.reader, self.writer = Topic, DataReader, DataWriter
+        self.participant = DomainParticipant(plan["domain"], Qos(Policy.Userdata(b"enclave=/;")))
+        self.qos = lambda data: Qos(
+            Policy.Reliability.Reliable(duration(seconds=5)),
+            Policy.History.KeepAll,
+            Policy.DataRepresentation(use_cdrv0_representation=True),
+            Policy.Userdata(data.encode()),
+        )
+        self.clients: dict[str, Any] = {}
+
+    def ends(self, service: str, kind: str, user_data: str, server: bool) -> tuple[Any, Any]:
+        request, response = self.types[kind]
+        requests = self.topic(self.participant, f"rq{service}Request", request)
+        replies = self.topic(self.participant, f"rr{service}Reply", response)
+        qos = self.qos(user_data)
+        write = self.writer(self.participant, replies if server else requests, qos=qos)
+        return self.reader(self.participant, requests if server else replies, qos=qos), write
+
+    def serve(self, kind: str) -> None:
+        name = f"/{plan['name']}/{kind}"
+        reader, writer = self.ends(name, kind, f"serviceid= 1.10.{kind};", True)
+        request_type, response = self.types[kind]
+
+        def work() -> None:
+            while True:
+                taken = reader.take(100)
+                # Others only tell that a client is gone.
+                for request in (item for item in taken if isinstance(item, request_type)):
+                    given = bytes(request.data) if kind == "blob" else (request.a, request.b)
+                    value = answer(kind, given)
+                    if value is not None:
+                        writer.write(response(request.client, request.number, value))
+                time.sleep(0.001)
+
+        threading.Thread(target=work, daemon=True).start()
+
+    def open(self, service: str, kind: str) -> None:
+        self.clients[service] = self.ends(service, kind, f"clientid= 1.10.{kind};", False)
+        deadline = time.monotonic() + 10
+        reader, writer = self.clients[service]
+        while not (reader.get_matched_publications() and writer.get_matched_subscriptions()):
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+
+    def call(self, service: str, kind: str, requests: list[Any]) -> list[Any]:
+        reader, writer = self.clients[service]
+        request = self.types[kind][0]
+        me, answers = 4711, {}
+        for number, given in enumerate(requests):
+            writer.write(request(me, number, *([given] if kind == "blob" else given)))
+        deadline = time.monotonic() + 10
+        while len(answers) < len(requests):
+            for reply in reader.take(100):
+                if getattr(reply, "client", None) == me:
+                    value = bytes(reply.data) if kind == "blob" else reply.sum
+                    answers[reply.number] = value
+            assert time.monotonic() < deadline, f"{len(answers)} of {len(requests)} answers"
+            time.sleep(0.001)
+        return [answers[number] for number in range(len(requests))]
+
+
+class FastDds:
+    """Fast DDS with the rules of rmw_fastrtps, see fastdds_peer.cpp."""
+
+    def __init__(self) -> None:
+        import struct
+
+        self.struct = struct
+        self.process = subprocess.Popen(
+            [plan["fastdds"], str(plan["domain"])],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        self.lock = threading.Condition()
+        self.matched: dict[str, bool] = {}
+        self.answers: dict[tuple[str, int], str] = {}
+        threading.Thread(target=self.read, daemon=True).start()
+
+    def say(self, *words: object) -> None:
+        with self.lock:
+            self.process.stdin.write(" ".join(map(str, words)) + "\n")
+            self.process.stdin.flush()
+
+    def read(self) -> None:
+        for line in self.process.stdout:
+            event = json.loads(line)
+            if "request" in event:
+                kind, data = event["request"], bytes.fromhex(event["data"])
+                value = answer(kind, self.read_request(kind, data))
+                if value is not None:
+                    self.say("reply", kind, event["number"], self.body(kind, value).hex())
+            with self.lock:
+                if "matched" in event:
+                    self.matched[event["matched"]] = bool(event["readers"] and event["writers"])
+                elif "reply" in event:
+                    self.answers[event["reply"], event["number"]] = event["data"]
+                self.lock.notify_all()
+
+    def read_request(self, kind: str, data: bytes) -> Any:
+        if kind == "add":
+            return self.struct.unpack_from("<qq", data, 4)
+        (size,) = self.struct.unpack_from("<I", data, 4)
+        return data[8 : 8 + size]
+
+    def body(self, kind: str, value: Any) -> bytes:
+        if kind == "blob":
+            return b"\0\1\0\0" + self.struct.pack("<I", len(value)) + value
+        values = value if isinstance(value, (list, tuple)) else [value]
+        return b"\0\1\0\0" + self.struct.pack(f"<{len(values)}q", *values)
+
+    def serve(self, kind: str) -> None:
+        self.say("server", kind, f"{plan['name']}/{kind}", {"add": ADD, "blob": BLOB}[kind])
+
+    def open(self, service: str, kind: str) -> None:
+        self.say("client", service, service[1:], {"add": ADD, "blob": BLOB}[kind])
+        with self.lock:
+            assert self.lock.wait_for(lambda: self.matched.get(service), 10)
+
+    def call(self, service: str, kind: str, requests: list[Any]) -> list[Any]:
+        wanted = [(service, number) for number in range(len(requests))]
+        for number, given in enumerate(requests):
+            # Its depth is 10, as rmw's: of more at once it forgets those that must be sent again.
+            with self.lock:
+                assert self.lock.wait_for(lambda n=number: n - len(self.answers) < 8, 10), number
+            self.say("call", service, number, self.body(kind, given).hex())
+        with self.lock:
+            assert self.lock.wait_for(lambda: len(self.answers) == len(wanted), 10), self.answers
+            found = [bytes.fromhex(self.answers.pop(key)) for key in wanted]
+        if kind == "add":
+            return [self.struct.unpack_from("<q", data, 4)[0] for data in found]
+        return [self.read_request(kind, data) for data in found]
+
+
+peer = {"rosglass": Rosglass, "dora": Dora, "cyclone": Cyclone, "fastdds": FastDds}[plan["kind"]]()
+for name in plan.get("serve", ()):
+    peer.serve(name)
+
+
+def work(order: dict[str, Any]) -> None:
+    """Call a service, {"call": name, "sums": [[a, b]]} or {"call": name, "size": bytes}."""
+    service = order["call"]
+    kind = "blob" if "size" in order else "add"
+    requests = order.get("sums") or [blob(order["size"])]
+    try:
+        if service not in opened:
+            opened.add(service)
+            peer.open(service, kind)
+        answers = peer.call(service, kind, requests)
+    except Exception as error:
+        tell(answers=f"{type(error).__name__}: {error}")
+        return
+    tell(answers=answers if kind == "add" else [answers[0] == requests[0][::-1]])
+
+
+opened: set[str] = set()
+pool = ThreadPoolExecutor(1)
+tell(ready=True)
+for line in sys.stdin:
+    pool.submit(work, json.loads(line))
