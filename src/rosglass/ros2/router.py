@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import re
 import socket
@@ -13,6 +14,8 @@ import zenoh
 from rosglass.comm import Handle
 from rosglass.errors import ConnectionLostError, ConversionError
 from rosglass.ros2.zenoh_config import close_session, reason, router_config, session_config
+from rosglass.ros2.zenoh_endpoints import CHANNEL, Pump
+from rosglass.ros2.zenoh_links import limit_silence
 from rosglass.ros2.zenoh_options import DEFAULT_PORT, ZenohOptions, locator
 
 __all__ = ["DEFAULT_LISTEN", "Router", "is_router_reachable"]
@@ -55,13 +58,25 @@ class Router(Handle):
             self._session = zenoh.open(router_config(self.listen))
         except zenoh.ZError as error:
             raise ConnectionLostError(self._why(error)) from error
+        self._pump = None if self.is_local else self._watch(self._session)
+        # A thread inside Zenoh must not meet an interpreter that is being taken down.
+        atexit.register(self.close)
 
     def close(self) -> None:
         """Stop the router; safe to call twice."""
         with self._lock:
             session, self._session = self._session, None
-        if session is not None:
-            close_session(session)
+        if session is None:
+            return
+        atexit.unregister(self.close)
+        if self._pump is not None:
+            self._pump.undeclare()
+        close_session(session)
+
+    def _watch(self, session: zenoh.Session) -> Pump:
+        """Let go of programs whose network is gone, so that they can come back at once."""
+        events = session.info.declare_transport_events_listener(CHANNEL, history=True)
+        return Pump(events, lambda _: limit_silence(session), f"{self.listen} links")
 
     def _why(self, error: zenoh.ZError) -> str:
         what = f"cannot run a router at {self.listen}"

@@ -6,6 +6,7 @@ import itertools
 import json
 import logging
 import threading
+import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
@@ -40,6 +41,7 @@ from rosglass.ros2.zenoh_endpoints import (
     ZenohWriter,
 )
 from rosglass.ros2.zenoh_keys import Token, gid_of, graph_key, topic_key
+from rosglass.ros2.zenoh_links import Pulse, limit_silence
 from rosglass.ros2.zenoh_reader import Drain, ZenohReader
 from rosglass.ros2.zenoh_services import ZenohReplier, ZenohRequester
 
@@ -55,6 +57,8 @@ __all__ = ["ZenohMiddleware"]
 _Kind = TypeVar("_Kind", bound=Declaration)
 
 _log = logging.getLogger("rosglass.ros2")
+#: Seconds between questions whether the router is there.
+_BEAT = 0.9
 #: Tokens that are not understood are logged up to so many.
 _MAX_STRANGE = 100
 
@@ -78,7 +82,9 @@ class ZenohMiddleware(Middleware):
         self._declared: dict[int, Declaration] = {}
         self._links: dict[str, bool] = {}
         self._was_connected = self._closed = False
-        self._refused = False
+        self._refused = self._linked = False
+        self._pulse = Pulse(f"@ros2_lv/{options.domain}/{self._id}/pulse")
+        self._next_beat = 0.0
         self._pumps: list[Pump] = []
         self._shared: SharedMemory | None = None
         if json.loads(self._config.get_json("transport/shared_memory/enabled")):
@@ -106,11 +112,20 @@ class ZenohMiddleware(Middleware):
         again = "trying again every second"
         if self._closed:
             return Status(ConnectionState.CLOSED, "closed")
-        if any(links.values()):
+        routers, silent = sum(links.values()), self._pulse.silent
+        if routers and not silent:
             return Status(ConnectionState.CONNECTED, f"router at {self._address}")
-        if links:
-            detail = f"linked with other nodes, but no router at {self._address}, {again}"
+        if len(links) > routers:
+            missing = (
+                f"the router at {self._address} is silent"
+                if routers
+                else (f"no router at {self._address}, {again}")
+            )
+            detail = f"linked with other nodes, but {missing}"
             return Status(ConnectionState.CONNECTED, detail)
+        if routers:
+            detail = f"connected to {self._address}, which is silent, waiting for it"
+            return Status(ConnectionState.LOST, detail)
         if was_connected:
             detail = f"connection to {self._address} lost, {again}"
             return Status(ConnectionState.LOST, detail)
@@ -194,6 +209,7 @@ class ZenohMiddleware(Middleware):
             return
         if self._refused:
             self._open()
+        self._watch_links()
         for declaration in self._of(Declaration):  # type: ignore[type-abstract]
             declaration.poll()
 
@@ -262,12 +278,27 @@ class ZenohMiddleware(Middleware):
         for declaration in waiting:
             declaration.attach(session)
 
+    def _watch_links(self) -> None:
+        """Notice links that are dead but not closed."""
+        with self._lock:
+            session, routers = self._session, any(self._links.values())
+            fresh, self._linked = self._linked, False
+        if session is None:
+            return
+        if fresh:
+            limit_silence(session)
+        if not routers:
+            self._pulse.rest()
+        elif (now := time.monotonic()) >= self._next_beat:
+            self._next_beat = now + _BEAT
+            self._pulse.beat(session, now)
+
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
         zid = str(event.transport.zid)
         with self._lock:
             if event.kind == zenoh.SampleKind.PUT:
                 self._links[zid] = event.transport.whatami == zenoh.WhatAmI.ROUTER
-                self._was_connected = True
+                self._was_connected = self._linked = True
             else:
                 self._links.pop(zid, None)
         self._changed()

@@ -1,7 +1,8 @@
 """Zenoh sessions and routers: their settings, chosen as rmw_zenoh's defaults are.
 
-A session is a peer that connects to a router, listens on the loopback interface only, and learns
-of other peers from those it is linked with (gossip), never by multicast.
+On one machine, a session is a peer that connects to a router, listens on the loopback interface
+only, and learns of other peers from those it is linked with (gossip), never by multicast. To a
+router on another machine it is a client.
 """
 
 from __future__ import annotations
@@ -18,10 +19,10 @@ import zenoh
 from rosglass.errors import ConversionError
 from rosglass.ros2.zenoh_options import ZenohOptions, locator
 
-__all__ = ["close_session", "reason", "router_config", "session_config"]
+__all__ = ["close_session", "is_local", "reason", "router_config", "session_config"]
 
 #: Pause between two attempts to connect, in milliseconds: first, and at most.
-_RETRY = {"period_init_ms": 250, "period_max_ms": 1000, "period_increase_factor": 2}
+_RETRY = {"period_init_ms": 250, "period_max_ms": 500, "period_increase_factor": 2}
 #: Longest time for opening a link, in milliseconds: closing a session waits for an attempt under
 #: way, and three round trips over a satellite have to fit.
 _OPEN_TIMEOUT_MS = 3000
@@ -47,7 +48,7 @@ def session_config(options: ZenohOptions) -> tuple[zenoh.Config, str]:
     }
     if options.config_file is None:
         config = zenoh.Config()
-        settings["mode"] = options.mode or "peer"
+        settings["mode"] = options.mode or ("peer" if is_local(options.host) else "client")
         settings["listen/endpoints"] = ["tcp/127.0.0.1:0"] if settings["mode"] == "peer" else []
         settings["scouting/multicast/enabled"] = False
         settings["scouting/gossip/enabled"] = True
@@ -88,6 +89,15 @@ def router_config(listen: str) -> zenoh.Config:
     for key, value in settings.items():
         config.insert_json5(key, json.dumps(value))
     return config
+
+
+def is_local(host: str | None) -> bool:
+    """Return whether a host is this machine, by its name or loopback address.
+
+    Peers on other machines listen for this machine's alone, as they do in ROS 2, and a router hands
+    on nothing between peers: only a client gets anything from there.
+    """
+    return host is None or host == "localhost" or host.startswith("127.") or host == "::1"
 
 
 def close_session(session: zenoh.Session) -> None:

@@ -38,7 +38,7 @@ class ZenohOptions:
         port: Router's TCP port.
         domain: ROS domain.
         mode: ``peer`` links directly with peers it hears of, ``client`` only with the router; None
-            takes what `config_file` says, or ``peer``.
+            takes what `config_file` says, or ``peer`` on one machine, ``client`` to another.
         humble: Whether to announce types without hash, as ROS 2 Humble does.
         shared_memory: Whether messages from 3 kB pass through shared memory between programs of
             one machine that both allow it; None takes what `config_file` says, or not.

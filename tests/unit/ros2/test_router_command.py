@@ -19,6 +19,9 @@ def routers(monkeypatch):
             super().__init__(listen)
             made.append(self)
 
+        def _watch(self, session):
+            return None
+
     monkeypatch.setattr(module, "Router", FakeRouter)
     monkeypatch.setattr("threading.Event.wait", lambda self, timeout=None: True)
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}

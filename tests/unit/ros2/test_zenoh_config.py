@@ -32,10 +32,10 @@ def rmw_file(tmp_path):
 
 
 def test_a_session_is_shy_by_default():
-    config, address = session_config(ZenohOptions("robot", 8000))
-    assert address == "tcp/robot:8000"
+    config, address = session_config(ZenohOptions("localhost", 8000))
+    assert address == "tcp/localhost:8000"
     assert setting(config, "mode") == "peer"
-    assert setting(config, "connect/endpoints") == ["tcp/robot:8000"]
+    assert setting(config, "connect/endpoints") == ["tcp/localhost:8000"]
     assert setting(config, "listen/endpoints") == ["tcp/127.0.0.1:0"]
     assert setting(config, "scouting/multicast/enabled") is False
     assert setting(config, "scouting/gossip/enabled") is True
@@ -44,6 +44,13 @@ def test_a_session_is_shy_by_default():
 
 def test_without_a_host_it_is_this_machine():
     assert session_config(ZenohOptions())[1] == "tcp/127.0.0.1:7447"
+
+
+@pytest.mark.parametrize("host", ["robot", "10.0.0.7", "fe80::7"])
+def test_a_session_is_a_client_of_another_machine(host):
+    config, _ = session_config(ZenohOptions(host))
+    assert setting(config, "mode") == "client"
+    assert setting(session_config(ZenohOptions(host, mode="peer"))[0], "mode") == "peer"
 
 
 def test_clients_do_not_listen():
