@@ -13,7 +13,13 @@ import zenoh
 
 from rosglass.comm import Handle
 from rosglass.errors import ConnectionLostError, ConversionError
-from rosglass.ros2.zenoh_config import close_session, reason, router_config, session_config
+from rosglass.ros2.zenoh_config import (
+    close_session,
+    open_session,
+    reason,
+    router_config,
+    session_config,
+)
 from rosglass.ros2.zenoh_endpoints import CHANNEL, Pump
 from rosglass.ros2.zenoh_links import limit_silence
 from rosglass.ros2.zenoh_options import DEFAULT_PORT, ZenohOptions, locator
@@ -55,7 +61,7 @@ class Router(Handle):
         self._lock = threading.Lock()
         self._session: zenoh.Session | None = None
         try:
-            self._session = zenoh.open(router_config(self.listen))
+            self._session = open_session(router_config(self.listen))
         except zenoh.ZError as error:
             raise ConnectionLostError(self._why(error)) from error
         self._pump = None if self.is_local else self._watch(self._session)
@@ -111,7 +117,7 @@ def is_router_reachable(url: str, timeout: float = 0.5) -> bool:
     config.insert_json5("transport/unicast/open_timeout", str(remaining))
     config.insert_json5("connect/timeout_ms", str(remaining))
     try:
-        session = zenoh.open(config)
+        session = open_session(config)
     except zenoh.ZError:
         return False
     try:

@@ -32,7 +32,13 @@ from rosglass.ros2.middleware import (
     Requester,
     Writer,
 )
-from rosglass.ros2.zenoh_config import close_session, reason, session_config
+from rosglass.ros2.zenoh_config import (
+    check_process,
+    close_session,
+    open_session,
+    reason,
+    session_config,
+)
 from rosglass.ros2.zenoh_endpoints import (
     CHANNEL,
     Announcement,
@@ -98,6 +104,7 @@ class ZenohMiddleware(Middleware):
 
     def open(self, graph: Graph, changed: Callable[[], None]) -> None:
         """Open the session; a peer's opens at once, a client's when its router answers."""
+        check_process()
         self._graph, self._changed = graph, changed
         if json.loads(self._config.get_json("mode")) == "client":
             self._refused = True  # it would wait for the router: poll() does
@@ -254,7 +261,7 @@ class ZenohMiddleware(Middleware):
 
     def _open(self) -> None:
         try:
-            session = zenoh.open(self._config)
+            session = open_session(self._config)
         except zenoh.ZError as error:
             if "Unable to connect" in str(error):
                 self._refused = True  # a client without router; poll() tries again

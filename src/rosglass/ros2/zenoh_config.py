@@ -8,6 +8,7 @@ router on another machine it is a client.
 from __future__ import annotations
 
 import json
+import os
 import re
 import secrets
 from contextlib import suppress
@@ -16,10 +17,18 @@ from typing import Any
 
 import zenoh
 
-from rosglass.errors import ConversionError
+from rosglass.errors import ConversionError, UnsupportedError
 from rosglass.ros2.zenoh_options import ZenohOptions, locator
 
-__all__ = ["close_session", "is_local", "reason", "router_config", "session_config"]
+__all__ = [
+    "check_process",
+    "close_session",
+    "is_local",
+    "open_session",
+    "reason",
+    "router_config",
+    "session_config",
+]
 
 #: Pause between two attempts to connect, in milliseconds: first, and at most.
 _RETRY = {"period_init_ms": 250, "period_max_ms": 500, "period_increase_factor": 2}
@@ -98,6 +107,32 @@ def is_local(host: str | None) -> bool:
     on nothing between peers: only a client gets anything from there.
     """
     return host is None or host == "localhost" or host.startswith("127.") or host == "::1"
+
+
+def open_session(config: zenoh.Config) -> zenoh.Session:
+    """Open a session.
+
+    Raises:
+        UnsupportedError: This process is a fork of one that had a session.
+        zenoh.ZError: It cannot be opened.
+    """
+    check_process()
+    _processes.add(os.getpid())
+    return zenoh.open(config)
+
+
+def check_process() -> None:
+    """Raise UnsupportedError in a fork of a process that had a session: Zenoh hangs there."""
+    if _processes and os.getpid() not in _processes:
+        raise UnsupportedError(
+            "Zenoh does not work in a fork of a process that used it: its threads did not come "
+            'along; start the process anew, e.g. with multiprocessing.get_context("spawn"), or '
+            "fork before connecting"
+        )
+
+
+#: The process that used Zenoh, and none of its forks.
+_processes: set[int] = set()
 
 
 def close_session(session: zenoh.Session) -> None:

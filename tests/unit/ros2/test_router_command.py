@@ -15,7 +15,7 @@ def routers(monkeypatch):
 
     class FakeRouter(module.Router):
         def __init__(self, listen):
-            monkeypatch.setattr(module.zenoh, "open", lambda config: None)
+            monkeypatch.setattr(module, "open_session", lambda config: None)
             super().__init__(listen)
             made.append(self)
 
