@@ -29,7 +29,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--url",
         default=os.environ.get("ROSGLASS_URL") or "zenoh://127.0.0.1:7447",
-        help="Zenoh router to meet at; one is started when none answers (default: %(default)s)",
+        help="where to meet: dds://, or a Zenoh router, which is started when none answers "
+        "(default: %(default)s)",
     )
     parser.add_argument(
         "--no-robot", action="store_true", help="open the cockpit on a robot that runs already"
@@ -151,6 +152,8 @@ def _find_router(stack: ExitStack, url: str) -> str:
     from rosglass.ros2.router import Router, is_router_reachable
     from rosglass.ros2.zenoh_options import ZenohOptions
 
+    if url.lower().startswith("dds:"):
+        return url  # where nodes find each other without one
     if is_router_reachable(url):
         print(f"using the Zenoh router at {url}", flush=True)
         return url
