@@ -7,6 +7,7 @@ import json
 import logging
 import threading
 import time
+from collections import deque
 from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
@@ -63,6 +64,8 @@ __all__ = ["ZenohMiddleware"]
 _Kind = TypeVar("_Kind", bound=Declaration)
 
 _log = logging.getLogger("rosglass.ros2")
+#: Numbers of closed endpoints that rest before the oldest of them is used again.
+_RESERVE = 8
 #: Seconds between questions whether the router is there.
 _BEAT = 0.9
 #: Tokens that are not understood are logged up to so many.
@@ -84,6 +87,7 @@ class ZenohMiddleware(Middleware):
         self._session: zenoh.Session | None = None
         self._id = json.loads(self._config.get_json("id"))
         self._numbers = itertools.count(1)
+        self._used_numbers: deque[str] = deque()
         self._lock = threading.Lock()
         self._declared: dict[int, Declaration] = {}
         self._links: dict[str, bool] = {}
@@ -229,11 +233,11 @@ class ZenohMiddleware(Middleware):
             session, self._session = self._session, None
             self._declared.clear()
             self._links.clear()
-        self._drain.close()
         for pump in self._pumps:
             pump.undeclare()
         if session is not None:
             close_session(session)
+        self._drain.close()
         self._changed()
 
     def forget(self, declaration: Declaration) -> None:
@@ -242,8 +246,17 @@ class ZenohMiddleware(Middleware):
             self._declared.pop(id(declaration), None)
         self._hide(declaration.token)
 
+    def recycle(self, declaration: Declaration) -> None:
+        """Use the number of a declaration again; for declarations.
+
+        Every program in the graph, and the router, remembers each token's key for ever.
+        """
+        self._used_numbers.append(Token.parse(declaration.token).entity_id)
+
     def _token(self, node: NodeName, endpoint: EndpointInfo) -> str:
-        number = str(next(self._numbers))
+        with self._lock:
+            again = len(self._used_numbers) > _RESERVE
+            number = self._used_numbers.popleft() if again else str(next(self._numbers))
         if self._options.humble:
             endpoint = replace(endpoint, type_hash="")
         return Token(self._options.domain, self._id, "0", number, node, endpoint).key()

@@ -51,6 +51,9 @@ class Owner(Protocol):
     def forget(self, declaration: Declaration) -> None:
         """Drop a declaration that was closed."""
 
+    def recycle(self, declaration: Declaration) -> None:
+        """Take back the number of a declaration whose token is gone."""
+
     def status(self) -> Status:
         """Return the state of the connection."""
 
@@ -94,6 +97,10 @@ class Declaration(Handle):
             self._closed = True
         self._owner.forget(self)
         self._release()
+        with self._lock:
+            gone = self._attached and not self._handles
+        if gone:
+            self._owner.recycle(self)
 
     def _error(self, error: zenoh.ZError) -> ConnectionLostError | NodeClosedError:
         if self._closed or self._owner.status().state is ConnectionState.CLOSED:
@@ -342,12 +349,18 @@ class Pump:
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
         self._thread.start()
 
-    def undeclare(self) -> None:
-        """Undeclare the source and wait for the thread, unless this is it."""
-        with suppress(zenoh.ZError):  # the session went first
+    def undeclare(self, patience: float = _PATIENCE) -> bool:
+        """Undeclare the source, and wait up to so many seconds for the thread, unless this is it.
+
+        Returns:
+            Whether the thread has ended. That of an advanced subscriber goes on while questions to
+            publishers are open; the end of the session ends it.
+        """
+        with suppress(zenoh.ZError):  # undeclared already, or the session went first
             self._source.undeclare()
         if self._thread is not threading.current_thread():
-            self._thread.join()
+            self._thread.join(patience)
+        return not self._thread.is_alive()
 
     def _work(self) -> None:
         for item in self._source.handler:

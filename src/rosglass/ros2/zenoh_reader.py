@@ -48,8 +48,10 @@ _MAX_BYTES = 32 * 1024 * 1024
 _MAX_BUSY = 512
 #: Largest sample, in bytes, whose copying does not outweigh what a channel saves.
 _SMALL = 65_536
-#: Seconds that closing waits for the thread that takes what nobody waits for.
+#: Seconds that closing waits for a thread.
 _PATIENCE = 1.0
+#: Seconds for the thread of a transient local subscription, which may last longer.
+_SHORTLY = 0.02
 #: Different keys on a reader's topic that are remembered; each definition of a type has one.
 _MAX_KEYS = 64
 
@@ -65,6 +67,7 @@ class Drain:
         self._lock = threading.Lock()
         self._collected: dict[_Collected, None] = {}
         self._wake = threading.Event()
+        self._leaving: list[Pump] = []
         self._thread: threading.Thread | None = None
 
     def add(self, collected: _Collected) -> None:
@@ -82,12 +85,20 @@ class Drain:
             if not self._collected:
                 self._wake.set()
 
+    def see_off(self, pump: Pump) -> None:
+        """Wait for the end of a pump's thread, but not before the session is closed."""
+        with self._lock:
+            self._leaving = [one for one in self._leaving if not one.undeclare(0)]
+            self._leaving.append(pump)
+
     def close(self) -> None:
-        """Take nothing more, and wait for the end of the thread."""
+        """Take nothing more, and wait for the end of the threads; the session is closed."""
         with self._lock:
             self._collected.clear()
-            thread = self._thread
+            leaving, thread = self._leaving, self._thread
         self._wake.set()
+        for pump in leaving:
+            pump.undeclare(_PATIENCE)
         if thread is not None and thread is not threading.current_thread():
             thread.join(_PATIENCE)
 
@@ -152,8 +163,11 @@ class _Direct:
 class _Pumped:
     """Hands on samples in a thread of their own."""
 
-    def __init__(self, subscriber: Any, take: _Take, name: str) -> None:
+    def __init__(
+        self, subscriber: Any, take: _Take, name: str, patience: float, drain: Drain
+    ) -> None:
         self._subscriber, self._take, self._name = subscriber, take, name
+        self._patience, self._drain = patience, drain
         self._pump: Pump | None = None
 
     def begin(self) -> None:
@@ -163,7 +177,8 @@ class _Pumped:
         if self._pump is None:
             self.begin()
         assert self._pump is not None
-        self._pump.undeclare()
+        if not self._pump.undeclare(self._patience):
+            self._drain.see_off(self._pump)
 
     def _receive(self, sample: zenoh.Sample) -> None:
         self._take(sample, time.time_ns())
@@ -243,7 +258,9 @@ class ZenohReader(Declaration, Reader):
         """Declare the subscriber; a transient local one asks publishers for their last samples."""
         source: _Source
         if self._qos.durability is Durability.TRANSIENT_LOCAL:
-            source = _Pumped(self._declare_advanced(session), self._take, f"{self._key} samples")
+            name = f"{self._key} samples"
+            advanced = self._declare_advanced(session)
+            source = _Pumped(advanced, self._take, name, _SHORTLY, self._drain)
         else:
             self._session = session
             source = _Direct(session, self._key, self._take)
@@ -346,7 +363,8 @@ class ZenohReader(Declaration, Reader):
             return _Collected(session, self._key, room, self._take, self._drain)
         channel = zenoh.handlers.FifoChannel(min(_MAX_BUSY, self._room()))
         subscriber = session.declare_subscriber(self._key, channel)
-        return _Pumped(subscriber, self._take, f"{self._key} samples")
+        name = f"{self._key} samples"
+        return _Pumped(subscriber, self._take, name, _PATIENCE, self._drain)
 
     def _take(self, sample: zenoh.Sample, received: int) -> None:
         """Hand a sample on; every line here is paid for by each sample."""
