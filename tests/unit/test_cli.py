@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 
 import rosglass
-from rosglass.cli import COMMANDS, _split, main
+from rosglass.cli import main
+from rosglass.cli.network import ask, interfaces, is_loopback
+from rosglass.cli.program import COMMANDS, _split, build_parser
+from rosglass.cli.values import split_type
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
@@ -41,7 +48,7 @@ def test_missing_extra_names_the_fix(
     def no_module(name: str) -> object:
         raise ModuleNotFoundError(f"No module named {name!r}", name="zenoh")
 
-    monkeypatch.setattr("rosglass.cli.import_module", no_module)
+    monkeypatch.setattr("rosglass.cli.program.import_module", no_module)
     assert main(["router"]) == 1
     assert 'pip install "rosglass[zenoh]"' in capsys.readouterr().err
 
@@ -72,3 +79,109 @@ def test_commands_that_are_no_nodes_take_no_ros_args(capsys: pytest.CaptureFixtu
         main(["router", "--ros-args", "-r", "a:=b"])
     assert exit_info.value.code == 2
     assert "router takes no --ros-args" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "topic pub --once -r 5 /x std_msgs/msg/Bool yes",
+        "topic pub /x --once std_msgs/msg/Bool -r 5 yes",
+        "topic pub /x std_msgs/msg/Bool yes -1 --rate 5",
+    ],
+)
+def test_options_stand_anywhere(line: str) -> None:
+    args = build_parser("topic").parse_args(line.split())
+    assert (args.topic, args.rest) == ("/x", ["std_msgs/msg/Bool", "yes"])
+    assert (args.count, args.rate) == (1, 5.0)
+
+
+@pytest.mark.parametrize("line", ["-v topic -v list", "topic list -vv", "-vv topic list"])
+def test_verbose_stands_anywhere(line: str) -> None:
+    assert build_parser("topic").parse_args(line.split()).verbose >= 1
+
+
+def test_negative_values_are_values() -> None:
+    args = build_parser("param").parse_args(["param", "set", "/arm", "x", "-5"])
+    assert args.value == "-5"
+
+
+def test_bags_as_in_ros2(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert main(["bag", "info", str(tmp_path / "none.mcap")]) == 1
+    assert "none.mcap does not exist" in capsys.readouterr().err
+
+
+def test_values_without_quotes_are_told_apart_from_types() -> None:
+    with pytest.raises(rosglass.Error, match="one pair of quotes: 'a: 1'"):
+        split_type(["a:", "1"])
+
+
+def run_python(code: str, **options: int) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        stderr=subprocess.PIPE, text=True, timeout=60, check=False, **options,
+    )  # fmt: skip
+
+
+def test_output_that_cannot_be_written_is_said() -> None:
+    code = "import sys; from rosglass.cli import main; sys.exit(main(['interface', 'list']))"
+    with Path("/dev/full").open("wb") as full:
+        done = run_python(code, stdout=full.fileno())
+    assert done.returncode == 1
+    assert done.stderr == "rosglass: No space left on device\n"
+    python = sys.executable
+    done = run_python(f"import os; os.close(1); os.execv({python!r}, [{python!r}, '-c', {code!r}])")
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_ctrl_c_while_modules_are_loaded_leaves_no_traceback() -> None:
+    done = run_python(
+        "import sys, signal\n"
+        "class Finder:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name == 'argparse': signal.raise_signal(signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Finder())\n"
+        "from rosglass.cli import main\n"
+        "sys.exit(main(['--help']))",
+        stdout=subprocess.DEVNULL,
+    )
+    assert (done.returncode, done.stderr) == (130, "")
+
+
+def test_ctrl_c_again_cuts_short_what_ends() -> None:
+    done = run_python(
+        "import signal, sys\n"
+        "from rosglass.cli.connecting import End\n"
+        "end = End()\n"
+        "signal.raise_signal(signal.SIGTERM)\n"
+        "assert end.is_set() and end.code == 143\n"
+        "try: signal.raise_signal(signal.SIGINT)\n"
+        "except KeyboardInterrupt: sys.exit(7)\n",
+        stdout=subprocess.DEVNULL,
+    )
+    assert (done.returncode, done.stderr) == (7, "")
+
+
+def test_knocking_at_a_router(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert ask("zenoh://127.0.0.1:1", 1.0)[0] == (
+        "127.0.0.1 is there, but nothing listens on its port 1"
+    )
+
+    def fails(error: OSError) -> tuple[str, str]:
+        def connect(*_: object) -> object:
+            raise error
+
+        monkeypatch.setattr("rosglass.cli.network.socket.create_connection", connect)
+        return ask("zenoh://robot", 1.0)
+
+    assert "rosglass router --open" in fails(ConnectionRefusedError())[1]
+    assert "firewall pass TCP port 7447" in fails(TimeoutError())[1]
+    assert "Network is unreachable" in fails(OSError(101, "Network is unreachable"))[0]
+    assert is_loopback("zenoh://?domain=1")
+    assert not is_loopback("zenoh://10.0.0.1")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells")
+def test_interfaces() -> None:
+    found = interfaces()
+    assert found is not None
+    assert [one.name for one in found if one.is_loopback] in ([], ["lo"])

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Bag", "BagMessage", "Channel", "open_bag"]
 
+#: How an MCAP file begins, whatever its name.
+_MCAP = b"\x89MCAP0\r\n"
+
 
 @dataclass(frozen=True)
 class Channel:
@@ -143,10 +146,18 @@ def open_bag(path: str | os.PathLike[str]) -> Bag:
     found = Path(path).expanduser()
     if not found.exists():
         raise BagError(f"{found} does not exist; name an MCAP file, a ROS 2 bag or a ROS 1 bag")
-    if found.is_file() and found.suffix == ".mcap":
+    if found.is_file() and (found.suffix == ".mcap" or _starts_as_mcap(found)):
         from rosglass.bags.mcap_bag import McapBag  # noqa: PLC0415 - the library is an extra
 
         return McapBag(found)
     from rosglass.bags.rosbags_bag import RosbagsBag  # noqa: PLC0415 - slow to import
 
     return RosbagsBag(found)
+
+
+def _starts_as_mcap(path: Path) -> bool:
+    try:
+        with path.open("rb") as file:
+            return file.read(len(_MCAP)) == _MCAP
+    except OSError as error:
+        raise BagError(f"{path} cannot be read: {error.strerror}") from error

@@ -81,8 +81,8 @@ class McapBag(Bag):
         summary = None
         try:
             summary = SeekingReader(self._file).get_summary()
-        except Exception as error:  # whatever the damage leads to
-            self._note(f"it was not closed properly ({error or 'its end is missing'})")
+        except Exception:  # whatever the damage leads to
+            self._note("it was not closed properly: its end is missing or damaged")
         complete = summary is not None and summary.statistics is not None
         self._complete = bool(complete and summary and summary.channels)
         if summary is not None and summary.statistics is not None and self._complete:

@@ -6,7 +6,7 @@ import logging
 import re
 import threading
 import time
-from collections import deque
+from collections import Counter, deque
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -120,7 +120,8 @@ class Recorder(Handle):
         self._lost: dict[str, int] = {}
         self._failure = ""
         self._started = time.monotonic()
-        self._subscriptions: dict[str, Subscription] = {}
+        self._subscriptions: dict[tuple[str, str], Subscription] = {}
+        self._begun: set[tuple[str, str]] = set()
         self._failed: dict[str, str] = {}
         self._counts: dict[str, int] = {}
         self._channels: dict[tuple[str, str, str], int] = {}
@@ -128,8 +129,12 @@ class Recorder(Handle):
         try:
             self._file = self.path.open("xb")
         except OSError as error:
-            hint = "choose another name" if isinstance(error, FileExistsError) else "see the path"
-            raise BagError(f"{self.path} cannot be written: {error.strerror}; {hint}") from error
+            hints = {
+                FileExistsError: "; choose another name",
+                FileNotFoundError: f": make the folder {self.path.parent} first",
+            }
+            hint = hints.get(type(error), "")
+            raise BagError(f"{self.path} cannot be written: {error.strerror}{hint}") from error
         self._writer: Any = Writer(self._file, compression=COMPRESSIONS[compression])
         self._writer.start(profile="ros2", library=f"rosglass {rosglass.__version__}")
         self._thread = threading.Thread(target=self._work, name="recorder", daemon=True)
@@ -148,12 +153,15 @@ class Recorder(Handle):
             raise BagError(self._failure)
         with self._lock:
             problems = dict(self._failed)
-            for topic, subscription in self._subscriptions.items():
-                if subscription.problem:
+            types = Counter(topic for topic, _ in self._subscriptions)
+            for (topic, _), subscription in self._subscriptions.items():
+                # Each of several is told that the others are there.
+                told = types[topic] > 1 and subscription.type is not None
+                if subscription.problem and not told:
                     problems[topic] = subscription.problem
-            for topic in sorted(self._topics - self._subscriptions.keys() - problems.keys()):
+            for topic in sorted(self._topics - types.keys() - problems.keys()):
                 problems[topic] = "nobody publishes it"
-            counts = {topic: self._counts.get(topic, 0) for topic in sorted(self._subscriptions)}
+            counts = {topic: self._counts.get(topic, 0) for topic in sorted(types)}
             duration = time.monotonic() - self._started
             return RecordingStatus(counts, self._dropped, self._size, duration, problems)
 
@@ -185,8 +193,10 @@ class Recorder(Handle):
         except NodeClosedError:
             return
         for topic in sorted(found):
-            if topic not in self._subscriptions and self._wants(topic):
-                self._subscribe(topic)
+            if not self._wants(topic):
+                continue
+            for type_name in sorted({p.type for p in self._node.publishers(topic)}):
+                self._subscribe(topic, type_name)
 
     def _wants(self, topic: str) -> bool:
         if self._exclude is not None and self._exclude.fullmatch(topic):
@@ -200,13 +210,16 @@ class Recorder(Handle):
             chosen = not self._topics and (self._hidden or not hidden)
         return chosen and bool(self._node.publishers(topic))
 
-    def _subscribe(self, topic: str) -> None:
+    def _subscribe(self, topic: str, type_name: str) -> None:
         with self._lock:
-            if self._closed:
+            # Two changes of the graph may be looked at at once.
+            if self._closed or (topic, type_name) in self._begun:
                 return
+            self._begun.add((topic, type_name))
         try:
             subscription = self._node.create_subscription(
                 topic,
+                type_name,
                 qos=QoS.best_available(_DEPTH),
                 raw_callback=lambda sample: self._receive(topic, sample),
                 executor=IMMEDIATE,
@@ -215,10 +228,12 @@ class Recorder(Handle):
             if topic not in self._failed:
                 _log.warning("%s is not recorded: %s", topic, error)
             self._failed[topic] = str(error)
+            with self._lock:
+                self._begun.discard((topic, type_name))
             return
         with self._lock:
             self._failed.pop(topic, None)
-            self._subscriptions[topic] = subscription
+            self._subscriptions[topic, type_name] = subscription
             closed = self._closed
         if closed:
             subscription.close()
@@ -261,7 +276,7 @@ class Recorder(Handle):
         except Exception as error:
             reason = getattr(error, "strerror", None) or error
             self._failure = f"{self.path} cannot be written: {reason}; nothing more is recorded"
-            _log.exception("%s cannot be written", self.path)
+            _log.error(self._failure, exc_info=not isinstance(error, OSError))
         finally:
             self._file.close()
 

@@ -6,7 +6,7 @@ import time
 from typing import TYPE_CHECKING
 
 from rosglass.cli.completion import complete
-from rosglass.cli.connecting import add_connection_options, connect, end_event, settle, wait
+from rosglass.cli.connecting import End, add_connection_options, connect, find, settle, wait
 from rosglass.cli.endpoints import describe
 from rosglass.cli.output import (
     Style,
@@ -37,12 +37,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Declare what can be done with actions."""
     add = Subcommands(parser).add
     sub = add("list", "list the actions there are", _list)
-    sub.add_argument("-t", "--types", action="store_true", help="show their types")
+    sub.add_argument("-t", "--types", "--show-types", action="store_true", help="show their types")
     _finish(sub)
     sub = add("info", "show who offers and uses an action", _info)
     complete(sub.add_argument("action"), "actions")
     _finish(sub)
-    sub = add("send", "send a goal and wait for its end; Ctrl-C cancels it", _send)
+    summary = "send a goal and wait for its end; Ctrl-C cancels it"
+    sub = add("send", summary, _send, aliases=("send_goal",))
     complete(sub.add_argument("action"), "actions")
     complete(
         sub.add_argument(
@@ -84,8 +85,7 @@ def _info(args: argparse.Namespace) -> int:
     with connect(args) as node:
         name = node.resolve(args.action)
         service = f"{name}/_action/send_goal"
-        wait(node, lambda: node.service_servers(service), args.timeout)
-        settle(node)
+        find(node, lambda: node.service_servers(service), args.timeout)
         servers, clients = node.service_servers(service), node.service_clients(service)
         types = node.actions().get(name, [])
     if not servers and not clients:
@@ -112,7 +112,7 @@ def _send(args: argparse.Namespace) -> int:
     from rosglass.errors import Error, ServiceUnavailableError
 
     type_name, text = split_type(args.rest)
-    style, end = Style(args), end_event()
+    style = Style(args)
 
     def show(feedback: Message) -> None:
         found = fields(feedback)
@@ -131,7 +131,7 @@ def _send(args: argparse.Namespace) -> int:
                 executor=IMMEDIATE,
                 timeout=args.timeout,
             )
-            told = GoalStatus.PENDING
+            told, end = GoalStatus.PENDING, End()
             while not goal.done.done():
                 if goal.status is not told and not args.json:
                     told = goal.status

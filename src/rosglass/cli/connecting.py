@@ -18,16 +18,32 @@ if TYPE_CHECKING:
 
     from rosglass.comm import Node, Status
 
-__all__ = ["add_connection_options", "connect", "end_event", "natural", "seconds", "settle", "wait"]
+__all__ = [
+    "TIMEOUT",
+    "End",
+    "add_connection_options",
+    "connect",
+    "find",
+    "natural",
+    "seconds",
+    "settle",
+    "wait",
+]
 
 _T = TypeVar("_T")
+#: Seconds to wait for the robot, unless told otherwise.
+TIMEOUT = 10.0
+#: Seconds that something which is there takes to show up in the graph.
+_DISCOVERY = 3.0
 #: Seconds after which a command says what it is waiting for.
 _PATIENCE = 2.0
 #: Seconds without news after which the graph counts as known.
 _QUIET = {"zenoh": 0.3, "dds": 0.7}
 
 
-def add_connection_options(parser: argparse.ArgumentParser, *, timeout: float = 10.0) -> None:
+def add_connection_options(
+    parser: argparse.ArgumentParser, *, timeout: float | None = TIMEOUT
+) -> None:
     """Declare the options that say which robot is meant."""
     group = parser.add_argument_group("connection")
     group.add_argument(
@@ -44,7 +60,12 @@ def add_connection_options(parser: argparse.ArgumentParser, *, timeout: float = 
         type=seconds,
         default=timeout,
         metavar="SECONDS",
-        help="how long to wait for the robot to answer (default: %(default)g)",
+        help="how long to wait for the robot to answer "
+        + (
+            f"(default: {timeout:g})"
+            if timeout is not None
+            else f"(default: {TIMEOUT:g}), and for each message (default: for ever)"
+        ),
     )
     parser.set_defaults(ros_arguments=[])
 
@@ -71,7 +92,7 @@ def connect(args: argparse.Namespace, *, own_services: bool = False) -> Node:
         own_services=own_services,
     )
     try:
-        _wait_for_connection(node, args.timeout)
+        _wait_for_connection(node, TIMEOUT if args.timeout is None else args.timeout)
     except BaseException:
         node.close()
         raise
@@ -114,12 +135,42 @@ def wait(node: Node, look: Callable[[], _T], timeout: float) -> _T:
             changed.clear()
 
 
-def end_event() -> threading.Event:
-    """Return an event that Ctrl-C and SIGTERM set, so that a command can end in good order."""
-    end = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: end.set())
-    return end
+def find(node: Node, look: Callable[[], _T], timeout: float) -> _T:
+    """Return what `look` finds in the graph, after having waited until that is complete.
+
+    What is not there is not waited for as long as for a robot that has not answered yet.
+    """
+    wait(node, look, min(timeout, _DISCOVERY))
+    settle(node)
+    return look()
+
+
+class End(threading.Event):
+    """An event that Ctrl-C and SIGTERM set, so that a command can end in good order.
+
+    To be made when all that can be waited for is there: until then, Ctrl-C is a
+    KeyboardInterrupt, which ends any waiting.
+
+    Args:
+        patient: Whether pressing Ctrl-C again changes nothing; otherwise it cuts short whatever
+            the command does in order to end.
+
+    Attributes:
+        code: The exit code that says what ended the command; 0 for nothing.
+    """
+
+    def __init__(self, *, patient: bool = False) -> None:
+        super().__init__()
+        self.code = 0
+        self._patient = patient
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._receive)
+
+    def _receive(self, number: int, _: object) -> None:
+        if self.is_set() and not self._patient:
+            raise KeyboardInterrupt
+        self.code = 128 + number
+        self.set()
 
 
 def seconds(text: str) -> float:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import os
 import platform
+import shlex
 import sys
 from collections import Counter
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rosglass.cli.connecting import add_connection_options, settle, wait
 from rosglass.cli.endpoints import problems
+from rosglass.cli.network import ask, interfaces, is_loopback
 from rosglass.cli.output import Style, add_output_options, print_json
 from rosglass.errors import Error
 
@@ -32,6 +34,8 @@ _PACKAGES = {
     "PySide6-Addons": ("camera pictures in QML", "camera"),
     "opencv-python-headless": ("compressed pictures", "images"),
     "mcap": ("recordings", "bags"),
+    "rosbags": ("ROS 1 bags and SQLite bags", "bags"),
+    "argcomplete": ("Tab completion", "completion"),
 }
 _VARIABLES = (
     "ROSGLASS_URL",
@@ -47,6 +51,7 @@ _VARIABLES = (
 )
 #: Receive buffer in bytes that a camera picture needs.
 _BUFFER = 4 * 2**20
+_NO_NETWORK = "connect a network, or for this machine alone: sudo ip link set lo up multicast on"
 #: Seconds to look around in a graph.
 _LOOK = 3.0
 
@@ -104,8 +109,19 @@ def _look(args: argparse.Namespace) -> Iterator[Finding]:
     yield from _environment()
     yield from _definitions()
     yield from _kernel()
-    for url in _urls(args):
-        yield from _robot(url, args.timeout)
+    yield from _interfaces()
+    urls, told = _urls(args)
+    answering = []
+    for url in urls:
+        findings = list(_robot(url, args.timeout))
+        if any(finding.level == "error" for finding in findings):
+            # Where nobody said that the robot is there, its absence is no fault yet.
+            findings = [replace(f, level=f.level if told else "note") for f in findings]
+        else:
+            answering.append(url)
+        yield from findings
+    if not told:
+        yield _address(answering)
     if args.scan:
         yield from _scan()
 
@@ -158,15 +174,48 @@ def _kernel() -> Iterator[Finding]:
         yield Finding("ok", "network", f"receive buffers up to {size / 2**20:.0f} MiB")
 
 
-def _urls(args: argparse.Namespace) -> list[str]:
+def _interfaces() -> Iterator[Finding]:
+    found = interfaces()
+    if found is None:
+        return
+    names = ", ".join(interface.name for interface in found)
+    if not found:
+        yield Finding("error", "network", "no network interface is up", _NO_NETWORK)
+    elif not any(interface.has_multicast for interface in found):
+        yield Finding(
+            "warning",
+            "network",
+            f"no network interface that is up ({names}) takes multicast, by which ROS 2's programs "
+            "find each other over DDS",
+            "connect a network, or for this machine alone: sudo ip link set lo multicast on && "
+            "sudo ip route add 224.0.0.0/4 dev lo",
+        )
+    elif all(interface.is_loopback for interface in found):
+        yield Finding("note", "network", f"only {names} is up: nothing but this machine is reached")
+    else:
+        yield Finding("ok", "network", f"{names} up")
+
+
+def _address(answering: list[str]) -> Finding:
+    """Say what to set where nothing is set."""
+    if not answering:
+        text = "nothing says where the robot is, and nobody answers on this machine"
+        fix = "export ROSGLASS_URL=zenoh://<robot's address> (or dds://), and see the notes above"
+        return Finding("error", "address", text, fix)
+    text = f"nothing says where the robot is; found: {', '.join(answering)}"
+    return Finding("warning", "address", text, f"export ROSGLASS_URL={shlex.quote(answering[0])}")
+
+
+def _urls(args: argparse.Namespace) -> tuple[list[str], bool]:
+    """Return where to look, and whether somebody said so."""
     from rosglass.connection import default_url
 
     if args.url:
-        return [args.url]
+        return [args.url], True
     try:
-        return [default_url(os.environ)]
+        return [default_url(os.environ)], True
     except Error:
-        return ["zenoh://127.0.0.1:7447", "dds://"]
+        return ["zenoh://127.0.0.1:7447", "dds://"], False
 
 
 def _robot(url: str, timeout: float) -> Iterator[Finding]:
@@ -176,13 +225,17 @@ def _robot(url: str, timeout: float) -> Iterator[Finding]:
     try:
         node = rosglass.connect(url, name=f"rosglass_doctor_{os.getpid()}", own_services=False)
     except Error as error:
-        yield Finding("error", url, str(error))
+        no_network = url.startswith("dds:") and interfaces() == []
+        yield Finding("error", url, str(error), _NO_NETWORK if no_network else "")
         return
     with node:
         wait(node, lambda: node.status().state is ConnectionState.CONNECTED, timeout)
         status = node.status()
         if status.state is not ConnectionState.CONNECTED:
-            yield Finding("error", url, status.detail, _advice(url))
+            # A configuration file may name another router.
+            asks = url.startswith("zenoh:") and not os.environ.get("ZENOH_SESSION_CONFIG_URI")
+            text, fix = ask(url, timeout) if asks else ("", "")
+            yield Finding("error", url, text or status.detail, fix or _advice(url))
             return
         yield Finding("ok", url, status.detail or "connected")
         settle(node, _LOOK)
@@ -191,9 +244,20 @@ def _robot(url: str, timeout: float) -> Iterator[Finding]:
 
 def _advice(url: str) -> str:
     if url.startswith("zenoh:"):
+        router = "rosglass router" if is_loopback(url) else "rosglass router --open"
         return (
-            "start a router on the robot (ros2 run rmw_zenoh_cpp rmw_zenohd, or rosglass router), "
-            "and check the address, the port and the firewall (TCP)"
+            f"start the robot's programs, with RMW_IMPLEMENTATION=rmw_zenoh_cpp, and a router for "
+            f"them: ros2 run rmw_zenoh_cpp rmw_zenohd (or: {router})"
+        )
+    if os.environ.get("ROS_LOCALHOST_ONLY") == "1":
+        return (
+            "ROS_LOCALHOST_ONLY=1 keeps this machine to itself. To reach a robot elsewhere: "
+            "unset ROS_LOCALHOST_ONLY"
+        )
+    if os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper() in ("LOCALHOST", "OFF"):
+        return (
+            "ROS_AUTOMATIC_DISCOVERY_RANGE keeps this machine to itself. To reach a robot "
+            "elsewhere: export ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET"
         )
     return (
         "check that the robot is on, in the same network and ROS_DOMAIN_ID (--scan looks in "
@@ -221,9 +285,7 @@ def _graph(node: Node) -> Iterator[Finding]:
     for topic in topics:
         ends = [*node.publishers(topic), *node.subscriptions(topic)]
         for problem in problems(ends):
-            yield Finding(
-                "warning", topic, problem, "ask for no more than is offered, of the same type"
-            )
+            yield Finding("warning", topic, problem.text, problem.fix)
 
 
 def _scan() -> Iterator[Finding]:

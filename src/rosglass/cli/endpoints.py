@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rosglass.comm import EndpointInfo
 
-__all__ = ["describe", "problems", "short"]
+__all__ = ["Problem", "describe", "problems", "short"]
+
+
+#: Best effort and volatile fits every publisher.
+_QOS_FIX = (
+    "let the subscription ask for less: QoS.sensor_data() in rosglass, qos_profile_sensor_data in "
+    "rclpy, rclcpp::SensorDataQoS() in C++; or let the publisher offer more"
+)
+
+
+class Problem(NamedTuple):
+    """Why some of a topic's endpoints do not match, and what helps."""
+
+    text: str
+    fix: str
 
 
 def describe(end: EndpointInfo) -> dict[str, Any]:
@@ -35,7 +49,7 @@ def describe(end: EndpointInfo) -> dict[str, Any]:
     }
 
 
-def problems(ends: Sequence[EndpointInfo]) -> list[str]:
+def problems(ends: Sequence[EndpointInfo]) -> list[Problem]:
     """Say which of a topic's endpoints do not match each other, and why."""
     from rosglass.comm import EndpointKind
 
@@ -44,15 +58,23 @@ def problems(ends: Sequence[EndpointInfo]) -> list[str]:
     sinks = [end for end in ends if end.kind is EndpointKind.SUBSCRIPTION]
     if len({end.type for end in ends}) > 1:
         told = "; ".join(f"{end.node} has {end.type}" for end in ends)
-        found.append(f"types differ: {told}")
+        found.append(
+            Problem(
+                f"types differ: {told}",
+                "let all use one type, or give one of them another topic: -r old:=new when it is "
+                "started",
+            )
+        )
     for sink in sinks:
         for source in sources:
             conflict = sink.qos.incompatibility(source.qos)
             if conflict:
-                found.append(f"{sink.node} may get nothing from {source.node}: {conflict}")
+                text = f"{sink.node} may get nothing from {source.node}: {conflict}"
+                found.append(Problem(text, _QOS_FIX))
             hashes = {end.type_hash for end in (sink, source)} - {""}
             if source.type == sink.type and len(hashes) > 1:
-                found.append(f"{sink.node} and {source.node} define {sink.type} differently")
+                text = f"{sink.node} and {source.node} define {sink.type} differently"
+                found.append(Problem(text, "build both from the same sources of messages"))
     return found
 
 

@@ -102,16 +102,24 @@ def _find(args: argparse.Namespace) -> MessageType | ServiceType | ActionType:
     import os
 
     from rosglass.errors import TypeNotFoundError, UnsupportedError
-    from rosglass.messages import load
+    from rosglass.messages import default_library, load
 
+    hint = ""
+    if "/" not in args.type:
+        names = default_library().names(1 if args.ros1 else 2)
+        close = [name for name in names if name.rpartition("/")[2].lower() == args.type.lower()]
+        told = f"Did you mean {' or '.join(close)}?" if close else "Write e.g. std_msgs/msg/Bool"
+        raise TypeNotFoundError(f"{args.type!r} names no package. {told}")
     try:
         return load(args.type, 1 if args.ros1 else 2)
     except TypeNotFoundError as error:
+        _, mark, close_ones = str(error).partition("Did you mean ")
+        hint = f"{mark}{close_ones.partition('?')[0]}?" if mark else ""
         if args.ros1 or not (args.url or os.environ.get("ROSGLASS_URL")):
-            hint = "or say where the robot is: --url zenoh://robot:7447"
-            raise TypeNotFoundError(f"{error}; {hint}") from error
+            where = "or say where the robot is: --url zenoh://robot:7447"
+            raise TypeNotFoundError(f"{error}; {where}") from error
     try:
         with connect(args) as node:
             return node.fetch_type(args.type, timeout=args.timeout)
-    except UnsupportedError as error:
-        raise TypeNotFoundError(f"{args.type}: {error}") from error
+    except (TypeNotFoundError, UnsupportedError) as error:
+        raise TypeNotFoundError(f"{args.type}: {error}. {hint}".rstrip(". ")) from error

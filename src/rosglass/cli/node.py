@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rosglass.cli.completion import complete
-from rosglass.cli.connecting import add_connection_options, connect, settle, wait
+from rosglass.cli.connecting import add_connection_options, connect, find, settle
 from rosglass.cli.endpoints import describe
 from rosglass.cli.output import Style, add_output_options, note, print_json
 from rosglass.cli.subcommands import Subcommands
@@ -24,7 +24,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
     _finish(add("list", "list the nodes there are", _list))
     sub = add("info", "show what a node publishes, subscribes, offers and calls", _info)
     complete(sub.add_argument("node"), "nodes")
-    sub.add_argument("--hidden", action="store_true", help="show what belongs to actions, too")
+    sub.add_argument(
+        "--hidden",
+        "--include-hidden",
+        action="store_true",
+        help="show those of actions, too",
+    )
     _finish(sub)
 
 
@@ -64,9 +69,7 @@ def _info(args: argparse.Namespace) -> int:
     style = Style(args)
     with connect(args) as node:
         name = "/" + args.node.lstrip("/")
-        wait(node, lambda: name in _others(node), args.timeout)
-        settle(node)
-        if name not in _others(node):
+        if not find(node, lambda: name in _others(node), args.timeout):
             return _unknown(node, name)
         ends = [end for end in node.endpoints(name) if args.hidden or not hidden(end.name)]
     if args.json:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import select
 import sys
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -15,11 +17,13 @@ if TYPE_CHECKING:
 
 __all__ = [
     "SHOWN",
+    "SHOWN_JSON",
     "Style",
     "add_output_options",
     "fields",
     "note",
     "print_json",
+    "require_reader",
     "table",
     "template",
     "to_json",
@@ -27,7 +31,9 @@ __all__ = [
 ]
 
 #: Elements of an array that are shown, unless all are asked for.
-SHOWN = 20
+SHOWN = 36
+#: The same for programs, which take more, but no pictures.
+SHOWN_JSON = 10_000
 _CODES = {"bold": 1, "dim": 2, "red": 31, "green": 32, "yellow": 33, "cyan": 36}
 
 
@@ -65,8 +71,24 @@ def note(text: str) -> None:
 
 
 def print_json(value: object) -> None:
-    """Print a value as JSON on several lines."""
-    print(json.dumps(value, indent=2, ensure_ascii=False, default=str), flush=True)
+    """Print a value as strict JSON on several lines; bytes become a list of numbers."""
+    from rosglass.messages.text import finite
+
+    print(json.dumps(finite(value), indent=2, ensure_ascii=False, default=list), flush=True)
+
+
+def require_reader() -> None:
+    """Raise BrokenPipeError if whoever read the output has gone, as in ``... | head -1``.
+
+    Without this, a command that waits for something to print would wait on.
+    """
+    events: list[tuple[int, int]] = []
+    with suppress(OSError, ValueError, AttributeError):  # no file, closed, or on Windows
+        poll = select.poll()
+        poll.register(sys.stdout.fileno(), 0)
+        events = poll.poll(0)
+    if any(event & select.POLLERR for _, event in events):
+        raise BrokenPipeError
 
 
 def fields(value: Any, limit: int | None = SHOWN) -> Any:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import argparse
     from collections.abc import Iterator
 
-    from rosglass.comm import Node, ParameterClient
+    from rosglass.comm import Node, ParameterClient, ParameterValue
 
 __all__ = ["configure", "run"]
 
@@ -36,6 +36,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
     complete(sub.add_argument("node"), "nodes")
     sub.add_argument("parameter")
     sub.add_argument("value", help="as in YAML: 1.5, true, hello, [1, 2]")
+    _finish(sub)
+    sub = add("delete", "take back a parameter that was set without being declared", _delete)
+    complete(sub.add_argument("node"), "nodes")
+    sub.add_argument("parameter")
     _finish(sub)
     sub = add("dump", "print all parameters of a node as a file for load", _dump)
     complete(sub.add_argument("node"), "nodes")
@@ -96,9 +100,9 @@ def _get(args: argparse.Namespace) -> int:
             return _unknown(client, args)
     value = found[args.parameter]
     if args.json:
-        print_json({args.parameter: list(value) if isinstance(value, bytes) else value})
+        print_json({args.parameter: value})
     else:
-        print(to_yaml(value).rstrip("\n"))
+        print(to_yaml(list(value) if isinstance(value, bytes) else value).rstrip("\n"))
     return 0
 
 
@@ -122,16 +126,26 @@ def _describe(args: argparse.Namespace) -> int:
 def _set(args: argparse.Namespace) -> int:
     from rosglass.ros2.parameter_files import parse_value
 
-    value = parse_value(args.value, f"the value {args.value!r}")
+    # Nothing between quotes is an empty text, as for ros2.
+    value = parse_value(args.value, f"the value {args.value!r}") if args.value else ""
+    return _change(args, value, "set")
+
+
+def _delete(args: argparse.Namespace) -> int:
+    return _change(args, None, "delete")
+
+
+def _change(args: argparse.Namespace, value: ParameterValue, what: str) -> int:
     with connect(args) as node, node.create_parameter_client(args.node) as client:
         result = client.set({args.parameter: value}, timeout=args.timeout)[args.parameter]
         name = client.node
     if args.json:
         print_json({"successful": result.successful, "reason": result.reason})
     elif result.successful:
-        print(f"{name}: {args.parameter} is set" + (f" ({result.reason})" * bool(result.reason)))
+        done = {"set": "is set", "delete": "is deleted"}[what]
+        print(f"{name}: {args.parameter} {done}" + (f" ({result.reason})" * bool(result.reason)))
     else:
-        note(f"{name} refuses to set {args.parameter}: {result.reason or 'it gives no reason'}")
+        note(f"{name} refuses to {what} {args.parameter}: {result.reason or 'it gives no reason'}")
     return 0 if result.successful else 1
 
 

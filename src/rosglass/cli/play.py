@@ -5,15 +5,16 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
+import logging
 import select
-import signal
+import shutil
 import sys
-import threading
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rosglass.cli.connecting import add_connection_options, connect, seconds
+from rosglass.cli.connecting import End, add_connection_options, connect, seconds
+from rosglass.cli.output import note
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -53,7 +54,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "-t", "--topics", nargs="+", default=[], metavar="TOPIC", help="play only these"
     )
     parser.add_argument(
-        "-x", "--exclude", default="", metavar="REGEX", help="leave out topics that match"
+        "-x",
+        "--exclude",
+        "--exclude-regex",
+        default="",
+        metavar="REGEX",
+        help="leave out topics that match",
     )
     parser.add_argument(
         "-m",
@@ -65,17 +71,31 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="publish a topic under another name",
     )
     parser.add_argument(
-        "--start", type=seconds, default=0.0, metavar="SECONDS", help="begin so far in"
+        "--start",
+        "--start-offset",
+        type=seconds,
+        default=0.0,
+        metavar="SECONDS",
+        help="begin so far in",
     )
-    parser.add_argument("--duration", type=seconds, metavar="SECONDS", help="play only so long")
     parser.add_argument(
+        "--duration", "--playback-duration", type=seconds, metavar="SECONDS",
+        help="play only so long",
+    )  # fmt: skip
+    parser.add_argument(
+        "-d",
         "--delay",
         type=seconds,
         default=1.0,
         metavar="SECONDS",
         help="time for subscriptions to be linked before the first message (default: %(default)g)",
     )
-    parser.add_argument("-p", "--paused", action="store_true", help="begin paused")
+    parser.add_argument(
+        "-p", "--paused", "--start-paused", action="store_true", help="begin paused"
+    )
+    parser.add_argument(
+        "--no-keys", "--disable-keyboard-controls", action="store_true", help="ignore keys"
+    )
     add_connection_options(parser)
     parser.epilog = f"Keys while it plays: {_KEYS}."
 
@@ -88,9 +108,9 @@ def run(args: argparse.Namespace) -> int:
         if args.list:
             print(json.dumps(_table(bag), indent=2) if args.json else _listing(bag))
             return 0
-        end = threading.Event()
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda *_: end.set())
+        if not args.verbose:
+            # What is not played, and why, is told here.
+            logging.getLogger("rosglass.bags").setLevel(logging.CRITICAL)
         with (
             connect(args) as node,
             Player(
@@ -108,34 +128,49 @@ def run(args: argparse.Namespace) -> int:
                 paused=args.paused,
             ) as player,
         ):
+            end = End()
             topics = len({channel.topic for channel in player.channels})
-            print(f"playing {topics} topics of {args.file} ({bag.duration:.1f} s) to {node.url}")
-            _watch(player, bag, end)
-            status = player.status()
-            print(f"{status.sent} messages sent")
-            for topic, problem in player.problems.items():
-                print(f"rosglass: {topic or args.file}: {problem}", file=sys.stderr)
-            return 0 if status.sent else 1
+            print(
+                f"playing {topics} topics of {args.file} ({bag.duration:.1f} s) to {node.url}",
+                flush=True,
+            )
+            told: dict[str, str] = {}
+            try:
+                _watch(player, bag, end, told, keys=not args.no_keys)
+            finally:
+                _tell(player, told, last=True)
+                sent = player.status().sent
+                print(f"{sent} messages sent", flush=True)
+            return end.code or (0 if sent else 1)
 
 
-def _watch(player: Player, bag: Bag, end: threading.Event) -> None:
-    interactive = sys.stdin.isatty() and sys.stdout.isatty()
+def _tell(player: Player, told: dict[str, str], *, last: bool = False) -> None:
+    """Tell what is not played, once; what messages were left out, at the end."""
+    for topic, problem in list(player.problems.items()):
+        if topic and told.get(topic) != problem and (last or topic not in told):
+            told[topic] = problem
+            note(f"{topic}: {problem}")
+
+
+def _watch(player: Player, bag: Bag, end: End, told: dict[str, str], *, keys: bool) -> None:
+    interactive = keys and sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
     if interactive:
         print(_KEYS)
     with _keys() if interactive else contextlib.nullcontext():
         while not end.is_set() and not player.wait(0.0 if interactive else 0.2):
+            _tell(player, told)
             if not interactive:
                 continue
             if select.select([sys.stdin], [], [], 0.2)[0] and not _obey(player, bag):
                 break
             status = player.status()
             lag = f", {status.lag:.1f} s behind" if status.lag > 0.5 else ""
-            print(
-                f"\r\033[K{status.state.value} {status.position:.1f} of {bag.duration:.1f} s, "
-                f"rate {status.rate:g}, {status.sent} messages{lag}",
-                end="",
-                flush=True,
+            line = (
+                f"{status.state.value} {status.position:.1f} of {bag.duration:.1f} s, "
+                f"rate {status.rate:g}, {status.sent} messages{lag}"
             )
+            # A line that wraps cannot be written over.
+            print(f"\r\033[K{line[: shutil.get_terminal_size().columns - 1]}", end="", flush=True)
     if interactive:
         print()
 

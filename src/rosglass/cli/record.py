@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
-import signal
+import logging
+import math
+import shutil
 import sys
-import threading
 import time
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rosglass.cli.connecting import add_connection_options, connect, seconds
+from rosglass.cli.connecting import End, add_connection_options, connect, seconds
+from rosglass.cli.output import note
+from rosglass.comm import ConnectionState
+from rosglass.errors import Error
 
 if TYPE_CHECKING:
     import argparse
 
     from rosglass.bags import Recorder, RecordingStatus
+    from rosglass.comm import Node
 
 __all__ = ["configure", "run"]
+
+#: Seconds that a problem may pass by itself.
+_PATIENCE = 2.0
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -33,13 +41,24 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="file to write; default: recording_<date>_<time>.mcap",
     )
     parser.add_argument(
+        "-a", "--all", action="store_true", help="record all topics; this is the default"
+    )
+    parser.add_argument(
         "-e", "--regex", default="", metavar="REGEX", help="record topics that match as well"
     )
     parser.add_argument(
-        "-x", "--exclude", default="", metavar="REGEX", help="never record topics that match"
+        "-x",
+        "--exclude",
+        "--exclude-regex",
+        default="",
+        metavar="REGEX",
+        help="never record topics that match",
     )
     parser.add_argument(
-        "--hidden", action="store_true", help="record hidden topics, too, e.g. those of actions"
+        "--hidden",
+        "--include-hidden-topics",
+        action="store_true",
+        help="record hidden topics, too, e.g. those of actions",
     )
     parser.add_argument(
         "-d", "--duration", type=seconds, metavar="SECONDS", help="end by itself after so long"
@@ -59,10 +78,14 @@ def run(args: argparse.Namespace) -> int:
     """Record until Ctrl-C, SIGTERM or the end of the duration."""
     from rosglass.bags import Recorder
 
-    path = args.output or Path(f"recording_{datetime.now():%Y-%m-%d_%H-%M-%S}.mcap")
-    end = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: end.set())
+    path = args.output or Path(f"recording_{datetime.now():%Y-%m-%d_%H-%M-%S}")
+    if path.suffix != ".mcap":
+        path = path.with_name(f"{path.name}.mcap")
+    if args.all and args.topics:
+        raise Error("--all and names of topics exclude each other")
+    if not args.verbose:
+        # What keeps topics from being recorded is told here, once.
+        logging.getLogger("rosglass.comm").setLevel(logging.ERROR)
     with connect(args) as node:
         recorder = Recorder(
             node,
@@ -73,35 +96,71 @@ def run(args: argparse.Namespace) -> int:
             hidden=args.hidden,
             compression=args.compression,
         )
+        end = End(patient=True)
         try:
-            print(f"recording into {path}; Ctrl-C ends it", file=sys.stderr, flush=True)
-            _watch(recorder, end, args.duration, args.quiet)
+            note(f"recording into {path}; Ctrl-C ends it")
+            _watch(node, recorder, end, args)
         finally:
-            status = recorder.status()
             recorder.close()
-    size = path.stat().st_size
-    print(f"{path}: {_summary(status)}, {size / 1e6:.1f} MB")
+        status = recorder.status()
+    if not status.messages:
+        path.unlink()
+        note("nothing was recorded, and no file is left")
+        return 1
+    print(f"{path}: {_summary(status)}, {path.stat().st_size / 1e6:.1f} MB")
     for topic, count in status.topics.items():
         print(f"  {count:8} {topic}")
-    for topic, problem in status.problems.items():
-        print(f"rosglass: {topic}: {problem}", file=sys.stderr)
-    if not status.messages:
-        print("rosglass: nothing was recorded", file=sys.stderr)
-    return 0 if status.messages else 1
+    return 0
 
 
-def _watch(recorder: Recorder, end: threading.Event, duration: float | None, quiet: bool) -> None:
-    until = None if duration is None else time.monotonic() + duration
-    shown = not quiet and sys.stderr.isatty()
-    while not end.is_set():
-        left = 0.5 if until is None else min(0.5, until - time.monotonic())
-        if left <= 0 or end.wait(left):
+def _watch(node: Node, recorder: Recorder, end: End, args: argparse.Namespace) -> None:
+    until = math.inf if args.duration is None else time.monotonic() + args.duration
+    shown = not args.quiet and sys.stderr.isatty()
+    news = _News(shown)
+    while not end.wait(max(0.0, min(0.5, until - time.monotonic()))):
+        if time.monotonic() >= until:
             break
         status = recorder.status()
+        news.tell(node, status)
         if shown:
-            print(f"\r\033[K{_summary(status)}", end="", file=sys.stderr, flush=True)
+            lines = shutil.get_terminal_size().columns
+            print(f"\r\033[K{_summary(status)[: lines - 1]}", end="", file=sys.stderr, flush=True)
+    news.tell(node, recorder.status(), last=True)
     if shown:
         print(file=sys.stderr)
+
+
+class _News:
+    """Tells what is wrong when it begins, and when it is over."""
+
+    def __init__(self, on_terminal: bool) -> None:
+        self._before = "\r\033[K" if on_terminal else ""
+        self._seen: dict[str, tuple[str, float]] = {}
+        self._told: dict[str, str] = {}
+
+    def tell(self, node: Node, status: RecordingStatus, *, last: bool = False) -> None:
+        now = time.monotonic()
+        problems = dict(status.problems)
+        state = node.status()
+        if state.state is ConnectionState.LOST:
+            problems = {node.url: state.detail}
+        if status.dropped:
+            problems["disk"] = "it is too slow: messages are lost"
+        for topic, problem in problems.items():
+            since = self._seen.get(topic, ("", now))
+            self._seen[topic] = (problem, since[1] if since[0] == problem else now)
+            if self._told.get(topic) == problem:
+                continue
+            # What is being looked for, or about to be replaced, is no news.
+            if last or now - self._seen[topic][1] > _PATIENCE:
+                self._told[topic] = problem
+                print(f"{self._before}rosglass: {topic}: {problem}", file=sys.stderr, flush=True)
+        for topic in self._told.keys() - problems.keys():
+            del self._told[topic]
+            if not last:
+                print(f"{self._before}rosglass: {topic}: well again", file=sys.stderr, flush=True)
+        for topic in self._seen.keys() - problems.keys():
+            del self._seen[topic]
 
 
 def _summary(status: RecordingStatus) -> str:

@@ -6,7 +6,7 @@ import time
 from typing import TYPE_CHECKING
 
 from rosglass.cli.completion import complete
-from rosglass.cli.connecting import add_connection_options, connect, settle, wait
+from rosglass.cli.connecting import add_connection_options, connect, find, settle, wait
 from rosglass.cli.endpoints import describe, short
 from rosglass.cli.output import (
     Style,
@@ -31,8 +31,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Declare what can be done with services."""
     add = Subcommands(parser).add
     sub = add("list", "list the services there are", _list)
-    sub.add_argument("-t", "--types", action="store_true", help="show their types")
-    sub.add_argument("--hidden", action="store_true", help="show those of actions, too")
+    sub.add_argument("-t", "--types", "--show-types", action="store_true", help="show their types")
+    sub.add_argument(
+        "--hidden", "--include-hidden-services", action="store_true",
+        help="show those of actions, too",
+    )  # fmt: skip
     _finish(sub)
     sub = add("info", "show who offers and uses a service", _info)
     complete(sub.add_argument("service"), "services")
@@ -79,9 +82,9 @@ def _info(args: argparse.Namespace) -> int:
     style = Style(args)
     with connect(args) as node:
         name = node.resolve(args.service)
-        wait(node, lambda: node.service_servers(name), args.timeout)
-        settle(node)
-        ends = [*node.service_servers(name), *node.service_clients(name)]
+        ends = find(
+            node, lambda: [*node.service_servers(name), *node.service_clients(name)], args.timeout
+        )
     if not ends:
         note(f"nobody offers or calls {name}; rosglass service list shows what there is")
         return 1
@@ -112,7 +115,7 @@ def _call(args: argparse.Namespace) -> int:
             request = client.type.request
             values = parse_fields(text, request.name, template(request))
             began = time.monotonic()
-            response = client.call(values, timeout=max(deadline - began, 1.0))
+            response = client.call(values, timeout=round(max(deadline - began, 1.0), 1))
             took = time.monotonic() - began
     found = fields(response, None if args.json else 100)
     if args.json:

@@ -2,13 +2,35 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from rosglass.cli.completion import is_completing
 
 if TYPE_CHECKING:
-    import argparse
     from collections.abc import Callable
 
-__all__ = ["Subcommands"]
+__all__ = ["Parser", "Subcommands", "add_verbose"]
+
+
+class Parser(argparse.ArgumentParser):
+    """Takes options before, after and between arguments, as ``ros2`` commands are written.
+
+    argparse alone gives up on ``pub --once /topic TYPE``, and on ``echo /topic --once TYPE``.
+    """
+
+    _mixing = False
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """See argparse."""
+        has_commands = any(action.nargs == argparse.PARSER for action in self._actions)
+        if has_commands or self._mixing or is_completing():
+            return super().parse_known_args(args, namespace)
+        self._mixing = True
+        try:
+            return self.parse_known_intermixed_args(args, namespace)
+        finally:
+            self._mixing = False
 
 
 class Subcommands:
@@ -22,11 +44,30 @@ class Subcommands:
         self._commands = parser.add_subparsers(metavar="WHAT", required=True)
 
     def add(
-        self, name: str, summary: str, handler: Callable[[argparse.Namespace], int]
+        self,
+        name: str,
+        summary: str,
+        handler: Callable[[argparse.Namespace], int],
+        aliases: tuple[str, ...] = (),
     ) -> argparse.ArgumentParser:
         """Add something that can be done, and return the parser of its options."""
         parser = self._commands.add_parser(
-            name, help=summary, description=f"{summary[0].upper()}{summary[1:]}."
+            name,
+            aliases=aliases,
+            help=summary,
+            description=f"{summary[0].upper()}{summary[1:]}.",
         )
         parser.set_defaults(handler=handler)
+        add_verbose(parser)
         return parser
+
+
+def add_verbose(parser: argparse.ArgumentParser) -> None:
+    """Declare ``-v``, which may stand after each word of a command."""
+    parser.add_argument(
+        "-v",
+        "--verbose",
+        action="count",
+        default=argparse.SUPPRESS,
+        help="show more; -vv shows everything",
+    )

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import argparse
 import time
 from typing import TYPE_CHECKING
 
 from rosglass.cli.completion import complete
 from rosglass.cli.connecting import (
+    TIMEOUT,
+    End,
     add_connection_options,
     connect,
-    end_event,
+    find,
     natural,
     seconds,
     settle,
@@ -23,8 +26,6 @@ from rosglass.cli.topic_rates import measure
 from rosglass.cli.values import parse_fields, profile, split_type
 
 if TYPE_CHECKING:
-    import argparse
-
     from rosglass.comm import Node
 
 __all__ = ["configure", "run"]
@@ -37,8 +38,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Declare what can be done with topics."""
     add = Subcommands(parser).add
     sub = add("list", "list the topics there are", _list)
-    sub.add_argument("-t", "--types", action="store_true", help="show their types")
-    sub.add_argument("--hidden", action="store_true", help="show hidden ones, too")
+    sub.add_argument("-t", "--types", "--show-types", action="store_true", help="show their types")
+    sub.add_argument("-c", "--count-topics", action="store_true", help="show how many there are")
+    sub.add_argument(
+        "--hidden", "--include-hidden-topics", action="store_true", help="show hidden ones, too"
+    )
     _finish(sub)
     sub = add("info", "show who publishes and subscribes to a topic, and how", _info)
     complete(sub.add_argument("topic"), "topics")
@@ -47,13 +51,20 @@ def configure(parser: argparse.ArgumentParser) -> None:
     complete(sub.add_argument("topic"), "topics")
     complete(sub.add_argument("type", nargs="?", help="default: what is published"), "messages")
     sub.add_argument("-f", "--field", metavar="PATH", help="print one field, as pose.position.x")
-    sub.add_argument("-n", "--count", type=natural, help="end after so many messages")
-    sub.add_argument("--once", dest="count", action="store_const", const=1, help="one is enough")
-    sub.add_argument("--full", action="store_true", help="print every element of long arrays")
+    _count(sub)
+    sub.add_argument(
+        "--full", "--full-length", action="store_true", help="print every element of long arrays"
+    )
+    sub.add_argument(
+        "-l", "--truncate", "--truncate-length", type=natural, metavar="N",
+        help="elements of an array to print (default: 36; with --json 10000)",
+    )  # fmt: skip
+    sub.add_argument("--csv", action="store_true", help="print values separated by commas")
     sub.add_argument("--raw", action="store_true", help="print the bytes, in hexadecimal")
     sub.add_argument("--stamps", action="store_true", help="print when messages were received")
+    sub.set_defaults(what="echo")
     _qos(sub, "best_available")
-    _finish(sub)
+    _finish(sub, timeout=None)
     for name, summary in (
         ("hz", "measure how often a topic's messages come"),
         ("bw", "measure how many bytes a topic takes"),
@@ -61,6 +72,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     ):
         sub = add(name, summary, measure)
         complete(sub.add_argument("topic"), "topics")
+        complete(sub.add_argument("type", nargs="?", help="default: what is published"), "messages")
         sub.add_argument(
             "-w", "--window", type=natural, default=_WINDOW, help="messages to look at"
         )
@@ -76,12 +88,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
         ),
         "messages",
     )
-    sub.add_argument("-r", "--rate", type=float, default=1.0, metavar="HZ", help="default: 1")
-    sub.add_argument("-n", "--count", type=natural, help="end after so many messages")
-    sub.add_argument("--once", dest="count", action="store_const", const=1, help="one is enough")
+    sub.add_argument("-r", "--rate", type=_rate, default=1.0, metavar="HZ", help="default: 1")
+    _count(sub)
     sub.add_argument(
         "-w",
         "--wait",
+        "--wait-matching-subscriptions",
         type=int,
         metavar="N",
         help="wait for so many subscriptions first; with --once 1 unless told otherwise",
@@ -99,20 +111,44 @@ def run(args: argparse.Namespace) -> int:
     return int(args.handler(args))
 
 
-def _finish(parser: argparse.ArgumentParser) -> None:
+def _finish(parser: argparse.ArgumentParser, *, timeout: float | None = TIMEOUT) -> None:
     add_output_options(parser)
-    add_connection_options(parser)
+    add_connection_options(parser, timeout=timeout)
+
+
+def _count(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("-n", "-t", "--count", "--times", type=natural, help="end after so many")
+    parser.add_argument(
+        "-1", "--once", dest="count", action="store_const", const=1, help="one is enough"
+    )
 
 
 def _qos(parser: argparse.ArgumentParser, default: str) -> None:
     group = parser.add_argument_group("quality of service")
     group.add_argument(
         "--qos",
+        "--qos-profile",
         default=default,
         metavar="PROFILE",
         help="default, sensor_data, latched, best_available, ... (default: %(default)s)",
     )
-    group.add_argument("--depth", type=natural, help="samples to keep")
+    group.add_argument("--depth", "--qos-depth", type=natural, help="samples to keep")
+    for policy, words in (
+        ("reliability", ("reliable", "best_effort")),
+        ("durability", ("volatile", "transient_local")),
+        ("history", ("keep_last", "keep_all")),
+    ):
+        group.add_argument(f"--qos-{policy}", choices=words, help="instead of the profile's")
+
+
+def _rate(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0 < value <= 10_000:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a rate above 0 and up to 10000")
+    return value
 
 
 def _list(args: argparse.Namespace) -> int:
@@ -123,6 +159,9 @@ def _list(args: argparse.Namespace) -> int:
         settle(node)
         found = {t: k for t, k in node.topics().items() if args.hidden or not hidden(t)}
         counts = {t: (len(node.publishers(t)), len(node.subscriptions(t))) for t in found}
+    if args.count_topics:
+        print(len(found))
+        return 0
     if args.json:
         print_json(
             [
@@ -145,17 +184,17 @@ def _info(args: argparse.Namespace) -> int:
     style = Style(args)
     with connect(args) as node:
         topic = node.resolve(args.topic)
-        wait(node, lambda: node.publishers(topic) or node.subscriptions(topic), args.timeout)
-        settle(node)
-        ends = [*node.publishers(topic), *node.subscriptions(topic)]
+        ends = find(
+            node, lambda: [*node.publishers(topic), *node.subscriptions(topic)], args.timeout
+        )
         if not ends:
             return _unknown(node, topic)
     if args.json:
         print_json({"topic": topic, "endpoints": [describe(end) for end in ends]})
         return 0
     print(f"{style(topic, 'bold')} [{', '.join(sorted({end.type for end in ends}))}]")
-    for line in problems(ends):
-        print(style(f"  {line}", "red"))
+    for problem in problems(ends):
+        print(style(f"  {problem.text}", "red"))
     for end in ends:
         print(f"  {end.kind.value} {style(end.node, 'cyan')}")
         for key, value in describe(end).items():
@@ -165,12 +204,7 @@ def _info(args: argparse.Namespace) -> int:
 
 
 def _publish(args: argparse.Namespace) -> int:
-    from rosglass.errors import Error
-
-    if not 0 < args.rate <= 10_000:
-        raise Error(f"--rate {args.rate:g} must be above 0 and at most 10000")
     type_name, text = split_type(args.rest)
-    end = end_event()
     with connect(args) as node:
         topic = node.resolve(args.topic)
         if type_name is None:
@@ -184,6 +218,7 @@ def _publish(args: argparse.Namespace) -> int:
             note(f"{topic}: {there} of {wanted} subscriptions within {args.timeout:g} s; "
                  "nothing was published")  # fmt: skip
             return 1
+        end = End()
         sent, due = 0, time.monotonic()
         while not end.is_set():
             publisher.publish(message)
@@ -197,7 +232,7 @@ def _publish(args: argparse.Namespace) -> int:
         end.wait(args.keep_alive)
         if args.json:
             print_json({"topic": topic, "type": type_name, "sent": sent})
-    return 0
+    return end.code
 
 
 def _announced(node: Node, topic: str, timeout: float) -> str:

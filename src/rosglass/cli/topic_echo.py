@@ -2,44 +2,55 @@
 
 from __future__ import annotations
 
+import math
 import time
 from typing import TYPE_CHECKING, Any
 
-from rosglass.cli.connecting import connect, end_event
-from rosglass.cli.output import SHOWN, Style, fields, note, to_json, to_yaml
+from rosglass.cli.connecting import End, connect
+from rosglass.cli.output import SHOWN, SHOWN_JSON, Style, fields, note, to_json, to_yaml
 from rosglass.cli.values import profile
+from rosglass.cli.waiting import Reasons
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
-    from rosglass.comm import Node, Sample, Subscription
+    from rosglass.comm import Sample
 
-__all__ = ["Reasons", "echo"]
+__all__ = ["echo"]
 
 
 def echo(args: argparse.Namespace) -> int:
     """Print messages until Ctrl-C, or as many as were asked for."""
-    style, end = Style(args), end_event()
-    limit = None if args.full else SHOWN
+    style = Style(args)
+    limit = args.truncate or (SHOWN_JSON if args.json else SHOWN)
     received = 0
     with connect(args) as node:
         subscription = node.create_subscription(args.topic, args.type, qos=profile(args))
         get = _getter(args.field)
-        with Reasons(node, subscription, args.timeout) as reasons:
+        end = End()
+        due = time.monotonic() + (math.inf if args.timeout is None else args.timeout)
+        with Reasons(node, subscription, args) as reasons:
             while not end.is_set() and (args.count is None or received < args.count):
                 sample = subscription.wait(0.2)
                 if sample is None:
-                    reasons.tell()
+                    late = time.monotonic() > due
+                    reasons.look(last=late)
+                    if late:
+                        break
                     continue
                 received += 1
+                reasons.hear(received)
+                due = time.monotonic() + (math.inf if args.timeout is None else args.timeout)
                 if args.stamps and not args.json:
                     print(style(f"# received {sample.received.seconds:.6f}", "dim"))
-                print(_text(args, sample, get, limit), flush=True)
+                print(_text(args, sample, get, None if args.full else limit), flush=True)
         dropped = subscription.statistics().dropped
     if dropped:
         note(f"{dropped} messages came faster than they could be printed, and were left out")
-    return 0 if received or args.count is None else 1
+    if end.is_set():
+        return end.code
+    return 0 if args.count is None or received == args.count else 1
 
 
 def _getter(path: str | None) -> Callable[[Sample], Any]:
@@ -67,33 +78,19 @@ def _text(
     found = fields(get(sample), limit)
     if args.json:
         return to_json(found)
+    if args.csv:
+        return ",".join(_cells(found))
     text = to_yaml(found)
     return text.rstrip("\n") + ("" if args.field and text.count("\n") < 2 else "\n---")
 
 
-class Reasons:
-    """Tells the person who waits why nothing comes."""
-
-    def __init__(self, node: Node, subscription: Subscription, patience: float) -> None:
-        self._node, self._subscription = node, subscription
-        self._due = time.monotonic() + min(2.0, patience)
-        self._told = ""
-
-    def __enter__(self) -> Reasons:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._subscription.close()
-
-    def tell(self) -> None:
-        """Say what is wrong, once for each reason."""
-        if time.monotonic() < self._due:
-            return
-        found = self._subscription
-        reason = found.problem or found.hint
-        if not reason and not found.statistics().received:
-            publishers = self._node.publishers(found.topic)
-            reason = "published, but nothing has come yet" if publishers else "nobody publishes it"
-        if reason and reason != self._told:
-            self._told = reason
-            note(f"{found.topic}: {reason}")
+def _cells(value: Any) -> Iterator[str]:
+    """Yield what a line of comma-separated values has for a value, in the order of the fields."""
+    if isinstance(value, (dict, list)):
+        for inner in value.values() if isinstance(value, dict) else value:
+            yield from _cells(inner)
+        return
+    text = str(value)
+    if set(text) & set(',"\n\r'):
+        text = '"' + text.replace('"', '""') + '"'
+    yield text

@@ -9,10 +9,10 @@ from collections import deque
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rosglass.cli.connecting import connect, end_event
-from rosglass.cli.output import Style, note, to_json
-from rosglass.cli.topic_echo import Reasons
+from rosglass.cli.connecting import End, connect
+from rosglass.cli.output import note, to_json
 from rosglass.cli.values import profile
+from rosglass.cli.waiting import Reasons
 
 if TYPE_CHECKING:
     import argparse
@@ -32,7 +32,6 @@ def measure(args: argparse.Namespace) -> int:
     """Print a figure each second, until Ctrl-C or the end of the duration."""
     from rosglass.comm import IMMEDIATE
 
-    end, style = end_event(), Style(args)
     seen: deque[_Seen] = deque(maxlen=args.window)
     lock = threading.Lock()
     wants_stamp = args.what == "delay"
@@ -45,12 +44,13 @@ def measure(args: argparse.Namespace) -> int:
 
     with connect(args) as node:
         subscription = node.create_subscription(
-            args.topic, qos=profile(args), raw_callback=receive, executor=IMMEDIATE
+            args.topic, args.type, qos=profile(args), raw_callback=receive, executor=IMMEDIATE
         )
+        end = End()
         until = None if args.duration is None else time.monotonic() + args.duration
-        with Reasons(node, subscription, args.timeout) as reasons:
-            shown = -1
-            while not end.is_set():
+        shown = -1
+        with Reasons(node, subscription, args) as reasons:
+            while not end.is_set() and not failure:
                 left = 1.0 if until is None else until - time.monotonic()
                 if left <= 0:
                     break
@@ -58,18 +58,21 @@ def measure(args: argparse.Namespace) -> int:
                 with lock:
                     samples = [s for s in seen if s.delay is not None or not wants_stamp]
                 total = subscription.statistics().received
-                if failure:
-                    break
-                if total == shown or len(samples) < 2:
-                    reasons.tell()
-                    if shown > 0 and total == shown:
-                        print(style("nothing new", "red"), flush=True)
-                    continue
-                shown = total
-                result = _FIGURES[args.what](samples)
-                print(to_json(result) if args.json else result.pop("text"), flush=True)
+                reasons.hear(total)
+                if total != shown and len(samples) > 1:
+                    shown = total
+                    result = _FIGURES[args.what](samples)
+                    print(to_json(result) if args.json else result.pop("text"), flush=True)
+                elif reasons.look() and total:
+                    # What comes after an interruption is measured anew.
+                    with lock:
+                        seen.clear()
+            if shown < 0 and not failure and not end.is_set():
+                reasons.look(last=True)
     for reason in failure[:1]:
         note(f"{args.topic}: {reason}")
+    if end.is_set():
+        return end.code
     return 0 if shown > 0 and not failure else 1
 
 

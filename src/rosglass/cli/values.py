@@ -47,6 +47,8 @@ def split_type(rest: Sequence[str]) -> tuple[str | None, str]:
     Raises:
         Error: There are more than two, or the first of two is no type's name.
     """
+    if len(rest) > 1 and (rest[0].endswith(":") or rest[0].startswith("{")):
+        raise Error(f"put the values into one pair of quotes: '{' '.join(rest)}'")
     if len(rest) > 2:
         raise Error(
             f"too many arguments: {' '.join(rest[2:])!r}; put the values into one pair of quotes, "
@@ -61,8 +63,17 @@ def split_type(rest: Sequence[str]) -> tuple[str | None, str]:
 
 
 def profile(args: argparse.Namespace) -> QoS:
-    """Return what ``--qos`` and ``--depth`` say; raises UnsupportedError."""
-    from rosglass.comm import QoS
+    """Return what ``--qos`` and its companions say; raises UnsupportedError."""
+    from dataclasses import replace
+
+    from rosglass.comm import Durability, History, QoS, Reliability
 
     found = QoS.preset(args.qos)
-    return found if args.depth is None else found.with_depth(args.depth)
+    if args.depth is not None:
+        found = found.with_depth(args.depth)
+    policies: dict[str, Any] = {
+        "reliability": args.qos_reliability and Reliability(args.qos_reliability),
+        "durability": args.qos_durability and Durability(args.qos_durability),
+        "history": args.qos_history and History(args.qos_history),
+    }
+    return replace(found, **{name: policy for name, policy in policies.items() if policy})

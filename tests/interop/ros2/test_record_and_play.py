@@ -67,6 +67,32 @@ def recording(join: Callable[..., Node], tmp_path: Path) -> Path:
     return path
 
 
+def test_all_types_of_a_topic_are_recorded(join: Callable[..., Node], tmp_path: Path) -> None:
+    robot, ears = join("robot"), join("ears")
+    texts = robot.create_publisher("/mixed", STRING)
+    path = tmp_path / "mixed.mcap"
+    with Recorder(ears, path, ["/mixed"]) as recorder:
+        until(texts.subscription_count)
+        texts.publish(data="x")
+        until(lambda: recorder.status().messages)
+        switches = robot.create_publisher("/mixed", "std_msgs/msg/Bool")
+        until(lambda: switches.subscription_count() > 1 or len(ears.topics()["/mixed"]) > 1)
+
+        def both() -> bool:
+            texts.publish(data="y")
+            switches.publish(data=True)
+            time.sleep(0.05)
+            with recorder._lock:
+                return len(recorder._channels) == 2
+
+        until(both)
+        assert recorder.status().problems == {}
+    with open_bag(path) as bag:
+        assert [channel.type_name for channel in bag.channels] == ["std_msgs/msg/Bool", STRING]
+        for message in bag.messages():
+            message.channel.type().decode(message.data)
+
+
 def test_a_recording_is_read_by_others_and_played_by_us(
     join: Callable[..., Node], recording: Path
 ) -> None:
@@ -163,9 +189,7 @@ def test_wrong_arguments_are_refused(
     node = connect("player")
     path = tmp_path / "a.mcap"
     with Recorder(node, path) as recorder:
-        publisher = node.create_publisher("/chatter", STRING)
-        until(publisher.subscription_count)
-        publisher.publish(data="x")
+        node.create_publisher("/chatter", STRING, QoS.latched()).publish(data="x")
         until(lambda: recorder.status().messages)
     with open_bag(path) as bag, pytest.raises(BagError, match=message):
         Player(node, bag, **options)

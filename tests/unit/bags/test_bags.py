@@ -233,3 +233,17 @@ def test_names_that_differ_only_in_case_are_refused():
 
     with pytest.raises(BagError, match="differ only in case"):
         Converter(MessageType.from_text("m/msg/X", "int8 a\nint8 A\n", ros=1))
+
+
+def test_an_mcap_file_is_known_by_its_beginning(tmp_path):
+    path = write_mcap(tmp_path / "a.mcap").rename(tmp_path / "drive")
+    with open_bag(path) as bag:
+        assert len(texts(bag)) == 5
+
+
+def test_the_end_of_a_file_of_zeros_is_named_in_words(tmp_path):
+    path = write_mcap(tmp_path / "a.mcap", 50, finish=False)
+    path.write_bytes(path.read_bytes() + bytes(100))
+    with open_bag(path) as bag:
+        assert len(texts(bag)) == 50
+        assert bag.problem == "it was not closed properly: its end is missing or damaged"

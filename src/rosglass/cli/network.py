@@ -1,0 +1,82 @@
+"""What the network of this machine does to a connection: for ``rosglass doctor``."""
+
+from __future__ import annotations
+
+import socket
+import struct
+import sys
+from typing import NamedTuple
+from urllib.parse import urlsplit
+
+__all__ = ["Interface", "ask", "interfaces", "is_loopback"]
+
+#: The request for an interface's flags, and some of these (Linux, netdevice(7)).
+_GET_FLAGS = 0x8913
+_UP, _LOOPBACK, _MULTICAST = 0x1, 0x8, 0x1000
+_PORT = 7447
+
+
+class Interface(NamedTuple):
+    """A network interface that is up."""
+
+    name: str
+    is_loopback: bool
+    has_multicast: bool
+
+
+def interfaces() -> list[Interface] | None:
+    """Return the network interfaces that are up; None where that cannot be told (not on Linux)."""
+    if sys.platform != "linux":
+        return None
+    import fcntl
+
+    found = []
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
+        for _, name in socket.if_nameindex():
+            request = struct.pack("16sH14x", name.encode()[:15], 0)
+            try:
+                answer = fcntl.ioctl(asking, _GET_FLAGS, request)
+            except OSError:  # it went away just now
+                continue
+            flags = struct.unpack("16sH14x", answer)[1]
+            if flags & _UP:
+                found.append(Interface(name, bool(flags & _LOOPBACK), bool(flags & _MULTICAST)))
+    return found
+
+
+def is_loopback(url: str) -> bool:
+    """Return whether an URL names this machine, if only by leaving the host out."""
+    host = urlsplit(url).hostname or ""
+    return host in ("", "localhost", "::1") or host.startswith("127.")
+
+
+def ask(url: str, timeout: float) -> tuple[str, str]:
+    """Knock at the port that a ``zenoh://`` URL names; return what happens, and what helps.
+
+    For when Zenoh got no answer there.
+    """
+    parts = urlsplit(url)
+    host, port = parts.hostname or "127.0.0.1", parts.port or _PORT
+    here = is_loopback(url)
+    command = "rosglass router" if here else "rosglass router --open"
+    if port != _PORT:
+        command = f"rosglass router --listen tcp/{'127.0.0.1' if here else '[::]'}:{port}"
+    where = "" if here else f" on {host}"
+    start = f"start a router{where}: ros2 run rmw_zenoh_cpp rmw_zenohd, or {command}"
+    try:
+        with socket.create_connection((host, port), timeout):
+            text = f"something listens at {host}:{port}, but does not answer as a Zenoh router does"
+            return text, f"look what it is (sudo ss -ltnp), and {start}"
+    except ConnectionRefusedError:
+        text = f"{host} is there, but nothing listens on its port {port}"
+        return text, f"{start}, or correct the port"
+    except socket.gaierror:
+        text = f"no computer is called {host}"
+        return text, f"correct the name, or use the address, as in zenoh://192.168.1.5:{port}"
+    except TimeoutError:
+        text = f"{host} does not answer on port {port}"
+        fix = f"check the address (ping {host}), and let the firewall pass TCP port {port}"
+        return text, fix
+    except OSError as error:
+        text = f"{host} cannot be reached: {error.strerror or error}"
+        return text, "connect this machine to the robot's network (ip addr shows where it is)"

@@ -1,0 +1,176 @@
+"""What the ``rosglass`` command does: find the subcommand, run it, tell what went wrong."""
+
+from __future__ import annotations
+
+import io
+import logging
+import os
+import sys
+from contextlib import suppress
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+import rosglass
+from rosglass.cli.completion import is_completing, offer
+from rosglass.cli.subcommands import Parser, add_verbose
+
+if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Sequence
+
+__all__ = ["COMMANDS", "run"]
+
+#: Subcommand -> (module, one-line help). Modules have ``configure(parser)``, ``run(args) -> int``.
+COMMANDS = {
+    "run": ("rosglass.cli.run", "open an interface written in QML"),
+    "demo": ("rosglass.cli.demo", "open the demo cockpit on a simulated robot"),
+    "robot": ("rosglass.cli.robot", "run the simulated robot"),
+    "topic": ("rosglass.cli.topic", "look at topics, listen to them, publish on them"),
+    "service": ("rosglass.cli.service", "look at services, call them"),
+    "action": ("rosglass.cli.action", "look at actions, send goals"),
+    "param": ("rosglass.cli.param", "read and set the parameters of nodes"),
+    "node": ("rosglass.cli.node", "look at nodes"),
+    "interface": ("rosglass.cli.interface", "look at types of messages, services and actions"),
+    "record": ("rosglass.cli.record", "record topics into an MCAP file"),
+    "play": ("rosglass.cli.play", "play a recording: MCAP, ROS 2 bag or ROS 1 bag"),
+    "doctor": ("rosglass.cli.doctor", "find what keeps this machine and the robot apart"),
+    "router": ("rosglass.cli.router", "run a Zenoh router for ROS 2 (rmw_zenoh)"),
+    "completion": ("rosglass.cli.completion_command", "let Tab complete commands and names"),
+}
+
+
+#: What users of ``ros2`` type -> what it is here.
+_AS_IN_ROS2: dict[tuple[str, ...], list[str]] = {
+    ("bag", "record"): ["record"],
+    ("bag", "play"): ["play"],
+    ("bag", "info"): ["play", "--list"],
+}
+#: Stands for all commands at once.
+_ALL = "*"
+
+
+def build_parser(command: str | None = None) -> argparse.ArgumentParser:
+    """Return the parser; only `command`'s own options are filled in, to keep start-up quick.
+
+    ``*`` fills in everything.
+    """
+    parser = Parser(
+        prog="rosglass",
+        description="A glass cockpit for robots: operator screens for ROS, without ROS installed.",
+        epilog="Every command has its own --help. The guide: docs/index.md in the source.",
+    )
+    parser.add_argument("--version", action="version", version=f"rosglass {rosglass.__version__}")
+    add_verbose(parser)
+    parser.set_defaults(verbose=0)
+    subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for name, (module, summary) in COMMANDS.items():
+        sub = subparsers.add_parser(
+            name, help=summary, description=f"{summary[0].upper()}{summary[1:]}."
+        )
+        add_verbose(sub)
+        if command in (name, _ALL):
+            import_module(module).configure(sub)
+    return parser
+
+
+def _split(arguments: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
+    """Return what is for the command, for ROS (``--ros-args ... --``), and for others (``--``).
+
+    argparse must not see the latter two: it would look for options in them.
+    """
+    ours: list[str] = []
+    told: list[str] = []
+    place = 0
+    while place < len(arguments):
+        argument = arguments[place]
+        if argument == "--":
+            return ours, told, list(arguments[place + 1 :])
+        if argument == "--ros-args":
+            end = place + 1
+            while end < len(arguments) and arguments[end] != "--":
+                end += 1
+            told += arguments[place : end + 1]
+            place = end
+        else:
+            ours.append(argument)
+        place += 1
+    return ours, told, []
+
+
+def run(argv: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code of :func:`rosglass.cli.main`."""
+    if is_completing():
+        offer(build_parser(_ALL))
+    _prepare_output()
+    try:
+        code = _run(list(sys.argv[1:] if argv is None else argv))
+        sys.stdout.flush()
+    except rosglass.Error as error:
+        return _fail(str(error))
+    except ModuleNotFoundError as error:
+        extra = _EXTRA_OF.get((error.name or "").partition(".")[0])
+        if extra is None:
+            raise
+        return _fail(
+            f"this command needs the package {error.name}, which is not installed; "
+            f'install it with: pip install "rosglass[{extra}]"'
+        )
+    except BrokenPipeError:
+        _drop_output()
+        return 141  # as programs end that SIGPIPE ends
+    except OSError as error:
+        _drop_output()
+        where = f"{error.filename}: " if error.filename else ""
+        return _fail(f"{where}{error.strerror or error}")
+    return code
+
+
+def _run(arguments: list[str]) -> int:
+    arguments, told, rest = _split(arguments)
+    arguments = _AS_IN_ROS2.get(tuple(arguments[:2]), arguments[:2]) + arguments[2:]
+    command = next((a for a in arguments if not a.startswith("-")), None)
+    parser = build_parser(command)
+    args = parser.parse_args(arguments)
+    if rest and not hasattr(args, "arguments"):
+        parser.error(f"{args.command} takes no arguments after --")
+    if told and not hasattr(args, "ros_arguments"):
+        parser.error(f"{args.command} takes no --ros-args: it is no node of its own")
+    args.arguments, args.ros_arguments = rest, told
+    level = {0: logging.WARNING, 1: logging.INFO}.get(args.verbose, logging.DEBUG)
+    logging.basicConfig(level=level, format="%(levelname)s %(name)s: %(message)s")
+    return int(import_module(COMMANDS[args.command][0]).run(args))
+
+
+def _prepare_output() -> None:
+    """Make sure that printing what robots say cannot fail for its characters."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:  # closed by whoever started us
+            setattr(sys, name, io.StringIO())
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _drop_output() -> None:
+    """Let Python's end find nothing that cannot be written."""
+    with suppress(OSError, ValueError):
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, sys.stdout.fileno())
+        os.close(null)
+
+
+def _fail(reason: str) -> int:
+    print(f"rosglass: {reason}", file=sys.stderr)
+    return 1
+
+
+_EXTRA_OF = {
+    "PySide6": "qml",
+    "zenoh": "zenoh",
+    "xxhash": "zenoh",
+    "cyclonedds": "dds",
+    "cv2": "images",
+    "mcap": "bags",
+    "rosbags": "bags",
+    "argcomplete": "completion",
+}

@@ -1,0 +1,101 @@
+"""Telling the person who waits for messages why none come."""
+
+from __future__ import annotations
+
+import logging
+import time
+from typing import TYPE_CHECKING
+
+from rosglass.cli.output import note, require_reader
+from rosglass.comm import ConnectionState
+
+if TYPE_CHECKING:
+    import argparse
+
+    from rosglass.comm import Node, Subscription
+
+__all__ = ["Reasons"]
+
+#: Seconds of silence that nobody asks about.
+_PATIENCE = 2.0
+#: How many times the usual pause between messages counts as silence.
+_PAUSES = 5
+
+
+class Reasons:
+    """Tells the person who waits why nothing comes, or nothing more; each reason once.
+
+    Args:
+        node: Who subscribes.
+        subscription: What is waited for; closed at the end.
+        args: The command's options.
+    """
+
+    def __init__(self, node: Node, subscription: Subscription, args: argparse.Namespace) -> None:
+        self._node, self._subscription = node, subscription
+        self._command = f"rosglass topic {args.what} {args.topic}"
+        self._began = self._heard = time.monotonic()
+        self._received = 0
+        self._pause = 0.0
+        self._told = ""
+        self._log = logging.getLogger("rosglass.comm")
+        self._quiet = not args.verbose
+
+    def __enter__(self) -> Reasons:
+        self._log.addFilter(self._passes)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._subscription.close()
+        self._log.removeFilter(self._passes)
+
+    def hear(self, count: int) -> None:
+        """Take note of how many messages have come so far."""
+        if count == self._received:
+            return
+        now = time.monotonic()
+        self._pause = (now - self._began) / count
+        self._received, self._heard, self._told = count, now, ""
+
+    def look(self, *, last: bool = False) -> str:
+        """Say what is wrong, if that is news, and return it; empty when nothing is.
+
+        Args:
+            last: Whether this is the end: there is nothing more to wait for.
+
+        Raises:
+            BrokenPipeError: Nobody reads what is printed any more.
+        """
+        require_reader()
+        silent = time.monotonic() - self._heard
+        if silent < _PATIENCE and not last:
+            return ""
+        reason = self._reason(silent)
+        if reason and reason != self._told:
+            self._told = reason
+            note(f"{self._subscription.topic}: {reason}")
+        return reason
+
+    def _reason(self, silent: float) -> str:
+        found = self._subscription
+        status = self._node.status()
+        if status.state is not ConnectionState.CONNECTED and not self._node.url.startswith("dds:"):
+            return status.detail
+        publishers = self._node.publishers(found.topic)
+        types = sorted({end.type for end in publishers})
+        if len(types) > 1 and found.type is None:
+            return f"published with several types, say which: {self._command} {types[0]}"
+        if not publishers:
+            return "nobody publishes it any more" if self._received else "nobody publishes it"
+        if found.problem or found.hint:
+            return found.problem or found.hint
+        if not self._received:
+            return "published, but nothing has come yet"
+        if self._received > 1 and silent > max(_PATIENCE, _PAUSES * self._pause):
+            return "nothing comes any more, though it is still announced"
+        return ""
+
+    def _passes(self, record: logging.LogRecord) -> bool:
+        """Keep what is told here from being told twice."""
+        ours = record.getMessage().startswith(f"{self._subscription.topic}: ")
+        return not (ours and self._quiet and record.levelno == logging.WARNING)
