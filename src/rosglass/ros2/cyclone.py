@@ -70,6 +70,7 @@ _PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
     "dds_create_reader": (_entity, [_entity, _entity, pointer, pointer]),
     "dds_create_writer": (_entity, [_entity, _entity, pointer, pointer]),
     "dds_delete": (c_int32, [_entity]),
+    "dds_wait_for_acks": (c_int32, [_entity, c_int64]),
     "dds_get_guid": (c_int32, [_entity, pointer]),
     "dds_get_entity_sertype": (c_int32, [_entity, POINTER(pointer)]),
     "dds_get_matched_publications": (c_int32, [_entity, pointer, c_size_t]),
@@ -290,6 +291,12 @@ def matched_publications(reader: int) -> list[int]:
 def matched_subscriptions(writer: int) -> list[int]:
     """Return the handles of the readers that a writer is matched with."""
     return _matched("dds_get_matched_subscriptions", writer)
+
+
+def acknowledged(writer: int) -> bool:
+    """Return whether every reliable reader that a writer is matched with has all that was sent."""
+    result: int = library().dds_wait_for_acks(writer, 0)
+    return result != TIMEOUT
 
 
 def assert_liveliness(entity: int, place: str) -> None:

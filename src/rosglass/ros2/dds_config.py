@@ -29,6 +29,8 @@ _SIZES = (
 )
 #: Fast DDS 2.9 notices no reader, writer or participant of ours that goes without this.
 _KEYS = "<GenerateKeyhash>true</GenerateKeyhash>"
+#: Deleting a writer holds up nobody: writers linger in dds_lingering.py, all together.
+_LINGER = "<WriterLingerDuration>0s</WriterLingerDuration>"
 #: Programs per machine that others can find by asking its ports; beyond, the ports are those of
 #: the next domain (RTPS 2.5, section 9.6.2).
 _LAST_INDEX = 119
@@ -64,7 +66,7 @@ def domain_config(options: DdsOptions) -> str:
                 f"CYCLONEDDS_URI without <{said[0]}>, as the URL chooses that; leave out one",
             )
     ours = (
-        f"<CycloneDDS><Domain>{_general(options)}<Internal>{_SIZES[1]}{_KEYS}</Internal>"
+        f"<CycloneDDS><Domain>{_general(options)}<Internal>{_SIZES[1]}{_KEYS}{_LINGER}</Internal>"
         f"{_discovery(options, addresses(options.peers))}{_END}"
     )
     return ",".join(part for part in (ours, options.config) if part)

@@ -87,7 +87,7 @@ class SampleWriter:
         make_topic: Callable[[int, str, str], int] = cyclone.create_topic,
         patience: float | None = None,
     ) -> None:
-        self._place = place
+        self._participant, self._place = participant, place
         self._patience = math.inf if patience is None else patience
         self._slice = min(self._patience, _SLICE)
         self._lock = threading.Lock()
@@ -125,15 +125,26 @@ class SampleWriter:
         """Try again and again; in between, signals are handled, such as Ctrl-C."""
         deadline = time.monotonic() + self._patience - self._slice
         while time.monotonic() < deadline:
+            if self._closed:
+                raise NodeClosedError(f"{self._place}: the publisher is closed")
             if send(self.entity, serdata, self._place):
                 return
         raise TimeoutError(f"{self._place}: the readers took nothing for too long")
 
     def close(self) -> None:
-        """Delete it; a write that waits in another thread ends with an error."""
+        """End it; a write that waits in another thread ends with an error.
+
+        It is deleted once its readers have what was sent, or do not take it for too long.
+        """
         if self._closed:
             return
         self._closed = True
+        if cyclone.acknowledged(self.entity):
+            self._delete()
+        else:
+            self._participant.lingering.add(self.entity, self._delete)
+
+    def _delete(self) -> None:
         cyclone.delete(self.entity)
         # The topic keeps the type alive that a write in another thread may be using.
         with self._lock:

@@ -10,6 +10,7 @@ from rosglass.ros2 import cyclone
 from rosglass.ros2.cyclone_qos import Qos
 from rosglass.ros2.dds_discovery_info import PARTICIPANT_USER_DATA, NodeEntities
 from rosglass.ros2.dds_domain import Domain
+from rosglass.ros2.dds_lingering import Lingering
 from rosglass.ros2.dds_pump import Pump
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ class Participant:
         guid: Its 16 bytes of identity.
         born: Monotonic time when it joined the domain.
         pump: Where everything that arrives is handed on.
+        lingering: Where closed writers wait until what they sent has arrived.
         on_nodes: Called with all nodes whenever they or their endpoints change, never twice at a
             time; what announces them sets it.
         seen: What is seen of the others; what follows them sets it.
@@ -58,6 +60,7 @@ class Participant:
             self.born = time.monotonic()
             self.guid = cyclone.guid(self.entity)
             self.pump = Pump(self.entity, f"DDS domain {options.domain}")
+            self.lingering = Lingering(self.pump)
         except BaseException:
             self._domain.close()
             raise
@@ -101,6 +104,7 @@ class Participant:
             self._closed = True
             self.on_nodes = lambda _: None
         self.pump.close()
+        self.lingering.close()
         cyclone.delete(self.entity)
         self._domain.close()
 
