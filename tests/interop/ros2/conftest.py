@@ -16,7 +16,14 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 import rosglass
-from rosglass.interfaces import Definition, Library, rihs01, type_description
+from rosglass.interfaces import (
+    ActionDefinition,
+    Definition,
+    Library,
+    ServiceDefinition,
+    rihs01,
+    type_description,
+)
 from rosglass.ros2.router import Router
 
 if TYPE_CHECKING:
@@ -142,6 +149,54 @@ def interfaces(tmp_path_factory: pytest.TempPathFactory) -> Path:
         for kind in ("srv", "action"):
             (prefix / "share" / package / kind).mkdir()
         (prefix / "share" / package / "package.xml").write_text(
+            f'<package format="3"><name>{package}</name><version>1.0.0</version><description/>'
+            '<maintainer email="a@example.org">a</maintainer><license>MIT</license></package>'
+        )
+    return prefix
+
+
+# What dora needs to know, with the types that ROS makes of each.
+_SERVICE = ("", "_Request", "_Response", "_Event")
+_INSTALLED = {
+    "example_interfaces/srv/AddTwoInts": _SERVICE,
+    "action_msgs/srv/CancelGoal": _SERVICE,
+    "example_interfaces/action/Fibonacci": (
+        "",
+        "_Goal",
+        "_Result",
+        "_Feedback",
+        "_FeedbackMessage",
+        *(f"_SendGoal{part}" for part in _SERVICE),
+        *(f"_GetResult{part}" for part in _SERVICE),
+    ),
+    "action_msgs/msg/GoalInfo": ("",),
+    "action_msgs/msg/GoalStatus": ("",),
+    "action_msgs/msg/GoalStatusArray": ("",),
+    "builtin_interfaces/msg/Time": ("",),
+    "service_msgs/msg/ServiceEventInfo": ("",),
+    "unique_identifier_msgs/msg/UUID": ("",),
+}
+
+
+@pytest.fixture(scope="session")
+def service_interfaces(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A prefix such as ROS installs, with the services and actions that peers need."""
+    prefix, library = tmp_path_factory.mktemp("service_interfaces"), Library()
+    for name, suffixes in _INSTALLED.items():
+        package, kind, base = name.split("/")
+        home = prefix / "share" / package
+        for folder in ("msg", "srv", "action"):
+            (home / folder).mkdir(parents=True, exist_ok=True)
+        definition = library.definition(name)
+        assert isinstance(definition, (Definition, ServiceDefinition, ActionDefinition))
+        (home / kind / f"{base}.{kind}").write_text(definition.text.partition("\n====")[0])
+        hashes = [
+            {"type_name": name + suffix, "hash_string": rihs01(library.definition(name + suffix))}
+            for suffix in suffixes
+        ]
+        described = {"type_description_msg": type_description(definition), "type_hashes": hashes}
+        (home / kind / f"{base}.json").write_text(json.dumps(described))
+        (home / "package.xml").write_text(
             f'<package format="3"><name>{package}</name><version>1.0.0</version><description/>'
             '<maintainer email="a@example.org">a</maintainer><license>MIT</license></package>'
         )

@@ -15,7 +15,6 @@ import pytest
 import rosglass
 from rosglass.comm import GoalStatus
 from rosglass.errors import ConnectionLostError, TimeoutError  # noqa: A004
-from rosglass.interfaces import Library, rihs01, type_description
 
 PEERS = Path(__file__).parent / "peers"
 ADD, FIBONACCI = "example_interfaces/srv/AddTwoInts", "example_interfaces/action/Fibonacci"
@@ -24,55 +23,9 @@ KINDS = ["dora-humble", "dora-rep2016", "sdk"]
 DORAS = KINDS[:2]
 pytestmark = pytest.mark.peers
 
-# What dora needs to know, with the types that ROS makes of each.
-_SERVICE = ("", "_Request", "_Response", "_Event")
-_INSTALLED = {
-    ADD: _SERVICE,
-    "action_msgs/srv/CancelGoal": _SERVICE,
-    FIBONACCI: (
-        "",
-        "_Goal",
-        "_Result",
-        "_Feedback",
-        "_FeedbackMessage",
-        *(f"_SendGoal{part}" for part in _SERVICE),
-        *(f"_GetResult{part}" for part in _SERVICE),
-    ),
-    "action_msgs/msg/GoalInfo": ("",),
-    "action_msgs/msg/GoalStatus": ("",),
-    "action_msgs/msg/GoalStatusArray": ("",),
-    "builtin_interfaces/msg/Time": ("",),
-    "service_msgs/msg/ServiceEventInfo": ("",),
-    "unique_identifier_msgs/msg/UUID": ("",),
-}
-
 
 @pytest.fixture(scope="module")
-def installed(tmp_path_factory):
-    """A prefix such as ROS installs, with the services and actions of these tests."""
-    prefix, library = tmp_path_factory.mktemp("zenoh_services"), Library()
-    for name, suffixes in _INSTALLED.items():
-        package, kind, base = name.split("/")
-        home = prefix / "share" / package
-        for folder in ("msg", "srv", "action"):
-            (home / folder).mkdir(parents=True, exist_ok=True)
-        definition = library.definition(name)
-        (home / kind / f"{base}.{kind}").write_text(definition.text.partition("\n====")[0])
-        hashes = [
-            {"type_name": name + suffix, "hash_string": rihs01(library.definition(name + suffix))}
-            for suffix in suffixes
-        ]
-        described = {"type_description_msg": type_description(definition), "type_hashes": hashes}
-        (home / kind / f"{base}.json").write_text(json.dumps(described))
-        (home / "package.xml").write_text(
-            f'<package format="3"><name>{package}</name><version>1.0.0</version><description/>'
-            '<maintainer email="a@example.org">a</maintainer><license>MIT</license></package>'
-        )
-    return prefix
-
-
-@pytest.fixture(scope="module")
-def run_peer(start, router, installed):
+def run_peer(start, router, service_interfaces):
     """Start a peer, which does what it is told in a domain of its own."""
 
     def run_peer(kind, **plan):
@@ -81,9 +34,14 @@ def run_peer(start, router, installed):
         if importlib.util.find_spec(module) is None:
             pytest.skip(f'{module} is not installed: pip install "rosglass[peers]"')
         port = int(router.listen.rpartition(":")[2])
-        plan |= {"port": port, "domain": 11, "interfaces": str(installed), "profile": profile}
+        plan |= {
+            "port": port,
+            "domain": 11,
+            "interfaces": str(service_interfaces),
+            "profile": profile,
+        }
         # dora takes the domain of its data keys and its type descriptions from here only.
-        env = os.environ | {"ROS_DOMAIN_ID": "11", "AMENT_PREFIX_PATH": str(installed)}
+        env = os.environ | {"ROS_DOMAIN_ID": "11", "AMENT_PREFIX_PATH": plan["interfaces"]}
         process = start(str(PEERS / f"{script}_services_peer.py"), json.dumps(plan), env=env)
         process.event("ready")
         return process

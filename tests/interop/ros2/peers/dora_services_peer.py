@@ -11,6 +11,7 @@ import os
 import sys
 import tempfile
 import threading
+import time
 from pathlib import Path
 
 import dora
@@ -108,6 +109,9 @@ def ask(client, request):
 def send_goals():
     tell(ready=True)
     client = node.create_action_client("/count", FIBONACCI, qos)
+    if plan["profile"] == "dds":
+        # RustDDS tells others of ten of its readers and writers a second.
+        time.sleep(4)
     for order, cancels in plan["goals"]:
         goal = client.send_goal(pa.array([{"order": order}], _order()), timeout_s=10.0)
         if goal is None:
