@@ -7,7 +7,6 @@ import json
 import logging
 import os
 import threading
-import time
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
@@ -25,7 +24,10 @@ DEFINITIONS = {
 }
 KINDS = ["cyclone", "fastdds", "dora", "rosglass"]
 #: A killed participant is gone after its lease, which is 10 s without this.
-SHORT_LEASE = "<Discovery><LeaseDuration>1s</LeaseDuration></Discovery>"
+SHORT_LEASE = (
+    "<CycloneDDS><Domain><Discovery><LeaseDuration>1s</LeaseDuration></Discovery></Domain>"
+    "</CycloneDDS>"
+)
 BIG = 1_000_000
 
 pytestmark = pytest.mark.peers
@@ -76,16 +78,19 @@ def peer(request, start_services):
     process.end()
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def types(prefix):
     library = Library()
     library.add_path(prefix)
     return {name: rosglass.load(name, library=library) for name in (ADD, BLOB)}
 
 
-@pytest.fixture
-def node(dds_connect):
-    return dds_connect("cockpit")
+@pytest.fixture(scope="module")
+def node(dds_domain):
+    """Our node: one for all tests, as another program takes a second or two to know a new one."""
+    made = rosglass.connect(f"dds://?domain={dds_domain}", "cockpit")
+    yield made
+    made.close()
 
 
 def ready(client: Any) -> Any:
@@ -128,17 +133,16 @@ def test_we_call_a_peer_with_a_megabyte_each_way(peer, node, types):
 
 
 def test_a_peer_calls_us(peer, node, types):
-    server = node.create_service_server("/add", types[ADD], lambda r: {"sum": r.a - r.b})
-    assert call_us(peer, "/add", sums=[[n, 5] for n in range(100)]) == [n - 5 for n in range(100)]
-    assert server.problem == ""
-    server.close()
+    with node.create_service_server("/add", types[ADD], lambda r: {"sum": r.a - r.b}) as server:
+        sums = call_us(peer, "/add", sums=[[n, 5] for n in range(100)])
+        assert sums == [n - 5 for n in range(100)]
+        assert server.problem == ""
 
 
 def test_a_peer_calls_us_with_a_megabyte_each_way(peer, node, types):
-    server = node.create_service_server("/blob", types[BLOB], lambda r: {"data": r.data[::-1]})
-    for size in (1000, BIG):
-        assert call_us(peer, "/blob", size=size) == [True]
-    server.close()
+    with node.create_service_server("/blob", types[BLOB], lambda r: {"data": r.data[::-1]}):
+        for size in (1000, BIG):
+            assert call_us(peer, "/blob", size=size) == [True]
 
 
 def test_a_peer_that_calls_us_is_killed(start_services, peer, node, types, wait_for):
@@ -152,15 +156,15 @@ def test_a_peer_that_calls_us_is_killed(start_services, peer, node, types, wait_
         requests.append(promised)
         return promised
 
-    node.create_service_server("/slow", types[ADD], serve)
-    doomed = start_services(peer.kind, "doomed", ())
-    doomed.ask(call="/slow", sums=[[-1, 0]])
-    wait_for(lambda: requests)
-    doomed.end()
-    requests[0].set_result({"sum": 0})
-    own = ready(node.create_service_client("/slow", types[ADD]))
-    assert own.call({"a": 7}).sum == 7
-    assert call_us(peer, "/slow", sums=[[8, 0]]) == [8]
+    with node.create_service_server("/slow", types[ADD], serve):
+        doomed = start_services(peer.kind, "doomed", ())
+        doomed.ask(call="/slow", sums=[[-1, 0]])
+        wait_for(lambda: requests)
+        doomed.end()
+        requests[0].set_result({"sum": 0})
+        own = ready(node.create_service_client("/slow", types[ADD]))
+        assert own.call({"a": 7}).sum == 7
+        assert call_us(peer, "/slow", sums=[[8, 0]]) == [8]
 
 
 # -- several at once -----------------------------------------------------------------------------
@@ -213,15 +217,16 @@ def test_a_server_killed_in_a_call_is_told_and_its_successor_called(
     start_services, node, types, kind
 ):
     # How long it takes to be noticed is up to the server's participant: its lease.
-    server = start_services(kind, "mortal", ["add"], config=SHORT_LEASE)
-    client = ready(node.create_service_client("/mortal/add", types[ADD]))
+    name = f"mortal_{kind}"
+    server = start_services(kind, name, ["add"], config=SHORT_LEASE)
+    client = ready(node.create_service_client(f"/{name}/add", types[ADD]))
     call = client.call_async({"a": -1}, timeout=None)
     assert server.event("got") == [-1, 0]
     server.end()
     with pytest.raises(rosglass.ConnectionLostError, match="may have carried it out or not"):
         call.result(15)
     waiting = client.call_async({"a": 5, "b": 6}, timeout=15)
-    server = start_services(kind, "mortal", ["add"])
+    server = start_services(kind, name, ["add"])
     assert waiting.result(15).sum == 11
     server.end()
 
@@ -249,7 +254,7 @@ def test_rubbish_is_named_once_and_disturbs_nobody(
     rubbish.end()
 
 
-def test_a_reply_from_the_main_thread_goes_out(node, dds_connect, types, peer):
+def test_a_reply_from_the_main_thread_goes_out(node, types, peer, wait_for):
     """Where a signal's exception must not end up in Cyclone DDS."""
     waiting: list[Any] = []
 
@@ -258,12 +263,10 @@ def test_a_reply_from_the_main_thread_goes_out(node, dds_connect, types, peer):
         waiting.append((promised, request.a))
         return promised
 
-    node.create_service_server("/patient", types[ADD], serve)
-    peer.ask(call="/patient", sums=[[41, 0]])
-    deadline = time.monotonic() + 10
-    while not waiting and time.monotonic() < deadline:
-        time.sleep(0.01)
-    promised, a = waiting[0]
-    assert threading.current_thread() is threading.main_thread()
-    promised.set_result({"sum": a + 1})
-    assert peer.event("answers") == [42]
+    with node.create_service_server("/patient", types[ADD], serve):
+        peer.ask(call="/patient", sums=[[41, 0]])
+        wait_for(lambda: waiting)
+        promised, a = waiting[0]
+        assert threading.current_thread() is threading.main_thread()
+        promised.set_result({"sum": a + 1})
+        assert peer.event("answers") == [42]

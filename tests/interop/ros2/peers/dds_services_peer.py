@@ -20,6 +20,9 @@ from summary import tell
 # (services that it calls), "interfaces" (a prefix with the types), "fastdds" (that program).
 plan = json.loads(sys.argv[1])
 NEVER = -1
+#: Seconds until a server is sure to know a client that has just found it; what it gets before that
+#: is lost in any DDS.
+SETTLING = 0.2
 ADD, BLOB = "example_interfaces::srv::dds_::AddTwoInts", "blob_interfaces::srv::dds_::Blob"
 
 
@@ -86,6 +89,7 @@ class Dora:
         self.qos = dora.Ros2QosPolicies(reliable=True, keep_last=10)
         self.types = {"add": "example_interfaces/AddTwoInts", "blob": "blob_interfaces/Blob"}
         self.clients: dict[str, Any] = {}
+        self.born = time.monotonic()
 
     def serve(self, kind: str) -> None:
         name = f"/{plan['name']}/{kind}"
@@ -107,6 +111,8 @@ class Dora:
 
     def open(self, service: str, kind: str) -> None:
         self.clients[service] = self.node.create_service_client(service, self.types[kind], self.qos)
+        # RustDDS tells those it meets of ten of its readers and writers a second.
+        time.sleep(max(SETTLING, self.born + 2.5 - time.monotonic()))
 
     def call(self, service: str, kind: str, requests: list[Any]) -> list[Any]:
         answers = []
@@ -239,6 +245,7 @@ class FastDds:
             text=True,
         )
         self.lock = threading.Condition()
+        self.born = time.monotonic()
         self.matched: dict[str, bool] = {}
         self.answers: dict[tuple[str, int], str] = {}
         threading.Thread(target=self.read, daemon=True).start()
@@ -282,6 +289,8 @@ class FastDds:
         self.say("client", service, service[1:], {"add": ADD, "blob": BLOB}[kind])
         with self.lock:
             assert self.lock.wait_for(lambda: self.matched.get(service), 10)
+        # Fast DDS tells some of those it meets only with its next heartbeat, each second.
+        time.sleep(max(SETTLING, self.born + 1.3 - time.monotonic()))
 
     def call(self, service: str, kind: str, requests: list[Any]) -> list[Any]:
         wanted = [(service, number) for number in range(len(requests))]
