@@ -16,14 +16,13 @@ from enum import Enum
 from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.comm.listeners import Listeners
-from rosglass.comm.node import Handle
+from rosglass.comm.loop import check_plain
+from rosglass.comm.node import Executor, Handle
 from rosglass.comm.time import Duration, Time
 from rosglass.errors import ConversionError, NodeClosedError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-    from rosglass.comm.node import Executor
 
 __all__ = ["Clock", "ClockChange", "Jump", "Timer"]
 
@@ -147,8 +146,11 @@ class Clock:
         length = period if isinstance(period, Duration) else _seconds("period", period)
         if length <= Duration():
             raise ConversionError("period", period, "a time above zero")
-        if not callable(callback):
-            raise ConversionError("callback", callback, "something that can be called")
+        check_plain(callback, "create_timer()")
+        if executor is not None and not isinstance(executor, Executor):
+            raise ConversionError(
+                "executor", executor, "a rosglass.comm.Executor", "create_timer()"
+            )
         timer = Timer(self, length, callback, executor or self._executor)
         with self._changed:
             if self._closed:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING, Generic, TypeVar
 
+from rosglass.comm.loop import check_plain
 from rosglass.comm.node import Executor, Handle
 from rosglass.errors import ConversionError
 
@@ -83,8 +84,7 @@ class Listener(Handle, Generic[_T]):
         executor: Executor,
         depth: int | None,
     ) -> None:
-        if not callable(callback):
-            raise ConversionError("callback", callback, "something that can be called")
+        check_plain(callback)
         if not isinstance(executor, Executor):
             raise ConversionError("executor", executor, "a rosglass.comm.Executor")
         self._owner, self._callback, self._executor = owner, callback, executor

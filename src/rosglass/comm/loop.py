@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine
     from concurrent.futures import Future
 
-__all__ = ["LoopExecutor", "executor_for"]
+__all__ = ["LoopExecutor", "check_plain", "executor_for", "is_coroutine_function"]
 
 _log = logging.getLogger("rosglass.comm")
 
@@ -66,6 +66,22 @@ class LoopExecutor(Executor):
         return asyncio.run_coroutine_threadsafe(coroutine, self._loop)
 
 
+def is_coroutine_function(callback: object) -> bool:
+    """Return whether calling `callback` does nothing but make a coroutine."""
+    call = getattr(callback, "__call__", None)  # noqa: B004 - objects may be callable, too
+    return inspect.iscoroutinefunction(callback) or inspect.iscoroutinefunction(call)
+
+
+def check_plain(callback: object, where: str = "", name: str = "callback") -> None:
+    """Raise ConversionError unless `callback` can be called and is no coroutine function."""
+    if not callable(callback):
+        raise ConversionError(name, callback, "something that can be called", where)
+    if is_coroutine_function(callback):
+        # It would be called, and nothing in it would ever run.
+        told = "a plain function (loop.call_soon_threadsafe() brings work into asyncio)"
+        raise ConversionError(name, callback, told, where)
+
+
 def executor_for(
     callback: Any, executor: Executor | None, default: Executor, where: str
 ) -> Executor:
@@ -74,8 +90,7 @@ def executor_for(
         raise ConversionError("callback", callback, "something that can be called", where)
     if executor is not None and not isinstance(executor, Executor):
         raise ConversionError("executor", executor, "a rosglass.comm.Executor", where)
-    call = getattr(callback, "__call__", None)  # noqa: B004 - objects may be callable, too
-    if not (inspect.iscoroutinefunction(callback) or inspect.iscoroutinefunction(call)):
+    if not is_coroutine_function(callback):
         return executor or default
     if executor is not None:
         told = "no executor beside a coroutine function, which runs in its event loop"

@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING
 from rosglass.comm.events import SubscriptionEvents
 from rosglass.comm.executor import IMMEDIATE
 from rosglass.comm.inbox import ImmediateInbox, Inbox
+from rosglass.comm.loop import check_plain
 from rosglass.comm.node import Executor, Handle
 from rosglass.comm.promise import check_timeout
+from rosglass.comm.sample import Sample
 from rosglass.comm.source import Source
 from rosglass.errors import ConversionError
 
@@ -29,7 +31,6 @@ if TYPE_CHECKING:
         SamplesLost,
     )
     from rosglass.comm.qos import QoS
-    from rosglass.comm.sample import Sample
     from rosglass.comm.statistics import Statistics
     from rosglass.comm.time import Duration
     from rosglass.messages import Message, MessageType
@@ -71,8 +72,11 @@ class Subscription(Handle):
         on_close: Callable[[], None] | None = None,
     ) -> None:
         for name, given in (("callback", callback), ("raw_callback", raw_callback)):
-            if given is not None and not callable(given):
-                raise ConversionError(name, given, "something that can be called", topic)
+            if given is not None:
+                check_plain(given, topic, name)
+        if callback is not None and raw_callback is not None:
+            told = "None beside a callback: one of the two is called, not both"
+            raise ConversionError("raw_callback", raw_callback, told, topic)
         if not isinstance(executor, Executor):
             raise ConversionError("executor", executor, "a rosglass.comm.Executor", topic)
         self.topic = topic
@@ -273,7 +277,12 @@ class Subscription(Handle):
         """Return how much longer a sample took than the fastest of its publisher.
 
         Zero when nothing is known about that. See :attr:`Statistics.lateness`.
+
+        Raises:
+            ConversionError: It is no sample.
         """
+        if not isinstance(sample, Sample):
+            raise ConversionError("sample", sample, "a rosglass.comm.Sample", self.topic)
         return self._inbox.lateness(sample)
 
     # -- events ----------------------------------------------------------------------------------

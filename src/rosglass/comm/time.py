@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time as _time
 from dataclasses import dataclass
+from typing import overload
 
 from rosglass.errors import ConversionError
 
@@ -32,8 +33,12 @@ class Duration:
 
     @classmethod
     def from_seconds(cls, seconds: float) -> Duration:
-        """Return the duration nearest to `seconds`."""
-        return cls(round(seconds * _NS))
+        """Return the duration nearest to `seconds`; raises ConversionError unless it is finite."""
+        try:
+            return cls(round(seconds * _NS))
+        except (TypeError, ValueError, OverflowError):
+            told = "a finite number of seconds"
+            raise ConversionError("seconds", seconds, told, "Duration.from_seconds()") from None
 
     @property
     def seconds(self) -> float:
@@ -41,9 +46,13 @@ class Duration:
         return self.nanoseconds / _NS
 
     def __add__(self, other: Duration) -> Duration:
+        if not isinstance(other, Duration):
+            return NotImplemented
         return Duration(self.nanoseconds + other.nanoseconds)
 
     def __sub__(self, other: Duration) -> Duration:
+        if not isinstance(other, Duration):
+            return NotImplemented
         return Duration(self.nanoseconds - other.nanoseconds)
 
     def __neg__(self) -> Duration:
@@ -94,7 +103,19 @@ class Time:
         return {"sec": self.sec, "nanosec": self.nanosec}
 
     def __add__(self, other: Duration) -> Time:
+        if not isinstance(other, Duration):
+            return NotImplemented
         return Time(self.nanoseconds + other.nanoseconds)
 
-    def __sub__(self, other: Time) -> Duration:
-        return Duration(self.nanoseconds - other.nanoseconds)
+    @overload
+    def __sub__(self, other: Time) -> Duration: ...
+
+    @overload
+    def __sub__(self, other: Duration) -> Time: ...
+
+    def __sub__(self, other: Time | Duration) -> Duration | Time:
+        if isinstance(other, Time):
+            return Duration(self.nanoseconds - other.nanoseconds)
+        if isinstance(other, Duration):
+            return Time(self.nanoseconds - other.nanoseconds)
+        return NotImplemented

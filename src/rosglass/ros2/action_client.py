@@ -72,8 +72,8 @@ class Ros2ActionClient(ActionClient, Member):
 
     @property
     def closed(self) -> bool:
-        """Whether :meth:`close` was called."""
-        return self._closed
+        """Whether :meth:`close` was called, of the client or of its node."""
+        return self._closed or self.core.closed
 
     @property
     def ready(self) -> bool:
@@ -223,6 +223,11 @@ class Ros2ActionClient(ActionClient, Member):
         assert self.type is not None  # there are goals
         return self.type.result.create()
 
+    def ended(self) -> NodeClosedError:
+        """Return the error of goals whose client was closed."""
+        told = f"the client of {self.name} was closed before the goal ended, which goes on"
+        return NodeClosedError(told)
+
     def replaced(self) -> ConnectionLostError:
         """Return the error of goals whose server made way for one with another definition."""
         return ConnectionLostError(
@@ -338,8 +343,7 @@ class Ros2ActionClient(ActionClient, Member):
         if self.core.forked:
             return
         for goal in goals:
-            told = f"the client of {self.name} was closed before the goal ended, which goes on"
-            goal.lose(NodeClosedError(told))
+            goal.lose(self.ended())
         if ends is not None:
             ends.close()
         self._readiness.close()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -16,7 +17,7 @@ from rosglass.errors import InvalidNameError, ParameterError, RosArgumentError
 from rosglass.ros2.names import expand, validate_namespace, validate_node_name
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from rosglass.comm import ParameterValue
 
@@ -181,7 +182,8 @@ class _Parser:
     """Goes through a command line once."""
 
     def __init__(self, arguments: Sequence[str]) -> None:
-        if isinstance(arguments, (str, bytes)) or not all(isinstance(a, str) for a in arguments):
+        listed = isinstance(arguments, Sequence) and not isinstance(arguments, (str, bytes))
+        if not (listed and all(isinstance(argument, str) for argument in arguments)):
             raise RosArgumentError(
                 "arguments must be a list of texts such as sys.argv, or "
                 f"['--ros-args', '-r', 'chatter:=talk']; got {arguments!r}"

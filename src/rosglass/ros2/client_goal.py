@@ -19,6 +19,7 @@ from rosglass.comm import (
     Time,
 )
 from rosglass.comm.inorder import InOrder
+from rosglass.comm.promise import check_timeout
 from rosglass.errors import (
     ConnectionLostError,
     ConversionError,
@@ -158,6 +159,7 @@ class Ros2ClientGoal(ClientGoal):
 
     def cancel(self, timeout: float | None = 10.0) -> Promise[CancelAnswer]:
         """Ask the server to cancel it; see :meth:`rosglass.comm.ClientGoal.cancel`."""
+        timeout = check_timeout(timeout, self._label)
         answer = Promise[CancelAnswer](
             f"the server has not answered the request to cancel {self._label}",
             self._client.core.dispatcher,
@@ -392,7 +394,7 @@ class Ros2ClientGoal(ClientGoal):
         try:
             call = self._client.ask_result(self)
         except Error as error:
-            self._end(GoalStatus.LOST, error)
+            self._end(GoalStatus.LOST, self._closing(error))
             return
         self._asking, self._asked = call, time.monotonic()
         call.add_done_callback(lambda _: self._came(call))
@@ -421,10 +423,16 @@ class Ros2ClientGoal(ClientGoal):
             else:
                 self._end(status, ActionResult(status, response.result))
         elif isinstance(error, NodeClosedError) or isinstance(error.__cause__, DecodeError):
-            self._end(GoalStatus.LOST, error)
+            self._end(GoalStatus.LOST, self._closing(error))
         else:
             _log.debug("%s: asking for its result failed, trying again: %s", self._label, error)
             self._ask_soon(_AGAIN)
+
+    def _closing(self, error: BaseException) -> BaseException:
+        """Return the error of a goal: asking may fail before the goal hears that all is closed."""
+        if isinstance(error, NodeClosedError) and self._client.closed:
+            return self._client.ended()
+        return error
 
     def _end(self, status: GoalStatus, end: ActionResult | BaseException) -> None:
         if self._done.done():

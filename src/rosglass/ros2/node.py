@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointKind, Node, NodeName, QoS, Subscription
+from rosglass.comm.loop import check_plain
 from rosglass.ros2.arguments import NO_ARGUMENTS
 from rosglass.ros2.core import Core
 from rosglass.ros2.furniture import Furniture
@@ -260,6 +261,7 @@ class Ros2Node(Node):
     ) -> Handle:
         """Call `callback` after nodes or endpoints appeared or went; changes may be merged."""
         self._core.check_open()
+        check_plain(callback, "on_graph_change()")
         return self._core.graph_listeners.add(
             lambda _: callback(), executor or self._core.dispatcher
         )

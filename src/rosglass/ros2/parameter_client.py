@@ -25,6 +25,7 @@ from rosglass.ros2.parameter_services import (
 )
 from rosglass.ros2.parameter_values import (
     check_name,
+    check_values,
     descriptor_from_message,
     event_from_message,
     parameter_to_message,
@@ -232,6 +233,7 @@ class Ros2ParameterClient(ParameterClient):
     def _parameters(
         self, values: Mapping[str, ParameterValue], deadline: _Deadline
     ) -> list[dict[str, Any]]:
+        check_values(values, self.node)
         empty = [check_name(name) for name, value in values.items() if _is_empty(value)]
         known = self._types(empty, deadline) if empty else {}
         not_set = ParameterType.NOT_SET

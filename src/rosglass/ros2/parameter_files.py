@@ -89,6 +89,8 @@ def matches(pattern: str, node: str) -> bool:
 
 def read(path: str | os.PathLike[str]) -> ParameterFile:
     """Read a parameter file; raises ParameterError with file, line and column."""
+    if not isinstance(path, (str, os.PathLike)):
+        raise ParameterError(f"a parameter file is given by its path, got {path!r}")
     label = os.fspath(path)
     try:
         size = Path(label).stat().st_size

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm import ParameterDescriptor, ParameterEvent, ParameterType, Range
 from rosglass.errors import ParameterError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable
 
     from rosglass.comm import ParameterValue, Time
     from rosglass.messages import Message
@@ -23,6 +24,7 @@ __all__ = [
     "TYPE_NAMES",
     "TypedValue",
     "check_name",
+    "check_values",
     "descriptor_from_message",
     "descriptor_to_message",
     "event_from_message",
@@ -105,6 +107,15 @@ def check_name(name: object) -> str:
         raise ParameterError(f"a parameter's name must be a text that is not empty, got {name!r}")
     _check_text(f"the parameter name {name!r}", name)
     return name
+
+
+def check_values(values: object, node: str) -> None:
+    """Raise ParameterError unless `values` gives values by name."""
+    if not isinstance(values, Mapping):
+        raise ParameterError(
+            f"{node}: parameters are set by a dict of names and values, e.g. "
+            f"set({{'speed': 1.5}}); got {values!r}"
+        )
 
 
 def typed(name: str, value: object, known: ParameterType = ParameterType.NOT_SET) -> TypedValue:

@@ -23,7 +23,14 @@ from rosglass.comm import (
 )
 from rosglass.comm import ParameterEvent as Event
 from rosglass.errors import ParameterError
-from rosglass.ros2.parameter_values import TYPE_NAMES, TypedValue, check_name, in_range, typed
+from rosglass.ros2.parameter_values import (
+    TYPE_NAMES,
+    TypedValue,
+    check_name,
+    check_values,
+    in_range,
+    typed,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -156,6 +163,7 @@ class Ros2Parameters(Parameters):
 
     def set(self, values: Mapping[str, ParameterValue]) -> None:
         """Set parameters, all or none; see :meth:`rosglass.comm.Parameters.set`."""
+        check_values(values, self.node)
         with self._lock:
             known = {name: self._entry(name).descriptor.type for name in values}
         reason = self.try_set({name: typed(name, values[name], known[name]) for name in values})

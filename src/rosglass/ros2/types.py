@@ -162,9 +162,10 @@ class Types:
 
     def _check(self, found: object, kind: type[_T], word: str, example: str) -> _T:
         if not isinstance(found, kind):
+            article = "an" if word == "action" else "a"
             raise TypeNotFoundError(
-                f"{found!r} is not a {word} type; give a name such as {example} "
-                f"or what rosglass.load() returns for a {word}"
+                f"{found!r} is not {article} {word} type; give a name such as {example} "
+                f"or what rosglass.load() returns for {article} {word}"
             )
         if found.ros != 2:
             raise UnsupportedError(

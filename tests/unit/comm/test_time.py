@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import math
+import operator
 import time
 
 import pytest
@@ -43,3 +45,21 @@ def test_now_is_the_system_clock():
 def test_only_whole_nanoseconds(kind, value):
     with pytest.raises(ConversionError, match=f"{kind.__name__}: nanoseconds: expected an integer"):
         kind(value)
+
+
+@pytest.mark.parametrize("seconds", ["1", None, math.nan, math.inf])
+def test_durations_need_finite_seconds(seconds):
+    with pytest.raises(ConversionError, match="seconds: expected a finite number"):
+        Duration.from_seconds(seconds)
+
+
+@pytest.mark.parametrize("other", [5, 1.5, "x"])
+@pytest.mark.parametrize("value", [Time(1), Duration(1)])
+def test_plain_numbers_have_no_unit(value, other):
+    for operate in (operator.add, operator.sub):
+        with pytest.raises(TypeError):
+            operate(value, other)
+
+
+def test_going_back_in_time():
+    assert Time(5) - Duration(2) == Time(3)

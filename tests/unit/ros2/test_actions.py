@@ -1086,6 +1086,22 @@ def test_closing_the_client_leaves_goals_to_the_server(node, client, server, clo
         running.cancel().result(0) if running.status.is_active else client.send_goal()
 
 
+def test_a_goal_whose_client_closes_while_it_asks_for_the_result_says_so(node, client, server):
+    goal = client.send_goal({"order": 99})
+    assert goal.acceptance.result(5)
+    # What a closing client's services answer may come before the goal hears of the end.
+    client._closed = True
+    client._ends.get_result.close()
+    with pytest.raises(rosglass.NodeClosedError, match="client of /fib was closed before the goal"):
+        goal.result(5)
+
+
+def test_cancelling_takes_seconds(client):
+    goal = client.send_goal({"order": 99})
+    with pytest.raises(rosglass.ConversionError, match="timeout: expected seconds"):
+        goal.cancel("soon")
+
+
 def test_closing_a_goal_ends_the_watching(client, server):
     told = []
     with client.send_goal({"order": 99}, on_status_change=told.append) as goal:

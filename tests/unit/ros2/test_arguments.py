@@ -259,7 +259,7 @@ def test_bad_lines_are_named(line: list[str], message: str) -> None:
         parse(*line)
 
 
-@pytest.mark.parametrize("arguments", ["--ros-args", [1], b"x"])
+@pytest.mark.parametrize("arguments", ["--ros-args", [1], b"x", 7, iter(["--ros-args"])])
 def test_a_text_is_no_list_of_arguments(arguments: Any) -> None:
     with pytest.raises(RosArgumentError, match="must be a list of texts"):
         Arguments.parse(arguments)

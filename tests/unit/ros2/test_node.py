@@ -64,6 +64,43 @@ def test_a_bad_depth_is_refused(node, create):
         getattr(node, create)("/t", STRING, qos=0)
 
 
+async def _coroutine(*_):
+    """Would never run."""
+
+
+@pytest.mark.parametrize("callback", [7, _coroutine])
+@pytest.mark.parametrize(
+    "register",
+    [
+        lambda node, callback: node.create_subscription("/t", STRING, callback),
+        lambda node, callback: node.create_subscription("/t", STRING, raw_callback=callback),
+        lambda node, callback: node.create_subscription("/t", STRING).on_matched(callback),
+        lambda node, callback: node.create_timer(1.0, callback),
+        lambda node, callback: node.on_graph_change(callback),
+        lambda node, callback: node.on_status_change(callback),
+    ],
+    ids=["subscription", "raw", "event", "timer", "graph", "status"],
+)
+def test_callbacks_that_would_never_run_are_refused(node, register, callback):
+    with pytest.raises(rosglass.ConversionError, match="callback: expected"):
+        register(node, callback)
+
+
+def test_only_one_of_two_callbacks_can_be_called(node):
+    with pytest.raises(rosglass.ConversionError, match="/t: raw_callback: expected None"):
+        node.create_subscription("/t", STRING, print, raw_callback=print)
+
+
+def test_a_timer_needs_an_executor(node):
+    with pytest.raises(rosglass.ConversionError, match="executor"):
+        node.create_timer(1.0, print, executor=7)
+
+
+def test_lateness_is_that_of_a_sample(node):
+    with pytest.raises(rosglass.ConversionError, match="/t: sample: expected"):
+        node.create_subscription("/t", STRING).lateness(7)
+
+
 # -- publishing ----------------------------------------------------------------------------------
 
 

@@ -278,6 +278,13 @@ def test_names_are_found_by_prefix_and_depth(
     assert parameters.find(prefixes, depth) == names
 
 
+def test_values_are_set_by_name(parameters: Ros2Parameters) -> None:
+    with pytest.raises(ParameterError, match="set by a dict of names and values"):
+        parameters.set(["speed"])  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match="given by its path, got 5"):
+        parameters.load(5)  # type: ignore[arg-type]
+
+
 def test_try_set_gives_a_reason_instead_of_raising(parameters: Ros2Parameters) -> None:
     assert "not declared" in parameters.try_set({"x": TypedValue(T.BOOL, True)})
     assert parameters.try_set({"use_sim_time": TypedValue(T.BOOL, True)}) == ""
