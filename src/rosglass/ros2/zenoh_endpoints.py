@@ -346,6 +346,8 @@ class Pump:
 
     def __init__(self, source: Any, callback: Callable[[Any], None], name: str) -> None:
         self._source, self._callback = source, _guarded(callback)
+        # It cannot be asked for any more once the source is undeclared.
+        self._items = source.handler
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
         self._thread.start()
 
@@ -363,7 +365,7 @@ class Pump:
         return not self._thread.is_alive()
 
     def _work(self) -> None:
-        for item in self._source.handler:
+        for item in self._items:
             self._callback(item)
 
 
