@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from rosbags.highlevel import AnyReader, AnyReaderError
-from rosbags.rosbag1 import ReaderError as Reader1Error
-from rosbags.rosbag2 import ReaderError as Reader2Error
+from rosbags.highlevel import AnyReader
 
 from rosglass.bags.bag import Bag, BagMessage, Channel
 from rosglass.bags.qos_text import profile
@@ -20,8 +18,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 __all__ = ["RosbagsBag"]
-
-_ERRORS = (AnyReaderError, Reader1Error, Reader2Error, OSError, ValueError, KeyError)
 
 
 class RosbagsBag(Bag):
@@ -36,10 +32,10 @@ class RosbagsBag(Bag):
         try:
             self._reader: Any = AnyReader([path])
             self._reader.open()
-        except _ERRORS as error:
+        except Exception as error:  # whatever the damage leads to, in whichever library below
             raise BagError(
-                f"{path} cannot be read as a recording: {error}; there are MCAP files (.mcap), "
-                "ROS 2 bags (a folder with metadata.yaml, .db3) and ROS 1 bags (.bag)"
+                f"{path} cannot be read as a recording: {_words(error)}; there are MCAP files "
+                "(.mcap), ROS 2 bags (a folder with metadata.yaml, .db3) and ROS 1 bags (.bag)"
             ) from error
         self._open = True
         wire = "cdr" if self._reader.is2 else "ros1"
@@ -74,14 +70,18 @@ class RosbagsBag(Bag):
         try:
             for connection, time, data in self._reader.messages(wanted, start, end):
                 yield BagMessage(owner[connection.id, id(connection.owner)], time, bytes(data))
-        except _ERRORS as error:
-            raise BagError(f"{self.path} is damaged: {error}") from error
+        except Exception as error:  # whatever the damage leads to
+            raise BagError(f"{self.path} is damaged: {_words(error)}") from error
 
     def close(self) -> None:
         """Close the files."""
         if self._open:
             self._open = False
             self._reader.close()
+
+
+def _words(error: Exception) -> str:
+    return str(error) or type(error).__name__
 
 
 def _channel(connection: Any, wire: str) -> Channel:

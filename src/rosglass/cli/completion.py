@@ -7,6 +7,7 @@ what it offers for names.
 from __future__ import annotations
 
 import os
+import sys
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -40,8 +41,10 @@ def is_completing() -> bool:
 
 def offer(parser: argparse.ArgumentParser) -> None:
     """Answer the shell, and end the program."""
-    import argcomplete
-
+    try:
+        import argcomplete
+    except ModuleNotFoundError:
+        sys.exit(1)  # nothing may be printed into the line that is being typed
     argcomplete.autocomplete(parser)
 
 

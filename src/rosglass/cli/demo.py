@@ -58,6 +58,9 @@ def run(args: argparse.Namespace) -> int:
     """Run the demo; returns 1 when camera or odometry never arrived."""
     if args.seconds is not None and not 1 <= args.seconds <= 86400:
         raise Error(f"--seconds {args.seconds:g}: expected 1 to 86400")
+    # Before anything is started: nothing is to be ended then.
+    import rosglass.qt  # noqa: F401 - whether it is installed
+
     headless = args.headless or not _has_display()
     seconds = args.seconds
     screenshot = args.screenshot

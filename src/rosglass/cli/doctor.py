@@ -224,6 +224,11 @@ def _robot(url: str, timeout: float) -> Iterator[Finding]:
 
     try:
         node = rosglass.connect(url, name=f"rosglass_doctor_{os.getpid()}", own_services=False)
+    except ModuleNotFoundError as error:
+        extra = url.partition(":")[0]
+        fix = f'pip install "rosglass[{extra}]"'
+        yield Finding("error", url, f"this needs the package {error.name}, which is missing", fix)
+        return
     except Error as error:
         no_network = url.startswith("dds:") and interfaces() == []
         yield Finding("error", url, str(error), _NO_NETWORK if no_network else "")
@@ -295,7 +300,7 @@ def _scan() -> Iterator[Finding]:
         url = f"dds://?domain={domain}"
         try:
             node = rosglass.connect(url, name=f"rosglass_doctor_{os.getpid()}", own_services=False)
-        except Error as error:
+        except (Error, ModuleNotFoundError) as error:
             yield Finding("error", url, str(error))
             return
         with node:

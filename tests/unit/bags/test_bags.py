@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from random import Random
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -247,3 +248,49 @@ def test_the_end_of_a_file_of_zeros_is_named_in_words(tmp_path):
     with open_bag(path) as bag:
         assert len(texts(bag)) == 50
         assert bag.problem == "it was not closed properly: its end is missing or damaged"
+
+
+def write_sqlite(path: Path) -> Path:
+    store = get_typestore(Stores.ROS2_JAZZY)
+    with Writer2(path / "sql", version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        connection = writer.add_connection("/chatter", STRING, typestore=store)
+        for i in range(30):
+            text = store.serialize_cdr(store.types[STRING](f"n{i}"), STRING)
+            writer.write(connection, i * SECOND, text)
+    return next((path / "sql").glob("*.db3"))
+
+
+def write_ros1(path: Path) -> Path:
+    store = get_typestore(Stores.ROS1_NOETIC)
+    with rosbag1.Writer(path / "a.bag") as writer:
+        connection = writer.add_connection("/chatter", STRING, typestore=store)
+        for i in range(30):
+            text = store.serialize_ros1(store.types[STRING](f"n{i}"), STRING)
+            writer.write(connection, i * SECOND, text)
+    return path / "a.bag"
+
+
+@pytest.mark.parametrize("kind", ["mcap", "sqlite", "ros1"])
+def test_whatever_is_damaged_is_read_or_refused(tmp_path, kind):
+    path = {
+        "mcap": lambda: write_mcap(tmp_path / "a.mcap", 30),
+        "sqlite": lambda: write_sqlite(tmp_path),
+        "ros1": lambda: write_ros1(tmp_path),
+    }[kind]()
+    good, random = path.read_bytes(), Random(7)
+    refused = 0
+    for number in range(70):
+        data = bytearray(good)
+        if number % 3 == 0:
+            del data[random.randrange(len(data)) :]
+        for _ in range(number % 5):
+            place = random.randrange(len(data) + 1)
+            data[place : place + 1] = random.randbytes(1)
+        path.write_bytes(data)
+        try:
+            with open_bag(path) as bag:
+                for _ in bag.messages():
+                    pass
+        except BagError:
+            refused += 1
+    assert refused
