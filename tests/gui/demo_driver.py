@@ -165,9 +165,19 @@ class _Driver:
         act(self.cockpit.window, getattr(self._core.Qt.Key, key))
 
     def repeat(self, key: str) -> None:
+        # As from the X server: the press waits in the queue however busy the program is meanwhile.
+        loop, pressed = self._core.QEventLoop(), []
+
+        def press() -> None:
+            self.key("press", key)
+            pressed.append(key)
+            loop.quit()
+
+        self._core.QTimer.singleShot(4, press)
+        # Handles what has waited, which may be the press already.
         self.key("release", key)
-        self._test.qWait(4)
-        self.key("press", key)
+        if not pressed:
+            loop.exec()
 
     def mouse(self, action: str, item: str, x: float, y: float) -> None:
         point = self._point(item, x, y)
