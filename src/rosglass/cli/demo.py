@@ -58,8 +58,11 @@ def run(args: argparse.Namespace) -> int:
     """Run the demo; returns 1 when camera or odometry never arrived."""
     if args.seconds is not None and not 1 <= args.seconds <= 86400:
         raise Error(f"--seconds {args.seconds:g}: expected 1 to 86400")
-    # Before anything is started: nothing is to be ended then.
-    import rosglass.qt  # noqa: F401 - whether it is installed
+    # Qt reads this when it is loaded; its media backends report every library they miss.
+    rules = [_QUIET, os.environ.get("QT_LOGGING_RULES", "")]
+    os.environ["QT_LOGGING_RULES"] = ";".join(filter(None, rules))
+    # Before anything is started: nothing is left running where it is not installed.
+    import rosglass.qt  # noqa: F401
 
     headless = args.headless or not _has_display()
     seconds = args.seconds
@@ -74,9 +77,6 @@ def run(args: argparse.Namespace) -> int:
             _use_virtual_screen(stack, seconds)
         url = _find_router(stack, args.url)
         robot = None if args.no_robot else _start_robot(stack, url)
-        # Qt reads this when it is loaded; its media backends report every library they miss.
-        rules = [_QUIET, os.environ.get("QT_LOGGING_RULES", "")]
-        os.environ["QT_LOGGING_RULES"] = ";".join(filter(None, rules))
         from rosglass.demo.app import Cockpit
 
         cockpit = Cockpit(url, _SIZE if headless else None)
