@@ -6,7 +6,6 @@ additions of a = -1. Its types need annotations that are evaluated.
 """
 
 import json
-import subprocess
 import sys
 import threading
 import time
@@ -231,83 +230,47 @@ class Cyclone:
         return [answers[number] for number in range(len(requests))]
 
 
-class FastDds:
+class Fastdds:
     """Fast DDS with the rules of rmw_fastrtps, see fastdds_peer.cpp."""
 
     def __init__(self) -> None:
         import struct
 
-        self.struct = struct
-        self.process = subprocess.Popen(
-            [plan["fastdds"], str(plan["domain"])],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        self.lock = threading.Condition()
-        self.born = time.monotonic()
-        self.matched: dict[str, bool] = {}
-        self.answers: dict[tuple[str, int], str] = {}
-        threading.Thread(target=self.read, daemon=True).start()
+        import fastdds
 
-    def say(self, *words: object) -> None:
-        with self.lock:
-            self.process.stdin.write(" ".join(map(str, words)) + "\n")
-            self.process.stdin.flush()
+        self.struct, self.header = struct, fastdds.CDR
+        self.dds = fastdds.FastDds(plan["fastdds"], plan["domain"])
+        self.types = {"add": ADD, "blob": BLOB}
 
-    def read(self) -> None:
-        for line in self.process.stdout:
-            event = json.loads(line)
-            if "request" in event:
-                kind, data = event["request"], bytes.fromhex(event["data"])
-                value = answer(kind, self.read_request(kind, data))
-                if value is not None:
-                    self.say("reply", kind, event["number"], self.body(kind, value).hex())
-            with self.lock:
-                if "matched" in event:
-                    self.matched[event["matched"]] = bool(event["readers"] and event["writers"])
-                elif "reply" in event:
-                    self.answers[event["reply"], event["number"]] = event["data"]
-                self.lock.notify_all()
+    def serve(self, kind: str) -> None:
+        def serve(_: int, data: bytes) -> bytes | None:
+            value = answer(kind, self.decode(kind, data, "<qq"))
+            return None if value is None else self.encode(kind, value)
 
-    def read_request(self, kind: str, data: bytes) -> Any:
+        self.dds.serve(kind, f"{plan['name']}/{kind}", self.types[kind], serve)
+
+    def open(self, service: str, kind: str) -> None:
+        self.dds.client(service, service, self.types[kind])
+
+    def call(self, service: str, kind: str, requests: list[Any]) -> list[Any]:
+        found = self.dds.call(service, [self.encode(kind, given) for given in requests])
+        values = [self.decode(kind, data, "<q") for data in found]
+        return values if kind == "blob" else [value[0] for value in values]
+
+    def decode(self, kind: str, data: bytes, layout: str) -> Any:
         if kind == "add":
-            return self.struct.unpack_from("<qq", data, 4)
+            return self.struct.unpack_from(layout, data, 4)
         (size,) = self.struct.unpack_from("<I", data, 4)
         return data[8 : 8 + size]
 
-    def body(self, kind: str, value: Any) -> bytes:
+    def encode(self, kind: str, value: Any) -> bytes:
         if kind == "blob":
-            return b"\0\1\0\0" + self.struct.pack("<I", len(value)) + value
+            return self.header + self.struct.pack("<I", len(value)) + value
         values = value if isinstance(value, (list, tuple)) else [value]
-        return b"\0\1\0\0" + self.struct.pack(f"<{len(values)}q", *values)
-
-    def serve(self, kind: str) -> None:
-        self.say("server", kind, f"{plan['name']}/{kind}", {"add": ADD, "blob": BLOB}[kind])
-
-    def open(self, service: str, kind: str) -> None:
-        self.say("client", service, service[1:], {"add": ADD, "blob": BLOB}[kind])
-        with self.lock:
-            assert self.lock.wait_for(lambda: self.matched.get(service), 10)
-        # Fast DDS tells some of those it meets only with its next heartbeat, each second.
-        time.sleep(max(SETTLING, self.born + 1.3 - time.monotonic()))
-
-    def call(self, service: str, kind: str, requests: list[Any]) -> list[Any]:
-        wanted = [(service, number) for number in range(len(requests))]
-        for number, given in enumerate(requests):
-            # Its depth is 10, as rmw's: of more at once it forgets those that must be sent again.
-            with self.lock:
-                assert self.lock.wait_for(lambda n=number: n - len(self.answers) < 8, 10), number
-            self.say("call", service, number, self.body(kind, given).hex())
-        with self.lock:
-            assert self.lock.wait_for(lambda: len(self.answers) == len(wanted), 10), self.answers
-            found = [bytes.fromhex(self.answers.pop(key)) for key in wanted]
-        if kind == "add":
-            return [self.struct.unpack_from("<q", data, 4)[0] for data in found]
-        return [self.read_request(kind, data) for data in found]
+        return self.header + self.struct.pack(f"<{len(values)}q", *values)
 
 
-peer = {"rosglass": Rosglass, "dora": Dora, "cyclone": Cyclone, "fastdds": FastDds}[plan["kind"]]()
+peer = {"rosglass": Rosglass, "dora": Dora, "cyclone": Cyclone, "fastdds": Fastdds}[plan["kind"]]()
 for name in plan.get("serve", ()):
     peer.serve(name)
 
