@@ -49,8 +49,11 @@ from rosglass.ros2.zenoh_endpoints import (
 )
 from rosglass.ros2.zenoh_keys import Token, gid_of, graph_key, topic_key
 from rosglass.ros2.zenoh_links import Pulse, limit_silence
+from rosglass.ros2.zenoh_local import Places
 from rosglass.ros2.zenoh_reader import Drain, ZenohReader
-from rosglass.ros2.zenoh_services import ZenohReplier, ZenohRequester
+from rosglass.ros2.zenoh_replier import ZenohReplier
+from rosglass.ros2.zenoh_requester import ZenohRequester
+from rosglass.ros2.zenoh_services import Service
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -101,6 +104,8 @@ class ZenohMiddleware(Middleware):
             from rosglass.ros2.zenoh_shm import SharedMemory  # noqa: PLC0415 - not everywhere
 
             self._shared = SharedMemory()
+        self._readers: Places[ZenohReader] = Places()
+        self._servers: Places[ZenohReplier] = Places()
         self._drain = Drain(f"{self._address} unread")
         self._changed: Callable[[], None] = lambda: None
         self._graph: Graph | None = None
@@ -154,7 +159,15 @@ class ZenohMiddleware(Middleware):
         kind = EndpointKind.PUBLISHER
         token = self._token(node, EndpointInfo(kind, topic, type_name, node, qos, type_hash))
         writer = ZenohWriter(
-            self, self._options, token, topic, type_name, type_hash, qos, self._shared
+            self,
+            self._options,
+            token,
+            topic,
+            type_name,
+            type_hash,
+            qos,
+            self._shared,
+            self._readers,
         )
         self._add(writer)
         return writer
@@ -172,7 +185,8 @@ class ZenohMiddleware(Middleware):
         kind = EndpointKind.SUBSCRIPTION
         token = self._token(node, EndpointInfo(kind, topic, type_name, node, qos, type_hash))
         key = topic_key(self._options.domain, topic, type_name, "*")
-        reader = ZenohReader(self, token, key, qos, on_sample, self._drain)
+        place = topic, type_name
+        reader = ZenohReader(self, token, place, key, qos, on_sample, self._drain, self._readers)
         self._add(reader)
         return reader
 
@@ -189,9 +203,8 @@ class ZenohMiddleware(Middleware):
         kind = EndpointKind.SERVICE_CLIENT
         token = self._token(node, EndpointInfo(kind, service, type_name, node, qos, type_hash))
         graph = self._opened_graph()
-        requester = ZenohRequester(
-            self, self._options, token, service, type_name, type_hash, graph, on_reply
-        )
+        wanted = Service(self._options, service, type_name, type_hash)
+        requester = ZenohRequester(self, token, wanted, graph, on_reply, self._servers)
         self._add(requester)
         return requester
 
@@ -208,9 +221,8 @@ class ZenohMiddleware(Middleware):
         kind = EndpointKind.SERVICE_SERVER
         token = self._token(node, EndpointInfo(kind, service, type_name, node, qos, type_hash))
         graph = self._opened_graph()
-        replier = ZenohReplier(
-            self, self._options, token, service, type_name, type_hash, graph, on_request
-        )
+        offered = Service(self._options, service, type_name, type_hash)
+        replier = ZenohReplier(self, token, offered, graph, on_request, self._servers)
         self._add(replier)
         return replier
 

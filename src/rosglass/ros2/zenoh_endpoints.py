@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rosglass.comm import EndpointInfo, QoS, Status
+    from rosglass.ros2.zenoh_local import Places
     from rosglass.ros2.zenoh_options import ZenohOptions
+    from rosglass.ros2.zenoh_reader import ZenohReader
     from rosglass.ros2.zenoh_shm import SharedMemory
 
 __all__ = [
@@ -149,7 +151,10 @@ class Announcement(Declaration):
 
 
 class ZenohWriter(Declaration, Writer):
-    """A publisher and its token; one publisher for each key that is listened to."""
+    """A publisher and its token; one publisher for each key that is listened to.
+
+    Plain subscriptions of the same node are handed the samples here.
+    """
 
     def __init__(
         self,
@@ -161,8 +166,10 @@ class ZenohWriter(Declaration, Writer):
         type_hash: str,
         qos: QoS,
         shared: SharedMemory | None,
+        readers: Places[ZenohReader],
     ) -> None:
         super().__init__(owner, token)
+        self._readers, self._place = readers, (topic, type_name)
         self._options, self._topic, self._qos = options, topic, qos
         self._type_name, self._type_hash = type_name, type_hash
         self.gid = gid_of(token)
@@ -195,10 +202,11 @@ class ZenohWriter(Declaration, Writer):
     def write_parts(self, parts: Sequence[bytes | bytearray | memoryview]) -> None:
         """Send a payload that comes in parts, with one copy less than by joining them."""
         now = time.time_ns()
-        shared = None if self._shared is None else self._shared.place(parts)
+        kept = self._latched or bool(self._readers.at(self._place))
+        shared = None if kept or self._shared is None else self._shared.place(parts)
         if shared is not None:
             self._send(b"", shared, now)
-        elif self._latched or not self._joining.acquire(blocking=False):
+        elif kept or not self._joining.acquire(blocking=False):
             joined = b"".join(parts)
             self._send(joined, joined, now)
         else:
@@ -226,11 +234,14 @@ class ZenohWriter(Declaration, Writer):
         try:
             if self._closed:
                 raise NodeClosedError(f"the publisher of {self._topic} is closed")
-            note = ATTACHMENT_FULL.pack(next(self._numbers), now, 16, self.gid)
+            number = next(self._numbers)
+            note = ATTACHMENT_FULL.pack(number, now, 16, self.gid)
             if self._latched:
                 self._history.append((data, note))
             for publisher in self._publishers:
                 publisher.put(payload, attachment=note)
+            for reader in self._readers.at(self._place):
+                reader.take_own(bytes(data), now, self.gid, number, self._type_hash)
         except zenoh.ZError as error:
             raise self._error(error) from error
         finally:
@@ -326,7 +337,7 @@ def _guarded(callback: Callable[[Any], None]) -> Callable[[Any], None]:
 
 
 def direct(callback: Callable[[Any], None]) -> Any:
-    """Run `callback` on the thread that receives; for plain subscribers and queryables only."""
+    """Run `callback` on the thread that receives; for what comes from other sessions only."""
     return zenoh.handlers.Callback(_guarded(callback), indirect=False)
 
 

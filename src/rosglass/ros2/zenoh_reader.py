@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.comm import QoS
+    from rosglass.ros2.zenoh_local import Places
 
 __all__ = ["Drain", "ZenohReader"]
 
@@ -52,6 +53,8 @@ _SMALL = 65_536
 _PATIENCE = 1.0
 #: Seconds for the thread of a transient local subscription, which may last longer.
 _SHORTLY = 0.02
+#: The node's own publishers hand on their samples themselves.
+_OTHERS = zenoh.Locality.REMOTE
 #: Different keys on a reader's topic that are remembered; each definition of a type has one.
 _MAX_KEYS = 64
 
@@ -133,7 +136,7 @@ class _Direct:
         self._lock = threading.Lock()
         self._held: deque[tuple[zenoh.Sample, int]] | None = deque()
         self._subscriber: Any = session.declare_subscriber(
-            key, zenoh.handlers.Callback(self._receive, indirect=False)
+            key, zenoh.handlers.Callback(self._receive, indirect=False), allowed_origin=_OTHERS
         )
 
     def begin(self) -> None:
@@ -194,7 +197,9 @@ class _Collected:
         # Reentrant: what listens to events of a subscription may ask for its samples.
         self._lock = threading.RLock()
         self._looked = time.time_ns()
-        self._subscriber: Any = session.declare_subscriber(key, zenoh.handlers.FifoChannel(room))
+        self._subscriber: Any = session.declare_subscriber(
+            key, zenoh.handlers.FifoChannel(room), allowed_origin=_OTHERS
+        )
         self._next = self._subscriber.handler.try_recv
 
     def begin(self) -> None:
@@ -234,16 +239,30 @@ class ZenohReader(Declaration, Reader):
     Args:
         owner: Keeps the declaration.
         token: The subscription's token.
+        place: The topic and its type.
         key: Key expression of the topic's samples, whatever their definition.
         qos: The subscription's profile.
         on_sample: Takes the samples.
         drain: Takes what nobody waits for.
+        readers: Where the node's own publishers find it.
     """
 
     def __init__(
-        self, owner: Owner, token: str, key: str, qos: QoS, on_sample: OnSample, drain: Drain
+        self,
+        owner: Owner,
+        token: str,
+        place: tuple[str, str],
+        key: str,
+        qos: QoS,
+        on_sample: OnSample,
+        drain: Drain,
+        readers: Places[ZenohReader],
     ) -> None:
         super().__init__(owner, token)
+        self._place, self._readers = place, readers
+        # Transient local ones get everything over Zenoh, and never in the thread that sends.
+        if qos.durability is not Durability.TRANSIENT_LOCAL:
+            readers.add(place, self)
         self._key, self._qos, self._on_sample, self._drain = key, qos, on_sample, drain
         self._session: zenoh.Session | None = None
         self._source: _Source | None = None
@@ -290,7 +309,17 @@ class ZenohReader(Declaration, Reader):
         self._marked, self._marked_at = count, now
         self._move()
 
+    def take_own(self, data: bytes, sent: int, gid: bytes, sequence: int, type_hash: str) -> None:
+        """Take a sample of the same node, in the thread that sends it."""
+        if not self._closed:
+            self._count += 1
+            try:
+                self._on_sample(data, time.time_ns(), sent, gid, sequence, type_hash)
+            except Exception:
+                self._log_failure()
+
     def _release(self) -> None:
+        self._readers.remove(self._place, self)
         super()._release()
         with self._lock:
             source, self._source = self._source, None
@@ -362,7 +391,7 @@ class ZenohReader(Declaration, Reader):
             room = min(_MAX_WAITING, self._room())
             return _Collected(session, self._key, room, self._take, self._drain)
         channel = zenoh.handlers.FifoChannel(min(_MAX_BUSY, self._room()))
-        subscriber = session.declare_subscriber(self._key, channel)
+        subscriber = session.declare_subscriber(self._key, channel, allowed_origin=_OTHERS)
         name = f"{self._key} samples"
         return _Pumped(subscriber, self._take, name, _PATIENCE, self._drain)
 
@@ -391,7 +420,10 @@ class ZenohReader(Declaration, Reader):
                 type_hash = self._read_key(key)
             self._on_sample(data, received, sent, gid, sequence, type_hash)
         except Exception:
-            _log.exception("%s: handling a sample failed", self._key)
+            self._log_failure()
+
+    def _log_failure(self) -> None:
+        _log.exception("%s: handling a sample failed", self._key)
 
     def _doubt(self, note: bytes) -> None:
         """Take note of a publisher that does not say who it is."""

@@ -1,0 +1,395 @@
+"""Networks that vanish, routers that die, peers that send rubbish, programs that never tidy up."""
+
+from __future__ import annotations
+
+import gc
+import json
+import logging
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+import rosglass
+from rosglass.comm import ConnectionState, NodeName
+from rosglass.errors import ConnectionLostError, ServiceError
+
+HERE = Path(__file__).parent
+ADD, TWIST = "example_interfaces/srv/AddTwoInts", "geometry_msgs/msg/Twist"
+IMAGE, STRING = "sensor_msgs/msg/Image", "std_msgs/msg/String"
+#: Seconds within which everything works again after a router has come back.
+RECOVERY = 2.0
+
+
+def memory():
+    """Return the bytes of physical memory that this process uses."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGESIZE")
+
+
+def descriptors():
+    return len(list(Path("/proc/self/fd").iterdir()))
+
+
+@pytest.fixture
+def start_router(start, free_port):
+    """Start the command `rosglass router`; always on the same port."""
+
+    def start_router():
+        process = start("-m", "rosglass", "router", "--listen", f"tcp/127.0.0.1:{free_port}")
+        while not any("Zenoh router at" in line for line in process.output):
+            assert process.popen.poll() is None, process.output
+            time.sleep(0.01)
+        return process
+
+    start_router.url = f"zenoh://127.0.0.1:{free_port}"
+    return start_router
+
+
+def private_network():
+    """Return how to run something as root of a network namespace of its own, None if forbidden."""
+    for kind in ("-n", "-rn"):
+        command = ["unshare", kind, "sh", "-c", "ip link set lo up && unshare -n true"]
+        if not subprocess.run(command, capture_output=True, check=False).returncode:
+            return ["unshare", kind]
+    return None
+
+
+@pytest.mark.skipif(not shutil.which("unshare"), reason="needs Linux with util-linux and iproute2")
+def test_a_cable_that_is_unplugged_for_ten_seconds():
+    within = private_network()
+    if within is None:
+        pytest.skip("network namespaces are not permitted here")
+    script = str(HERE / "peers" / "two_machines.py")
+    done = subprocess.run(
+        [*within, sys.executable, "-W", "ignore", script, "10"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    seen = json.loads(done.stdout.splitlines()[-1])
+    assert seen["lost"] < 5, "the operator is told soon"
+    assert seen["states"] == ["LOST", "LOST", "CONNECTED"], "silent, then given up, then back"
+    assert seen["call"].startswith("ConnectionLostError"), "nobody waits for what cannot come"
+    assert seen["recovered"] < RECOVERY
+    assert seen["silence"] > 9
+    assert seen["ordered"], "nothing comes twice, nothing old comes late"
+    assert seen["maps"] == ["hall"]
+    assert (seen["before"], seen["after"]) == (3, 11)
+    assert seen["status"].startswith("CONNECTED")
+
+
+@pytest.mark.parametrize("mode", ["peer", "client"])
+def test_services_and_latched_topics_after_a_router_was_restarted(
+    mode, start_router, connect, wait_for
+):
+    router = start_router()
+    robot = connect("robot", f"?mode={mode}", url=start_router.url)
+    cockpit = connect("cockpit", f"?mode={mode}", url=start_router.url)
+    answer = threading.Event()
+
+    def add(request):
+        answer.wait(5)
+        return {"sum": request.a + request.b}
+
+    robot.create_service_server("/add", ADD, add)
+    robot.create_publisher("/map", STRING, rosglass.QoS.latched()).publish(data="hall")
+    client = cockpit.create_service_client("/add", ADD)
+    assert client.wait_for_server(5), client.problem
+    call = client.call_async({"a": 1, "b": 2}, timeout=20)
+    time.sleep(0.2)
+    before = time.monotonic()
+    router.end()
+    if mode == "client":
+        with pytest.raises(ConnectionLostError, match="went away before it answered"):
+            call.result(5)
+        assert time.monotonic() - before < 2
+    answer.set()
+    if mode == "peer":
+        assert call.result(5).sum == 3, "peers go on without the router"
+    time.sleep(0.3)
+    start_router()
+    returned = time.monotonic()
+    assert client.call({"a": 3, "b": 4}, timeout=RECOVERY).sum == 7
+    late = connect("late", f"?mode={mode}", url=start_router.url)
+    subscription = late.create_subscription("/map", STRING, qos=rosglass.QoS.latched())
+    assert subscription.wait(RECOVERY).message().data == "hall"
+    assert time.monotonic() - returned < 2 * RECOVERY
+    assert len(cockpit.service_servers("/add")) == 1
+    assert len(late.publishers("/map")) == 1
+
+
+CAMERA = """
+import time, rosglass
+node = rosglass.connect({url!r}, "camera")
+publisher = node.create_publisher("/camera", {image!r}, rosglass.QoS.sensor_data())
+picture = publisher.type.encode(width=640, height=480, step=1920, data=bytes(921_600))
+while True:
+    publisher.publish_serialized(picture)
+    time.sleep(0.01)
+"""
+
+
+def test_a_slow_consumer_costs_no_memory(router, start, connect, wait_for):
+    node = connect("cockpit")
+    camera = start("-c", CAMERA.format(url=router.url, image=IMAGE))
+    ready = threading.Event()
+    seen = []
+
+    def look(message):
+        seen.append(message.width)
+        ready.wait(0.2)
+
+    subscription = node.create_subscription("/camera", IMAGE, look, rosglass.QoS.sensor_data())
+    wait_for(lambda: subscription.statistics().received > 20)
+    before, received = memory(), subscription.statistics().received
+    wait_for(lambda: subscription.statistics().received > received + 150, 20)
+    statistics = subscription.statistics()
+    # 140 MB have come meanwhile.
+    assert memory() - before < 40e6
+    assert len(seen) < 100
+    assert 0 <= statistics.received - statistics.dropped - len(seen) <= 10
+    ready.set()
+    camera.end()
+
+
+def test_rubbish_is_named_and_disturbs_nothing(router, connect, caplog, wait_for):
+    zenoh = pytest.importorskip("zenoh")
+    node = connect("cockpit")
+    good, received = connect("robot"), []
+    qos = rosglass.QoS(1000)
+    node.create_subscription("/count", TWIST, lambda m: received.append(m.linear.x), qos)
+    server = node.create_service_server("/add", ADD, lambda r: {"sum": r.a + r.b})
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", f'["{router.listen}"]')
+    twist, add = rosglass.load(TWIST), rosglass.load(ADD)
+    publisher = good.create_publisher("/count", TWIST)
+    wait_for(publisher.subscription_count)
+    caplog.set_level(logging.WARNING)
+    caplog.clear()
+    with zenoh.open(config) as session:
+        session_id = str(session.info.zid())
+        tokens = [
+            session.liveliness().declare_token(f"@ros2_lv/0/{session_id}/{rest}")
+            for rest in ("x", "0/1/XX/%/%/node", "0/2/MP/%/%/node/%t/type", "0/3/MS/%/%/n/%t/a/b/c")
+        ]
+        key = f"0/count/geometry_msgs::msg::dds_::Twist_/{twist.rihs01}"
+        service = f"0/add/example_interfaces::srv::dds_::AddTwoInts_/{add.rihs01}"
+        for number in range(300):
+            session.put(key, b"\x00\x01\x00\x00" + os.urandom(number % 40), attachment=b"?" * 33)
+            session.put(key, os.urandom(number % 7))
+            session.put(key + "/more", b"")
+            if number % 10 == 0:
+                publisher.publish(linear={"x": number})
+        refused = [
+            [reply.err is not None for reply in session.get(service, timeout=2, **request)]
+            for request in (
+                {},
+                {"payload": b"no"},
+                {"payload": b"\x00\x01\x00\x00", "attachment": b"x"},
+            )
+        ]
+        assert refused == [[True], [True], [True]]
+        wait_for(lambda: 290 in received)
+        del tokens
+    assert [x for x in received if x in range(0, 300, 10)] == [*range(0, 300, 10)]
+    client = good.create_service_client("/add", ADD)
+    assert client.call({"a": 1, "b": 2}).sum == 3
+    assert server.problem == ""
+    told = [record.getMessage() for record in caplog.records]
+    for what in ("graph token that is not understood", "/count", "/add"):
+        assert any(what in line for line in told), what
+    assert len(told) < 20, told
+
+
+def test_a_server_that_answers_rubbish(router, connect, caplog):
+    zenoh = pytest.importorskip("zenoh")
+    node = connect("cockpit")
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", f'["{router.listen}"]')
+    add = rosglass.load(ADD)
+    kind = f"example_interfaces::srv::dds_::AddTwoInts_/{add.rihs01}"
+    replies = {"short": b"\x00", "empty": b"", "text": b"hello, robot"}
+    with zenoh.open(config) as session:
+        own = str(session.info.zid())
+        kept = []
+        for name, data in replies.items():
+
+            def answer(query, data=data):
+                query.reply(query.key_expr, data)
+                query.drop()
+
+            kept.append(session.declare_queryable(f"0/{name}/{kind}", answer, complete=True))
+            token = f"@ros2_lv/0/{own}/0/{len(kept)}/SS/%/%/liar/%{name}/{kind}/::,10:,:,:,,"
+            kept.append(session.liveliness().declare_token(token))
+        for name in replies:
+            client = node.create_service_client(f"/{name}", ADD)
+            assert client.wait_for_server(5), client.problem
+            with pytest.raises(ServiceError, match=f"/{name}"):
+                client.call({"a": 1, "b": 2}, timeout=5)
+        for one in kept:
+            one.undeclare()
+
+
+def test_a_thousand_of_everything_leave_nothing_behind(start_router, connect, wait_for):
+    start_router()
+    node, other = (connect(name, url=start_router.url) for name in ("cockpit", "robot"))
+    latched = rosglass.QoS.latched()
+    other.create_publisher("/map", STRING, latched).publish(data="hall")
+    subscription = other.create_subscription("/count", TWIST)
+
+    def cycle(number):
+        made = [
+            node.create_publisher("/count", TWIST),
+            node.create_subscription("/count", TWIST, callback=id),
+            node.create_service_server("/add", ADD, lambda r: {"sum": r.a + r.b}),
+            node.create_service_client("/add", ADD),
+        ]
+        if number % 10 == 0:  # these have threads of their own
+            made.append(node.create_publisher("/own_map", STRING, latched))
+            made.append(node.create_subscription("/map", STRING, callback=id, qos=latched))
+        made[0].publish(linear={"x": 1.0})
+        for one in made:
+            one.close()
+
+    def settled():
+        return not other.service_servers("/add") and not other.publishers("/count")
+
+    for number in range(100):
+        cycle(number)
+    wait_for(settled)
+    gc.collect()
+    threads, files, objects, before = (
+        threading.active_count(), descriptors(), len(gc.get_objects()), memory(),
+    )  # fmt: skip
+    for number in range(250):
+        cycle(number)
+    wait_for(settled)
+    wait_for(lambda: threading.active_count() <= threads, 3)
+    gc.collect()
+    assert descriptors() <= files + 2
+    assert len(gc.get_objects()) < objects + 500
+    assert memory() - before < 10e6
+    assert subscription.statistics().lost == 0, "endpoints that follow each other are told apart"
+    assert node.status().state is ConnectionState.CONNECTED
+
+
+def test_fifty_nodes_that_call_each_other_leave_nothing_behind(router):
+    def cycle():
+        with (
+            rosglass.connect(router.url, "one") as one,
+            rosglass.connect(router.url, "two") as two,
+        ):
+            one.create_service_server("/add", ADD, lambda r: {"sum": r.a + r.b})
+            subscription = two.create_subscription("/count", TWIST)
+            client = two.create_service_client("/add", ADD)
+            assert client.call({"a": 1, "b": 2}, timeout=5).sum == 3
+            one.create_publisher("/count", TWIST).publish()
+            client.call_async({"a": 1, "b": 2})  # left alone with its call
+            subscription.wait(0.001)
+
+    for _ in range(5):
+        cycle()
+    time.sleep(0.5)
+    threads, files, before = threading.active_count(), descriptors(), memory()
+    for _ in range(25):
+        cycle()
+    time.sleep(0.5)
+    assert threading.active_count() == threads
+    assert descriptors() < files + 20
+    assert memory() - before < 30e6
+
+
+def test_two_nodes_in_one_process(connect, wait_for):
+    one, two = connect("one"), connect("two")
+    one.create_service_server("/add", ADD, lambda r: {"sum": r.a + r.b})
+    subscription = one.create_subscription("/count", TWIST)
+    publisher = two.create_publisher("/count", TWIST)
+    wait_for(publisher.subscription_count)
+    publisher.publish(linear={"x": 4.0})
+    assert subscription.wait(5).message().linear.x == 4
+    assert two.create_service_client("/add", ADD).call({"a": 1, "b": 2}).sum == 3
+    assert one.create_service_client("/add", ADD).call({"a": 2, "b": 2}).sum == 4
+    one.close()
+    wait_for(lambda: NodeName("/", "one") not in two.nodes())
+    publisher.publish()
+    assert two.status().state is ConnectionState.CONNECTED
+
+
+FORK = """
+import os, rosglass
+node = rosglass.connect({url!r}, "parent")
+server = node.create_service_server("/add", {add!r}, lambda r: {{"sum": r.a + r.b}})
+client = node.create_service_client("/add", {add!r})
+assert client.call({{"a": 1, "b": 2}}).sum == 3
+child = os.fork()
+if child == 0:
+    for use in (lambda: client.call({{"a": 1}}), lambda: rosglass.connect({url!r}, "child")):
+        try:
+            use()
+        except rosglass.Error as error:
+            print(type(error).__name__, flush=True)
+    node.close()
+    os._exit(7)
+assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
+assert client.call({{"a": 3, "b": 4}}).sum == 7
+node.close()
+"""
+
+
+def test_a_fork_is_told_and_leaves_its_parent_alone(router):
+    program = FORK.format(url=router.url, add=ADD)
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=30, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.split() == ["NodeClosedError", "UnsupportedError"]
+
+
+BUSY = """
+import sys, threading, time, rosglass
+node = rosglass.connect({url!r}, "busy")
+latched = rosglass.QoS.latched()
+node.create_service_server("/add", {add!r}, lambda r: {{"sum": r.a + r.b}})
+node.create_subscription("/count", {twist!r}, id)
+node.create_subscription("/map", {twist!r}, id, latched)
+publishers = [
+    node.create_publisher("/count", {twist!r}), node.create_publisher("/map", {twist!r}, latched)
+]
+client = node.create_service_client("/add", {add!r})
+print("busy", flush=True)
+try:
+    while True:
+        for publisher in publishers:
+            publisher.publish()
+        client.call({{"a": 1, "b": 2}})
+        node.create_subscription("/count").wait(0.001)
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+"""
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.02, 0.05, 0.1, 0.2, 0.5])
+def test_ctrl_c_at_any_moment(delay, router):
+    program = BUSY.format(url=router.url, add=ADD, twist=TWIST)
+    process = subprocess.Popen(
+        [sys.executable, "-c", program],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "busy\n"
+    time.sleep(delay)
+    process.send_signal(signal.SIGINT)
+    out, errors = process.communicate(timeout=10)
+    assert (process.returncode, out, errors) == (0, "interrupted\n", "")
