@@ -142,7 +142,7 @@ def test_without_xvfb_it_says_what_to_install(tmp_path: Path, url: str) -> None:
     [
         (["--seconds", "0"], "--seconds"),
         (["--screenshot", "nowhere/demo.png"], "no such directory"),
-        (["--url", "dds://?domain=0"], "dds"),
+        (["--url", "ros1://robot:11311"], "ros1"),
     ],
 )
 def test_bad_options_are_explained(tmp_path: Path, arguments: list[str], named: str) -> None:
