@@ -29,3 +29,22 @@ def test_make_targets_exist() -> None:
     shown = set(re.findall(r"`?make ([a-z]+)\b[` ]", README))
     assert {"demo", "test"} <= shown
     assert all(re.search(rf"^{target}:", makefile, re.MULTILINE) for target in shown)
+
+
+PEERS = (ROOT / "docs/peers.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("named", sorted(set(re.findall(r"`(test_\w+\.py(?:::\w+)?)`", PEERS))))
+def test_every_test_that_the_table_of_peers_names_exists(named: str) -> None:
+    file, _, test = named.partition("::")
+    text = (ROOT / "tests/interop/ros2" / file).read_text(encoding="utf-8")
+    assert (f"def {test}(" if test else "def test_") in text
+
+
+def test_every_cell_of_the_table_of_peers_names_a_test_or_a_reason() -> None:
+    rows = [line for line in PEERS.splitlines() if line.startswith("| ") and "---" not in line]
+    cells = [cell.strip() for row in rows for cell in row.strip("| ").split(" | ")[1:]]
+    named = ("test_", "the same", "both", "- none: ", "its writers", "ours to it only")
+    headings = [cell for row in rows if row.startswith("| | ") for cell in row.split(" | ")]
+    for cell in cells:
+        assert any(word in cell for word in named) or cell in " ".join(headings), cell
