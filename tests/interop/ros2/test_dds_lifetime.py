@@ -280,25 +280,6 @@ print(subscription.wait(5).message().data, flush=True)
     assert process.returncode == 0
 
 
-def test_a_peer_that_is_killed_in_the_middle_of_big_messages(dds_connect, dds_domain):
-    text = f"""
-publisher = node.create_publisher('/big', '{IMAGE}')
-while True:
-    publisher.publish(data=bytes(6_000_000))
-"""
-    subscription = dds_connect("hears").create_subscription("/big", IMAGE)
-    for _ in range(2):
-        process = program(text, dds_domain)
-        for _ in range(3):
-            sample = subscription.wait(10)
-            assert sample is not None
-            sample.type.validate(sample.data)
-        process.kill()
-        process.wait()
-        while subscription.wait(0.3) is not None:
-            pass
-
-
 def test_a_second_configuration_of_the_domain_is_refused(dds_connect, dds_domain):
     dds_connect("first")
     with pytest.raises(UnsupportedError, match="other settings"):

@@ -119,8 +119,7 @@ def profile(writer: bool) -> Qos:
     return Qos(*policies)
 
 
-def subscribe(name: str, kind: type) -> None:
-    reader = DataReader(participant, Topic(participant, f"rt{name}", kind), qos=profile(False))
+def subscribe(name: str, kind: type, reader: DataReader) -> None:
     while True:
         for sample in reader.take(100):
             if isinstance(sample, kind):
@@ -128,9 +127,7 @@ def subscribe(name: str, kind: type) -> None:
         time.sleep(0.002)
 
 
-def publish(name: str, type_name: str) -> None:
-    kind = Rubbish if "rubbish" in plan else TYPES[type_name]
-    writer = DataWriter(participant, Topic(participant, f"rt{name}", kind), qos=profile(True))
+def publish(name: str, type_name: str, kind: type, writer: DataWriter) -> None:
     samples = [value(kind, VALUES.get(type_name, {"data": 7}))] if kind is not Rubbish else []
     samples += [Rubbish(2**32 - 1 - size, [size] * size) for size in plan.get("rubbish", ())]
     time.sleep(plan.get("start", 0))
@@ -149,9 +146,19 @@ def publish(name: str, type_name: str) -> None:
 
 participant = DomainParticipant(plan["domain"])
 kept: list[DataWriter] = []
-for topic, of_type in plan.get("subscribe", {}).items():
-    threading.Thread(target=subscribe, args=(topic, TYPES[of_type]), daemon=True).start()
-for topic, of_type in plan.get("publish", {}).items():
-    threading.Thread(target=publish, args=(topic, of_type), daemon=True).start()
+threads: list[threading.Thread] = []
+# Here, not in the threads: cyclonedds prepares a type with no regard to others that do the same.
+for name, of_type in plan.get("subscribe", {}).items():
+    kind = TYPES[of_type]
+    reader = DataReader(participant, Topic(participant, f"rt{name}", kind), qos=profile(False))
+    threads.append(threading.Thread(target=subscribe, args=(name, kind, reader), daemon=True))
+for name, of_type in plan.get("publish", {}).items():
+    kind = Rubbish if "rubbish" in plan else TYPES[of_type]
+    writer = DataWriter(participant, Topic(participant, f"rt{name}", kind), qos=profile(True))
+    threads.append(
+        threading.Thread(target=publish, args=(name, of_type, kind, writer), daemon=True)
+    )
+for thread in threads:
+    thread.start()
 tell(ready=True)
 sys.stdin.read()

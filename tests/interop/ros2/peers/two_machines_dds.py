@@ -1,0 +1,117 @@
+"""A robot and an operator on two machines, in two network namespaces that a cable connects, by DDS.
+
+``two_machines_dds.py SECONDS``, to be run as root of a network namespace, which is the operator's.
+The cable is unplugged for so long. Prints what the operator sees.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+
+from summary import tell
+
+import rosglass
+from rosglass.comm import IMMEDIATE
+
+ADD, TWIST, STRING = (
+    "example_interfaces/srv/AddTwoInts",
+    "geometry_msgs/msg/Twist",
+    "std_msgs/msg/String",
+)
+ROBOT = """
+import time, rosglass
+node = rosglass.connect("dds://", "robot")
+node.create_service_server("/add", "example_interfaces/srv/AddTwoInts",
+                           lambda request: {"sum": request.a + request.b})
+latched = node.create_publisher("/map", "std_msgs/msg/String", rosglass.QoS.latched())
+latched.publish(data="hall")
+numbers = node.create_publisher("/count", "geometry_msgs/msg/Twist")
+print("ready", flush=True)
+number = 0
+while True:
+    numbers.publish(linear={"x": number})
+    number += 1
+    time.sleep(0.02)
+"""
+
+
+def run(command: str) -> None:
+    subprocess.run(command.split(), check=True)
+
+
+# The robot's machine lives as long as this process, which holds its namespace.
+machine = subprocess.Popen(["unshare", "-n", "cat"], stdin=subprocess.PIPE)
+time.sleep(0.3)
+there = f"nsenter -t {machine.pid} -n"
+run("ip link set lo up")
+run(f"{there} ip link set lo up")
+run(f"ip link add cable type veth peer name cable netns {machine.pid}")
+run("ip addr add 10.77.0.1/24 dev cable")
+run(f"{there} ip addr add 10.77.0.2/24 dev cable")
+run("ip link set cable up")
+run(f"{there} ip link set cable up")
+robot = subprocess.Popen([*there.split(), sys.executable, "-c", ROBOT], stdout=subprocess.PIPE)
+assert robot.stdout is not None
+try:
+    assert robot.stdout.readline() == b"ready\n"
+    node = rosglass.connect("dds://", "operator")
+    began = time.monotonic()
+
+    def now() -> float:
+        return time.monotonic() - began
+
+    states: list[tuple[float, str]] = []
+    node.on_status_change(lambda status: states.append((now(), status.state.name)), IMMEDIATE)
+    got: list[tuple[float, float]] = []
+    numbers = node.create_subscription(
+        "/count",
+        TWIST,
+        raw_callback=lambda s: got.append((now(), s.message().linear.x)),
+        executor=IMMEDIATE,
+    )
+    maps: list[str] = []
+    node.create_subscription("/map", STRING, lambda m: maps.append(m.data), rosglass.QoS.latched())
+    client = node.create_service_client("/add", ADD)
+    assert client.wait_for_server(20), client.problem
+    before = client.call({"a": 1, "b": 2}).sum
+    while not (maps and got):
+        time.sleep(0.01)
+    states.clear()
+    run("ip link set cable down")
+    unplugged = now()
+    call = client.call_async({"a": 3, "b": 4}, timeout=20)
+    time.sleep(float(sys.argv[1]) - 0.2)
+    meanwhile = {
+        "status": str(node.status()),
+        "publishers": numbers.publisher_count(),
+        "problem": numbers.problem,
+        "server": client.problem,
+        "ready": client.ready,
+    }
+    time.sleep(0.2)
+    run("ip link set cable up")
+    plugged = now()
+    while got[-1][0] < plugged + 1 and now() < plugged + 15:
+        time.sleep(0.05)
+    count = [number for _, number in got]
+    tell(
+        before=before,
+        meanwhile=meanwhile,
+        call=repr(call.exception(15)),
+        after=client.call({"a": 5, "b": 6}, timeout=15).sum,
+        lost=next((when for when, state in states if state == "LOST"), 99) - unplugged,
+        states=[state for _, state in states],
+        recovered=next((when for when, _ in got if when > plugged), 99) - plugged,
+        rate=sum(when > got[-1][0] - 0.5 for when, _ in got) / 0.5,
+        ordered=count == sorted(set(count)),
+        maps=maps,
+        publishers=numbers.publisher_count(),
+        problems=[numbers.problem, client.problem],
+        status=str(node.status()),
+    )
+    node.close()
+finally:
+    robot.kill()
+    machine.kill()
