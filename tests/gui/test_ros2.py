@@ -125,8 +125,9 @@ def test_the_address_can_be_changed_while_running(running: Any, wait: Any) -> No
 
 
 def engine_with(session: Session, tmp_path: Any) -> Any:
-    from conftest import Bench
     from memory_world import MemoryWorld
+
+    from conftest import Bench
 
     engine = QQmlEngine()
     install(engine, session)

@@ -279,9 +279,14 @@ class ZenohMiddleware(Middleware):
                 raise NodeClosedError("the node is closed; connect again")
             self._declared[id(declaration)] = declaration
             session = self._session
-        self._show(declaration.token)
         if session is not None:
             declaration.attach(session)
+        # Last: who counts it, and publishes, counts on its being there.
+        self._show(declaration.token)
+        with self._lock:
+            gone = id(declaration) not in self._declared
+        if gone:
+            self._hide(declaration.token)
         return declaration
 
     def _open(self) -> None:
