@@ -186,7 +186,10 @@ class ZenohMiddleware(Middleware):
         token = self._token(node, EndpointInfo(kind, topic, type_name, node, qos, type_hash))
         key = topic_key(self._options.domain, topic, type_name, "*")
         place = topic, type_name
-        reader = ZenohReader(self, token, place, key, qos, on_sample, self._drain, self._readers)
+        graph = self._opened_graph()
+        reader = ZenohReader(
+            self, token, place, key, qos, on_sample, self._drain, self._readers, graph
+        )
         self._add(reader)
         return reader
 

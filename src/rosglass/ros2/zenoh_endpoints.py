@@ -17,7 +17,14 @@ import zenoh.ext
 from rosglass.comm import ConnectionState, Durability, Handle, History, Reliability
 from rosglass.errors import ConnectionLostError, NodeClosedError
 from rosglass.ros2.middleware import Writer
-from rosglass.ros2.zenoh_keys import ATTACHMENT_FULL, HUMBLE_HASH, gid_of, topic_key, without_hash
+from rosglass.ros2.zenoh_keys import (
+    ATTACHMENT,
+    ATTACHMENT_FULL,
+    HUMBLE_HASH,
+    gid_of,
+    topic_key,
+    without_hash,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -292,9 +299,12 @@ class ZenohWriter(Declaration, Writer):
         publishers = [self._declare_publisher(session, name) for name in sorted(hashes)]
         # First: whatever is written from here on reaches them; some of it twice, under one number.
         self._publishers += tuple(publishers)
+        lifespan, now = self._qos.lifespan, time.time_ns()
         for data, note in tuple(self._history):
-            for publisher in publishers:
-                publisher.put(data, attachment=note)
+            sent = ATTACHMENT.unpack(note)[1]
+            if lifespan is None or now - sent <= lifespan.nanoseconds:
+                for publisher in publishers:
+                    publisher.put(data, attachment=note)
         return publishers
 
     def _declare_publisher(self, session: zenoh.Session, type_hash: str) -> Any:

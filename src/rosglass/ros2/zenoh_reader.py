@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 import zenoh
 import zenoh.ext
 
-from rosglass.comm import Durability, Reliability
+from rosglass.comm import Durability, EndpointKind, Reliability
+from rosglass.comm.lateness import Lateness
 from rosglass.ros2.middleware import OnSample, Reader
 from rosglass.ros2.zenoh_endpoints import Declaration, Owner, Pump
 from rosglass.ros2.zenoh_keys import ATTACHMENT, HUMBLE_HASH, NO_ATTACHMENT
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.comm import QoS
+    from rosglass.ros2.graph import Graph
     from rosglass.ros2.zenoh_local import Places
 
 __all__ = ["Drain", "ZenohReader"]
@@ -57,6 +59,8 @@ _SHORTLY = 0.02
 _OTHERS = zenoh.Locality.REMOTE
 #: Different keys on a reader's topic that are remembered; each definition of a type has one.
 _MAX_KEYS = 64
+#: Publishers whose lifespan is remembered, for a second.
+_MAX_PUBLISHERS = 256
 
 #: Takes a sample and the time at which it was received.
 _Take: TypeAlias = "Callable[[zenoh.Sample, int], None]"
@@ -245,6 +249,7 @@ class ZenohReader(Declaration, Reader):
         on_sample: Takes the samples.
         drain: Takes what nobody waits for.
         readers: Where the node's own publishers find it.
+        graph: Where publishers' profiles are looked up.
     """
 
     def __init__(
@@ -257,9 +262,10 @@ class ZenohReader(Declaration, Reader):
         on_sample: OnSample,
         drain: Drain,
         readers: Places[ZenohReader],
+        graph: Graph,
     ) -> None:
         super().__init__(owner, token)
-        self._place, self._readers = place, readers
+        self._place, self._readers, self._graph = place, readers, graph
         # Transient local ones get everything over Zenoh, and never in the thread that sends.
         if qos.durability is not Durability.TRANSIENT_LOCAL:
             readers.add(place, self)
@@ -269,6 +275,8 @@ class ZenohReader(Declaration, Reader):
         self._way = _Way.DIRECT
         self._eager, self._moving = True, False
         self._hashes: dict[str, str] = {}
+        self._lifespans: dict[bytes, int] = {}
+        self._lateness = Lateness()
         self._warned = self._anonymous = False
         self._count = self._largest = self._marked = 0
         self._marked_at, self._rate = time.monotonic(), 0.0
@@ -305,6 +313,7 @@ class ZenohReader(Declaration, Reader):
         now, count = time.monotonic(), self._count
         if now - self._marked_at < _WINDOW:
             return
+        self._lifespans.clear()  # publishers may have appeared since
         self._rate = (count - self._marked) / (now - self._marked_at)
         self._marked, self._marked_at = count, now
         self._move()
@@ -418,6 +427,13 @@ class ZenohReader(Declaration, Reader):
             type_hash = self._hashes.get(key)
             if type_hash is None:
                 type_hash = self._read_key(key)
+            lifespan = self._lifespans.get(gid)
+            if lifespan is None:
+                lifespan = self._find_lifespan(gid)
+            # Not by the difference of two clocks, but by how long others of its kind took.
+            known = lifespan and sent is not None
+            if known and self._lateness.see(gid, received, sent) > lifespan:
+                return
             self._on_sample(data, received, sent, gid, sequence, type_hash)
         except Exception:
             self._log_failure()
@@ -436,6 +452,17 @@ class ZenohReader(Declaration, Reader):
                 self._key,
                 len(note),
             )
+
+    def _find_lifespan(self, gid: bytes) -> int:
+        """Return after how many nanoseconds a publisher's samples are worthless, 0 for never."""
+        profiles = [self._qos]
+        if gid:
+            publishers = self._graph.endpoints(EndpointKind.PUBLISHER, self._place[0])
+            profiles += [publisher.qos for publisher in publishers if publisher.gid == gid]
+        spans = [profile.lifespan.nanoseconds for profile in profiles if profile.lifespan]
+        if len(self._lifespans) < _MAX_PUBLISHERS:
+            self._lifespans[gid] = min(spans, default=0)
+        return min(spans, default=0)
 
     def _read_key(self, key: str) -> str:
         type_hash = key.rpartition("/")[2]

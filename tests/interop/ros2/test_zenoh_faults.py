@@ -137,6 +137,46 @@ while True:
 """
 
 
+def test_what_a_stalled_link_hands_on_too_late_is_dropped_if_it_says_so(
+    start_router, connect, wait_for
+):
+    router = start_router()
+    robot, cockpit = (
+        connect(name, "?mode=client", url=start_router.url) for name in ("robot", "cockpit")
+    )
+    brief = rosglass.QoS(1000, lifespan=rosglass.Duration.from_seconds(0.4))
+    publishers = [
+        robot.create_publisher("/mortal", TWIST, brief),
+        robot.create_publisher("/immortal", TWIST, rosglass.QoS(1000)),
+    ]
+    ages = {"/mortal": [], "/immortal": []}
+    for topic, seen in ages.items():
+        cockpit.create_subscription(
+            topic,
+            TWIST,
+            raw_callback=lambda s, seen=seen: seen.append((s.received_ns - s.sent_ns) / 1e9),
+            qos=rosglass.QoS(1000),
+        )
+    wait_for(lambda: all(p.subscription_count() for p in publishers))
+
+    def publish(seconds):
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            for publisher in publishers:
+                publisher.publish()
+            time.sleep(0.02)
+
+    publish(0.5)
+    os.kill(router.pid, signal.SIGSTOP)
+    publish(1.2)
+    os.kill(router.pid, signal.SIGCONT)
+    publish(0.3)
+    wait_for(lambda: max(ages["/immortal"]) > 0.9)
+    assert max(ages["/mortal"]) < 0.6
+    assert len(ages["/mortal"]) > 20
+    assert ages["/mortal"][-1] < 0.3, "those that follow are fresh"
+
+
 def test_a_slow_consumer_costs_no_memory(router, start, connect, wait_for):
     node = connect("cockpit")
     camera = start("-c", CAMERA.format(url=router.url, image=IMAGE))
@@ -236,6 +276,18 @@ def test_a_server_that_answers_rubbish(router, connect, caplog):
             assert client.wait_for_server(5), client.problem
             with pytest.raises(ServiceError, match=f"/{name}"):
                 client.call({"a": 1, "b": 2}, timeout=5)
+        # One that lets the request go, without a word.
+        kept.append(
+            session.declare_queryable(f"0/silent/{kind}", lambda query: query.drop(), complete=True)
+        )
+        token = f"@ros2_lv/0/{own}/0/99/SS/%/%/liar/%silent/{kind}/::,10:,:,:,,"
+        kept.append(session.liveliness().declare_token(token))
+        client = node.create_service_client("/silent", ADD)
+        assert client.wait_for_server(5), client.problem
+        before = time.monotonic()
+        with pytest.raises(ConnectionLostError, match="/silent"):
+            client.call({"a": 1, "b": 2}, timeout=10)
+        assert time.monotonic() - before < 3
         for one in kept:
             one.undeclare()
 

@@ -1,0 +1,123 @@
+from __future__ import annotations
+
+import socket
+import sys
+
+import pytest
+
+zenoh = pytest.importorskip("zenoh")
+
+from rosglass.ros2.zenoh_links import Pulse, limit_silence  # noqa: E402
+from rosglass.ros2.zenoh_local import Places  # noqa: E402
+
+
+class FakeSession:
+    """Answers questions for tokens when told to; knows links."""
+
+    def __init__(self, links=()):
+        self.questions = []
+        self.links = lambda: links
+
+    @property
+    def info(self):
+        return self
+
+    def liveliness(self):
+        return self
+
+    def get(self, key, channel, timeout):
+        self.questions.append(FakeChannel())
+        return self.questions[-1]
+
+
+class FakeChannel:
+    """What a question returns: open, ended, or with an error in it."""
+
+    state = "open"
+
+    def try_recv(self):
+        if self.state == "ended":
+            raise zenoh.ZError("channel is empty and closed")
+        return None if self.state == "open" else "Timeout"
+
+
+def test_a_router_that_answers_is_asked_again():
+    pulse, session = Pulse("key"), FakeSession()
+    for now in range(10):
+        pulse.beat(session, float(now))
+        session.questions[-1].state = "ended"
+        assert not pulse.silent
+    assert len(session.questions) == 10
+
+
+def test_a_router_that_owes_an_answer_is_silent_until_it_answers():
+    pulse, session = Pulse("key"), FakeSession()
+    silent = []
+    for now in range(8):
+        pulse.beat(session, float(now))
+        silent.append(pulse.silent)
+    assert silent == [False] * 4 + [True] * 4
+    assert len(session.questions) == 1, "one question at a time"
+    session.questions[0].state = "ended"
+    pulse.beat(session, 8.0)
+    assert not pulse.silent
+    assert len(session.questions) == 2
+
+
+def test_a_question_whose_time_is_over_is_asked_again_and_the_router_stays_silent():
+    pulse, session = Pulse("key"), FakeSession()
+    pulse.beat(session, 0.0)
+    pulse.beat(session, 5.0)
+    session.questions[0].state = "error"
+    pulse.beat(session, 10.0)
+    assert pulse.silent
+    assert len(session.questions) == 2
+    pulse.rest()
+    assert not pulse.silent
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="a setting of Linux")
+@pytest.mark.parametrize(
+    ("peer", "locator", "limited"),
+    [
+        ("127.0.0.1", "tcp/127.0.0.1:7", False),
+        ("::1", "tcp/[::1]:7", False),
+        ("192.0.2.1", "tcp/192.0.2.1:7", True),
+        ("::ffff:192.0.2.1", "tcp/[::ffff:192.0.2.1]:7", True),
+        ("fe80::1%eth0", "tcp/[fe80::1]:7", True),
+        ("192.0.2.1", "udp/192.0.2.1:7", False),
+        ("192.0.2.1", "tcp/192.0.2.2:7", False),
+        ("192.0.2.1", "tcp/192.0.2.1:8", False),
+        ("192.0.2.1", "tcp/robot:7", False),
+    ],
+)
+def test_connections_that_leave_the_machine_end_when_nothing_is_acknowledged(
+    peer, locator, limited, monkeypatch
+):
+    with (
+        socket.create_server(("127.0.0.1", 0)) as server,
+        socket.create_connection(server.getsockname()) as connection,
+    ):
+        # An address of this machine's own passes for another machine's.
+        monkeypatch.setattr(socket.socket, "getpeername", lambda _: (peer, 7), raising=False)
+
+        class Link:
+            dst = locator
+
+        limit_silence(FakeSession([Link]))
+        timeout = connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT)
+        assert (timeout == 4000) is limited
+
+
+def test_places():
+    places = Places()
+    assert places.at(("/t", "type")) == ()
+    places.add(("/t", "type"), "a")
+    places.add(("/t", "type"), "b")
+    places.add(("/u", "type"), "c")
+    assert places.at(("/t", "type")) == ("a", "b")
+    places.remove(("/t", "type"), "a")
+    places.remove(("/t", "type"), "a")
+    places.remove(("/t", "type"), "b")
+    assert places.at(("/t", "type")) == ()
+    assert places.at(("/u", "type")) == ("c",)

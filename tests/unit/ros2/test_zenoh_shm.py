@@ -1,0 +1,52 @@
+from __future__ import annotations
+
+import logging
+
+import pytest
+
+zenoh = pytest.importorskip("zenoh")
+pytest.importorskip("zenoh.shm")
+
+from rosglass.ros2 import zenoh_shm  # noqa: E402
+from rosglass.ros2.zenoh_shm import SharedMemory  # noqa: E402
+
+BIG = 100_000
+
+
+def test_small_payloads_take_the_usual_way():
+    assert SharedMemory().place((b"x" * 1000,)) is None
+
+
+def test_parts_arrive_as_they_are():
+    parts = (b"head", bytearray(b"y" * BIG), memoryview(b"z" * 3 * BIG), b"")
+    payload = SharedMemory().place(parts)
+    assert payload is not None
+    assert payload.to_bytes() == b"".join(parts)
+
+
+def test_bigger_payloads_get_a_bigger_pool(monkeypatch):
+    monkeypatch.setattr(zenoh_shm, "_POOL", 4 * BIG)
+    monkeypatch.setattr(zenoh_shm, "_PAYLOADS", 2)
+    shared = SharedMemory()
+    kept = [shared.place((bytes([size]) * size * BIG,)) for size in (1, 2, 3, 8)]
+    assert [payload.to_bytes()[:1] for payload in kept] == [b"\x01", b"\x02", b"\x03", b"\x08"]
+
+
+def test_a_full_pool_is_no_error(monkeypatch):
+    monkeypatch.setattr(zenoh_shm, "_POOL", 4 * BIG)
+    monkeypatch.setattr(zenoh_shm, "_PAYLOADS", 2)
+    shared = SharedMemory()
+    kept = [shared.place((b"x" * BIG,)) for _ in range(8)]
+    assert kept[0] is not None
+    assert kept[-1] is None
+    kept.clear()
+    assert shared.place((b"x" * BIG,)) is not None
+
+
+def test_a_machine_without_room_is_told_once(monkeypatch, caplog):
+    monkeypatch.setattr(zenoh_shm, "_free", lambda: 1_000_000)
+    shared = SharedMemory()
+    with caplog.at_level(logging.WARNING):
+        assert [shared.place((b"x" * BIG,)) for _ in range(3)] == [None, None, None]
+    assert len(caplog.records) == 1
+    assert "no shared memory for messages of 100000 bytes" in caplog.text
