@@ -7,7 +7,8 @@ receives the same bytes on the same key with the package zenoh; "raw" is publish
 raw callback; "message" is publish() of a message and a callback that reads one field, on the node's
 dispatcher; "native" is a zenoh subscriber whose samples nobody ever takes: Zenoh's own share.
 "dora" and "sdk" are the subscriptions of dora-rs and zenoh-ros2-sdk to our publisher. A latency
-starts before the publisher's call and ends when the bytes, or the message, are in the callback's hands.
+starts before the publisher's call and ends when the bytes, or the message, are in the callback's
+hands.
 The ways run in turns, several times, and the better run of each counts, as other programs disturb.
 Exits 1 when a target is missed or something got lost.
 """
