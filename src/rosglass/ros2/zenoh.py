@@ -268,6 +268,10 @@ class ZenohMiddleware(Middleware):
         """
         self._used_numbers.append(Token.parse(declaration.token).entity_id)
 
+    def wake(self) -> None:
+        """Have declarations polled soon; for declarations."""
+        self._changed()
+
     def _token(self, node: NodeName, endpoint: EndpointInfo) -> str:
         with self._lock:
             again = len(self._used_numbers) > _RESERVE

@@ -63,6 +63,9 @@ class Owner(Protocol):
     def recycle(self, declaration: Declaration) -> None:
         """Take back the number of a declaration whose token is gone."""
 
+    def wake(self) -> None:
+        """Have declarations polled soon; from any thread."""
+
     def status(self) -> Status:
         """Return the state of the connection."""
 

@@ -14,7 +14,7 @@ import time
 from collections import deque
 from contextlib import suppress
 from enum import Enum
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol
 
 import zenoh
 import zenoh.ext
@@ -26,8 +26,6 @@ from rosglass.ros2.zenoh_endpoints import Declaration, Owner, Pump
 from rosglass.ros2.zenoh_keys import ATTACHMENT, HUMBLE_HASH, NO_ATTACHMENT
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from rosglass.comm import QoS
     from rosglass.ros2.graph import Graph
     from rosglass.ros2.zenoh_local import Places
@@ -39,7 +37,9 @@ _log = logging.getLogger("rosglass.ros2")
 _INTERVAL = 0.05
 _INTERVAL_NS = 50_000_000
 #: Seconds, at least, over which samples are counted to know their rate.
-_WINDOW = 0.5
+_WINDOW = 0.2
+#: Every 512th sample is a moment to see whether they come too fast.
+_HURRY = 511
 #: Samples per second from which collecting what nobody waits for is worth while.
 _OFTEN = 30.0
 #: Samples per second from which a thread of their own is worth while.
@@ -57,13 +57,16 @@ _PATIENCE = 1.0
 _SHORTLY = 0.02
 #: The node's own publishers hand on their samples themselves.
 _OTHERS = zenoh.Locality.REMOTE
-#: Different keys on a reader's topic that are remembered; each definition of a type has one.
-_MAX_KEYS = 64
-#: Publishers whose lifespan is remembered, for a second.
+#: Publishers that are remembered, for a second.
 _MAX_PUBLISHERS = 256
+_NOTE_SIZE, _read_note = ATTACHMENT.size, ATTACHMENT.unpack
 
-#: Takes a sample and the time at which it was received.
-_Take: TypeAlias = "Callable[[zenoh.Sample, int], None]"
+
+class _Take(Protocol):
+    """Takes samples."""
+
+    def __call__(self, sample: zenoh.Sample, received: int = 0, /) -> None:
+        """Take a sample and the time at which it was received, 0 for now."""
 
 
 class Drain:
@@ -133,15 +136,14 @@ class _Source(Protocol):
 
 
 class _Direct:
-    """Hands on samples in the thread that receives them."""
+    """Hands on samples in the thread that receives them; held ones only from the beginning on."""
 
-    def __init__(self, session: zenoh.Session, key: str, take: _Take) -> None:
+    def __init__(self, session: zenoh.Session, key: str, take: _Take, *, held: bool) -> None:
         self._take = take
         self._lock = threading.Lock()
-        self._held: deque[tuple[zenoh.Sample, int]] | None = deque()
-        self._subscriber: Any = session.declare_subscriber(
-            key, zenoh.handlers.Callback(self._receive, indirect=False), allowed_origin=_OTHERS
-        )
+        self._held: deque[tuple[zenoh.Sample, int]] | None = deque() if held else None
+        callback = zenoh.handlers.Callback(self._receive if held else take, indirect=False)
+        self._subscriber: Any = session.declare_subscriber(key, callback, allowed_origin=_OTHERS)
 
     def begin(self) -> None:
         held = self._held
@@ -274,8 +276,7 @@ class ZenohReader(Declaration, Reader):
         self._source: _Source | None = None
         self._way = _Way.DIRECT
         self._eager, self._moving = True, False
-        self._hashes: dict[str, str] = {}
-        self._lifespans: dict[bytes, int] = {}
+        self._known: dict[bytes, tuple[str, int]] = {}
         self._lateness = Lateness()
         self._warned = self._anonymous = False
         self._count = self._largest = self._marked = 0
@@ -290,7 +291,7 @@ class ZenohReader(Declaration, Reader):
             source = _Pumped(advanced, self._take, name, _SHORTLY, self._drain)
         else:
             self._session = session
-            source = _Direct(session, self._key, self._take)
+            source = _Direct(session, self._key, self._take, held=False)
         with self._lock:
             self._source = source
         source.begin()
@@ -313,7 +314,7 @@ class ZenohReader(Declaration, Reader):
         now, count = time.monotonic(), self._count
         if now - self._marked_at < _WINDOW:
             return
-        self._lifespans.clear()  # publishers may have appeared since
+        self._known.clear()  # other publishers may have appeared, or these tell more
         self._rate = (count - self._marked) / (now - self._marked_at)
         self._marked, self._marked_at = count, now
         self._move()
@@ -395,7 +396,7 @@ class ZenohReader(Declaration, Reader):
 
     def _make(self, session: zenoh.Session, way: _Way) -> _Source:
         if way is _Way.DIRECT:
-            return _Direct(session, self._key, self._take)
+            return _Direct(session, self._key, self._take, held=True)
         if way is _Way.COLLECTED:
             room = min(_MAX_WAITING, self._room())
             return _Collected(session, self._key, room, self._take, self._drain)
@@ -404,39 +405,64 @@ class ZenohReader(Declaration, Reader):
         name = f"{self._key} samples"
         return _Pumped(subscriber, self._take, name, _PATIENCE, self._drain)
 
-    def _take(self, sample: zenoh.Sample, received: int) -> None:
+    def _take(self, sample: zenoh.Sample, received: int = 0, /) -> None:
         """Hand a sample on; every line here is paid for by each sample."""
         try:
             if self._closed:
                 return
+            received = received or time.time_ns()
             data = sample.payload.to_bytes()
-            size = len(data)
-            if size < 4 and sample.kind == zenoh.SampleKind.DELETE:
-                return
-            self._count += 1
-            if size > self._largest:  # noqa: PLR1730 - max() takes longer
-                self._largest = size
             attached = sample.attachment
             note = b"" if attached is None else attached.to_bytes()
-            if len(note) == ATTACHMENT.size and note[16] == 16:
-                sequence, sent, gid = ATTACHMENT.unpack(note)
+            known = None
+            if len(note) == _NOTE_SIZE and note[16] == 16:
+                sequence, sent, gid = _read_note(note)
+                known = self._known.get(gid)
             else:
                 sequence, sent, gid = NO_ATTACHMENT
-                self._doubt(note)
-            key = str(sample.key_expr)
-            type_hash = self._hashes.get(key)
-            if type_hash is None:
-                type_hash = self._read_key(key)
-            lifespan = self._lifespans.get(gid)
-            if lifespan is None:
-                lifespan = self._find_lifespan(gid)
+            if known is None:
+                known = self._look_at(sample, data, note, gid)
+                if known is None:
+                    return
+            self._count = count = self._count + 1
+            if not count & _HURRY:
+                self._hurry()
+            type_hash, lifespan = known
             # Not by the difference of two clocks, but by how long others of its kind took.
-            known = lifespan and sent is not None
-            if known and self._lateness.see(gid, received, sent) > lifespan:
+            if lifespan and gid and self._lateness.see(gid, received, sent) > lifespan:
                 return
             self._on_sample(data, received, sent, gid, sequence, type_hash)
         except Exception:
             self._log_failure()
+
+    def _hurry(self) -> None:
+        """Have the way of receiving chosen anew, if this one is too slow for what comes."""
+        span = time.monotonic() - self._marked_at
+        fast = self._count - self._marked > _FAST * span
+        if fast and span > _WINDOW and self._way is _Way.DIRECT:
+            self._owner.wake()
+
+    def _look_at(
+        self, sample: zenoh.Sample, data: bytes, note: bytes, gid: bytes
+    ) -> tuple[str, int] | None:
+        """Take a closer look at a publisher's sample, about once a second.
+
+        Returns:
+            The publisher's type hash, and the nanoseconds after which its samples are worthless, 0
+            for never. None when there is no sample.
+        """
+        if len(data) < 4 and sample.kind == zenoh.SampleKind.DELETE:
+            return None
+        self._largest = max(self._largest, len(data))
+        type_hash = str(sample.key_expr).rpartition("/")[2]
+        if type_hash == HUMBLE_HASH:
+            type_hash = ""
+        known = type_hash, self._lifespan_of(gid)
+        if not gid:
+            self._doubt(note)
+        elif len(self._known) < _MAX_PUBLISHERS:
+            self._known[gid] = known
+        return known
 
     def _log_failure(self) -> None:
         _log.exception("%s: handling a sample failed", self._key)
@@ -453,21 +479,8 @@ class ZenohReader(Declaration, Reader):
                 len(note),
             )
 
-    def _find_lifespan(self, gid: bytes) -> int:
-        """Return after how many nanoseconds a publisher's samples are worthless, 0 for never."""
-        profiles = [self._qos]
-        if gid:
-            publishers = self._graph.endpoints(EndpointKind.PUBLISHER, self._place[0])
-            profiles += [publisher.qos for publisher in publishers if publisher.gid == gid]
+    def _lifespan_of(self, gid: bytes) -> int:
+        publishers = self._graph.endpoints(EndpointKind.PUBLISHER, self._place[0])
+        profiles = [self._qos, *(one.qos for one in publishers if gid and one.gid == gid)]
         spans = [profile.lifespan.nanoseconds for profile in profiles if profile.lifespan]
-        if len(self._lifespans) < _MAX_PUBLISHERS:
-            self._lifespans[gid] = min(spans, default=0)
         return min(spans, default=0)
-
-    def _read_key(self, key: str) -> str:
-        type_hash = key.rpartition("/")[2]
-        if type_hash == HUMBLE_HASH:
-            type_hash = ""
-        if len(self._hashes) < _MAX_KEYS:
-            self._hashes[key] = type_hash
-        return type_hash
