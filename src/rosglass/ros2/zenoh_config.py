@@ -8,9 +8,11 @@ router on another machine it is a client.
 from __future__ import annotations
 
 import json
+import logging
 import os
 import re
 import secrets
+import threading
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -30,6 +32,9 @@ __all__ = [
     "session_config",
 ]
 
+_log = logging.getLogger("rosglass.ros2")
+#: Seconds that closing a session may take; it has taken minutes with 100 nodes in one process.
+_PATIENCE = 5.0
 #: Pause between two attempts to connect, in milliseconds: first, and at most.
 _RETRY = {"period_init_ms": 250, "period_max_ms": 500, "period_increase_factor": 2}
 #: Longest time for opening a link, in milliseconds: closing a session waits for an attempt under
@@ -136,7 +141,24 @@ _processes: set[int] = set()
 
 
 def close_session(session: zenoh.Session) -> None:
-    """Close a session, whatever state it is in."""
+    """Close a session, whatever state it is in; waits for that 5 s at most.
+
+    A thread of Zenoh's own, which closing waits for, does not wait at all.
+    """
+    closing = threading.Thread(target=_close, args=(session,), name="Zenoh closes", daemon=True)
+    try:
+        closing.start()
+    except RuntimeError:  # the interpreter ends, and starts no more threads
+        _close(session)
+        return
+    if isinstance(threading.current_thread(), threading._DummyThread):
+        return
+    closing.join(_PATIENCE)
+    if closing.is_alive():
+        _log.warning("Zenoh still closes a session after %.0f s; it goes on without us", _PATIENCE)
+
+
+def _close(session: zenoh.Session) -> None:
     with suppress(zenoh.ZError):  # one that is broken already is closed enough
         session.close()  # type: ignore[no-untyped-call]
 
