@@ -45,7 +45,7 @@ RATE_RATIO = 0.8
 #: At most this share of a core for 1 kHz of PoseStamped that nobody reads ...
 UNREAD_CPU = 0.03
 #: ... or, where Zenoh alone takes as much already, so much more than that.
-UNREAD_EXTRA = 0.015
+UNREAD_EXTRA = 0.02
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 Usually each sample comes on the thread that receives it, which is the fastest. Where thousands come
 in a second, a thread of Python's own takes them from a native channel, as entering Python from
 outside costs more than everything else. Where nobody waits for them, they are taken from a channel
-some twenty times a second.
+some ten times a second.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ __all__ = ["Drain", "ZenohReader"]
 
 _log = logging.getLogger("rosglass.ros2")
 #: Seconds between two looks at what nobody waits for.
-_INTERVAL = 0.05
-_INTERVAL_NS = 50_000_000
+_INTERVAL = 0.1
+_INTERVAL_NS = 100_000_000
 #: Seconds, at least, over which samples are counted to know their rate.
 _WINDOW = 0.2
 #: Every 512th sample is a moment to see whether they come too fast.

@@ -122,8 +122,8 @@ def test_services_and_latched_topics_after_a_router_was_restarted(
     subscription = late.create_subscription("/map", STRING, qos=rosglass.QoS.latched())
     assert subscription.wait(RECOVERY).message().data == "hall"
     assert time.monotonic() - returned < 2 * RECOVERY
-    assert len(cockpit.service_servers("/add")) == 1
-    assert len(late.publishers("/map")) == 1
+    wait_for(lambda: len(cockpit.service_servers("/add")) == 1)
+    wait_for(lambda: len(late.publishers("/map")) == 1)
 
 
 CAMERA = """
