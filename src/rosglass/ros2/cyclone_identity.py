@@ -45,13 +45,14 @@ from rosglass.ros2.cyclone_samples import COPIED, payload
 from rosglass.ros2.dds_identity import Identity, Origin, inline_qos, read_origin
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from rosglass.ros2.dds_endpoints import SampleWriter
 
 __all__ = [
     "create_reading_topic",
     "create_writing_topic",
+    "hasten",
     "origin",
     "prepare",
     "reading_problem",
@@ -102,6 +103,8 @@ _ToSerUnref = PYFUNCTYPE(None, c_void_p, c_void_p)
 _lock = threading.Lock()
 _origins: dict[int, Origin] = {}
 _told = threading.local()
+#: What to call with samples while they are received, by the address of their type.
+_hasty: dict[int, Callable[[Origin, bytes | memoryview], None]] = {}
 #: Fragments with inline QoS that the library is sending, by their address.
 _fragments: dict[int, Any] = {}
 #: By the address of the type that points to them; the address may be another type's later.
@@ -128,6 +131,29 @@ def prepare(writer: int) -> None:
     _writing.prepare(cyclone.sertype(writer))
 
 
+def hasten(reader: int, take: Callable[[Origin, bytes | memoryview], None]) -> Callable[[], None]:
+    """Have samples of other processes handed on while they are received, besides later on.
+
+    It saves waking a thread, a quarter of a service call's time. Only for what cannot wait for
+    anything: it holds up everything else that is received.
+
+    Args:
+        reader: Of a topic of :func:`create_reading_topic`.
+        take: Takes a sample's origin and payload.
+
+    Returns:
+        What ends it.
+    """
+    sertype = cyclone.sertype(reader)
+    if not _reading.problem:
+        _hasty[sertype] = take
+
+    def end() -> None:
+        _hasty.pop(sertype, None)
+
+    return end
+
+
 def origin(serdata: int) -> Origin | None:
     """Return where a received sample comes from, once; None when it came within this process.
 
@@ -151,7 +177,9 @@ def write(
         Whether it went out with inline QoS; not so if nobody outside this process is matched.
     """
     _told.identity = False
-    writer.write((_MARK, inline_qos(identity), *parts))
+    begin = _MARK + inline_qos(identity)
+    small = sum(map(len, parts)) <= COPIED
+    writer.write((b"".join((begin, *parts)),) if small else (begin, *parts))
     return bool(_told.identity)
 
 
@@ -246,14 +274,19 @@ class _Reading(_Hook):
     """Notes where samples come from."""
 
     def replace(self, originals: Any) -> dict[int, Any]:
-        keeping, releasing = _FromSer(originals[_FROM_SER]), _FromSerFree(originals[_FROM_SER])
+        small, big = _FromSer(originals[_FROM_SER]), _FromSerFree(originals[_FROM_SER])
+        lib = keeping()
 
         def from_ser(sertype: int, kind: int, fragments: int, size: int) -> int | None:
-            make = keeping if size <= COPIED else releasing
+            make = small if size <= COPIED else big
             serdata: int | None = make(sertype, kind, fragments, size)
             try:
                 if serdata is not None and kind == _SDK_DATA:
-                    _note(serdata, fragments)
+                    found = _note(serdata, fragments)
+                    take = _hasty.get(sertype)
+                    if take is not None and found is not None:
+                        lib.ddsi_serdata_ref(serdata)
+                        take(found, payload(serdata))
             except Exception:
                 _log.exception("the origin of a DDS sample cannot be noted")
             return serdata
@@ -371,19 +404,20 @@ class _Writing(_Hook):
 _reading, _writing = _Reading(), _Writing()
 
 
-def _note(serdata: int, fragments: int) -> None:
+def _note(serdata: int, fragments: int) -> Origin | None:
     """Note the origin of a sample that was made from fragments of which the first is the first."""
     rmsg, _, first, _, submessage, end, _ = _RDATA.unpack(string_at(fragments, _RDATA.size))
     _origins.pop(serdata, None)
     if first != 0 or not rmsg or end <= submessage:
-        return
+        return None
     # The library has checked that submessage and parameters end where the payload begins.
     found = read_origin(string_at(rmsg + _PACKET + submessage, end - submessage))
     if found is None:
-        return
+        return None
     while len(_origins) >= _MAX_ORIGINS:
         _origins.pop(next(iter(_origins)), None)
     _origins[serdata] = found
+    return found
 
 
 def _flag(part: int, *, first: bool) -> bool:

@@ -254,17 +254,20 @@ class SampleReader:
         cyclone.delete(self._topic)
 
     def _serve(self) -> bool:
-        if self._on_matched is not None:
-            with suppress(NodeClosedError):
-                if subscription_matched(self.entity).change:
-                    self._on_matched()
-        busy = self._busy
+        busy, count = self._busy, self._count
         if not (busy.acquire(False) or busy.acquire(True, _SOON)):
             return True
         try:
-            return self._hand_on(1)
+            more = self._hand_on(1)
         finally:
             busy.release()
+        # The status calls until it is read, and costs as much as taking a sample.
+        if self._on_matched is not None and self._count == count:
+            with suppress(NodeClosedError):
+                matched = subscription_matched(self.entity)
+                if matched.change or matched.current_change:
+                    self._on_matched()
+        return more
 
     def _hand_on(self, batches: int) -> bool:
         """Hand on so many batches at most; return whether there may be more."""

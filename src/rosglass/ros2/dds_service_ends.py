@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 from rosglass.comm import EndpointKind
 from rosglass.errors import Error, NodeClosedError
 from rosglass.ros2 import cyclone, cyclone_builtin, cyclone_identity
+from rosglass.ros2.cyclone import keeping
 from rosglass.ros2.cyclone_events import Event, publication_matched
 from rosglass.ros2.cyclone_qos import qos_of
 from rosglass.ros2.dds_discovery_info import format_user_data
@@ -102,6 +103,9 @@ class Matched:
     Args:
         handles: Returns their handles.
         look_up: Returns the one with a handle.
+
+    Attributes:
+        all: Those that were there at the last look.
     """
 
     def __init__(
@@ -112,6 +116,7 @@ class Matched:
     ) -> None:
         self._entity, self._handles, self._look_up = entity, handles, look_up
         self._known: dict[int, Discovered] = {}
+        self.all: tuple[Discovered, ...] = ()
 
     def get(self, handle: int) -> Discovered | None:
         """Return the one with a handle; None when it is gone, and was not seen before."""
@@ -122,15 +127,15 @@ class Matched:
                 self._known[handle] = known
         return known
 
-    def all(self) -> list[Discovered]:
-        """Return all there are now."""
+    def refresh(self) -> None:
+        """Look who is there now; to be called when that changes."""
         try:
             handles = self._handles(self._entity)
         except Error:  # deleted meanwhile
-            return []
+            handles = []
         here = {handle: found for handle in handles if (found := self.get(handle)) is not None}
         self._known = here
-        return list(here.values())
+        self.all = tuple(here.values())
 
 
 class Ends:
@@ -150,6 +155,13 @@ class Ends:
         on_taken: Takes what the reader receives, from :meth:`start` on.
         on_matched: Called, on the participant's pump mostly, when peers came, went or settled.
         server: Whether they are a server's.
+
+    Attributes:
+        reader: Receives the other side's.
+        writer: Sends ours; None as long as it must not be there yet.
+        writers: Whom the reader is matched with.
+        readers: Whom the writer is matched with.
+        outbox: What waits to be sent.
     """
 
     def __init__(
@@ -221,6 +233,16 @@ class Ends:
         if scheme_of(writer) is Scheme.HEADER:
             return True
         return time.monotonic() - self._since.get(writer, math.inf) >= _SETTLING
+
+    def catch_up(self) -> None:
+        """Take note of readers whose coming or going has not been told yet."""
+        writer, readers = self.writer, self.readers
+        if writer is None or readers is None:
+            return
+        # Nothing of ours is called while the lock is held that this waits for.
+        count = keeping().dds_get_matched_subscriptions(writer.entity, None, 0)
+        if count >= 0 and count != len(readers.all):
+            self._matched()
 
     def strangers(self) -> list[EndpointInfo]:
         """Return the peers in the graph that do not use Cyclone DDS."""
@@ -305,8 +327,11 @@ class Ends:
         """Look who came or went, and tell."""
         if not self._started.is_set() or self.closed:
             return
+        self.writers.refresh()
+        if self.readers is not None:
+            self.readers.refresh()
         strangers = {
-            found.guid for found in self.writers.all() if scheme_of(found.guid) is Scheme.IDENTITY
+            found.guid for found in self.writers.all if scheme_of(found.guid) is Scheme.IDENTITY
         }
         with self._probing:
             new = not strangers <= self._since.keys()
@@ -356,7 +381,8 @@ class Ends:
         if self.closed or self.writer is None:
             return
         with suppress(NodeClosedError):
-            if publication_matched(self.writer.entity).change:
+            matched = publication_matched(self.writer.entity)
+            if matched.change or matched.current_change:
                 self._matched()
         if self.outbox.retry():
             self._wake(False)

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import itertools
 import logging
+import math
 import secrets
 import struct
 import threading
+import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -21,6 +23,7 @@ from rosglass.errors import (
     UnsupportedError,
 )
 from rosglass.ros2 import cyclone_identity
+from rosglass.ros2.cyclone_samples import COPIED
 from rosglass.ros2.dds_discovery_info import parse_user_data
 from rosglass.ros2.dds_identity import UNKNOWN_GUID, Identity, Origin
 from rosglass.ros2.dds_service_ends import Ends, Scheme, in_this_process, names_of, scheme_of
@@ -38,10 +41,14 @@ __all__ = ["DdsReplier", "DdsRequester"]
 
 _log = logging.getLogger("rosglass.ros2")
 
+Parts = tuple["bytes | bytearray | memoryview", ...]
+_IDS, _IDS_BIG = struct.Struct("<Qq"), struct.Struct(">Qq")
 #: An encapsulation header, and what comes behind it with Scheme.HEADER.
 _ENCAPSULATION, _HEADER = 4, 16
 #: A participant's readers and writers share the beginning of its GUID.
 _PREFIX = 12
+#: Seconds after which a reader of requests without writer of replies belongs to no server.
+_LISTENER = 2.0
 #: Seconds that a reply waits for its client's reader to be found, or to take something.
 _REPLY_PATIENCE = 3.0
 #: Seconds that closing waits for replies that are on their way.
@@ -76,6 +83,11 @@ class DdsRequester(Requester):
         self._calls: dict[int, int] = {}
         self._by_sequence: dict[int, int] = {}
         self._sequence = 0
+        #: How requests are sent now; None when no server is linked.
+        self._scheme: Scheme | None = None
+        #: When readers of requests that belong to no known server came, and when to look again.
+        self._unlinked: dict[bytes, float] = {}
+        self._recheck = math.inf
         self._ends = Ends(
             participant,
             graph,
@@ -85,12 +97,13 @@ class DdsRequester(Requester):
             type_hash,
             qos,
             self._on_replies,
-            self._tell,
+            self._link,
             server=False,
         )
         assert self._ends.writer is not None
         self._writer = self._ends.writer
         self.gid = self._writer.guid
+        self._end_haste = cyclone_identity.hasten(self._ends.reader.entity, self._hasten)
         self._ends.start()
 
     @property
@@ -111,7 +124,9 @@ class DdsRequester(Requester):
 
     def ready(self) -> bool:
         """Return whether a server's reader of requests and its writer of replies are matched."""
-        return not self._ends.closed and self._route() is not None
+        if time.monotonic() >= self._recheck:
+            self._link()
+        return self._scheme is not None and not self._ends.closed
 
     def send(self, data: bytes | bytearray, timeout: float | None) -> int:
         """Send a request; see :meth:`rosglass.ros2.middleware.Requester.send`."""
@@ -129,7 +144,7 @@ class DdsRequester(Requester):
             float("inf") if timeout is None else timeout,
             expired,
             # A signal's exception in the main thread must not spoil the count of what was sent.
-            now=self._route() is not Scheme.IDENTITY or not _in_main_thread(),
+            now=self._scheme is not Scheme.IDENTITY or not _in_main_thread(),
         )
         return number
 
@@ -140,6 +155,9 @@ class DdsRequester(Requester):
 
     def close(self) -> None:
         """Withdraw the client; replies that still come are dropped."""
+        if self._ends.closed:
+            return
+        self._end_haste()
         self._ends.close()
         with self._lock:
             self._calls.clear()
@@ -147,15 +165,15 @@ class DdsRequester(Requester):
 
     def _send(self, number: int, data: bytes | bytearray) -> bool:
         """Send a request; return whether nothing more is to be done for it."""
-        scheme = self._route()
+        # Whoever has just come must not be sent what it takes for something else.
+        self._ends.catch_up()
+        scheme = self._scheme
         if scheme is None:
             self._fail(number, SERVER_LEFT)
             return True
-        parts: tuple[bytes | bytearray | memoryview, ...] = (data,)
+        parts: Parts = (data,)
         if scheme is Scheme.HEADER:
-            header = struct.pack("<Qq", self._id, number)
-            view = memoryview(data)
-            parts = (view[:_ENCAPSULATION], header, view[_ENCAPSULATION:])
+            parts = _with_header(data, _IDS.pack(self._id, number))
         # Replies are looked up under the lock, too: they may come before this returns.
         with self._lock:
             if number not in self._calls:
@@ -179,6 +197,17 @@ class DdsRequester(Requester):
                 self._by_sequence[self._sequence] = number
         return True
 
+    def _hasten(self, origin: Origin, data: bytes | memoryview) -> None:
+        """Take a reply while it is received; what is not taken now comes again."""
+        # Whoever has the lock may be sending, for longer than anybody may be held up here.
+        if self._lock.acquire(blocking=False):
+            try:
+                claim = self._claim(origin.related, data)
+            finally:
+                self._lock.release()
+            if claim is not None:
+                self._answer(*claim, data)
+
     def _on_replies(self, taken: list[Taken]) -> None:
         for data, _, handle, origin in taken:
             server = self._ends.writers.get(handle)
@@ -190,33 +219,37 @@ class DdsRequester(Requester):
                 _log.exception("%s: a reply is lost", self._service)
 
     def _take(self, server: bytes, data: bytes | memoryview, origin: Origin | None) -> None:
-        number = None
         related = None if origin is None else origin.related
-        ours = related is not None and related.guid in (self.gid, self._ends.reader.guid)
-        if related is not None and not ours:
-            pass  # somebody else's
-        elif scheme_of(server) is Scheme.HEADER:
-            header = _read_header(data)
-            if header is None:
-                # Within this process, what says that a reply is for someone else is not told.
-                if not in_this_process(server):
-                    text = "ignoring a reply of %s, which is too short for its header: %d bytes"
-                    self._ends.name(server, text, self._ends.who(server), len(data))
-            elif header[0] == self._id:
-                number = header[1]
-                data = _without_header(data)
-        elif related is not None:
-            with self._lock:
-                number = self._by_sequence.pop(related.sequence, None)
-        elif not cyclone_identity.reading_problem():
-            text = "ignoring replies of %s, which do not say what they answer"
-            self._ends.name(server, text, self._ends.who(server))
-        if number is None:
-            return
         with self._lock:
-            known = self._calls.pop(number, None)
-        if known is not None:
-            self._on_reply(number, data, "")
+            claim = self._claim(related, data)
+        if claim is not None:
+            self._answer(*claim, data)
+        elif related is not None:
+            pass  # somebody else's, or taken before
+        elif scheme_of(server) is Scheme.IDENTITY:
+            if not cyclone_identity.reading_problem():
+                text = "ignoring replies of %s, which do not say what they answer"
+                self._ends.name(server, text, self._ends.who(server))
+        # Within this process, what says that a reply is for someone else is not told.
+        elif _read_header(data) is None and not in_this_process(server):
+            text = "ignoring a reply of %s, which is too short for its header: %d bytes"
+            self._ends.name(server, text, self._ends.who(server), len(data))
+
+    def _claim(
+        self, related: Identity | None, data: bytes | memoryview
+    ) -> tuple[int, Scheme] | None:
+        """Return which open call a reply belongs to, and what shows that, and close the call."""
+        number, scheme = None, Scheme.IDENTITY
+        if related is not None and related.guid in (self.gid, self._ends.reader.guid):
+            number = self._by_sequence.pop(related.sequence, None)
+        if number is None and (header := _read_header(data)) is not None and header[0] == self._id:
+            number, scheme = header[1], Scheme.HEADER
+        if number is None or self._calls.pop(number, None) is None:
+            return None
+        return number, scheme
+
+    def _answer(self, number: int, scheme: Scheme, data: bytes | memoryview) -> None:
+        self._on_reply(number, _without_header(data) if scheme is Scheme.HEADER else data, "")
 
     def _fail(self, number: int, error: str) -> None:
         with self._lock:
@@ -235,17 +268,27 @@ class DdsRequester(Requester):
 
     def _schemes(self) -> dict[Scheme, bool]:
         """Return what the linked servers speak, and whether their replies are sure to arrive."""
-        ends = self._ends
-        answering = {_server_of(found): ends.settled(found.guid) for found in ends.writers.all()}
+        ends, now = self._ends, time.monotonic()
+        answering = {_server_of(found): ends.settled(found.guid) for found in ends.writers.all}
         schemes: dict[Scheme, bool] = {}
-        for found in () if ends.readers is None else ends.readers.all():
+        unlinked: dict[bytes, float] = {}
+        for found in () if ends.readers is None else ends.readers.all:
+            scheme = scheme_of(found.guid)
             settled = answering.get(_server_of(found))
+            if settled is None and scheme is Scheme.IDENTITY:
+                # Its writer of replies is about to be found, unless it is only listening.
+                unlinked[found.guid] = since = self._unlinked.get(found.guid, now)
+                settled = None if now - since >= _LISTENER else False
             if settled is not None:
-                scheme = scheme_of(found.guid)
                 schemes[scheme] = settled or schemes.get(scheme, False)
+        self._unlinked = unlinked
+        young = [since + _LISTENER for since in unlinked.values() if since + _LISTENER > now]
+        self._recheck = min(young, default=math.inf)
         return schemes
 
-    def _tell(self) -> None:
+    def _link(self) -> None:
+        """Take note of the servers that are there now."""
+        self._scheme = self._route()
         if self.changed is not None:
             self.changed()
 
@@ -286,6 +329,9 @@ class DdsReplier(Replier):
         on_request: OnRequest,
     ) -> None:
         self._service, self._on_request = service, on_request
+        #: Clients whose readers of replies are matched, as found out since the last change.
+        self._hearing: set[bytes] = set()
+        self._strangers = False
         self._ends = Ends(
             participant,
             graph,
@@ -295,7 +341,7 @@ class DdsReplier(Replier):
             type_hash,
             qos,
             self._on_requests,
-            lambda: None,
+            self._link,
             server=True,
         )
         self._pump = participant.pump
@@ -373,13 +419,10 @@ class DdsReplier(Replier):
         writer = self._ends.writer
         if writer is None or not self._hears(answer):
             # A reply to a reader that is not matched yet would be lost.
-            return answer.client not in self._ends.writers.all()
-        parts: tuple[bytes | bytearray | memoryview, ...] = (data,)
-        if answer.header:
-            view = memoryview(data)
-            parts = (view[:_ENCAPSULATION], answer.header, view[_ENCAPSULATION:])
+            return answer.client not in self._ends.writers.all
+        parts = _with_header(data, answer.header) if answer.header else (data,)
         try:
-            if answer.header and not self._heard_by_strangers():
+            if answer.header and not self._strangers:
                 writer.write(parts)
             elif not cyclone_identity.write(writer, answer.identity, parts) and not answer.header:
                 who = self._ends.who(answer.client.guid)
@@ -389,23 +432,30 @@ class DdsReplier(Replier):
             return False
         return True
 
-    def _heard_by_strangers(self) -> bool:
-        """Return whether clients get replies that have to say that they are not for them.
-
-        RustDDS's fail when they get one that carries no identity.
-        """
-        if cyclone_identity.writing_problem() or self._ends.readers is None:
-            return False
-        readers = self._ends.readers.all()
-        return any(scheme_of(found.guid) is Scheme.IDENTITY for found in readers)
+    def _link(self) -> None:
+        """Take note of the clients that are there now."""
+        self._hearing = set()
+        readers = () if self._ends.readers is None else self._ends.readers.all
+        # RustDDS's clients fail when they get a reply without identity, whosever it is.
+        self._strangers = not cyclone_identity.writing_problem() and any(
+            scheme_of(found.guid) is Scheme.IDENTITY for found in readers
+        )
 
     def _hears(self, answer: _Answer) -> bool:
         """Return whether the client's reader of replies is matched."""
-        readers = [] if self._ends.readers is None else self._ends.readers.all()
+        hearing = self._hearing
+        key = answer.reader or answer.client.guid
+        if key in hearing:
+            return True
+        readers = () if self._ends.readers is None else self._ends.readers.all
         if answer.reader:
-            return any(found.guid == answer.reader for found in readers)
-        client = _client_of(answer.client)
-        return any(_client_of(found) == client for found in readers)
+            heard = any(found.guid == answer.reader for found in readers)
+        else:
+            client = _client_of(answer.client)
+            heard = any(_client_of(found) == client for found in readers)
+        if heard:
+            hearing.add(key)
+        return heard
 
 
 def _in_main_thread() -> bool:
@@ -426,8 +476,15 @@ def _read_header(data: bytes | memoryview) -> tuple[int, int] | None:
     """Return the client's number and the request's; None when the payload is too short."""
     if len(data) < _ENCAPSULATION + _HEADER:
         return None
-    client, number = struct.unpack_from("<Qq" if data[1] & 1 else ">Qq", data, _ENCAPSULATION)
+    client, number = (_IDS if data[1] & 1 else _IDS_BIG).unpack_from(data, _ENCAPSULATION)
     return client, number
+
+
+def _with_header(data: bytes | bytearray, header: bytes) -> Parts:
+    if len(data) <= COPIED:
+        return (b"".join((data[:_ENCAPSULATION], header, data[_ENCAPSULATION:])),)
+    view = memoryview(data)
+    return view[:_ENCAPSULATION], header, view[_ENCAPSULATION:]
 
 
 def _without_header(data: bytes | memoryview) -> bytes:
