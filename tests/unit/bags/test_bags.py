@@ -119,7 +119,7 @@ def test_a_type_without_definition_is_opaque(tmp_path):
     path = tmp_path / "a.mcap"
     writer = mcap_writer.Writer(str(path))
     writer.start("ros2")
-    schema = writer.register_schema("secret_msgs/msg/Thing", "", b"")
+    schema = writer.register_schema("unheard_of_msgs/msg/Thing", "", b"")
     number = writer.register_channel("/s", "cdr", schema)
     writer.add_message(number, 1, b"\0\1\0\0\1", 1)
     writer.finish()
