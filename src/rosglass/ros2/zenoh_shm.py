@@ -21,8 +21,9 @@ _BIG = 64 * 1024
 #: Size of the pool in bytes, at least, and in payloads; only what is used takes up memory.
 _POOL = 64 * 1024 * 1024
 _PAYLOADS = 10
-#: Bytes copied at a time from what Zenoh does not read itself.
-_PIECE = 256 * 1024
+#: Bytes copied at a time from what Zenoh does not read itself; from 128 kB on, each allocation
+#: would get fresh memory from the system.
+_PIECE = 96 * 1024
 #: Where Linux keeps shared memory.
 _PLACE = "/dev/shm"
 
