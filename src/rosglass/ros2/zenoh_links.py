@@ -52,7 +52,10 @@ class Pulse:
             try:
                 over = self._answer.try_recv() is not None  # an error: nobody answered in time
             except zenoh.ZError:  # the end of the answer
-                over, self.silent = True, False
+                over = True
+                # A link that is given up ends its questions, too: only a prompt end is an answer.
+                if now - self._asked <= _SILENCE:
+                    self.silent = False
             if over:
                 self._answer = None
             elif now - self._asked > _SILENCE:
