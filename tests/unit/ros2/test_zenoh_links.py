@@ -60,8 +60,11 @@ def test_a_router_that_owes_an_answer_is_silent_until_it_answers():
     assert len(session.questions) == 1, "one question at a time"
     session.questions[0].state = "ended"
     pulse.beat(session, 8.0)
-    assert not pulse.silent
+    assert pulse.silent, "a link that is given up ends its questions, too"
     assert len(session.questions) == 2
+    session.questions[1].state = "ended"
+    pulse.beat(session, 9.0)
+    assert not pulse.silent
 
 
 def test_a_question_whose_time_is_over_is_asked_again_and_the_router_stays_silent():
