@@ -94,6 +94,7 @@ class ZenohMiddleware(Middleware):
         self._lock = threading.Lock()
         self._declared: dict[int, Declaration] = {}
         self._links: dict[str, bool] = {}
+        self.version = 0
         self._was_connected = self._closed = False
         self._refused = self._linked = False
         self._pulse = Pulse(f"@ros2_lv/{options.domain}/{self._id}/pulse")
@@ -336,6 +337,7 @@ class ZenohMiddleware(Middleware):
         elif (now := time.monotonic()) >= self._next_beat:
             self._next_beat = now + _BEAT
             self._pulse.beat(session, now)
+            self.version += self._pulse.silent
 
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
         zid = str(event.transport.zid)
@@ -345,6 +347,7 @@ class ZenohMiddleware(Middleware):
                 self._was_connected = self._linked = True
             else:
                 self._links.pop(zid, None)
+        self.version += 1
         self._changed()
 
     def _on_token(self, sample: zenoh.Sample) -> None:
@@ -371,6 +374,8 @@ class ZenohMiddleware(Middleware):
             self._graph.put_node(key, token.node)
             return
         self._graph.put_endpoint(key, endpoint)
+        if endpoint.kind is EndpointKind.SERVICE_SERVER:
+            self.version += 1
         if endpoint.kind is EndpointKind.SERVICE_CLIENT and not endpoint.type_hash:
             for replier in self._of(ZenohReplier):
                 replier.client_came(endpoint)
@@ -380,6 +385,7 @@ class ZenohMiddleware(Middleware):
             return
         self._graph.remove(key)
         if key.split("/", 6)[5:6] == ["SS"]:
+            self.version += 1
             for requester in self._of(ZenohRequester):
                 requester.server_left(gid_of(key))
 

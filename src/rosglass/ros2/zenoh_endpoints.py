@@ -55,7 +55,13 @@ _PATIENCE = 1.0
 
 
 class Owner(Protocol):
-    """Who keeps declarations."""
+    """Who keeps declarations.
+
+    Attributes:
+        version: Another number after each change of links or service servers.
+    """
+
+    version: int
 
     def forget(self, declaration: Declaration) -> None:
         """Drop a declaration that was closed."""

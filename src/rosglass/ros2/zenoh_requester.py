@@ -111,6 +111,7 @@ class ZenohRequester(Declaration, Requester):
         self._numbers = itertools.count(1)
         self._session: zenoh.Session | None = None
         self._queriers: dict[str, zenoh.Querier] = {}
+        self._known_route: tuple[int, tuple[str, set[bytes]]] = -1, ("", set())
         self._calls: dict[int, _Call] = {}
         self._ended: deque[weakref.ref[_Answer]] = deque()
 
@@ -134,10 +135,7 @@ class ZenohRequester(Declaration, Requester):
 
         Not while the link is silent: what is sent then arrives, if ever, when it is out of date.
         """
-        if self._own():
-            return True
-        linked = self._owner.status().state is ConnectionState.CONNECTED
-        return linked and bool(self._route()[1])
+        return bool(self._own()) or bool(self._route()[1])
 
     def send(self, data: bytes | bytearray, timeout: float | None) -> int:
         """Send a request; see :meth:`rosglass.ros2.middleware.Requester.send`."""
@@ -271,6 +269,16 @@ class ZenohRequester(Declaration, Requester):
 
     def _route(self) -> tuple[str, set[bytes]]:
         """Return the key to send requests on, and the servers of others that listen to it."""
+        version = self._owner.version
+        known, route = self._known_route
+        if known != version or not route[1]:
+            route = self._find_route()
+            self._known_route = version, route
+        return route
+
+    def _find_route(self) -> tuple[str, set[bytes]]:
+        if self._owner.status().state is not ConnectionState.CONNECTED:
+            return "", set()
         servers = self._graph.endpoints(EndpointKind.SERVICE_SERVER, self._service.name)
         own = {replier.gid for replier in self._own()}
         for name, key in self._service.keys.items():
