@@ -10,7 +10,8 @@ from rosglass.errors import NodeClosedError
 from rosglass.ros2.dds_discovery import DdsDiscovery
 from rosglass.ros2.dds_endpoints import DdsReader, DdsWriter
 from rosglass.ros2.dds_participant import Participant
-from rosglass.ros2.dds_services import DdsReplier, DdsRequester
+from rosglass.ros2.dds_replier import DdsReplier
+from rosglass.ros2.dds_requester import DdsRequester
 from rosglass.ros2.middleware import Middleware, Reader, Replier, Requester, Writer
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointKind
 from rosglass.errors import Error, NodeClosedError
-from rosglass.ros2 import cyclone, cyclone_builtin, cyclone_identity
+from rosglass.ros2 import cyclone, cyclone_builtin, cyclone_inline_qos, cyclone_origins
 from rosglass.ros2.cyclone import keeping
 from rosglass.ros2.cyclone_events import Event, publication_matched
 from rosglass.ros2.cyclone_qos import qos_of
@@ -36,7 +36,17 @@ if TYPE_CHECKING:
     from rosglass.ros2.dds_participant import Participant
     from rosglass.ros2.graph import Graph
 
-__all__ = ["Ends", "Matched", "Scheme", "in_this_process", "names_of", "scheme_of"]
+__all__ = [
+    "PREFIX",
+    "REMEDY",
+    "Ends",
+    "Matched",
+    "Scheme",
+    "in_main_thread",
+    "in_this_process",
+    "names_of",
+    "scheme_of",
+]
 
 _log = logging.getLogger("rosglass.ros2")
 
@@ -50,7 +60,9 @@ _VENDORS = {
     b"\x01\x12": "RustDDS",
 }
 #: A participant's readers and writers share the beginning of its GUID.
-_PREFIX = 12
+PREFIX = 12
+#: What to do about a peer that cannot be served.
+REMEDY = "start it with RMW_IMPLEMENTATION=rmw_cyclonedds_cpp, or use zenoh:// with rmw_zenoh_cpp"
 #: Requests and replies that are kept until they are acknowledged, or handed on.
 _DEPTH = 1000
 #: Seconds that sending waits in the caller's thread for readers that take nothing.
@@ -84,7 +96,7 @@ class Scheme(Enum):
     #: the client's and one of the request's, which servers return as they are.
     HEADER = "header"
     #: Everyone else's: plain payloads; a reply's inline QoS carries the identity of its request
-    #: (OMG DDS-RPC 1.0), see :mod:`rosglass.ros2.cyclone_identity`.
+    #: (OMG DDS-RPC 1.0), see :mod:`rosglass.ros2.dds_identity`.
     IDENTITY = "identity"
 
 
@@ -106,6 +118,7 @@ class Matched:
 
     Attributes:
         all: Those that were there at the last look.
+        by_guid: The same by their GUIDs.
     """
 
     def __init__(
@@ -117,6 +130,7 @@ class Matched:
         self._entity, self._handles, self._look_up = entity, handles, look_up
         self._known: dict[int, Discovered] = {}
         self.all: tuple[Discovered, ...] = ()
+        self.by_guid: dict[bytes, Discovered] = {}
 
     def get(self, handle: int) -> Discovered | None:
         """Return the one with a handle; None when it is gone, and was not seen before."""
@@ -136,6 +150,7 @@ class Matched:
         here = {handle: found for handle in handles if (found := self.get(handle)) is not None}
         self._known = here
         self.all = tuple(here.values())
+        self.by_guid = {found.guid: found for found in self.all}
 
 
 class Ends:
@@ -204,15 +219,15 @@ class Ends:
             self._user_data,
             self._place,
             self._hand_on,
-            cyclone_identity.create_reading_topic,
-            cyclone_identity.origin,
+            cyclone_origins.create_topic,
+            cyclone_origins.origin,
             self._matched,
         )
         self.writers = Matched(
             self.reader.entity, cyclone.matched_publications, cyclone_builtin.matched_publication
         )
         participant.add_endpoint(node, self.reader.guid, writer=False)
-        _here[participant.guid[:_PREFIX]] += 1
+        _here[participant.guid[:PREFIX]] += 1
         self._server = server
         if not server or self._synced():
             try:
@@ -257,7 +272,7 @@ class Ends:
         nodes = {
             peer.node.full
             for peer in self._graph.endpoints(self._kind, self._service)
-            if peer.gid[:_PREFIX] == guid[:_PREFIX]
+            if peer.gid[:PREFIX] == guid[:PREFIX]
         }
         return f"{' or '.join(sorted(nodes)) or guid.hex()} ({_vendor(guid)})"
 
@@ -272,7 +287,7 @@ class Ends:
         if self.closed:
             return
         self.closed = True
-        _here[self._participant.guid[:_PREFIX]] -= 1
+        _here[self._participant.guid[:PREFIX]] -= 1
         self._participant.remove_endpoint(self.reader.guid)
         self.reader.close()
         self.outbox.close()
@@ -293,7 +308,7 @@ class Ends:
             self._user_data,
             self._place,
             # Requests need no identity beyond that which every sample has.
-            cyclone_identity.create_writing_topic if self._server else cyclone.create_topic,
+            cyclone_inline_qos.create_topic if self._server else cyclone.create_topic,
             _PATIENCE,
         )
         with self._probing:
@@ -301,7 +316,7 @@ class Ends:
                 writer.close()
                 return
             if self._server:
-                cyclone_identity.prepare(writer.entity)
+                cyclone_inline_qos.prepare(writer.entity)
             self.readers = Matched(
                 writer.entity, cyclone.matched_subscriptions, cyclone_builtin.matched_subscription
             )
@@ -407,9 +422,14 @@ class Ends:
             self._participant.pump.visit(self.reader.entity, None)
 
 
+def in_main_thread() -> bool:
+    """Return whether the calling thread is the one where signals raise exceptions."""
+    return threading.current_thread() is threading.main_thread()
+
+
 def in_this_process(guid: bytes) -> bool:
     """Return whether a reader or writer of a service belongs to this process."""
-    return _here[guid[:_PREFIX]] > 0
+    return _here[guid[:PREFIX]] > 0
 
 
 def names_of(peers: Iterable[EndpointInfo]) -> str:
@@ -420,5 +440,5 @@ def names_of(peers: Iterable[EndpointInfo]) -> str:
 
 def _new_id(participant: bytes) -> str:
     """Return what rmw_cyclonedds calls a client or service id, spelled as it does."""
-    first, *rest = participant[:_PREFIX] + next(_numbers).to_bytes(4, "big")
+    first, *rest = participant[:PREFIX] + next(_numbers).to_bytes(4, "big")
     return ".".join((f"{first:2x}", *(f"{byte:x}" for byte in rest)))

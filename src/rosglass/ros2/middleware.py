@@ -139,6 +139,9 @@ class Requester(Handle):
     #: Called, from any thread, when what :meth:`ready` returns may have changed; set by whoever
     #: created it. Without such calls, a server is noticed up to a second late.
     changed: Callable[[], None] | None = None
+    #: Told a request's number, whether taking its reply runs none but our own code, and at once:
+    #: it may be taken in the middle of receiving then. Set by whoever created the requester.
+    quick: Callable[[int], bool] | None = None
 
     @abstractmethod
     def ready(self) -> bool:
@@ -189,6 +192,9 @@ class Replier(Handle):
 
     #: Why some clients in the graph cannot be served, in words; empty when all can.
     problem: str = ""
+    #: Whether taking a request only puts it aside for another thread: it may be taken in the
+    #: middle of receiving then. Set by whoever created the replier.
+    quick: bool = False
 
     @abstractmethod
     def reply(self, request: RequestId, data: bytes | bytearray) -> None:

@@ -33,6 +33,7 @@ class Request:
         servers: Identities of the servers that were there when it was sent.
         alone: Since when none of them is there, None while one is.
         link: Through which it was sent, and its number there.
+        private: Whether nobody else has the call, so that its end calls nobody.
     """
 
     call: Call
@@ -44,6 +45,7 @@ class Request:
     servers: frozenset[bytes | str] = frozenset()
     alone: float | None = None
     link: tuple[Link, int] | None = None
+    private: bool = False
 
     def encode(self, kind: ServiceType) -> bytes:
         """Return its bytes for a type that may have been found only after the call."""
@@ -110,6 +112,13 @@ class Link:
             self._answer(self, request, data, error)
         except Exception:
             _log.exception("taking a reply failed")
+
+    def quick(self, number: int) -> bool:
+        """Return whether taking a reply now runs none but our own code."""
+        with self._lock:
+            request = self._requests.get(number)
+            # While requests are sent, a reply is put aside for whoever sends its request.
+            return request.private if request is not None else self._sending > 0
 
     def forget(self, number: int) -> None:
         """Drop a request's reply, should it still come."""

@@ -157,6 +157,7 @@ class Ros2ServiceClient(ServiceClient, Member):
             )
         timeout = check_timeout(timeout, self.name)
         entry = self._enter(request, timeout)
+        entry.private = True
         try:
             self._flush()
             if timeout is not None:
@@ -371,7 +372,7 @@ class Ros2ServiceClient(ServiceClient, Member):
         link.requester = self._core.middleware.create_requester(
             self._core.name, self.name, kind.name, self._announced.hash, self.qos, link.take
         )
-        link.requester.changed = self._core.wake
+        link.requester.changed, link.requester.quick = self._core.wake, link.quick
         with self._lock:
             old, self._link = self._link, link
             self.type = kind

@@ -8,7 +8,7 @@ import threading
 from concurrent.futures import CancelledError, Future
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import EndpointKind, QoS, ServiceServer
+from rosglass.comm import Dispatcher, EndpointKind, QoS, ServiceServer
 from rosglass.comm.loop import LoopExecutor, executor_for
 from rosglass.errors import DecodeError, Error, NodeClosedError
 from rosglass.ros2.announced import Announced, mismatches, nodes_of
@@ -66,6 +66,8 @@ class Ros2ServiceServer(ServiceServer, Member):
         self._replier = core.middleware.create_replier(
             core.name, name, self.type.name, self._announced.hash, self.qos, self._on_request
         )
+        # Others' executors may do anything.
+        self._replier.quick = isinstance(self._executor, (Dispatcher, LoopExecutor))
         core.add(self)
         core.wake()
 

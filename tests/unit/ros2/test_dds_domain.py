@@ -14,7 +14,7 @@ import rosglass
 
 pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
 
-from rosglass.ros2 import cyclone, cyclone_identity, dds_domain
+from rosglass.ros2 import cyclone, cyclone_inline_qos, cyclone_origins, dds_domain
 from rosglass.ros2.dds_domain import Domain
 from rosglass.ros2.dds_options import DdsOptions
 
@@ -145,7 +145,7 @@ def test_another_version_of_the_series_is_used_with_a_word_on_what_is_lost(
 def test_private_layouts_of_another_version_are_left_alone(monkeypatch):
     monkeypatch.setattr(cyclone, "distribution", lambda _: Package("11.3.0"))
     told = "cyclonedds 11.3.0 is installed instead of 11.0.1"
-    assert cyclone_identity._reading._try(0) == cyclone_identity._writing._try(0) == told
+    assert cyclone_origins._hook._try(0) == cyclone_inline_qos._hook._try(0) == told
 
 
 def test_another_series_is_refused(monkeypatch):

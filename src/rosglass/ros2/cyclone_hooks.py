@@ -1,0 +1,133 @@
+"""Replacing functions that Cyclone DDS makes and reads samples with.
+
+Each topic's type points to a table of functions (``ddsi_serdata_ops``, meant for other languages'
+type support); a topic made here gets a table of its own with some of them replaced. That takes
+private layouts, those of Cyclone DDS 11.0.1 on 64-bit Linux. They are tested once, on memory of our
+own, before anything relies on them.
+
+What the library was given is never freed, as samples outlive readers, writers and topics.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import logging
+import sys
+import threading
+from abc import ABC, abstractmethod
+from ctypes import c_char_p, c_size_t, c_void_p
+from typing import Any
+
+from rosglass.ros2 import cyclone
+from rosglass.ros2.cyclone import keeping
+
+__all__ = ["SDK_DATA", "Hook", "expect", "make_sample"]
+
+_log = logging.getLogger("rosglass.ros2")
+
+#: ``ddsi_serdata_kind`` of a sample that has data.
+SDK_DATA = 2
+#: ``ddsi_sertype.serdata_ops``, and how many functions it has.
+_OPS_OF_TYPE = 8
+_OPS = 17
+
+_lock = threading.Lock()
+#: By the address of the type that points to them; the address may be another type's later.
+_tables: dict[int, Any] = {}
+
+
+class Hook(ABC):
+    """Replaces functions of the types of topics."""
+
+    def __init__(self) -> None:
+        self.problem = ""
+        self._tested = False
+        self._replaced: dict[int, dict[int, Any]] = {}
+
+    def create_topic(self, participant: int, name: str, type_name: str) -> int:
+        """Create a topic whose type has functions replaced; see `cyclone.create_topic`."""
+        # Topics whose types look the same to the library share one: nobody may get in between.
+        with _lock:
+            topic = cyclone.create_topic(participant, name, type_name)
+            try:
+                sertype = cyclone.sertype(topic)
+                if not self._tested:
+                    self._tested = True
+                    self.problem = self._try(sertype)
+                    if self.problem:
+                        _log.warning("%s", self.problem)
+                elif not self.problem:
+                    self._install(sertype)
+            except BaseException:
+                cyclone.delete(topic)
+                raise
+        return topic
+
+    def prepare(self, sertype: int) -> None:
+        """Replace the functions of a type that nobody else uses."""
+        with _lock:
+            if not self.problem:
+                self._install(sertype)
+
+    def function(self, sertype: int, place: int) -> Any:
+        """Return what the library calls for a type, by the place in the table."""
+        return _tables[sertype][place]
+
+    @abstractmethod
+    def replace(self, originals: Any) -> dict[int, Any]:
+        """Return functions by their place in the table, which call the original ones."""
+
+    @abstractmethod
+    def test(self, sertype: int) -> None:
+        """Raise when the functions do not do what they should with samples of a type."""
+
+    def _try(self, sertype: int) -> str:
+        if strange := cyclone.strange_version():
+            return strange
+        if sys.platform != "linux" or sys.byteorder != "little":
+            return f"DDS on {sys.platform} does without identities: it was never tried there"
+        pointer = c_void_p.from_address(sertype + _OPS_OF_TYPE)
+        originals = pointer.value
+        try:
+            self._install(sertype)
+            self.test(sertype)
+        except Exception as error:
+            pointer.value = originals
+            return (
+                f"Cyclone DDS {cyclone.VERSION} is built differently on this machine "
+                f"({type(self).__name__}: {error!r})"
+            )
+        return ""
+
+    def _install(self, sertype: int) -> None:
+        pointer = c_void_p.from_address(sertype + _OPS_OF_TYPE)
+        table = _tables.get(sertype)
+        if table is not None and pointer.value == ctypes.addressof(table):
+            return
+        originals = pointer.value
+        assert originals is not None
+        if originals not in self._replaced:
+            self._replaced[originals] = self.replace((c_void_p * _OPS).from_address(originals))
+        # One for each type: otherwise the library would take types for the same that it knows as
+        # two, and remove the wrong one when a topic is deleted.
+        if table is None:
+            table = _tables[sertype] = (c_void_p * _OPS)()
+        ctypes.memmove(table, originals, ctypes.sizeof(table))
+        for place, function in self._replaced[originals].items():
+            table[place] = ctypes.cast(function, c_void_p)
+        pointer.value = ctypes.addressof(table)
+
+
+def make_sample(sertype: int, data: bytes) -> int:
+    """Return the address of a new serdata, for tests; raises ValueError when there is none."""
+    part = (c_size_t * 2)(ctypes.cast(c_char_p(data), c_void_p).value or 0, len(data))
+    made = keeping().ddsi_serdata_from_ser_iov(sertype, SDK_DATA, 1, part, len(data))
+    if not made:
+        raise ValueError("no sample can be made")
+    return int(made)
+
+
+def expect(found: object, wanted: object) -> None:
+    """Raise ValueError when a test finds something else than wanted."""
+    if found != wanted:
+        raise ValueError(f"{found!r} instead of {wanted!r}")
