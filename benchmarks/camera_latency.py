@@ -34,7 +34,7 @@ import numpy as np
 from rosglass.demo import framecode
 from rosglass.demo.camera import CODE_POSITION, HEIGHT, WIDTH
 from rosglass.demo.processes import VirtualScreen
-from rosglass.ros2.router import Router
+from rosglass.ros2.zenoh.router import Router
 
 TARGET = 25.0
 #: The C++ plugin (qml_ros_plugin 1.0.0, ROS 1, qmlscene, same interface, same pictures).

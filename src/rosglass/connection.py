@@ -152,10 +152,10 @@ def _zenoh(url: str) -> Middleware:
             f"cannot connect to {url!r}: Zenoh is not installed; "
             'install it with: pip install "rosglass[zenoh]"'
         )
-    from rosglass.ros2.zenoh_options import ZenohOptions  # noqa: PLC0415
+    from rosglass.ros2.zenoh.options import ZenohOptions  # noqa: PLC0415
 
     options = ZenohOptions.parse(url, os.environ)
-    from rosglass.ros2.zenoh import ZenohMiddleware  # noqa: PLC0415
+    from rosglass.ros2.zenoh.middleware import ZenohMiddleware  # noqa: PLC0415
 
     return ZenohMiddleware(options)
 
@@ -166,9 +166,9 @@ def _dds(url: str) -> Middleware:
             f"cannot connect to {url!r}: Cyclone DDS is not installed; "
             'install it with: pip install "rosglass[dds]"'
         )
-    from rosglass.ros2.dds_options import DdsOptions  # noqa: PLC0415
+    from rosglass.ros2.dds.options import DdsOptions  # noqa: PLC0415
 
     options = DdsOptions.parse(url, os.environ)
-    from rosglass.ros2.dds import DdsMiddleware  # noqa: PLC0415
+    from rosglass.ros2.dds.middleware import DdsMiddleware  # noqa: PLC0415
 
     return DdsMiddleware(options)

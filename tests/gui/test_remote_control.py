@@ -13,7 +13,7 @@ import pytest
 import rosglass
 from rosglass.comm import QoS, Time
 from rosglass.qml import Session, install
-from rosglass.ros2.router import Router
+from rosglass.ros2.zenoh.router import Router
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

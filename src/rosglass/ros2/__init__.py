@@ -1,7 +1,7 @@
 """ROS 2 on the wire: names, the graph, topics, over one small middleware seam.
 
-Import what you need from the modules: :mod:`rosglass.ros2.zenoh` brings in the ``eclipse-zenoh``
-package, the others do not.
+Import what you need from the modules: those of :mod:`rosglass.ros2.zenoh` bring in the
+``eclipse-zenoh`` package, those of :mod:`rosglass.ros2.dds` ``cyclonedds``, the others neither.
 """
 
 from rosglass.ros2.graph import Graph

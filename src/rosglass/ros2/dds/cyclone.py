@@ -5,9 +5,8 @@ while it copies samples, announces a type description that keeps plain ROS 2 end
 matching, and takes 0.2 s to import. Entities are the numbers that the library gives them. What is
 declared here follows the headers of Eclipse Cyclone DDS 11 (``dds/dds.h``, ``dds/ddsc/*.h``).
 
-Samples are in :mod:`rosglass.ros2.cyclone_samples`, profiles in :mod:`rosglass.ros2.cyclone_qos`,
-events in :mod:`rosglass.ros2.cyclone_events`, the discovered participants and endpoints in
-:mod:`rosglass.ros2.cyclone_builtin`.
+Beside it, samples are in ``cyclone_samples``, profiles in ``cyclone_qos``, events in
+``cyclone_events``, the discovered participants and endpoints in ``cyclone_builtin``.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ from rosglass.errors import (
 )
 
 if TYPE_CHECKING:
-    from rosglass.ros2.cyclone_qos import Qos
+    from rosglass.ros2.dds.cyclone_qos import Qos
 
 __all__ = [
     "GONE",

@@ -13,15 +13,15 @@ import zenoh
 
 from rosglass.comm import EndpointKind
 from rosglass.ros2.middleware import OnRequest, Replier, RequestId
-from rosglass.ros2.zenoh_endpoints import Declaration, Owner, direct
-from rosglass.ros2.zenoh_keys import NO_ATTACHMENT, Attachment, gid_of, without_hash
-from rosglass.ros2.zenoh_services import Service, send
+from rosglass.ros2.zenoh.endpoints import Declaration, Owner, direct
+from rosglass.ros2.zenoh.keys import NO_ATTACHMENT, Attachment, gid_of, without_hash
+from rosglass.ros2.zenoh.services import Service, send
 
 if TYPE_CHECKING:
     from rosglass.comm import EndpointInfo
     from rosglass.ros2.graph import Graph
-    from rosglass.ros2.zenoh_local import Places
-    from rosglass.ros2.zenoh_requester import ZenohRequester
+    from rosglass.ros2.zenoh.local import Places
+    from rosglass.ros2.zenoh.requester import ZenohRequester
 
 __all__ = ["HeldCall", "ZenohReplier"]
 

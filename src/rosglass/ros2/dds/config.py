@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rosglass.errors import ConversionError
-from rosglass.ros2.dds_options import DdsOptions, DiscoveryRange
-from rosglass.ros2.dds_peers import addresses
+from rosglass.ros2.dds.options import DdsOptions, DiscoveryRange
+from rosglass.ros2.dds.peers import addresses
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,7 +29,7 @@ _SIZES = (
 )
 #: Fast DDS 2.9 notices no reader, writer or participant of ours that goes without this.
 _KEYS = "<GenerateKeyhash>true</GenerateKeyhash>"
-#: Deleting a writer holds up nobody: writers linger in dds_lingering.py, all together.
+#: Deleting a writer holds up nobody: writers linger in lingering.py, all together.
 _LINGER = "<WriterLingerDuration>0s</WriterLingerDuration>"
 #: Programs per machine that others can find by asking its ports; beyond, the ports are those of
 #: the next domain (RTPS 2.5, section 9.6.2).

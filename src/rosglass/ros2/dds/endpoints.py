@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import History, Reliability
 from rosglass.errors import NodeClosedError, TimeoutError  # noqa: A004 - the field's own word
-from rosglass.ros2 import cyclone, cyclone_builtin
-from rosglass.ros2.cyclone_events import (
+from rosglass.ros2.dds import cyclone, cyclone_builtin
+from rosglass.ros2.dds.cyclone_events import (
     Event,
     liveliness_changed,
     sample_lost,
     set_events,
     subscription_matched,
 )
-from rosglass.ros2.cyclone_qos import qos_of
-from rosglass.ros2.cyclone_samples import Batch, Taken, discard, sample, send
-from rosglass.ros2.dds_discovery_info import format_user_data, hash_of
+from rosglass.ros2.dds.cyclone_qos import qos_of
+from rosglass.ros2.dds.cyclone_samples import Batch, Taken, discard, sample, send
+from rosglass.ros2.dds.discovery_info import format_user_data, hash_of
 from rosglass.ros2.middleware import Reader, Writer
 from rosglass.ros2.names import mangle_type
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rosglass.comm import NodeName, QoS
-    from rosglass.ros2.dds_participant import Participant
+    from rosglass.ros2.dds.participant import Participant
     from rosglass.ros2.middleware import OnSample
 
 __all__ = ["DdsReader", "DdsWriter", "SampleReader", "SampleWriter", "Taken", "topic_name"]

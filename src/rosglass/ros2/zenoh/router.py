@@ -13,16 +13,16 @@ import zenoh
 
 from rosglass.comm import Handle
 from rosglass.errors import ConnectionLostError, ConversionError
-from rosglass.ros2.zenoh_config import (
+from rosglass.ros2.zenoh.config import (
     close_session,
     open_session,
     reason,
     router_config,
     session_config,
 )
-from rosglass.ros2.zenoh_endpoints import CHANNEL, Pump
-from rosglass.ros2.zenoh_links import limit_silence
-from rosglass.ros2.zenoh_options import DEFAULT_PORT, ZenohOptions, locator
+from rosglass.ros2.zenoh.endpoints import CHANNEL, Pump
+from rosglass.ros2.zenoh.links import limit_silence
+from rosglass.ros2.zenoh.options import DEFAULT_PORT, ZenohOptions, locator
 
 __all__ = ["DEFAULT_LISTEN", "Router", "is_router_reachable"]
 

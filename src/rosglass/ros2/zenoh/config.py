@@ -20,7 +20,7 @@ from typing import Any
 import zenoh
 
 from rosglass.errors import ConversionError, UnsupportedError
-from rosglass.ros2.zenoh_options import ZenohOptions, locator
+from rosglass.ros2.zenoh.options import ZenohOptions, locator
 
 __all__ = [
     "check_process",

@@ -19,21 +19,21 @@ from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointKind
 from rosglass.errors import Error, NodeClosedError
-from rosglass.ros2 import cyclone, cyclone_builtin, cyclone_inline_qos, cyclone_origins
-from rosglass.ros2.cyclone import keeping
-from rosglass.ros2.cyclone_events import Event, publication_matched
-from rosglass.ros2.cyclone_qos import qos_of
-from rosglass.ros2.dds_discovery_info import format_user_data
-from rosglass.ros2.dds_endpoints import SampleReader, SampleWriter, Taken
-from rosglass.ros2.dds_outbox import Outbox
+from rosglass.ros2.dds import cyclone, cyclone_builtin, cyclone_inline_qos, cyclone_origins
+from rosglass.ros2.dds.cyclone import keeping
+from rosglass.ros2.dds.cyclone_events import Event, publication_matched
+from rosglass.ros2.dds.cyclone_qos import qos_of
+from rosglass.ros2.dds.discovery_info import format_user_data
+from rosglass.ros2.dds.endpoints import SampleReader, SampleWriter, Taken
+from rosglass.ros2.dds.outbox import Outbox
 from rosglass.ros2.names import mangle_type
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from rosglass.comm import EndpointInfo, NodeName, QoS
-    from rosglass.ros2.cyclone_builtin import Discovered
-    from rosglass.ros2.dds_participant import Participant
+    from rosglass.ros2.dds.cyclone_builtin import Discovered
+    from rosglass.ros2.dds.participant import Participant
     from rosglass.ros2.graph import Graph
 
 __all__ = [
@@ -96,7 +96,7 @@ class Scheme(Enum):
     #: the client's and one of the request's, which servers return as they are.
     HEADER = "header"
     #: Everyone else's: plain payloads; a reply's inline QoS carries the identity of its request
-    #: (OMG DDS-RPC 1.0), see :mod:`rosglass.ros2.dds_identity`.
+    #: (OMG DDS-RPC 1.0), see :mod:`rosglass.ros2.dds.identity`.
     IDENTITY = "identity"
 
 

@@ -6,19 +6,19 @@ import threading
 import time
 from typing import TYPE_CHECKING
 
-from rosglass.ros2 import cyclone
-from rosglass.ros2.cyclone_qos import Qos
-from rosglass.ros2.dds_discovery_info import PARTICIPANT_USER_DATA, NodeEntities
-from rosglass.ros2.dds_domain import Domain
-from rosglass.ros2.dds_lingering import Lingering
-from rosglass.ros2.dds_pump import Pump
+from rosglass.ros2.dds import cyclone
+from rosglass.ros2.dds.cyclone_qos import Qos
+from rosglass.ros2.dds.discovery_info import PARTICIPANT_USER_DATA, NodeEntities
+from rosglass.ros2.dds.domain import Domain
+from rosglass.ros2.dds.lingering import Lingering
+from rosglass.ros2.dds.pump import Pump
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.comm import NodeName
-    from rosglass.ros2.dds_graph import DdsGraph
-    from rosglass.ros2.dds_options import DdsOptions
+    from rosglass.ros2.dds.graph import DdsGraph
+    from rosglass.ros2.dds.options import DdsOptions
 
 __all__ = ["Participant"]
 

@@ -17,7 +17,7 @@ import zenoh.ext
 from rosglass.comm import ConnectionState, Durability, Handle, History, Reliability
 from rosglass.errors import ConnectionLostError, NodeClosedError
 from rosglass.ros2.middleware import Writer
-from rosglass.ros2.zenoh_keys import (
+from rosglass.ros2.zenoh.keys import (
     ATTACHMENT,
     ATTACHMENT_FULL,
     HUMBLE_HASH,
@@ -30,10 +30,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rosglass.comm import EndpointInfo, QoS, Status
-    from rosglass.ros2.zenoh_local import Places
-    from rosglass.ros2.zenoh_options import ZenohOptions
-    from rosglass.ros2.zenoh_reader import ZenohReader
-    from rosglass.ros2.zenoh_shm import SharedMemory
+    from rosglass.ros2.zenoh.local import Places
+    from rosglass.ros2.zenoh.options import ZenohOptions
+    from rosglass.ros2.zenoh.reader import ZenohReader
+    from rosglass.ros2.zenoh.shm import SharedMemory
 
 __all__ = [
     "CHANNEL",

@@ -1,7 +1,7 @@
 """Service clients over DDS, for servers of every DDS implementation.
 
 A service's replies go to all its clients, who pick their own. How, depends on the server; see
-:class:`rosglass.ros2.dds_service_ends.Scheme`.
+:class:`rosglass.ros2.dds.service_ends.Scheme`.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from rosglass.errors import (
     TimeoutError,  # noqa: A004 - the field's own word
     UnsupportedError,
 )
-from rosglass.ros2 import cyclone_origins
-from rosglass.ros2.dds_discovery_info import parse_user_data
-from rosglass.ros2.dds_headers import Parts, pack, unpack, with_header, without_header
-from rosglass.ros2.dds_service_ends import (
+from rosglass.ros2.dds import cyclone_origins
+from rosglass.ros2.dds.discovery_info import parse_user_data
+from rosglass.ros2.dds.headers import Parts, pack, unpack, with_header, without_header
+from rosglass.ros2.dds.service_ends import (
     PREFIX,
     REMEDY,
     Ends,
@@ -37,10 +37,10 @@ from rosglass.ros2.middleware import SERVER_LEFT, Requester
 
 if TYPE_CHECKING:
     from rosglass.comm import NodeName, QoS
-    from rosglass.ros2.cyclone_builtin import Discovered
-    from rosglass.ros2.dds_endpoints import Taken
-    from rosglass.ros2.dds_identity import Identity, Origin
-    from rosglass.ros2.dds_participant import Participant
+    from rosglass.ros2.dds.cyclone_builtin import Discovered
+    from rosglass.ros2.dds.endpoints import Taken
+    from rosglass.ros2.dds.identity import Identity, Origin
+    from rosglass.ros2.dds.participant import Participant
     from rosglass.ros2.graph import Graph
     from rosglass.ros2.middleware import OnReply
 

@@ -12,14 +12,14 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointInfo, EndpointKind, NodeName
-from rosglass.ros2.dds_discovery_info import hash_of, is_rosglass
+from rosglass.ros2.dds.discovery_info import hash_of, is_rosglass
 from rosglass.ros2.names import demangle_topic, demangle_type
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from rosglass.ros2.cyclone_builtin import Discovered
-    from rosglass.ros2.dds_discovery_info import ParticipantEntities
+    from rosglass.ros2.dds.cyclone_builtin import Discovered
+    from rosglass.ros2.dds.discovery_info import ParticipantEntities
     from rosglass.ros2.graph import Graph
 
 __all__ = ["UNKNOWN", "DdsGraph"]

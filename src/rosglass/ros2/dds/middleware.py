@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 from rosglass.comm import ConnectionState, EndpointInfo, EndpointKind, Handle, Status
 from rosglass.errors import NodeClosedError
-from rosglass.ros2.dds_discovery import DdsDiscovery
-from rosglass.ros2.dds_endpoints import DdsReader, DdsWriter
-from rosglass.ros2.dds_participant import Participant
-from rosglass.ros2.dds_replier import DdsReplier
-from rosglass.ros2.dds_requester import DdsRequester
+from rosglass.ros2.dds.discovery import DdsDiscovery
+from rosglass.ros2.dds.endpoints import DdsReader, DdsWriter
+from rosglass.ros2.dds.participant import Participant
+from rosglass.ros2.dds.replier import DdsReplier
+from rosglass.ros2.dds.requester import DdsRequester
 from rosglass.ros2.middleware import Middleware, Reader, Replier, Requester, Writer
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from rosglass.comm import NodeName, QoS
     from rosglass.interfaces import Definition
-    from rosglass.ros2.dds_options import DdsOptions
+    from rosglass.ros2.dds.options import DdsOptions
     from rosglass.ros2.graph import Graph
     from rosglass.ros2.middleware import OnReply, OnRequest, OnSample
 
@@ -130,7 +130,7 @@ class DdsMiddleware(Middleware):
 
     def describe_type(self, endpoint: EndpointInfo, timeout: float) -> Definition | None:
         """Return the definition that an endpoint announces by XTypes."""
-        from rosglass.ros2.dds_types import announced_definition  # noqa: PLC0415 - rarely needed
+        from rosglass.ros2.dds.types import announced_definition  # noqa: PLC0415 - rarely needed
 
         provider = f"wire {endpoint.node} (TypeLookup)"
         entity = self._joined().entity
