@@ -82,11 +82,11 @@ class ClientGoal(Handle):
 
     Attributes:
         id: 16 bytes (a UUID) in ROS 2.
-        goal: What was asked for.
+        goal: What was asked for; None while the action's type is not discovered yet.
     """
 
     id: bytes
-    goal: Message
+    goal: Message | None
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.id_text} {self.status.value}>"
@@ -131,7 +131,9 @@ class ClientGoal(Handle):
             TimeoutError: It has not ended within the time, and goes on; or the server did not
                 accept it within the time given to send_goal() (status LOST).
             GoalRejectedError: The server did not accept it.
-            ServiceUnavailableError: No server appeared within the time given to send_goal().
+            ServiceUnavailableError: No server appeared within the time given to send_goal(), or the
+                goal was cancelled before any server told the action's type (status CANCELED).
+            ConversionError: A value does not fit the type, which was discovered after sending.
             ServiceError: The server's answer cannot be decoded.
             ConnectionLostError: The server went away before the end.
             NodeClosedError: The client is closed, or gets closed meanwhile.
@@ -231,9 +233,8 @@ class ActionClient(Handle):
             timeout: Seconds for the server to appear and to accept or reject it; None for ever.
 
         Raises:
-            ConversionError: A value does not fit its field; nothing is sent.
-            ServiceUnavailableError: The client was created without a type, and no server is there
-                yet that tells it.
+            ConversionError: A value does not fit its field; nothing is sent. While the type is not
+                discovered yet, that shows later: the goal ends with it.
             NodeClosedError: The client is closed.
         """
 

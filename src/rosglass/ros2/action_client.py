@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import logging
 import threading
+import time
 import uuid
 from typing import TYPE_CHECKING, Any, cast
 
@@ -58,6 +60,8 @@ class Ros2ActionClient(ActionClient, Member):
         self._lock = threading.Lock()
         self._goals: dict[bytes, Ros2ClientGoal] = {}
         self._ends: ActionEnds | None = None
+        #: What is to be done once the type is known.
+        self._held: list[Callable[[], None]] = []
         self._closed = False
         self._warned = ""
         self._readiness = Readiness(name, lambda: self.ready, self._check_open, core.dispatcher)
@@ -126,12 +130,13 @@ class Ros2ActionClient(ActionClient, Member):
         if executor is not None and not isinstance(executor, Executor):
             raise ConversionError("executor", executor, "a rosglass.comm.Executor", self.name)
         kind = self.type
-        if kind is None:
-            raise ServiceUnavailableError(
-                f"the type of {self.name} is not known yet: {self.problem}; wait for the server, "
-                "or give the type to create_action_client()"
-            )
-        made = Ros2ClientGoal(self, uuid.uuid4().bytes, kind.goal.create(goal), timeout)
+        if kind is not None:
+            value: Any = kind.goal.create(goal)
+        elif goal is None or hasattr(goal, "to_dict") or isinstance(goal, dict):
+            value = copy.deepcopy(goal)  # the caller may change it meanwhile
+        else:
+            raise ConversionError("", goal, "a message or a dict of fields", self.name)
+        made = Ros2ClientGoal(self, uuid.uuid4().bytes, value, timeout, typed=kind is not None)
         if on_feedback is not None:
             made.on_feedback(on_feedback, executor)
         if on_status_change is not None:
@@ -143,7 +148,11 @@ class Ros2ActionClient(ActionClient, Member):
         with self._lock:
             if not self._closed:
                 self._goals[made.id] = made
-        made.send()
+        if kind is not None:
+            made.send()
+        else:
+            made.hold()
+            self._once_typed(made.begin)
         return made
 
     def cancel_all(self, timeout: float | None = 10.0) -> Promise[CancelAnswer]:
@@ -189,6 +198,9 @@ class Ros2ActionClient(ActionClient, Member):
         self, goal_id: bytes, stamp: Time, answer: Promise[CancelAnswer], timeout: float | None
     ) -> None:
         """Ask for goals to be cancelled: one, or those until a time, or all."""
+        if self._ends is None and not self._closed:
+            self._ask_cancel_later(goal_id, stamp, answer, timeout)
+            return
         try:
             request = {"goal_info": goal_info(goal_id, stamp)}
             call = self._open_ends().cancel_goal.call_async(request, timeout=timeout)
@@ -196,6 +208,30 @@ class Ros2ActionClient(ActionClient, Member):
             answer.fail(error)
             return
         call.add_done_callback(lambda _: self._take_answer(goal_id, call, answer, timeout))
+
+    def _ask_cancel_later(
+        self, goal_id: bytes, stamp: Time, answer: Promise[CancelAnswer], timeout: float | None
+    ) -> None:
+        until = None if timeout is None else time.monotonic() + timeout
+
+        def ask() -> None:
+            if not answer.done():
+                left = None if until is None else max(0.0, until - time.monotonic())
+                self.ask_cancel(goal_id, stamp, answer, left)
+
+        def give_up() -> None:
+            if self._ends is None:
+                answer.fail(self._no_cancelling(timeout))
+
+        if timeout is not None:
+            self.core.timers.after(timeout, give_up)
+        self._once_typed(ask)
+
+    def _no_cancelling(self, timeout: float | None) -> ServiceUnavailableError:
+        return ServiceUnavailableError(
+            f"{self.name} could not be asked to cancel within {timeout or 0.0:g} s: "
+            f"{self.problem or 'its server appeared too late'}"
+        )
 
     def withdraw(self, call: Call) -> bool:
         """Take a goal back that was not sent yet; return whether that was so."""
@@ -247,10 +283,7 @@ class Ros2ActionClient(ActionClient, Member):
                 "all the same: watch the goal's status"
             )
         elif isinstance(error, ServiceUnavailableError):
-            error = ServiceUnavailableError(
-                f"{self.name} could not be asked to cancel within {timeout:g} s: "
-                f"{self.problem or 'its server appeared too late'}"
-            )
+            error = self._no_cancelling(timeout)
         if error is not None:
             answer.fail(error)
             return
@@ -293,8 +326,11 @@ class Ros2ActionClient(ActionClient, Member):
             self.type = types.action
             closed = self._closed
             goals = list(self._goals.values())
+            held, self._held = self._held, []
         if closed:
             ends.close()
+        for job in held:
+            job()
         if old is None:
             return
         for goal in goals:
@@ -303,6 +339,14 @@ class Ros2ActionClient(ActionClient, Member):
             elif goal.accepted is not None:
                 goal.lose(self.replaced())
         old.close()
+
+    def _once_typed(self, job: Callable[[], None]) -> None:
+        """Do something now, or as soon as the type is known."""
+        with self._lock:
+            if self._ends is None and not self._closed:
+                self._held.append(job)
+                return
+        job()
 
     def _conflicts(self) -> list[str]:
         """Say what a person has to mend."""
@@ -339,11 +383,13 @@ class Ros2ActionClient(ActionClient, Member):
                 return
             self._closed = True
             goals = list(self._goals.values())
-            ends = self._ends
+            ends, held, self._held = self._ends, self._held, []
         if self.core.forked:
             return
         for goal in goals:
             goal.lose(self.ended())
+        for job in held:
+            job()  # finds the client closed
         if ends is not None:
             ends.close()
         self._readiness.close()

@@ -6,7 +6,7 @@ import logging
 import time
 from collections import deque
 from functools import partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rosglass.comm import (
     ActionResult,
@@ -74,14 +74,17 @@ class Ros2ClientGoal(ClientGoal):
     Args:
         client: Its client.
         id: Its id, 16 random bytes.
-        goal: What is asked for.
+        goal: What is asked for: a message of the action's type, or what becomes one.
         timeout: Seconds for the server to appear and to accept or reject it.
+        typed: Whether the action's type is known.
     """
 
     def __init__(
-        self, client: Ros2ActionClient, id: bytes, goal: Message, timeout: float | None
+        self, client: Ros2ActionClient, id: bytes, goal: Any, timeout: float | None, *, typed: bool
     ) -> None:
-        self.id, self.goal = id, goal
+        self.id = id
+        self.goal: Message | None = goal if typed else None
+        self._given = goal
         self._client = client
         self._timeout = timeout
         self._deadline = None if timeout is None else time.monotonic() + timeout
@@ -90,8 +93,7 @@ class Ros2ClientGoal(ClientGoal):
         self._accepted: Time | None = None
         self._feedback: Message | None = None
         dispatcher = client.core.dispatcher
-        label = f"goal {self.id_text} of {client.name}"
-        self._label = label
+        self._label = label = f"goal {self.id_text} of {client.name}"
         self._acceptance: Promise[bool] = Promise(
             f"{label} was neither accepted nor rejected", dispatcher, cancellable=False
         )
@@ -105,6 +107,7 @@ class Ros2ClientGoal(ClientGoal):
         self._cancels: list[tuple[Promise[CancelAnswer], float | None]] = []
         self._sending: Call | None = None
         self._asking: Call | None = None
+        self._patience: Handle | None = None
         self._servers: frozenset[bytes | str] = frozenset()
         self._strangers: frozenset[bytes | str] = frozenset()
         self._alone: float | None = None
@@ -183,6 +186,16 @@ class Ros2ClientGoal(ClientGoal):
         self._sending = call
         call.add_done_callback(lambda _: self._jobs.add(lambda: self._answered(call)))
 
+    def hold(self) -> None:
+        """Wait for :meth:`begin`, for as long as the server may take to appear."""
+        if self._timeout is not None:
+            timers = self._client.core.timers
+            self._patience = timers.after(self._timeout, lambda: self._jobs.add(self._give_up))
+
+    def begin(self) -> None:
+        """Send it, now that the type is known."""
+        self._jobs.add(self._begin)
+
     def take_back(self, service: Ros2ServiceClient) -> bool:
         """Take it back from its service if it was not sent yet; return whether that was so."""
         call, self._sending = self._sending, None  # its end is not the goal's
@@ -196,6 +209,7 @@ class Ros2ClientGoal(ClientGoal):
     def send_again(self, kind: MessageType) -> None:
         """Send it with another version of its type."""
         try:
+            assert self.goal is not None  # it waited to be sent
             self.goal = kind.create(self.goal.to_dict())
             self.send()
         except Error as error:
@@ -222,6 +236,22 @@ class Ros2ClientGoal(ClientGoal):
         self._jobs.add(lambda: self._end(GoalStatus.LOST, error))
 
     # -- sending ---------------------------------------------------------------------------------
+
+    def _begin(self) -> None:
+        if self._done.done():
+            return
+        kind = self._client.type
+        try:
+            if kind is None:
+                raise self._client.ended()
+            self.goal = kind.goal.create(self._given)
+            self.send()
+        except Error as error:
+            self._end(GoalStatus.LOST, self._closing(error))
+
+    def _give_up(self) -> None:
+        if self.goal is None:
+            self._end(GoalStatus.LOST, self._explain(ServiceUnavailableError()))
 
     def _answered(self, call: Call) -> None:
         """Take the answer to the goal."""
@@ -323,6 +353,10 @@ class Ros2ClientGoal(ClientGoal):
         if not self._status.is_active:
             told = f"the goal has ended already: {self._status.value}"
             answer.fulfil(CancelAnswer((), told))
+        elif self.goal is None:
+            told = f"{self._label} was cancelled before any server told its type: no result"
+            self._end(GoalStatus.CANCELED, ServiceUnavailableError(told))
+            answer.fulfil(CancelAnswer((self.id,)))
         elif self._status is not GoalStatus.PENDING:
             self._client.ask_cancel(self.id, Time(), answer, timeout)
         elif call is not None and self._client.withdraw(call):
@@ -442,11 +476,13 @@ class Ros2ClientGoal(ClientGoal):
         for answer, _ in cancels:
             answer.fulfil(CancelAnswer((), f"the goal has ended already: {self._status.value}"))
         self._client.forget(self)
+        if self._patience is not None:
+            self._patience.close()
         asking, self._asking = self._asking, None
         if asking is not None:
             asking.cancel()
         if isinstance(end, BaseException):
-            if status is GoalStatus.REJECTED:
+            if status in (GoalStatus.REJECTED, GoalStatus.CANCELED):
                 self._acceptance.fulfil(False)
             else:
                 self._acceptance.fail(end)

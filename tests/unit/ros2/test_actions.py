@@ -714,12 +714,57 @@ def test_a_result_that_cannot_be_decoded(client, peer, eventually):
 def test_the_type_is_discovered(node, robot, eventually):
     client = node.create_action_client("/fib")
     assert "type not known yet" in repr(client)
-    with pytest.raises(rosglass.ServiceUnavailableError, match="type of /fib is not known yet: no"):
-        client.send_goal({"order": 3})
     robot.create_action_server("/fib", FIB, fibonacci)
     assert client.wait_for_server(5)
     assert client.type.name == FIB
     assert client.send_goal({"order": 3}).result(5).status is SUCCEEDED
+
+
+def test_goals_sent_before_the_type_is_known(node, robot, eventually):
+    client = node.create_action_client("/fib")
+    wanted = {"order": 3}
+    goal = client.send_goal(wanted, timeout=None)
+    wanted["order"] = 99  # of no concern any more
+    canceled, late = client.send_goal({"order": 99}), client.send_goal(timeout=0.01)
+    wrong = client.send_goal({"order": "three"})
+    with pytest.raises(rosglass.ConversionError, match="expected a message or a dict"):
+        client.send_goal(3)
+    assert goal.goal is None
+    assert goal.status is GoalStatus.PENDING
+    assert canceled.cancel().result(1).accepted == (canceled.id,)
+    assert (canceled.status, canceled.acceptance.result(1)) == (CANCELED, False)
+    with pytest.raises(rosglass.ServiceUnavailableError, match="cancelled before any server told"):
+        canceled.result(1)
+    with pytest.raises(rosglass.ServiceUnavailableError, match=r"within 0\.01 s: no server offers"):
+        late.result(5)
+    with pytest.raises(rosglass.ServiceUnavailableError, match=r"asked to cancel within .* s: no"):
+        client.cancel_before(Time(1), 0.01).result(5)
+    robot.create_action_server("/fib", FIB, fibonacci)
+    assert goal.result(5).result.sequence.tolist() == [0, 1, 2]
+    assert goal.goal.order == 3
+    with pytest.raises(rosglass.ConversionError, match="order: expected"):
+        wrong.result(5)
+    assert client.goals == ()
+
+
+def test_cancelling_waits_for_the_type(node, robot):
+    client = node.create_action_client("/fib")
+    goal = client.send_goal({"order": 99})
+    answer, other = client.cancel_all(), client.cancel_before(Time(1))
+    assert goal.status is CANCELED
+    assert not answer.done()
+    robot.create_action_server("/fib", FIB, fibonacci)
+    assert (answer.result(5).accepted, other.result(5).accepted) == ((), ())
+
+
+def test_closing_ends_goals_whose_type_is_not_known(node):
+    client = node.create_action_client("/fib")
+    goal, answer = client.send_goal({"order": 3}), client.cancel_before(Time(1))
+    client.close()
+    with pytest.raises(rosglass.NodeClosedError, match="closed before the goal ended"):
+        goal.result(5)
+    with pytest.raises(rosglass.NodeClosedError, match="is closed"):
+        answer.result(5)
 
 
 def test_types_that_do_not_fit_are_named(node, middleware, caplog, eventually):
