@@ -23,6 +23,7 @@ from rosglass.comm.events import (
 from rosglass.comm.executor import IMMEDIATE, Dispatcher
 from rosglass.comm.graph import ConnectionState, EndpointInfo, EndpointKind, NodeName, Status
 from rosglass.comm.inbox import INBOX_LIMIT
+from rosglass.comm.lifecycle import LifecycleClient, State, Transition, TransitionEvent
 from rosglass.comm.listeners import Listeners
 from rosglass.comm.loop import LoopExecutor, executor_for
 from rosglass.comm.node import Answer, Executor, Handle, Node
@@ -74,6 +75,7 @@ __all__ = [
     "History",
     "IncompatibleQoS",
     "Jump",
+    "LifecycleClient",
     "Listeners",
     "Liveliness",
     "LivelinessChanged",
@@ -101,6 +103,7 @@ __all__ = [
     "ServiceServer",
     "SetResult",
     "Source",
+    "State",
     "Statistics",
     "Status",
     "Subscription",
@@ -108,6 +111,8 @@ __all__ = [
     "Time",
     "Timer",
     "Timers",
+    "Transition",
+    "TransitionEvent",
     "Worker",
     "executor_for",
 ]

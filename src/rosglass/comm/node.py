@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from rosglass.comm.action import ActionClient, ActionServer, ServerGoal
     from rosglass.comm.clock import Clock, Timer
     from rosglass.comm.graph import EndpointInfo, NodeName, Status
+    from rosglass.comm.lifecycle import LifecycleClient
     from rosglass.comm.parameters import ParameterClient, Parameters
     from rosglass.comm.promise import Promise
     from rosglass.comm.publisher import Publisher
@@ -258,6 +259,10 @@ class Node(Handle):
     def create_parameter_client(self, node: str | NodeName) -> ParameterClient:
         """Return a client of another node's parameters; `node` is its full name."""
         raise self._unsupported("parameters")
+
+    def create_lifecycle_client(self, node: str | NodeName) -> LifecycleClient:
+        """Return a client that drives a lifecycle node; `node` is its full name."""
+        raise self._unsupported("lifecycle nodes")
 
     @property
     def logger(self) -> Logger:

@@ -7,19 +7,19 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import Handle, Time
+from rosglass.comm import LifecycleClient, State, Time, Transition, TransitionEvent
 from rosglass.comm.promise import check_timeout
 from rosglass.errors import NodeClosedError, TransitionError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from rosglass.comm import Executor, Node, ServiceClient, Subscription
+    from rosglass.comm import Executor, Handle, Node, ServiceClient, Subscription
     from rosglass.messages import Message
 
-__all__ = ["LifecycleClient", "State", "Transition", "TransitionEvent"]
+__all__ = ["Ros2LifecycleClient"]
 
 _SERVICES = {
     "change_state": "lifecycle_msgs/srv/ChangeState",
@@ -31,58 +31,8 @@ _SERVICES = {
 _EVENT_TYPE = "lifecycle_msgs/msg/TransitionEvent"
 
 
-class State(NamedTuple):
-    """A state of a lifecycle node.
-
-    Attributes:
-        id: Its number (``lifecycle_msgs/msg/State``), e.g. 3.
-        label: Its name, e.g. ``active``.
-    """
-
-    id: int
-    label: str
-
-    def __str__(self) -> str:
-        return f"{self.label} [{self.id}]"
-
-
-class Transition(NamedTuple):
-    """A way from one state to another.
-
-    Attributes:
-        id: Its number (``lifecycle_msgs/msg/Transition``), e.g. 3.
-        label: Its name, e.g. ``activate``.
-        start: The state it begins in.
-        goal: The state it leads to, by way of the states that the node passes through.
-    """
-
-    id: int
-    label: str
-    start: State
-    goal: State
-
-    def __str__(self) -> str:
-        return f"{self.label} [{self.id}]"
-
-
-class TransitionEvent(NamedTuple):
-    """A lifecycle node that went from one state to another.
-
-    Attributes:
-        time: When, by the node's clock; zero when it does not say.
-        transition: What it did; its states are those it came from and went to.
-    """
-
-    time: Time
-    transition: Transition
-
-
-class LifecycleClient(Handle):
-    """Drives a lifecycle node; made by :meth:`Ros2Node.create_lifecycle_client`.
-
-    Every method that asks the node takes `timeout`, seconds in all (None waits for ever), and
-    raises ServiceUnavailableError when the node is not there or is no lifecycle node,
-    TimeoutError when it does not answer, and NodeClosedError.
+class Ros2LifecycleClient(LifecycleClient):
+    """Drives a lifecycle node; made by :meth:`Node.create_lifecycle_client`.
 
     Args:
         owner: The node that asks.
@@ -97,9 +47,6 @@ class LifecycleClient(Handle):
         self._watches: list[Subscription] = []
         self._closed = False
         self._client("get_state")
-
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__} of {self.node}>"
 
     @property
     def ready(self) -> bool:
@@ -130,20 +77,7 @@ class LifecycleClient(Handle):
         return _transitions(response.available_transitions)
 
     def change_state(self, transition: str | int, *, timeout: float | None = 10.0) -> State:
-        """Let the node take a transition, wait until it has, and return the state it is in then.
-
-        A node may take its time for that: give a driver that looks for its hardware more than the
-        usual 10 s.
-
-        Args:
-            transition: Its name, e.g. ``configure`` (``shutdown`` is possible in several states
-                under one name), or its number.
-            timeout: Seconds to wait in all.
-
-        Raises:
-            TransitionError: It is not possible now (the message names those that are), or the
-                node tried and failed.
-        """
+        """Let the node take a transition; see the base class."""
         end = _end(timeout, self.node)
         allowed = self.available_transitions(timeout=_left(end))
         chosen = next((t for t in allowed if _is_called(t, transition)), None)
@@ -161,26 +95,6 @@ class LifecycleClient(Handle):
                 f"{self.node} failed to {chosen.label}, and is {state} now; its own log says why"
             )
         return state
-
-    def configure(self, *, timeout: float | None = 10.0) -> State:
-        """Go from unconfigured to inactive."""
-        return self.change_state("configure", timeout=timeout)
-
-    def activate(self, *, timeout: float | None = 10.0) -> State:
-        """Go from inactive to active."""
-        return self.change_state("activate", timeout=timeout)
-
-    def deactivate(self, *, timeout: float | None = 10.0) -> State:
-        """Go from active to inactive."""
-        return self.change_state("deactivate", timeout=timeout)
-
-    def cleanup(self, *, timeout: float | None = 10.0) -> State:
-        """Go from inactive to unconfigured."""
-        return self.change_state("cleanup", timeout=timeout)
-
-    def shutdown(self, *, timeout: float | None = 10.0) -> State:
-        """Go to finalized, from which there is no way back."""
-        return self.change_state("shutdown", timeout=timeout)
 
     def watch(
         self, callback: Callable[[TransitionEvent], None], executor: Executor | None = None

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         EndpointInfo,
         Executor,
         Handle,
+        LifecycleClient,
         Promise,
         Publisher,
         Sample,
@@ -40,7 +41,6 @@ if TYPE_CHECKING:
     from rosglass.interfaces import Library
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
     from rosglass.ros2.arguments import Arguments
-    from rosglass.ros2.lifecycle import LifecycleClient
     from rosglass.ros2.middleware import Middleware
     from rosglass.ros2.parameter_client import Ros2ParameterClient
     from rosglass.ros2.parameters import Ros2Parameters
@@ -189,10 +189,10 @@ class Ros2Node(Node):
 
     def create_lifecycle_client(self, node: str | NodeName) -> LifecycleClient:
         """Return a client that drives a lifecycle node; `node` is its full name."""
-        from rosglass.ros2.lifecycle import LifecycleClient  # noqa: PLC0415
+        from rosglass.ros2.lifecycle import Ros2LifecycleClient  # noqa: PLC0415
 
         self._core.check_open()
-        return LifecycleClient(self, self._node_name(node))
+        return Ros2LifecycleClient(self, self._node_name(node))
 
     @property
     def logger(self) -> NodeLogger:

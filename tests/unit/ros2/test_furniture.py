@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from rosglass import Time, load
-from rosglass.comm import ClockChange, NodeName, ParameterDescriptor, ParameterType, Range
+from rosglass.comm import (
+    ClockChange,
+    NodeName,
+    ParameterDescriptor,
+    ParameterType,
+    Range,
+    State,
+    Transition,
+)
 from rosglass.errors import (
     NodeClosedError,
     ParameterError,
@@ -20,7 +28,6 @@ from rosglass.errors import (
 )
 from rosglass.ros2 import Ros2Node
 from rosglass.ros2.arguments import Arguments
-from rosglass.ros2.lifecycle import State, Transition
 
 from .conftest import FakeMiddleware
 
