@@ -7,6 +7,7 @@ import os
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
+from rosglass.comm.flags import check_flag
 from rosglass.errors import ConversionError, UnsupportedError
 from rosglass.interfaces import Library
 
@@ -80,7 +81,7 @@ def connect(
             log, descriptions of its types. They appear shortly after connecting.
 
     Raises:
-        ConversionError: A part of the URL or an environment variable is not valid.
+        ConversionError: A part of the URL, an environment variable or an option is not valid.
         RosArgumentError: One of `arguments` is not valid; the message says which, and what to
             write instead.
         UnsupportedError: The URL's scheme is unknown, or there is neither URL nor environment.
@@ -97,6 +98,7 @@ def connect(
         url = f"{scheme}://{rest}"
     if library is not None and not isinstance(library, Library):
         raise ConversionError("library", library, "a rosglass.Library, or None for the shared one")
+    check_flag(own_services, "own_services", "connect()")
     if scheme not in ("dds", "zenoh") or not separator:
         reason = _REFUSED.get(scheme, f"unknown scheme {scheme!r}" if separator else "no scheme")
         raise UnsupportedError(

@@ -19,6 +19,7 @@ from rosglass.comm.listeners import Listeners
 from rosglass.comm.loop import check_plain
 from rosglass.comm.node import Executor, Handle
 from rosglass.comm.time import Duration, Time
+from rosglass.comm.unique import Unique
 from rosglass.errors import ConversionError, NodeClosedError
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ class Jump(NamedTuple):
     change: ClockChange
 
 
-class Clock:
+class Clock(Unique):
     """What time it is for a node.
 
     Args:

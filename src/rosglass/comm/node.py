@@ -10,6 +10,7 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from rosglass.comm.qos import QoS
+from rosglass.comm.unique import Unique
 from rosglass.errors import (
     NodeClosedError,
     TimeoutError,  # noqa: A004 - the field's own word
@@ -54,7 +55,7 @@ class Executor(ABC):
         """Run `job` soon; called from any thread, returns without waiting."""
 
 
-class Handle(ABC):
+class Handle(Unique, ABC):
     """Something started or registered that can be ended; ends by itself as a context manager."""
 
     @abstractmethod

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from rosglass.comm.events import SubscriptionEvents
 from rosglass.comm.executor import IMMEDIATE
+from rosglass.comm.flags import check_flag
 from rosglass.comm.inbox import ImmediateInbox, Inbox
 from rosglass.comm.loop import check_plain
 from rosglass.comm.node import Executor, Handle
@@ -249,7 +250,11 @@ class Subscription(Handle):
 
         For callbacks that look at a fast topic now and then: receiving takes a fraction of the time
         where the middleware need not hand on each sample by itself.
+
+        Raises:
+            ConversionError: It is neither True nor False.
         """
+        check_flag(patient, "patient", self.topic)
         if patient != self._patient:
             self._patient = patient
             self.source.inform()

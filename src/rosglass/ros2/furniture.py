@@ -126,6 +126,7 @@ class Furniture(Member):
             services = ParameterServices(self._node, parameters, self._core.own_dispatcher)
             rosout = self._logging()
             descriptions = TypeDescriptionServer(self._core)
+            describes = parameters.get(DESCRIBE_TYPES)
         except NodeClosedError:
             return
         with self._lock:
@@ -133,7 +134,7 @@ class Furniture(Member):
                 return
             self._made += [services, descriptions]
         self._steps += [rosout.open, *services.steps()]
-        if parameters.get(DESCRIBE_TYPES):
+        if describes:
             self._steps.insert(1, descriptions.open)
         self._step()
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointKind, Node, NodeName, QoS, Subscription
+from rosglass.comm.flags import check_flag
 from rosglass.comm.loop import check_plain
 from rosglass.ros2.arguments import NO_ARGUMENTS
 from rosglass.ros2.core import Core
@@ -113,6 +114,7 @@ class Ros2Node(Node):
         """Subscribe to `topic`; see :meth:`rosglass.comm.Node.create_subscription`."""
         self._core.check_open()
         full = self.resolve(topic)
+        check_flag(ignore_local, "ignore_local", full)
         subscription = Subscription(
             full,
             type_if_known(self._core, full, type),

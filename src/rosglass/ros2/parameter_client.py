@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import (
@@ -34,7 +35,7 @@ from rosglass.ros2.parameter_values import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Mapping
     from os import PathLike
 
     from rosglass.comm import (
@@ -204,7 +205,7 @@ class Ros2ParameterClient(ParameterClient):
         return self._client(service).call(request, timeout=deadline.left())
 
     def _names(self, prefixes: Iterable[str], depth: int, deadline: _Deadline) -> list[str]:
-        wanted = [prefixes] if isinstance(prefixes, str) else list(prefixes)
+        wanted = _texts(prefixes, "prefixes", self.node)
         request = {"prefixes": wanted, "depth": depth}
         return sorted(self._call("list_parameters", request, deadline).result.names)
 
@@ -215,7 +216,7 @@ class Ros2ParameterClient(ParameterClient):
         if names is None:
             wanted = self._names((), 0, deadline)
         else:
-            wanted = [check_name(n) for n in ([names] if isinstance(names, str) else names)]
+            wanted = [check_name(n) for n in _texts(names, "names", self.node)]
         wanted = list(dict.fromkeys(wanted))
         if not wanted:
             return {}
@@ -268,6 +269,15 @@ class _Deadline:
         """Return the seconds that are left, None when there is no end."""
         # Rounded: people read it when the time is over.
         return None if self._end is None else max(0.0, round(self._end - time.monotonic(), 2))
+
+
+def _texts(given: object, what: str, node: str) -> list[str]:
+    """Return names as a list; raises ParameterError."""
+    if isinstance(given, str):
+        return [given]
+    if not isinstance(given, Iterable):
+        raise ParameterError(f"{node}: {what} must be a list of names, got {given!r}")
+    return list(given)
 
 
 def _is_empty(value: object) -> bool:

@@ -100,7 +100,7 @@ class ParameterServices(Handle):
         for name in request.names:
             try:
                 descriptor = self._parameters.describe(name)
-            except ParameterError:
+            except (ParameterError, NodeClosedError):  # closing is told by the service's end
                 descriptor = ParameterDescriptor(name)
             descriptors.append(descriptor_to_message(descriptor))
         return {"descriptors": descriptors}

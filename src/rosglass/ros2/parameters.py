@@ -22,7 +22,7 @@ from rosglass.comm import (
     Range,
 )
 from rosglass.comm import ParameterEvent as Event
-from rosglass.errors import ParameterError
+from rosglass.errors import NodeClosedError, ParameterError
 from rosglass.ros2.parameter_values import (
     TYPE_NAMES,
     TypedValue,
@@ -112,6 +112,7 @@ class Ros2Parameters(Parameters):
         descriptor: ParameterDescriptor | None = None,
     ) -> ParameterValue:
         """Make a parameter known; see :meth:`rosglass.comm.Parameters.declare`."""
+        self._check_open()
         check_name(name)
         descriptor = ParameterDescriptor() if descriptor is None else descriptor
         if not isinstance(descriptor, ParameterDescriptor):
@@ -145,6 +146,7 @@ class Ros2Parameters(Parameters):
 
     def undeclare(self, name: str) -> None:
         """Forget a parameter; raises ParameterError."""
+        self._check_open()
         with self._lock:
             entry = self._entry(name)
             if entry.descriptor.read_only:
@@ -158,11 +160,13 @@ class Ros2Parameters(Parameters):
 
     def get(self, name: str) -> ParameterValue:
         """Return its value, None when it has none; raises ParameterError when not declared."""
+        self._check_open()
         with self._lock:
             return self._entry(name).value.copy()
 
     def set(self, values: Mapping[str, ParameterValue]) -> None:
         """Set parameters, all or none; see :meth:`rosglass.comm.Parameters.set`."""
+        self._check_open()
         check_values(values, self.node)
         with self._lock:
             known = {name: self._entry(name).descriptor.type for name in values}
@@ -172,19 +176,21 @@ class Ros2Parameters(Parameters):
 
     def describe(self, name: str) -> ParameterDescriptor:
         """Return what is known about it; raises ParameterError when not declared."""
+        self._check_open()
         with self._lock:
             return self._entry(name).descriptor
 
     def names(self) -> list[str]:
         """Return the declared names, sorted."""
+        self._check_open()
         return sorted(self._entries)
 
     def find(self, prefixes: Iterable[str] = (), depth: int = 0) -> list[str]:
         """Return the names below `prefixes` (all without), up to `depth` levels (0: all)."""
         prefixes = list(prefixes)
         if not prefixes:
-            return [n for n in self.names() if not depth or n.count(".") < depth]
-        return [n for n in self.names() if any(_below(n, p, depth) for p in prefixes)]
+            return [n for n in sorted(self._entries) if not depth or n.count(".") < depth]
+        return [n for n in sorted(self._entries) if any(_below(n, p, depth) for p in prefixes)]
 
     def typed_value(self, name: str) -> TypedValue:
         """Return the value with its type; type NOT_SET for what is not declared or has no value."""
@@ -219,6 +225,7 @@ class Ros2Parameters(Parameters):
 
     def on_set(self, validate: Callable[[Mapping[str, ParameterValue]], str]) -> Handle:
         """Let `validate` refuse values; see :meth:`rosglass.comm.Parameters.on_set`."""
+        self._check_open()
         if not callable(validate):
             raise ParameterError(f"on_set() needs something that can be called, got {validate!r}")
         validator = _Validator(self, validate)
@@ -230,6 +237,7 @@ class Ros2Parameters(Parameters):
         self, callback: Callable[[Event], None], executor: Executor | None = None
     ) -> Handle:
         """Call `callback` with each change."""
+        self._check_open()
         if not callable(callback):
             raise ParameterError(
                 f"on_change() needs something that can be called, got {callback!r}"
@@ -244,6 +252,7 @@ class Ros2Parameters(Parameters):
 
     def load(self, path: str | PathLike[str]) -> None:
         """Set the parameters that a file has for this node; see the base class."""
+        self._check_open()
         from rosglass.ros2 import parameter_files  # noqa: PLC0415 - yaml
 
         values = parameter_files.read(path).for_node(self.node)
@@ -263,6 +272,7 @@ class Ros2Parameters(Parameters):
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the parameters to a file that can be loaded; raises ParameterError."""
+        self._check_open()
         from rosglass.ros2 import parameter_files  # noqa: PLC0415 - yaml
 
         values = {name: value.value for name, value in self.snapshot().items()}
@@ -280,6 +290,10 @@ class Ros2Parameters(Parameters):
         with self._lock:
             if validator in self._validators:
                 self._validators.remove(validator)
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise NodeClosedError(f"node {self.node} is closed; connect again")
 
     def _entry(self, name: str) -> _Entry:
         entry = self._entries.get(name)

@@ -275,6 +275,37 @@ def test_a_closed_node_has_no_parameters(start) -> None:
         _ = robot.parameters
 
 
+@pytest.mark.parametrize(
+    "use",
+    [
+        lambda parameters: parameters.get("use_sim_time"),
+        lambda parameters: parameters.set({"use_sim_time": True}),
+        lambda parameters: parameters.declare("speed", 1.5),
+        lambda parameters: parameters.undeclare("use_sim_time"),
+        lambda parameters: parameters.describe("use_sim_time"),
+        lambda parameters: parameters.names(),
+        lambda parameters: parameters.on_set(print),
+        lambda parameters: parameters.on_change(print),
+        lambda parameters: parameters.load("robot.yaml"),
+        lambda parameters: parameters.save("robot.yaml"),
+    ],
+)
+def test_parameters_that_are_kept_say_that_their_node_is_closed(start, use) -> None:
+    robot = start()
+    parameters = robot.parameters
+    robot.close()
+    with pytest.raises(NodeClosedError, match="node /robot is closed; connect again"):
+        use(parameters)
+
+
+def test_names_of_parameters_are_a_list(node) -> None:
+    client = node.create_parameter_client("/robot")
+    with pytest.raises(ParameterError, match="/robot: names must be a list of names, got 5"):
+        client.get(5)
+    with pytest.raises(ParameterError, match="/robot: prefixes must be a list of names, got 5"):
+        client.names(5)
+
+
 # -- --ros-args --------------------------------------------------------------------------------
 
 

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import copy
+import pickle
 import threading
 import time
 
@@ -514,3 +516,30 @@ def test_services_actions_and_what_a_node_has(node, middleware):
     assert node.endpoints("/nobody") == []
     with pytest.raises(rosglass.InvalidNameError):
         node.endpoints("no body")
+
+
+def test_options_are_on_or_off(node):
+    with pytest.raises(rosglass.ConversionError, match="own_services: expected True or False, got"):
+        rosglass.connect("dds://", own_services="no")
+    with pytest.raises(rosglass.ConversionError, match="/x: ignore_local: expected True or False"):
+        node.create_subscription("/x", ignore_local="no")
+    with pytest.raises(rosglass.ConversionError, match="/x: patient: expected True or False"):
+        node.create_subscription("/x").set_patient(1)
+
+
+@pytest.mark.parametrize("take", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_what_lives_in_the_graph_cannot_be_copied(node, take):
+    for made in (
+        node,
+        node.create_publisher("/x", "std_msgs/msg/Empty"),
+        node.create_subscription("/x"),
+        node.create_service_client("/s"),
+        node.create_service_server("/s", "std_srvs/srv/Empty", print),
+        node.create_action_client("/a"),
+        node.parameters,
+        node.create_parameter_client("/robot"),
+        node.clock,
+    ):
+        with pytest.raises(rosglass.UnsupportedError, match="neither be copied nor") as told:
+            take(made)
+        assert str(told.value).startswith(f"{made!r} can")

@@ -316,5 +316,5 @@ def test_nobody_is_called_back_after_closing(parameters: Ros2Parameters) -> None
     parameters.on_set(lambda _: "never")
     parameters.close()
     parameters.close()
-    parameters.set({"use_sim_time": True})
+    assert not parameters.try_set({"use_sim_time": TypedValue(T.BOOL, True)})
     assert not events
