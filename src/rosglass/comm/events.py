@@ -132,11 +132,15 @@ class _Known:
 
 
 class Appearances(Generic[_E]):
-    """Tells each listener about who appears and who goes, those who are there already first."""
+    """Tells each listener about who appears and who goes, those who are there already first.
 
-    def __init__(self) -> None:
+    Args:
+        where: The topic, for errors.
+    """
+
+    def __init__(self, where: str = "") -> None:
         self._lock = threading.Lock()
-        self._listeners: Listeners[_E] = Listeners()
+        self._listeners: Listeners[_E] = Listeners(where=where)
         self._known: dict[Listener[_E], _Known] = {}
 
     def __bool__(self) -> bool:
@@ -192,15 +196,15 @@ class Appearances(Generic[_E]):
 
 
 class SubscriptionEvents:
-    """Who wants to know what about a subscription; worlds tell them."""
+    """Who wants to know what about a subscription of a topic; worlds tell them."""
 
-    def __init__(self) -> None:
-        self.matched: Appearances[Matched] = Appearances()
-        self.incompatible: Appearances[IncompatibleQoS] = Appearances()
-        self.liveliness: Appearances[LivelinessChanged] = Appearances()
-        self.deadline: Listeners[DeadlineMissed] = Listeners()
-        self.lost: Listeners[SamplesLost] = Listeners()
-        self.problem: Listeners[str] = Listeners()
+    def __init__(self, topic: str) -> None:
+        self.matched: Appearances[Matched] = Appearances(topic)
+        self.incompatible: Appearances[IncompatibleQoS] = Appearances(topic)
+        self.liveliness: Appearances[LivelinessChanged] = Appearances(topic)
+        self.deadline: Listeners[DeadlineMissed] = Listeners(where=topic)
+        self.lost: Listeners[SamplesLost] = Listeners(where=topic)
+        self.problem: Listeners[str] = Listeners(where=topic)
 
     def clear(self) -> None:
         """Forget everyone."""
@@ -216,17 +220,18 @@ class PublisherEvents:
     """Who wants to know what about a publisher; worlds tell them.
 
     Args:
+        topic: The publisher's topic.
         executor: Where callbacks run that bring no executor of their own.
         added: Called when there is a new listener, which is to be told soon.
     """
 
-    def __init__(self, executor: Executor, added: Callable[[], None]) -> None:
+    def __init__(self, topic: str, executor: Executor, added: Callable[[], None]) -> None:
         self.executor, self._added = executor, added
-        self.matched: Appearances[Matched] = Appearances()
-        self.incompatible: Appearances[IncompatibleQoS] = Appearances()
-        self.deadline: Listeners[DeadlineMissed] = Listeners()
-        self.liveliness: Listeners[LivelinessLost] = Listeners()
-        self.problem: Listeners[str] = Listeners()
+        self.matched: Appearances[Matched] = Appearances(topic)
+        self.incompatible: Appearances[IncompatibleQoS] = Appearances(topic)
+        self.deadline: Listeners[DeadlineMissed] = Listeners(where=topic)
+        self.liveliness: Listeners[LivelinessLost] = Listeners(where=topic)
+        self.problem: Listeners[str] = Listeners(where=topic)
 
     def added(self, handle: Handle) -> Handle:
         """Have a new listener told soon; returns its handle."""

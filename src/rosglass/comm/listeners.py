@@ -24,10 +24,11 @@ class Listeners(Generic[_T]):
         merge: Whether a callback that has not run yet is only told the newest value, so that a
             burst of changes costs one call.
         depth: How many values wait for a callback that is slow, the newest ones; None for all.
+        where: What they listen to, e.g. a topic; for errors.
     """
 
-    def __init__(self, merge: bool = False, depth: int | None = None) -> None:
-        self._depth = 1 if merge else depth
+    def __init__(self, merge: bool = False, depth: int | None = None, where: str = "") -> None:
+        self._depth, self._where = 1 if merge else depth, where
         self._lock = threading.Lock()
         self._listeners: list[Listener[_T]] = []
 
@@ -40,6 +41,9 @@ class Listeners(Generic[_T]):
         Raises:
             ConversionError: One of the two is not what it should be.
         """
+        check_plain(callback, self._where)
+        if not isinstance(executor, Executor):
+            raise ConversionError("executor", executor, "a rosglass.comm.Executor", self._where)
         listener = Listener(self, callback, executor, self._depth)
         with self._lock:
             self._listeners.append(listener)
@@ -84,9 +88,6 @@ class Listener(Handle, Generic[_T]):
         executor: Executor,
         depth: int | None,
     ) -> None:
-        check_plain(callback)
-        if not isinstance(executor, Executor):
-            raise ConversionError("executor", executor, "a rosglass.comm.Executor")
         self._owner, self._callback, self._executor = owner, callback, executor
         self._depth = depth
         self._lock = threading.Lock()

@@ -96,10 +96,16 @@ class QoS:
     lease_duration: Duration | None = None
 
     def __post_init__(self) -> None:
-        if type(self.depth) is not int or not 1 <= self.depth <= _MAX_DEPTH:
+        depth = self.depth
+        if isinstance(depth, str) and depth in _PRESETS:
             raise UnsupportedError(
-                f"QoS depth must be an integer from 1 to {_MAX_DEPTH}, got {self.depth!r}; "
-                "use History.KEEP_ALL to keep every sample"
+                f"a QoS profile or a depth was expected, got the text {depth!r}; "
+                f"use QoS.preset({depth!r})"
+            )
+        if type(depth) is not int or not 1 <= depth <= _MAX_DEPTH:
+            raise UnsupportedError(
+                f"QoS depth must be an integer from 1 to {_MAX_DEPTH}, got {depth!r}; "
+                "use History.KEEP_ALL to keep every sample, or a profile such as QoS.sensor_data()"
             )
         for name, kind in (
             ("reliability", Reliability),

@@ -83,7 +83,7 @@ class Subscription(Handle):
         self.topic = topic
         self.on_close = on_close
         self.source = Source()
-        self.events = SubscriptionEvents()
+        self.events = SubscriptionEvents(topic)
         self._qos, self._type, self._executor = qos, message_type, executor
         self._called = callback is not None or raw_callback is not None
         self._decodes = callback is not None and raw_callback is None

@@ -100,8 +100,8 @@ class Ros2ClientGoal(ClientGoal):
         self._done: Promise[ActionResult] = Promise(
             f"{label} has not ended, and goes on: no result", dispatcher, cancellable=False
         )
-        self._feedback_listeners: Listeners[Message] = Listeners(depth=_DEPTH)
-        self._status_listeners: Listeners[GoalStatus] = Listeners()
+        self._feedback_listeners: Listeners[Message] = Listeners(depth=_DEPTH, where=self._label)
+        self._status_listeners: Listeners[GoalStatus] = Listeners(where=self._label)
         self._held: deque[Message] = deque(maxlen=_DEPTH)
         self._heard: tuple[GoalStatus, Time] | None = None
         self._cancels: list[tuple[Promise[CancelAnswer], float | None]] = []

@@ -58,7 +58,7 @@ class Ros2Publisher(Publisher, Member):
         self._problem = ""
         self._known: list[EndpointInfo] | None = None
         self._big = False
-        self.events: PublisherEvents = PublisherEvents(core.dispatcher, self._look)
+        self.events: PublisherEvents = PublisherEvents(topic, core.dispatcher, self._look)
         self._lock = threading.Lock()
         self._watchdogs: dict[str, Watchdog] = {}
         self._missed = self._lost = 0

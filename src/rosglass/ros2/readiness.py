@@ -42,7 +42,7 @@ class Readiness:
         self._default = default
         self._changed = threading.Condition()
         self._told = False
-        self._listeners: Listeners[bool] = Listeners()
+        self._listeners: Listeners[bool] = Listeners(where=name)
 
     def wait(self, timeout: float | None) -> bool:
         """Wait up to `timeout` seconds, None for ever; return whether somebody is there."""

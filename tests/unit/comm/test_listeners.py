@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+import rosglass
 from rosglass.comm import Executor, Listeners
 
 
@@ -34,6 +35,21 @@ def test_how_many_values_wait_for_a_slow_callback(options, told):
     assert listeners.notify(5)
     executor.run()
     assert seen == [*told, 5]
+
+
+async def later(value):
+    raise AssertionError(value)
+
+
+@pytest.mark.parametrize(
+    ("callback", "executor", "told"),
+    [(5, Manual(), "callback"), (later, Manual(), "callback"), (print, 5, "executor")],
+)
+def test_what_cannot_be_called_is_refused_and_the_place_named(callback, executor, told):
+    listeners = Listeners(where="/scan")
+    with pytest.raises(rosglass.ConversionError, match=f"/scan: {told}: "):
+        listeners.add(callback, executor)
+    assert not listeners
 
 
 def test_closed_and_cleared_listeners_are_not_told():

@@ -54,6 +54,13 @@ def test_depth_must_be_a_positive_integer(depth):
         QoS(depth=depth)
 
 
+def test_the_name_of_a_preset_is_no_depth_and_its_profile_is_named():
+    with pytest.raises(UnsupportedError, match=r"'sensor_data'; use QoS.preset\('sensor_data'\)"):
+        QoS("sensor_data")
+    with pytest.raises(UnsupportedError, match=r"a profile such as QoS.sensor_data\(\)"):
+        QoS("sensor")
+
+
 def test_presets_are_ros_2s():
     assert QoS.sensor_data() == QoS(depth=5, reliability=Reliability.BEST_EFFORT)
     assert QoS.latched(3) == QoS(depth=3, durability=Durability.TRANSIENT_LOCAL)
