@@ -160,6 +160,13 @@ class Requester(Handle):
             A number that the reply will bear. The reply may come before this returns.
         """
 
+    def stranded(self, number: int) -> bool:
+        """Return whether everyone who was sent a request has left since, even if they are back.
+
+        For middlewares that lose what a server sends meanwhile, and do not know whether it did.
+        """
+        return False
+
     @abstractmethod
     def forget(self, number: int) -> None:
         """Drop the reply to a request, should it still come."""

@@ -31,7 +31,7 @@ class Request:
         timer: Ends the call then.
         sent: Monotonic time of sending, None before.
         servers: Identities of the servers that were there when it was sent.
-        alone: Since when none of them is there, None while one is.
+        alone: Since when none of them is there, or was; None while one is that may answer.
         link: Through which it was sent, and its number there.
         private: Whether nobody else has the call, so that its end calls nobody.
     """

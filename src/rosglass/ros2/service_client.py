@@ -62,7 +62,7 @@ class Ros2ServiceClient(ServiceClient, Member):
         wanted: The type, or its name: then the version that the server announces is taken if the
             library has it; None takes whatever type the server announces.
         qos: Profile of requests and replies; None for the usual one.
-        patient: Whether calls go on when their server has left the graph.
+        patient: Whether calls go on as long as their server is away.
         quiet: Whether somebody else logs what is wrong.
     """
 
@@ -388,8 +388,8 @@ class Ros2ServiceClient(ServiceClient, Member):
             entry.call.fail(self._loss(entry))
 
     def _watch(self) -> None:
-        """End the calls whose servers have been gone for too long."""
-        if self._patient or not self._requests:
+        """End the calls whose servers left, and have not answered for too long since."""
+        if not self._requests:
             return
         here = self.server_ids()
         now = time.monotonic()
@@ -400,12 +400,19 @@ class Ros2ServiceClient(ServiceClient, Member):
                 continue
             if not entry.servers:
                 entry.servers = here
-            if entry.servers & here or not entry.servers:
+            if not self._left(entry, here):
                 entry.alone = None
             elif entry.alone is None:
                 entry.alone = now
             elif now - entry.alone >= _GRACE:
                 entry.call.fail(self._loss(entry))
+
+    def _left(self, entry: Request, here: frozenset[bytes | str]) -> bool:
+        """Return whether a request's servers have left, so that it may get no answer any more."""
+        stranded = entry.link is not None and entry.link[0].requester.stranded(entry.link[1])
+        if self._patient:
+            return stranded and self.ready  # there is somebody to be asked again
+        return stranded or (bool(entry.servers) and not entry.servers & here)
 
     def _servers(self) -> list[EndpointInfo]:
         return self._core.graph.endpoints(EndpointKind.SERVICE_SERVER, self.name)

@@ -6,7 +6,9 @@ import importlib.util
 import json
 import logging
 import os
+import signal
 import threading
+import time
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
@@ -29,6 +31,8 @@ SHORT_LEASE = (
     "</CycloneDDS>"
 )
 BIG = 1_000_000
+#: What peers on rosglass answer when they are told to.
+LATER = -2
 
 pytestmark = pytest.mark.peers
 
@@ -212,9 +216,72 @@ def test_servers_that_exclude_each_other_are_named(start_services, node, types, 
 # -- what goes wrong -----------------------------------------------------------------------------
 
 
+@pytest.fixture
+def impatient(monkeypatch):
+    """Give servers that left a tenth of a second to answer all the same."""
+    monkeypatch.setattr("rosglass.ros2.service_client._GRACE", 0.1)
+
+
+def cut_off(server: Any, wait_for: Any, until: Any) -> None:
+    """Let a program say nothing, as when its link is down, until something holds."""
+    os.kill(server.pid, signal.SIGSTOP)
+    try:
+        wait_for(until, what="its absence")
+    finally:
+        os.kill(server.pid, signal.SIGCONT)
+
+
+def test_a_server_that_was_cut_off_in_a_call_and_is_back(
+    start_services, node, types, wait_for, impatient
+):
+    """Its answer may have been lost meanwhile: nobody waits for it for ever."""
+    server = start_services("cyclone", "away", ["add"], config=SHORT_LEASE)
+    client = ready(node.create_service_client("/away/add", types[ADD]))
+    call = client.call_async({"a": -1}, timeout=None)
+    assert server.event("got") == [-1, 0]
+    cut_off(server, wait_for, lambda: not client.ready)
+    with pytest.raises(rosglass.ConnectionLostError, match="may have carried it out or not"):
+        call.result(15)
+    assert ready(client).call({"a": 1, "b": 2}).sum == 3
+    server.end()
+
+
+def test_a_server_that_was_cut_off_shortly_still_answers(start_services, node, types, wait_for):
+    server = start_services("rosglass", "slow", ["add"], config=SHORT_LEASE)
+    client = ready(node.create_service_client("/slow/add", types[ADD]))
+    call = client.call_async({"a": LATER, "b": 1}, timeout=None)
+    assert server.event("got") == [LATER, 1]
+    cut_off(server, wait_for, lambda: not client.ready)
+    ready(client)
+    server.ask(finish=True)
+    assert call.result(15).sum == LATER + 1
+    server.end()
+
+
+def test_a_call_goes_on_as_long_as_one_of_its_servers_stays(
+    start_services, node, types, wait_for, impatient
+):
+    one, two = (start_services("cyclone", "both", ["add"], config=SHORT_LEASE) for _ in range(2))
+    client = node.create_service_client("/both/add", types[ADD])
+    wait_for(lambda: len(client.server_ids()) == 2, what="two servers")
+    wait_for(lambda: "offer" in client.problem, what="two servers")
+    ready(client)
+    call = client.call_async({"a": -1}, timeout=None)
+    assert one.event("got") == two.event("got") == [-1, 0]
+    cut_off(one, wait_for, lambda: len(client.server_ids()) == 1)
+    wait_for(lambda: len(client.server_ids()) == 2, what="the return of the first")
+    with pytest.raises(rosglass.TimeoutError):
+        call.result(1.5)
+    # The one that is back never asked again: the call ends with the other.
+    two.end()
+    with pytest.raises(rosglass.ConnectionLostError):
+        call.result(15)
+    one.end()
+
+
 @pytest.mark.parametrize("kind", ["cyclone", "rosglass"])
 def test_a_server_killed_in_a_call_is_told_and_its_successor_called(
-    start_services, node, types, kind
+    start_services, node, types, impatient, kind
 ):
     # How long it takes to be noticed is up to the server's participant: its lease.
     name = f"mortal_{kind}"

@@ -92,6 +92,8 @@ class FakeRequester(_FakeServiceEnd, Requester):
     def __init__(self, middleware: FakeMiddleware, info: EndpointInfo, on_reply: Any) -> None:
         self.on_reply, self.sent, self.forgotten, self.linked = on_reply, [], [], None
         self.timeouts: list[float | None] = []
+        #: Requests whose servers left, whoever is there now.
+        self.abandoned: set[int] = set()
         self._numbers = itertools.count(1)
         self._appear(middleware, info)
 
@@ -109,6 +111,9 @@ class FakeRequester(_FakeServiceEnd, Requester):
         for server in self._servers():
             self.middleware.network.post(lambda s=server: s.receive(request, bytes(data)))
         return number
+
+    def stranded(self, number: int) -> bool:
+        return number in self.abandoned
 
     def forget(self, number: int) -> None:
         self.forgotten.append(number)

@@ -13,6 +13,7 @@ from rosglass.comm import Dispatcher, EndpointKind, Executor, Promise
 from rosglass.interfaces import Library
 from rosglass.ros2 import Ros2Node
 from rosglass.ros2.middleware import CALL_DROPPED, SERVER_LEFT, RequestId
+from rosglass.ros2.service_client import Ros2ServiceClient
 
 SERVER, CLIENT = EndpointKind.SERVICE_SERVER, EndpointKind.SERVICE_CLIENT
 ADD, TRIGGER, SET = (
@@ -316,6 +317,37 @@ def test_a_server_that_comes_back_soon_keeps_its_calls(client, requester, middle
     eventually(lambda: changes == [True, False, True])
     requester.reply(1, answer())
     assert call.result(0).sum == 3
+
+
+def test_calls_end_when_their_server_was_away_and_is_back(
+    client, requester, middleware, monkeypatch
+):
+    monkeypatch.setattr("rosglass.ros2.service_client._GRACE", 0.05)
+    requester.linked = True
+    middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01, gid=b"1" * 16)
+    calls = [client.call_async(timeout=None) for _ in range(2)]
+    requester.abandoned.add(1)
+    with pytest.raises(rosglass.ConnectionLostError, match="went away before it answered"):
+        calls[0].result(5)
+    requester.reply(2, answer())
+    assert calls[1].result(0).sum == 3
+
+
+def test_patient_calls_wait_for_their_server_to_be_back(node, middleware, monkeypatch):
+    monkeypatch.setattr("rosglass.ros2.service_client._GRACE", 0.05)
+    client = Ros2ServiceClient(node._core, "/add", ADD, patient=True)
+    (requester,) = middleware.requesters
+    key = middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01, gid=b"1" * 16)
+    requester.linked = True
+    call = client.call_async(timeout=None)
+    requester.linked = False
+    requester.abandoned.add(1)
+    middleware.graph.remove(key)
+    with pytest.raises(rosglass.TimeoutError):
+        call.result(0.5)
+    requester.linked = True
+    with pytest.raises(rosglass.ConnectionLostError):
+        call.result(5)
 
 
 @pytest.mark.parametrize("reason", [SERVER_LEFT, CALL_DROPPED])

@@ -78,6 +78,10 @@ class DdsRequester(Requester):
         self._calls: dict[int, int] = {}
         self._by_sequence: dict[int, int] = {}
         self._sequence = 0
+        #: Handles of the linked servers' readers of requests; whoever comes back has others.
+        self._linked: dict[Scheme, frozenset[int]] = {}
+        #: Numbers of calls that were sent, and who was linked then and has been ever since.
+        self._asked: dict[int, frozenset[int]] = {}
         #: How requests are sent now; None when no server is linked.
         self._scheme: Scheme | None = None
         #: When readers of requests that belong to no known server came, and when to look again.
@@ -143,6 +147,11 @@ class DdsRequester(Requester):
         )
         return number
 
+    def stranded(self, number: int) -> bool:
+        """Return whether a request's servers have left; what they sent meanwhile is lost."""
+        asked = self._asked.get(number)
+        return asked is not None and not asked
+
     def forget(self, number: int) -> None:
         """Drop the reply to a request, should it still come."""
         with self._lock:
@@ -157,6 +166,7 @@ class DdsRequester(Requester):
         with self._lock:
             self._calls.clear()
             self._by_sequence.clear()
+            self._asked.clear()
 
     def _send(self, number: int, data: bytes | bytearray) -> bool:
         """Send a request; return whether nothing more is to be done for it."""
@@ -187,6 +197,7 @@ class DdsRequester(Requester):
                     return False
                 raise
             self._sequence = sequence + 1 if sequence >= 0 else -1
+            self._asked[number] = self._linked.get(scheme, frozenset())
             if scheme is Scheme.IDENTITY:
                 self._calls[number] = self._sequence
                 self._by_sequence[self._sequence] = number
@@ -250,6 +261,7 @@ class DdsRequester(Requester):
 
     def _drop(self, number: int) -> bool:
         """Close a call; return whether it was open."""
+        self._asked.pop(number, None)
         sequence = self._calls.pop(number, None)
         if sequence:
             self._by_sequence.pop(sequence, None)
@@ -293,8 +305,21 @@ class DdsRequester(Requester):
         self._recheck = min(young, default=math.inf)
         return schemes
 
+    def _readers(self) -> dict[Scheme, frozenset[int]]:
+        """Return the handles of the linked servers' readers of requests, by what they speak."""
+        answering = {_server_of(found) for found in self._ends.writers.all}
+        readers: dict[Scheme, set[int]] = {scheme: set() for scheme in Scheme}
+        for found in () if self._ends.readers is None else self._ends.readers.all:
+            if _server_of(found) in answering:
+                readers[scheme_of(found.guid)].add(found.handle)
+        return {scheme: frozenset(handles) for scheme, handles in readers.items()}
+
     def _link(self) -> None:
         """Take note of the servers that are there now."""
+        with self._lock:
+            self._linked = linked = self._readers()
+            everybody = frozenset().union(*linked.values())
+            self._asked = {number: asked & everybody for number, asked in self._asked.items()}
         self._scheme = self._route()
         if self.changed is not None:
             self.changed()

@@ -2,7 +2,8 @@
 
 It offers `/<name>/add` (example_interfaces/srv/AddTwoInts) and `/<name>/blob`
 (blob_interfaces/srv/Blob), and calls them where it is told to on standard input. It never answers
-additions of a = -1. Its types need annotations that are evaluated.
+additions of a = -1; on rosglass, it answers those of a = -2 when it is told to, {"finish": true}.
+Its types need annotations that are evaluated.
 """
 
 import json
@@ -18,7 +19,7 @@ from summary import tell
 # The plan: "kind" (below), "domain", "name", "serve" (which of "add" and "blob" it offers), "call"
 # (services that it calls), "interfaces" (a prefix with the types), "fastdds" (that program).
 plan = json.loads(sys.argv[1])
-NEVER = -1
+NEVER, LATER = -1, -2
 #: Seconds until a server is sure to know a client that has just found it; what it gets before that
 #: is lost in any DDS.
 SETTLING = 0.2
@@ -48,17 +49,24 @@ class Rosglass:
             "blob": "blob_interfaces/srv/Blob",
         }
         self.clients: dict[str, Any] = {}
+        self.promised: list[tuple[Future[Any], Any]] = []
 
     def serve(self, kind: str) -> None:
         def serve(request: Any) -> Any:
             given = bytes(request.data) if kind == "blob" else (request.a, request.b)
             response = answer(kind, given)
-            if response is None:
-                return Future()
+            if response is None or given[0] == LATER:
+                self.promised.append((Future(), response))
+                return self.promised[-1][0]
             return {"data" if kind == "blob" else "sum": response}
 
         name = f"/{plan['name']}/{kind}"
         self.node.create_service_server(name, self.types[kind], serve)
+
+    def finish(self) -> None:
+        for promise, response in self.promised:
+            if response is not None:
+                promise.set_result({"sum": response})
 
     def open(self, service: str, kind: str) -> None:
         client = self.node.create_service_client(service, self.types[kind])
@@ -277,6 +285,9 @@ for name in plan.get("serve", ()):
 
 def work(order: dict[str, Any]) -> None:
     """Call a service, {"call": name, "sums": [[a, b]]} or {"call": name, "size": bytes}."""
+    if "finish" in order:
+        peer.finish()
+        return
     service = order["call"]
     kind = "blob" if "size" in order else "add"
     requests = order.get("sums") or [blob(order["size"])]
