@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import inspect
 import logging
+import math
 import threading
 import time
 from concurrent.futures import Future
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import ActionServer, Dispatcher, Time
+from rosglass.comm import ActionServer, Dispatcher, EndpointKind, Time
 from rosglass.comm.inorder import InOrder
 from rosglass.comm.loop import LoopExecutor, executor_for
 from rosglass.errors import ConversionError, Error, NodeClosedError
@@ -52,6 +53,8 @@ _log = logging.getLogger("rosglass.ros2")
 _RESULT_TIMEOUT = 900.0
 #: Ended goals that are kept at most.
 _MAX_ENDED = 500
+#: Seconds after its acceptance in which a client asks for a goal's result: closing waits for that.
+_ASKING = 1.0
 #: Seconds in all that closing waits for goals to notice.
 _PATIENCE = 2.0
 #: ``action_msgs/srv/CancelGoal``'s return codes.
@@ -156,6 +159,7 @@ class Ros2ActionServer(ActionServer, Member):
             return
         for goal in goals:
             goal.close()
+        self._await_questions(goals)
         for end in (*self._services, self._feedback, self._status):
             end.close()
         self._desk.close()
@@ -165,6 +169,19 @@ class Ros2ActionServer(ActionServer, Member):
             if thread.is_alive():
                 _log.warning("%s still runs %.0f s after closing", thread.name, _PATIENCE)
         self._core.remove(self)
+
+    def _await_questions(self, goals: Sequence[Ros2ServerGoal]) -> None:
+        """Let clients ask what became of goals accepted just now: nobody else can tell them."""
+        if self._desk.is_current or not goals:
+            return
+        graph, name = self._core.graph, part(self.name, GET_RESULT)
+        while time.monotonic() - max(
+            (goal.begun for goal in goals if not goal.asked), default=-math.inf
+        ) < _ASKING and graph.endpoints(EndpointKind.SERVICE_CLIENT, name):
+            time.sleep(0.005)
+        answered = threading.Event()
+        self._desk.post(answered.set)  # behind the last answer
+        answered.wait(_ASKING)
 
     # -- for goals -------------------------------------------------------------------------------
 

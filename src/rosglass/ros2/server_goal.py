@@ -41,6 +41,8 @@ class Ros2ServerGoal(ServerGoal):
         self._stop = threading.Event()
         self._response: Message | None = None
         self._waiting: list[Future[Any]] = []
+        #: Monotonic time of its acceptance, and whether anybody asked for the result since.
+        self.begun, self.asked = time.monotonic(), False
         #: Monotonic time of its end, None before.
         self.ended: float | None = None
 
@@ -147,7 +149,7 @@ class Ros2ServerGoal(ServerGoal):
         """Answer a request for the result, now or when there is one."""
         dropped = None
         with self._lock:
-            response = self._response
+            response, self.asked = self._response, True
             if response is None:
                 if len(self._waiting) >= _MAX_WAITING:
                     dropped = self._waiting.pop(0)

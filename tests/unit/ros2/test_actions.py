@@ -1183,6 +1183,38 @@ def test_closing_the_server_aborts_its_goals_and_tells(client, robot, close, eve
     eventually(lambda: not client.ready)
 
 
+@pytest.mark.parametrize("close", ["server", "node"])
+def test_a_goal_accepted_just_before_closing_is_told_its_end(robot, node, close, eventually):
+    server = robot.create_action_server("/fib", FIB, fibonacci)
+    ask = {
+        part: node.create_service_client(f"/fib/_action/{part}")
+        for part in ("send_goal", "get_result")
+    }
+    for each in ask.values():
+        assert each.wait_for_server(5)
+    mine = {"uuid": b"m" * 16}
+    assert ask["send_goal"].call({"goal_id": mine, "goal": {"order": 99}}).accepted
+    closing = threading.Thread(target=(server if close == "server" else robot).close)
+    closing.start()
+    eventually(lambda: server.closed)
+    time.sleep(0.05)  # on its way
+    assert ask["get_result"].call({"goal_id": mine}).status == 6
+    closing.join(5)
+    assert not closing.is_alive()
+
+
+def test_closing_does_not_wait_for_clients_that_never_ask(robot, node, monkeypatch):
+    monkeypatch.setattr("rosglass.ros2.action_server._ASKING", 0.1)
+    server = robot.create_action_server("/fib", FIB, fibonacci)
+    ask = node.create_service_client("/fib/_action/send_goal")
+    never = node.create_service_client("/fib/_action/get_result")
+    assert ask.wait_for_server(5)
+    assert never.wait_for_server(5)
+    assert ask.call({"goal": {"order": 99}}).accepted
+    server.close()
+    assert not ask.wait_for_server(0)
+
+
 def test_closing_from_execute_does_not_hang(client, robot, eventually):
     server = robot.create_action_server("/fib", FIB, lambda _: server.close())
     goal = client.send_goal()
