@@ -13,6 +13,7 @@ import os
 import re
 import secrets
 import threading
+import time
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -140,12 +141,21 @@ def check_process() -> None:
 _processes: set[int] = set()
 
 
-def close_session(session: zenoh.Session) -> None:
+def close_session(session: zenoh.Session, pause: float = 0.0) -> None:
     """Close a session, whatever state it is in; waits for that 5 s at most.
 
     A thread of Zenoh's own, which closing waits for, does not wait at all.
+
+    Args:
+        session: What to close.
+        pause: Seconds to wait first.
     """
-    closing = threading.Thread(target=_close, args=(session,), name="Zenoh closes", daemon=True)
+
+    def close() -> None:
+        time.sleep(pause)
+        _close(session)
+
+    closing = threading.Thread(target=close, name="Zenoh closes", daemon=True)
     try:
         closing.start()
     except RuntimeError:  # the interpreter ends, and starts no more threads
@@ -153,7 +163,7 @@ def close_session(session: zenoh.Session) -> None:
         return
     if isinstance(threading.current_thread(), threading._DummyThread):
         return
-    closing.join(_PATIENCE)
+    closing.join(pause + _PATIENCE)
     if closing.is_alive():
         _log.warning("Zenoh still closes a session after %.0f s; it goes on without us", _PATIENCE)
 

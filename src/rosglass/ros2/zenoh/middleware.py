@@ -73,6 +73,9 @@ _RESERVE = 8
 _BEAT = 0.9
 #: Tokens that are not understood are logged up to so many.
 _MAX_STRANGE = 100
+#: Seconds without a new link before a peer's session is closed: a link that another peer, or this
+#: one, opens at that moment is never closed (eclipse-zenoh 1.10.2), nor are its sockets.
+_SETTLING = 0.2
 
 
 class ZenohMiddleware(Middleware):
@@ -94,7 +97,10 @@ class ZenohMiddleware(Middleware):
         self._lock = threading.Lock()
         self._declared: dict[int, Declaration] = {}
         self._links: dict[str, bool] = {}
+        self._versions = itertools.count(1)
         self.version = 0
+        self._is_peer = json.loads(self._config.get_json("mode")) != "client"
+        self._settled = 0.0
         self._was_connected = self._closed = False
         self._refused = self._linked = False
         self._pulse = Pulse(f"@ros2_lv/{options.domain}/{self._id}/pulse")
@@ -116,7 +122,7 @@ class ZenohMiddleware(Middleware):
         """Open the session; a peer's opens at once, a client's when its router answers."""
         check_process()
         self._graph, self._changed = graph, changed
-        if json.loads(self._config.get_json("mode")) == "client":
+        if not self._is_peer:
             self._refused = True  # it would wait for the router: poll() does
             changed()
         else:
@@ -247,12 +253,14 @@ class ZenohMiddleware(Middleware):
                 return
             self._closed = True
             session, self._session = self._session, None
+            pause = max(0.0, self._settled - time.monotonic()) if self._is_peer else 0.0
             self._declared.clear()
             self._links.clear()
+        self._renew()
         for pump in self._pumps:
             pump.undeclare()
         if session is not None:
-            close_session(session)
+            close_session(session, pause)
         self._drain.close()
         self._changed()
 
@@ -306,6 +314,7 @@ class ZenohMiddleware(Middleware):
                 return
             raise ConnectionLostError(f"cannot open a Zenoh session: {reason(error)}") from error
         self._refused = False
+        self._settled = time.monotonic() + _SETTLING
         events = session.info.declare_transport_events_listener(CHANNEL, history=True)
         tokens = session.liveliness().declare_subscriber(
             graph_key(self._options.domain), CHANNEL, history=True
@@ -319,7 +328,7 @@ class ZenohMiddleware(Middleware):
                 self._session = session
             waiting = list(self._declared.values())
         if self._closed:
-            close_session(session)
+            close_session(session, _SETTLING)
         for declaration in waiting:
             declaration.attach(session)
 
@@ -337,17 +346,23 @@ class ZenohMiddleware(Middleware):
         elif (now := time.monotonic()) >= self._next_beat:
             self._next_beat = now + _BEAT
             self._pulse.beat(session, now)
-            self.version += self._pulse.silent
+            if self._pulse.silent:
+                self._renew()
+
+    def _renew(self) -> None:
+        # A number never used before, whichever thread comes last.
+        self.version = next(self._versions)
 
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
         zid = str(event.transport.zid)
         with self._lock:
             if event.kind == zenoh.SampleKind.PUT:
+                self._settled = time.monotonic() + _SETTLING
                 self._links[zid] = event.transport.whatami == zenoh.WhatAmI.ROUTER
                 self._was_connected = self._linked = True
             else:
                 self._links.pop(zid, None)
-        self.version += 1
+        self._renew()
         self._changed()
 
     def _on_token(self, sample: zenoh.Sample) -> None:
@@ -375,7 +390,7 @@ class ZenohMiddleware(Middleware):
             return
         self._graph.put_endpoint(key, endpoint)
         if endpoint.kind is EndpointKind.SERVICE_SERVER:
-            self.version += 1
+            self._renew()
         if endpoint.kind is EndpointKind.SERVICE_CLIENT and not endpoint.type_hash:
             for replier in self._of(ZenohReplier):
                 replier.client_came(endpoint)
@@ -385,7 +400,7 @@ class ZenohMiddleware(Middleware):
             return
         self._graph.remove(key)
         if key.split("/", 6)[5:6] == ["SS"]:
-            self.version += 1
+            self._renew()
             for requester in self._of(ZenohRequester):
                 requester.server_left(gid_of(key))
 

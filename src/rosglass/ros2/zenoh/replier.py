@@ -125,6 +125,8 @@ class ZenohReplier(Declaration, Replier):
         own_servers: Where clients of this very node find it.
     """
 
+    tells_failures = True
+
     def __init__(
         self,
         owner: Owner,
