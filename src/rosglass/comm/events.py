@@ -220,12 +220,12 @@ class PublisherEvents:
     """Who wants to know what about a publisher; worlds tell them.
 
     Args:
-        topic: The publisher's topic.
         executor: Where callbacks run that bring no executor of their own.
         added: Called when there is a new listener, which is to be told soon.
+        topic: The publisher's topic, for errors.
     """
 
-    def __init__(self, topic: str, executor: Executor, added: Callable[[], None]) -> None:
+    def __init__(self, executor: Executor, added: Callable[[], None], topic: str = "") -> None:
         self.executor, self._added = executor, added
         self.matched: Appearances[Matched] = Appearances(topic)
         self.incompatible: Appearances[IncompatibleQoS] = Appearances(topic)

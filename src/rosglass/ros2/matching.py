@@ -9,20 +9,35 @@ from rosglass.comm import IncompatibleQoS
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from rosglass.comm import EndpointInfo
+    from rosglass.comm import EndpointInfo, QoS
+    from rosglass.ros2.middleware import Middleware
 
     Conflicts = Mapping[EndpointInfo, Mapping[str, str]]
 
-__all__ = ["conflict_events", "words"]
+__all__ = ["conflict_events", "conflicts", "words"]
 
 
-def words(conflicts: Mapping[str, str]) -> str:
+def conflicts(
+    middleware: Middleware, endpoint: EndpointInfo, requested: QoS, offered: QoS
+) -> dict[str, str]:
+    """Say, policy by policy, what keeps a publisher and a subscription apart.
+
+    Args:
+        middleware: What connects them.
+        endpoint: The one of the two that is not ours.
+        requested: The subscription's profile.
+        offered: The publisher's profile.
+    """
+    return {**requested.conflicts(offered), **middleware.conflicts(endpoint)}
+
+
+def words(found: Mapping[str, str]) -> str:
     """Return the conflicts of policies as one line."""
-    return "; ".join(f"{policy}: {told}" for policy, told in conflicts.items())
+    return "; ".join(f"{policy}: {told}" for policy, told in found.items())
 
 
 def conflict_events(
-    conflicts: Conflicts,
+    found: Conflicts,
 ) -> Callable[[EndpointInfo, int, int, int], IncompatibleQoS | None]:
     """Return what makes events of the endpoints in conflict, for :class:`comm.Appearances`."""
 
@@ -31,7 +46,7 @@ def conflict_events(
     ) -> IncompatibleQoS | None:
         if change < 0:
             return None
-        told = conflicts[endpoint]
+        told = found[endpoint]
         return IncompatibleQoS(endpoint, tuple(told), words(told), total)
 
     return event

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Protocol
 from rosglass.comm import Handle
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from rosglass.comm import EndpointInfo, NodeName, QoS, Status
     from rosglass.interfaces import Definition
@@ -216,10 +216,13 @@ class Middleware(ABC):
 
     Attributes:
         matches_qos: Whether a writer and a reader with incompatible profiles exchange nothing.
+        matches_hashes: Whether endpoints whose types have one name but different hashes exchange
+            nothing.
         keeps_byte_order: Whether big-endian payloads arrive as such.
     """
 
     matches_qos: bool
+    matches_hashes: bool = True
     keeps_byte_order: bool = True
     #: Whether a service's hash in the graph may be that of its request's type.
     announces_requests: bool = False
@@ -298,6 +301,14 @@ class Middleware(ABC):
         on_request: OnRequest,
     ) -> Replier:
         """Announce a service server; arguments as in :meth:`create_requester`."""
+
+    def conflicts(self, endpoint: EndpointInfo) -> Mapping[str, str]:
+        """Say what keeps a publisher or subscription from all of ours, besides its profile.
+
+        Returns:
+            The conflict in words for each policy, as :meth:`QoS.conflicts` does.
+        """
+        return {}
 
     def describe_type(self, endpoint: EndpointInfo, timeout: float) -> Definition | None:
         """Return the definition of a message that a publisher or subscription itself announces.

@@ -26,7 +26,7 @@ from rosglass.errors import (
 )
 from rosglass.ros2.announced import similar
 from rosglass.ros2.core import Member
-from rosglass.ros2.matching import conflict_events, words
+from rosglass.ros2.matching import conflict_events, conflicts, words
 from rosglass.ros2.watchdog import Watchdog
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class Ros2Publisher(Publisher, Member):
         self._problem = ""
         self._known: list[EndpointInfo] | None = None
         self._big = False
-        self.events: PublisherEvents = PublisherEvents(topic, core.dispatcher, self._look)
+        self.events: PublisherEvents = PublisherEvents(core.dispatcher, self._look, topic)
         self._lock = threading.Lock()
         self._watchdogs: dict[str, Watchdog] = {}
         self._missed = self._lost = 0
@@ -218,25 +218,33 @@ class Ros2Publisher(Publisher, Member):
     def _subscriptions(self) -> list[EndpointInfo]:
         return self._core.graph.endpoints(_SUBSCRIPTION, self.topic)
 
-    def _understands(self, endpoint: EndpointInfo) -> bool:
-        """Return whether a subscription is for our type, in our version as far as it says."""
-        same = not self._hash or endpoint.type_hash in ("", self._hash)
-        return same and endpoint.type == self.type.name
+    def _agrees(self, endpoint: EndpointInfo) -> bool:
+        """Return whether a subscription's type is our version of it, as far as it says."""
+        return not self._hash or endpoint.type_hash in ("", self._hash)
+
+    def _receives(self, endpoint: EndpointInfo) -> bool:
+        """Return whether a subscription's type lets it receive what we send."""
+        same = endpoint.type == self.type.name
+        return same and (self._agrees(endpoint) or not self._core.middleware.matches_hashes)
 
     def _matching(self, subscriptions: Sequence[EndpointInfo]) -> list[EndpointInfo]:
-        found = [one for one in subscriptions if self._understands(one)]
-        if not self._core.middleware.matches_qos:
+        found = [one for one in subscriptions if self._receives(one)]
+        middleware = self._core.middleware
+        if not middleware.matches_qos:
             return found
-        return [one for one in found if not one.qos.conflicts(self.qos)]
+        return [one for one in found if not conflicts(middleware, one, one.qos, self.qos)]
 
     def _conflicts(
         self, subscriptions: Sequence[EndpointInfo]
     ) -> dict[EndpointInfo, dict[str, str]]:
-        """Return what those ask for too much of that understand us."""
+        """Return what those ask for too much of that would receive us."""
+        middleware = self._core.middleware
         found = {
-            one: one.qos.conflicts(self.qos) for one in subscriptions if self._understands(one)
+            one: conflicts(middleware, one, one.qos, self.qos)
+            for one in subscriptions
+            if self._receives(one)
         }
-        return {one: conflicts for one, conflicts in found.items() if conflicts}
+        return {one: told for one, told in found.items() if told}
 
     def _problems(self, subscriptions: Sequence[EndpointInfo]) -> list[str]:
         problems: dict[str, None] = {}
@@ -245,20 +253,26 @@ class Ros2Publisher(Publisher, Member):
             if one.type != name:
                 told = f"{one.node} subscribes to {one.type} here, not {name}"
                 problems[f"{told}: it receives nothing from us"] = None
-            elif not self._understands(one):
+            elif not self._agrees(one):
+                told = (
+                    "it receives our messages all the same, and may take them for something else"
+                    if self._receives(one)
+                    else "it receives nothing from us"
+                )
                 problems[
                     f"{one.node} has another definition of {name} ({one.type_hash}; ours is "
-                    f"{self._hash}): it receives nothing from us"
+                    f"{self._hash}): {told}"
                 ] = None
         effect = (
             "it receives nothing from us"
             if self._core.middleware.matches_qos
             else "it is served without that guarantee"
         )
-        for one, conflicts in self._conflicts(subscriptions).items():
+        for one, found in self._conflicts(subscriptions).items():
+            remedy = "; offer what it asks for" if one.qos.conflicts(self.qos) else ""
             problems[
-                f"quality of service requested by {one.node} does not match "
-                f"({words(conflicts)}): {effect}; offer what it asks for"
+                f"quality of service requested by {one.node} does not match ({words(found)}): "
+                f"{effect}{remedy}"
             ] = None
         return list(problems)
 
@@ -279,8 +293,8 @@ class Ros2Publisher(Publisher, Member):
         self.events.matched.update(matching, Matched)
         if not self.events.incompatible:
             return
-        conflicts = self._conflicts(subscriptions)
-        self.events.incompatible.update(conflicts, conflict_events(conflicts))
+        found = self._conflicts(subscriptions)
+        self.events.incompatible.update(found, conflict_events(found))
 
     def _watch(self) -> None:
         """Watch the limits that somebody wants to be told about, from the first sending on."""

@@ -18,7 +18,7 @@ from rosglass.errors import Error, NodeClosedError, TypeNotFoundError
 from rosglass.ros2.announced import similar
 from rosglass.ros2.core import Member
 from rosglass.ros2.liveliness import Liveness
-from rosglass.ros2.matching import conflict_events, words
+from rosglass.ros2.matching import conflict_events, conflicts, words
 from rosglass.ros2.repeats import Repeats
 from rosglass.ros2.topic_types import TopicTypes
 from rosglass.ros2.watchdog import Watchdog
@@ -229,24 +229,30 @@ class Reading(Member, Source):
             if self._core.middleware.matches_qos
             else "it is received without that guarantee"
         )
-        return [
-            f"quality of service offered by {publisher.node} does not match ({words(conflicts)}): "
-            f"{effect}; ask for no more than it offers"
-            for publisher, conflicts in self._conflicts(publishers).items()
-        ]
+        qos = self.subscription.qos
+        problems = []
+        for publisher, found in self._conflicts(publishers).items():
+            remedy = "; ask for no more than it offers" if qos.conflicts(publisher.qos) else ""
+            problems.append(
+                f"quality of service offered by {publisher.node} does not match ({words(found)}): "
+                f"{effect}{remedy}"
+            )
+        return problems
 
     def _conflicts(self, publishers: Sequence[EndpointInfo]) -> dict[EndpointInfo, dict[str, str]]:
         """Return what those offer too little of that are understood."""
-        qos = self.subscription.qos
-        found = {p: qos.conflicts(p.qos) for p in publishers if self._types.accepts(p)}
-        return {publisher: conflicts for publisher, conflicts in found.items() if conflicts}
+        qos, middleware = self.subscription.qos, self._core.middleware
+        found = {
+            p: conflicts(middleware, p, qos, p.qos) for p in publishers if self._types.accepts(p)
+        }
+        return {publisher: told for publisher, told in found.items() if told}
 
     def _matching(self, publishers: Sequence[EndpointInfo]) -> list[EndpointInfo]:
         understood = [p for p in publishers if self._types.accepts(p)]
-        if not self._core.middleware.matches_qos:
+        qos, middleware = self.subscription.qos, self._core.middleware
+        if not middleware.matches_qos:
             return understood
-        qos = self.subscription.qos
-        return [p for p in understood if not qos.conflicts(p.qos)]
+        return [p for p in understood if not conflicts(middleware, p, qos, p.qos)]
 
     # -- reading ---------------------------------------------------------------------------------
 
@@ -303,8 +309,8 @@ class Reading(Member, Source):
         matching = self._matching(publishers)
         events.matched.update(matching, Matched)
         if events.incompatible:
-            conflicts = self._conflicts(publishers)
-            events.incompatible.update(conflicts, conflict_events(conflicts))
+            found = self._conflicts(publishers)
+            events.incompatible.update(found, conflict_events(found))
         if events.liveliness:
             alive = self._liveness.follow(matching, self._reader)
 

@@ -276,3 +276,28 @@ def test_a_thousand_endpoints_told_again_and_again_change_only_what_is_new(domai
     domain.tell(robot, writers(TALKER, *guids[:-1]), writers(LISTENER, guids[-1]))
     assert domain.changes == before + 1
     assert len(domain.graph.endpoints_of(TALKER)) == 999
+
+
+@pytest.mark.parametrize(
+    ("representations", "reader", "foreign"),
+    [
+        ((), False, False),
+        ((0,), False, False),
+        ((2,), False, True),
+        ((0, 2), False, False),
+        ((2, 0), False, True),  # a writer sends in the first one
+        ((2, 0), True, False),
+        ((2,), True, True),
+    ],
+)
+def test_endpoints_that_do_not_speak_our_encoding_are_known(
+    domain, representations, reader, foreign
+):
+    guid = domain.join() + b"\0\0\1" + (b"\4" if reader else b"\3")
+    found = Discovered(
+        True, guid, 1, guid, b"", "rt/t", STRING, QoS(), representations=representations
+    )
+    domain.dds.put_endpoint(found, reader=reader)
+    assert domain.dds.is_foreign(guid) is foreign
+    domain.drop(guid)
+    assert not domain.dds.is_foreign(guid)

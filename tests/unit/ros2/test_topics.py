@@ -153,7 +153,21 @@ def test_a_publisher_names_subscriptions_of_other_types_and_definitions(node, as
     asker(type_hash=OTHER, node="other")
     told = eventually(lambda: "; " in publisher.problem and publisher.problem)
     assert f"/wrong subscribes to {TWIST} here, not {STRING}: it receives nothing" in told
-    assert f"/other has another definition of {STRING} ({OTHER}; ours is {hash_of(STRING)})" in told
+    definition = f"/other has another definition of {STRING} ({OTHER}; ours is {hash_of(STRING)})"
+    assert f"{definition}: it receives nothing from us" in told
+    assert publisher.subscription_count() == 0
+
+
+def test_subscriptions_with_another_definition_receive_us_where_names_match(
+    node, middleware, asker, eventually
+):
+    middleware.matches_hashes = False
+    publisher = node.create_publisher("/t", STRING)
+    asker(type_hash=OTHER, node="other")
+    told = eventually(lambda: publisher.problem)
+    assert "it receives our messages all the same" in told
+    assert "receives nothing" not in told
+    assert publisher.subscription_count() == 1
 
 
 def test_hints_at_names_that_were_meant(node, robot, asker, eventually):

@@ -116,6 +116,7 @@ _PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
     "dds_qset_userdata": (None, [pointer, c_char_p, c_size_t]),
     "dds_qset_writer_data_lifecycle": (None, [pointer, c_bool]),
     "dds_qset_data_representation": (None, [pointer, c_uint32, pointer]),
+    "dds_qget_data_representation": (c_bool, [pointer, POINTER(c_uint32), POINTER(pointer)]),
     "dds_qget_reliability": (c_bool, [pointer, _int_p, _long_p]),
     "dds_qget_durability": (c_bool, [pointer, _int_p]),
     "dds_qget_history": (c_bool, [pointer, _int_p, _int_p]),

@@ -39,6 +39,8 @@ class Discovered:
         topic: Its DDS topic, empty for a participant.
         type: Its DDS type, empty for a participant.
         qos: Its profile.
+        representations: The encodings that a writer offers or a reader takes, by their numbers;
+            empty when it does not say, which stands for XCDR1 alone.
         properties: Those of `__NetworkAddresses`, `__Hostname`, `__Pid` and `__ProcessName` that a
             participant announces.
     """
@@ -51,6 +53,7 @@ class Discovered:
     topic: str = ""
     type: str = ""
     qos: QoS = field(default_factory=QoS)
+    representations: tuple[int, ...] = ()
     properties: tuple[tuple[str, str], ...] = ()
 
 
@@ -148,6 +151,7 @@ def _endpoint(address: Any, handle: int, alive: bool) -> Discovered:
         data.topic.decode(errors="replace"),
         data.type.decode(errors="replace"),
         qos.profile(),
+        tuple(qos.representations()),
     )
 
 

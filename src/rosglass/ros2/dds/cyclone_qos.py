@@ -6,12 +6,15 @@ The mapping is rmw_cyclonedds's: whoever speaks to ROS 2 must offer and request 
 from __future__ import annotations
 
 import ctypes
-from ctypes import byref, c_char_p, c_int16, c_int32, c_int64, c_size_t, c_void_p
+from ctypes import byref, c_char_p, c_int16, c_int32, c_int64, c_size_t, c_uint32, c_void_p
 
 from rosglass.comm import Durability, Duration, History, Liveliness, QoS, Reliability
 from rosglass.ros2.dds.cyclone import INFINITY, library
 
-__all__ = ["Qos", "qos_of"]
+__all__ = ["XCDR1", "Qos", "qos_of"]
+
+#: The encoding of ROS 2's messages, as data representations are numbered (DDS-XTypes 1.3, 7.6.3.1).
+XCDR1 = 0
 
 _AUTOMATIC, _MANUAL_BY_TOPIC = 0, 2
 _UNLIMITED = -1
@@ -66,6 +69,17 @@ class Qos:
         text = ctypes.cast(value, c_char_p).value or b""
         library().dds_free(value)
         return text.decode(errors="replace")
+
+    def representations(self) -> list[int]:
+        """Return the numbers of the encodings that are announced, empty when none are."""
+        values, size = c_void_p(), c_uint32()
+        if not library().dds_qget_data_representation(self.address, byref(size), byref(values)):
+            return []
+        if not values.value:
+            return []
+        found = (c_int16 * size.value).from_address(values.value)[:]
+        library().dds_free(values)
+        return found
 
     def profile(self) -> QoS:
         """Return the policies that ROS 2 has; what was not announced has DDS's default.
@@ -136,7 +150,7 @@ def qos_of(profile: QoS, *, writer: bool, user_data: bytes = b"") -> Qos:
     if writer:
         lib.dds_qset_writer_data_lifecycle(address, False)
     # XCDR1 alone: ROS 2 knows no other encoding.
-    lib.dds_qset_data_representation(address, 1, byref(c_int16(0)))
+    lib.dds_qset_data_representation(address, 1, byref(c_int16(XCDR1)))
     if user_data:
         qos.set_user_data(user_data)
     return qos

@@ -94,6 +94,10 @@ class DdsDiscovery:
         with self._lock:
             self._seen.put_own(endpoint)
 
+    def is_foreign(self, guid: bytes) -> bool:
+        """Return whether a reader or writer knows no encoding of ours."""
+        return self._seen.is_foreign(guid)
+
     def participant(self, guid: bytes) -> Discovered | None:
         """Return the participant that a GUID is of, or belongs to; None when it is gone."""
         return self._seen.participant(guid)

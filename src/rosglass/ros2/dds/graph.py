@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointInfo, EndpointKind, NodeName
+from rosglass.ros2.dds.cyclone_qos import XCDR1
 from rosglass.ros2.dds.discovery_info import hash_of, is_rosglass
 from rosglass.ros2.names import demangle_topic, demangle_type
 
@@ -77,6 +78,7 @@ class DdsGraph:
         self._replies: dict[_Call, set[bytes]] = {}
         self._requests: dict[_Call, set[bytes]] = {}
         self._call_of: dict[bytes, _Call] = {}
+        self._foreign: set[bytes] = set()
 
     @property
     def peers(self) -> int:
@@ -101,6 +103,10 @@ class DdsGraph:
         """Return the participant that a GUID is of, or belongs to; None when it is gone."""
         known = self._participants.get(guid[:_PREFIX])
         return None if known is None else known.found
+
+    def is_foreign(self, guid: bytes) -> bool:
+        """Return whether a reader or writer knows no encoding of ours; from any thread."""
+        return guid in self._foreign
 
     def put_participants(self, news: Iterable[Discovered]) -> None:
         """Take in participants that came, changed or went.
@@ -162,6 +168,10 @@ class DdsGraph:
         carried = demangle_topic(found.topic)
         if carried is None:
             return  # not of ROS 2
+        # A writer sends in the first encoding that it names.
+        known = found.representations or (XCDR1,)
+        if XCDR1 not in (known if reader else known[:1]):
+            self._foreign.add(found.guid)
         prefix, name = carried
         if prefix == "rt":
             kind = EndpointKind.SUBSCRIPTION if reader else EndpointKind.PUBLISHER
@@ -187,6 +197,7 @@ class DdsGraph:
         self._show(found.guid)
 
     def _drop(self, guid: bytes) -> None:
+        self._foreign.discard(guid)
         if self._endpoints.pop(guid, None) is None:
             return
         prefix = guid[:_PREFIX]
@@ -203,7 +214,9 @@ class DdsGraph:
             if not left:
                 ends.pop(call, None)
         self._graph.remove(guid)
-        if call not in self._replies:
+        if call in self._replies:
+            self._show(next(iter(self._replies[call])))
+        else:
             for request in self._requests.get(call, ()):
                 self._graph.remove(request)
 
@@ -220,6 +233,12 @@ class DdsGraph:
         participant = self._participants.get(guid[:_PREFIX])
         if participant is not None:
             endpoint = replace(endpoint, node=participant.owner(guid))
+        replies = self._replies.get(self._call_of[guid]) if guid in self._call_of else None
+        if replies:
+            hashes = {self._endpoints[reply].type_hash for reply in replies}
+            told = hashes.pop() if len(hashes) == 1 else ""
+            if told != endpoint.type_hash:
+                endpoint = replace(endpoint, response_hash=told)
         self._graph.put_endpoint(guid, endpoint)
 
     def _set_nodes(

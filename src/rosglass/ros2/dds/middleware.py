@@ -15,7 +15,7 @@ from rosglass.ros2.dds.requester import DdsRequester
 from rosglass.ros2.middleware import Middleware, Reader, Replier, Requester, Writer
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from rosglass.comm import NodeName, QoS
     from rosglass.interfaces import Definition
@@ -30,6 +30,7 @@ class DdsMiddleware(Middleware):
     """A participant in a DDS domain."""
 
     matches_qos = True
+    matches_hashes = False
     # Cyclone labels every payload as little endian, but knows no types whose bytes to swap.
     keeps_byte_order = False
     announces_requests = True
@@ -127,6 +128,13 @@ class DdsMiddleware(Middleware):
         kind = EndpointKind.SERVICE_SERVER
         self._show(EndpointInfo(kind, service, type_name, node, qos, type_hash, replier.gid))
         return replier
+
+    def conflicts(self, endpoint: EndpointInfo) -> Mapping[str, str]:
+        """Say so when it is another encoding that an endpoint offers or requests."""
+        if self._discovery is None or not self._discovery.is_foreign(endpoint.gid):
+            return {}
+        verb = "offered" if endpoint.kind is EndpointKind.PUBLISHER else "requested"
+        return {"data representation": f"XCDR2 alone {verb}, but ROS 2's messages are XCDR1"}
 
     def describe_type(self, endpoint: EndpointInfo, timeout: float) -> Definition | None:
         """Return the definition that an endpoint announces by XTypes."""

@@ -24,7 +24,8 @@ from summary import VALUES, summary, tell
 # What is in the plan: "domain"; types by topic to "publish" and "subscribe"; how many to publish in
 # "count", seconds between them in "period" and before them in "start"; "texts" to number them;
 # "rubbish" with the lengths of sequences to be sent as Strings. What is in "qos": "best_effort",
-# "latched", "depth" (0 keeps all), and seconds of "deadline", "lifespan" and "lease".
+# "latched", "xcdr2" (no other encoding), "depth" (0 keeps all), and seconds of "deadline",
+# "lifespan" and "lease".
 plan = json.loads(sys.argv[1])
 given = plan.get("qos", {})
 
@@ -105,7 +106,10 @@ def profile(writer: bool) -> Qos:
         else Policy.Reliability.Reliable(duration(seconds=1)),
         Policy.Durability.TransientLocal if given.get("latched") else Policy.Durability.Volatile,
         Policy.History.KeepLast(depth) if depth else Policy.History.KeepAll,
-        Policy.DataRepresentation(use_cdrv0_representation=True),
+        Policy.DataRepresentation(
+            use_cdrv0_representation="xcdr2" not in given,
+            use_xcdrv2_representation="xcdr2" in given,
+        ),
     ]
     if given.get("latched") and writer:
         history = Policy.History.KeepLast(depth or 1)
