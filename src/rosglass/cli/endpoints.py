@@ -45,6 +45,7 @@ def describe(end: EndpointInfo) -> dict[str, Any]:
             "lease_duration": None if qos.lease_duration is None else qos.lease_duration.seconds,
         },
         "type_hash": end.type_hash,
+        "response_hash": end.response_hash,
         "gid": end.gid.hex(),
     }
 

@@ -94,7 +94,7 @@ def _info(args: argparse.Namespace) -> int:
     print(f"{style(name, 'bold')} [{', '.join(sorted({end.type for end in ends}))}]")
     for end in ends:
         print(f"  {end.kind.value} {style(end.node, 'cyan')}")
-        for key in ("type", "type_hash", "gid"):
+        for key in ("type", "type_hash", "response_hash", "gid"):
             if describe(end)[key]:
                 print(f"    {key}: {short(describe(end)[key])}")
     return 0

@@ -50,7 +50,9 @@ class EndpointInfo:
         type: Type name, ``pkg/msg/Type``.
         node: The node it belongs to.
         qos: Its quality of service as announced.
-        type_hash: RIHS01 hash (REP 2016) or md5 (ROS 1); empty when not announced.
+        type_hash: RIHS01 hash (REP 2016) or md5 (ROS 1); empty when not announced. Over DDS, ROS 2
+            nodes announce a service by the hash of its request, and
+        response_hash: that of its response; empty when it is not announced apart.
         gid: Identity of the endpoint, as bytes; empty when the world has none.
     """
 
@@ -61,6 +63,7 @@ class EndpointInfo:
     qos: QoS = field(default_factory=QoS)
     type_hash: str = ""
     gid: bytes = b""
+    response_hash: str = ""
 
 
 class ConnectionState(Enum):

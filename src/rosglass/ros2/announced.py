@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
-from rosglass.errors import Error
+from rosglass.errors import DefinitionConflictError, Error
 from rosglass.interfaces.hashes import announced_hashes
 
 if TYPE_CHECKING:
@@ -63,6 +63,7 @@ class Announced(Generic[_T]):
         self._failed: tuple[str, str] | None = None
         self.type: _T | None = None
         self.hash, self.hashes = "", frozenset[str]()
+        self._response_hash = ""
         self.failure = ""
         self.pending = False
         if given is not None:
@@ -81,8 +82,8 @@ class Announced(Generic[_T]):
         """
         if self._fixed:
             return False
-        hashes = {peer.type_hash for peer in peers if peer.type == name and peer.type_hash}
         current = self.type if self.type is not None and self.type.name == name else None
+        hashes = {self._version(peer) for peer in peers if peer.type == name} - {""}
         if current is not None and (len(hashes) != 1 or hashes <= self.hashes):
             self._clear()
             return False
@@ -91,6 +92,7 @@ class Announced(Generic[_T]):
             return False
         try:
             found = self._load(*wanted)
+            self._check(found, peers)
         except Error as error:
             self.failure, self.pending = missing(self._core, *wanted, peers, error)
             self._failed = None if self.pending else wanted
@@ -99,13 +101,35 @@ class Announced(Generic[_T]):
         self._take(found)
         return True
 
+    def told(self, peer: EndpointInfo) -> str:
+        """Say how a peer's version differs from ours, in hashes."""
+        if peer.type_hash in self.hashes and peer.response_hash:
+            return f"of its response: {peer.response_hash}, ours is {self._response_hash}"
+        return f"{peer.type_hash}, ours is {self.hash}"
+
     def fits(self, peer: EndpointInfo) -> bool:
         """Return whether a peer has this type in this version, as far as it says."""
         return (
             self.type is not None
             and peer.type == self.type.name
-            and (not peer.type_hash or peer.type_hash in self.hashes)
+            and self.hashes.issuperset(filter(None, (peer.type_hash, peer.response_hash)))
         )
+
+    def _version(self, peer: EndpointInfo) -> str:
+        """Return the hash that tells a peer's version from ours, or that it has the same."""
+        if peer.type_hash in self.hashes and peer.response_hash not in self.hashes:
+            return peer.response_hash or peer.type_hash
+        return peer.type_hash
+
+    def _check(self, found: _T, peers: Sequence[EndpointInfo]) -> None:
+        """Raise DefinitionConflictError for a version with the peers' response, but no request."""
+        hashes = announced_hashes(found.definition)
+        for peer in peers:
+            if peer.response_hash in hashes and peer.type_hash not in hashes:
+                raise DefinitionConflictError(
+                    f"no definition has both its request ({peer.type_hash}) and its response "
+                    f"({peer.response_hash})"
+                )
 
     def _clear(self) -> None:
         self._failed, self.failure, self.pending = None, "", False
@@ -113,6 +137,7 @@ class Announced(Generic[_T]):
     def _take(self, found: _T) -> None:
         hashes = announced_hashes(found.definition)
         self.type, self.hash, self.hashes = found, hashes[0], frozenset(hashes)
+        self._response_hash = hashes[-1]
 
 
 def missing(
@@ -178,8 +203,8 @@ def mismatches(
             problems[f"{peer.node} {verb} {peer.type} here, not {name}: {effect}"] = None
         elif not announced.fits(peer):
             problems[
-                f"{peer.node} has another definition of {name} ({peer.type_hash}, ours is "
-                f"{announced.hash}): {effect}; add the robot's definition to the library"
+                f"{peer.node} has another definition of {name} ({announced.told(peer)}): {effect}; "
+                "add the robot's definition to the library"
             ] = None
     return list(problems)
 

@@ -213,6 +213,26 @@ def test_a_service_shows_when_both_its_topics_are_there(domain, server, request_
     assert domain.graph.nodes() == [TALKER]
 
 
+def test_a_service_shows_the_hash_of_its_response_too(domain):
+    robot = domain.join()
+    (request, request_type), (reply, reply_type) = ADD
+    told = {"user_data": b"typehash=RIHS01_q;"}
+    domain.add(robot, request, request_type, reader=True, **told)
+
+    def response_hash():
+        return [end.response_hash for end in domain.graph.endpoints(SERVER, "/add")]
+
+    first = domain.add(robot, reply, reply_type, user_data=b"typehash=RIHS01_r;")
+    assert response_hash() == ["RIHS01_r"]
+    other = domain.add(robot, reply, reply_type, user_data=b"typehash=RIHS01_x;")
+    assert response_hash() == [""]  # whose is whose cannot be told
+    domain.drop(other)
+    assert response_hash() == ["RIHS01_r"]
+    domain.drop(first)
+    domain.add(robot, reply, reply_type, **told)
+    assert response_hash() == [""]  # one hash for the whole service
+
+
 def test_topics_of_two_participants_make_no_service(domain):
     (request, request_type), (reply, reply_type) = ADD
     domain.add(domain.join(), request, request_type, reader=True)

@@ -5,11 +5,20 @@ from __future__ import annotations
 import asyncio
 import concurrent.futures
 import threading
+from dataclasses import replace
 
 import pytest
 
 import rosglass
-from rosglass.comm import Dispatcher, EndpointKind, Executor, Promise
+from rosglass.comm import (
+    IMMEDIATE,
+    Dispatcher,
+    EndpointInfo,
+    EndpointKind,
+    Executor,
+    NodeName,
+    Promise,
+)
 from rosglass.interfaces import Library
 from rosglass.ros2 import Ros2Node
 from rosglass.ros2.middleware import CALL_DROPPED, SERVER_LEFT, RequestId
@@ -755,6 +764,37 @@ def test_a_plain_function_that_returns_a_coroutine_is_told_so(robot, client):
     robot.create_service_server("/add", ADD, lambda _: serve(None))
     with pytest.raises(rosglass.ServiceError, match="must be an async def"):
         client.call(timeout=5)
+
+
+def test_another_version_of_the_response_alone_is_named_and_taken(middleware, eventually):
+    theirs_only = Library()
+    theirs_only.add_text(ADD, "int64 a\nint64 b\n---\nint64 sum\nbool overflow\n")
+    theirs_only.prefer("wire")
+    theirs, ours = rosglass.load(ADD, library=theirs_only), rosglass.load(ADD)
+    assert theirs.request.rihs01 == ours.request.rihs01
+    robot = NodeName("/", "robot")
+    server = EndpointInfo(
+        SERVER,
+        "/add",
+        ADD,
+        robot,
+        type_hash=ours.request.rihs01,
+        response_hash=theirs.response.rihs01,
+    )
+    library = Library()
+    with Ros2Node(middleware, "fake://", "cockpit", library=library) as node:
+        client, fixed = (node.create_service_client("/add", given) for given in (ADD, ours))
+        middleware.graph.put_endpoint("s", server)
+        eventually(lambda: f"/robot has {ADD}, which cannot be used" in client.problem)
+        assert f"has the hash {theirs.response.rihs01}" in client.problem
+        told = f"(of its response: {theirs.response.rihs01}, ours is {ours.response.rihs01})"
+        assert f"another definition of {ADD} {told}: it cannot be called" in fixed.problem
+        assert not client.ready
+        library.add_version(theirs.definition)
+        eventually(lambda: client.type.rihs01 == theirs.rihs01)
+        other = replace(server, type_hash=OTHER_HASH, response_hash=ours.response.rihs01)
+        middleware.graph.put_endpoint("s", other)
+        eventually(lambda: f"has the hash {OTHER_HASH}" in client.problem)
 
 
 def test_a_second_server_and_strange_clients_are_named(robot, middleware, caplog, eventually):
