@@ -86,6 +86,7 @@ class ServiceClient(Handle):
                 asked to.
             ServiceError: The server says that it failed, or its response cannot be decoded.
             ConnectionLostError: The server went away before it answered.
+            UnsupportedError: The calling thread is one that the answer needs.
             NodeClosedError: The client is closed, or gets closed meanwhile.
         """
 

@@ -202,6 +202,8 @@ class Replier(Handle):
     #: Whether taking a request only puts it aside for another thread: it may be taken in the
     #: middle of receiving then. Set by whoever created the replier.
     quick: bool = False
+    #: Whether :meth:`fail` tells anything.
+    tells_failures: bool = False
 
     @abstractmethod
     def reply(self, request: RequestId, data: bytes | bytearray) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from rosglass.comm import Listeners
 from rosglass.comm.promise import check_timeout
 from rosglass.errors import ConversionError
+from rosglass.ros2.receiving import check_may_wait
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -52,6 +53,7 @@ class Readiness:
             self._check_open()
             if self._ready():
                 return True
+            check_may_wait(self._name)
             left = _SLICE if deadline is None else deadline - time.monotonic()
             if left <= 0:
                 return False

@@ -34,6 +34,7 @@ from rosglass.ros2.announced import (
 from rosglass.ros2.core import Member
 from rosglass.ros2.middleware import CALL_DROPPED, SERVER_LEFT
 from rosglass.ros2.readiness import Readiness
+from rosglass.ros2.receiving import check_may_wait
 from rosglass.ros2.requests import Link, Request
 
 if TYPE_CHECKING:
@@ -155,6 +156,7 @@ class Ros2ServiceClient(ServiceClient, Member):
                 "thread of this node; take call_async() here, or give the server an executor "
                 "of its own"
             )
+        check_may_wait(self.name)
         timeout = check_timeout(timeout, self.name)
         entry = self._enter(request, timeout)
         entry.private = True

@@ -186,10 +186,11 @@ class Ros2ServiceServer(ServiceServer, Member):
             data = kind.encode(answer)
         except Error as error:
             _log.error(
-                "%s: the callback's response to %s does not fit: %s; nothing was sent",
+                "%s: the callback's response to %s does not fit: %s; %s",
                 self.name,
                 self._origin(request),
                 error,
+                self._consequence,
             )
             self._replier.fail(request, f"the server made no valid response: {error}")
             return
@@ -200,11 +201,18 @@ class Ros2ServiceServer(ServiceServer, Member):
         except Error as error:
             _log.error("%s: cannot answer %s: %s", self.name, self._origin(request), error)
 
+    @property
+    def _consequence(self) -> str:
+        """What a client gets instead of a response, for people."""
+        told = self._replier.tells_failures
+        return "it is told the error instead" if told else "it gets no response, and waits"
+
     def _failed(self, request: RequestId, error: Exception) -> None:
         _log.error(
-            "%s: the callback failed on a request of %s; it gets no response",
+            "%s: the callback failed on a request of %s; %s",
             self.name,
             self._origin(request),
+            self._consequence,
             exc_info=error,
         )
         self._replier.fail(request, f"{type(error).__name__}: {error}")

@@ -8,7 +8,6 @@ import logging
 import os
 import signal
 import threading
-import time
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Any

@@ -13,12 +13,13 @@ from pathlib import Path
 import pytest
 
 import rosglass
-from rosglass.comm import CancelAnswer, GoalStatus
+from rosglass.comm import IMMEDIATE, CancelAnswer, GoalStatus
 from rosglass.ros2.zenoh.router import Router
 
 HERE = Path(__file__).parent
 EXAMPLES = HERE.parents[2] / "examples"
 ADD, TRIGGER = "example_interfaces/srv/AddTwoInts", "std_srvs/srv/Trigger"
+TEXT = "std_msgs/msg/String"
 FIBONACCI = "example_interfaces/action/Fibonacci"
 #: A killed participant of DDS is gone after its lease, which is 10 s without this.
 SHORT_LEASE = (
@@ -97,6 +98,25 @@ def test_a_callback_that_fails(node, server):
     assert client.wait_for_server(10), client.problem
     with pytest.raises((rosglass.ServiceError, rosglass.TimeoutError)):
         client.call(timeout=1)
+
+
+def test_no_callback_waits_in_the_thread_that_receives(node, server, wait_for, url):
+    client = node.create_service_client("/add", ADD)
+    assert client.wait_for_server(10), client.problem
+    told = []
+
+    def ask(_):
+        with pytest.raises(rosglass.UnsupportedError, match="in a thread that receives") as raised:
+            client.call(timeout=60)
+        told.append(raised.value)
+
+    with rosglass.connect(url, "talker") as talker:
+        node.create_subscription("/talk", TEXT, ask, executor=IMMEDIATE)
+        publisher = talker.create_publisher("/talk", TEXT)
+        wait_for(lambda: publisher.publish({"data": "hello"}) or told, what="a message")
+    told.clear()
+    client.call_async({"a": 1}).add_done_callback(ask)
+    wait_for(lambda: told, what="the response")
 
 
 def test_goals_in_every_way(node, server, wait_for):

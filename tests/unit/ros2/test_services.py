@@ -583,6 +583,27 @@ def test_a_callback_that_would_wait_for_itself_is_told_so(node, client, robot):
     assert client.call({"a": 2}).sum == 2
 
 
+def test_threads_that_everything_waits_for_must_not_wait(node, robot, client, eventually):
+    refused = []
+    told = "this callback runs in a thread that receives .* take call_async"
+
+    def wait(*_):
+        with pytest.raises(rosglass.UnsupportedError, match=f"/add: {told}"):
+            client.call(timeout=60)
+        assert client.wait_for_server(60)  # it is there
+        with pytest.raises(rosglass.UnsupportedError, match=f"/nothing: {told}"):
+            nothing.wait_for_server(60)
+        refused.append(threading.current_thread())
+
+    nothing = node.create_service_client("/nothing", ADD)
+    client.on_ready_change(wait, IMMEDIATE)
+    robot.create_service_server("/add", ADD, add)
+    eventually(lambda: len(refused) == 1)
+    nothing.call_async(timeout=0.2).add_done_callback(wait)
+    eventually(lambda: len(refused) == 2)
+    assert threading.main_thread() not in refused
+
+
 def test_ctrl_c_gives_the_call_up(client, requester, monkeypatch):
     requester.linked = True
 
@@ -656,7 +677,11 @@ def test_a_response_that_does_not_fit_is_logged(robot, client, caplog, response,
     assert told in caplog.text
 
 
-def test_a_callback_that_fails_is_logged_with_who_asked(robot, client, caplog):
+@pytest.mark.parametrize(
+    ("tells", "told"),
+    [(True, "it is told the error instead"), (False, "it gets no response, and waits")],
+)
+def test_a_callback_that_fails_is_logged_with_who_asked(robot, client, caplog, tells, told):
     answers = iter([ValueError("the arm is off"), {"sum": 1}])
 
     def callback(_):
@@ -666,9 +691,10 @@ def test_a_callback_that_fails_is_logged_with_who_asked(robot, client, caplog):
         return got
 
     robot.create_service_server("/add", ADD, callback)
+    robot.fake.repliers[0].tells_failures = tells
     with pytest.raises(rosglass.ServiceError, match="ValueError: the arm is off"):
         client.call(timeout=5)
-    assert "/add: the callback failed on a request of /arm/cockpit; it gets no resp" in caplog.text
+    assert f"/add: the callback failed on a request of /arm/cockpit; {told}" in caplog.text
     assert "in callback" in caplog.text
     assert client.call(timeout=5).sum == 1
 
