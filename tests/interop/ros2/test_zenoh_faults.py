@@ -126,6 +126,46 @@ def test_services_and_latched_topics_after_a_router_was_restarted(
     wait_for(lambda: len(late.publishers("/map")) == 1)
 
 
+@pytest.mark.parametrize("mode", ["peer", "client"])
+def test_a_client_follows_its_servers_wherever_they_are(mode, start_router, connect, wait_for):
+    router = start_router()
+    cockpit = connect("cockpit", f"?mode={mode}", url=start_router.url)
+    client = cockpit.create_service_client("/add", ADD)
+
+    def offer(name, where):
+        node = connect(name, f"?mode={where}", url=start_router.url)
+        node.create_service_server("/add", ADD, lambda r: {"sum": r.a + r.b})
+        return node
+
+    def answers():
+        assert client.wait_for_server(10), client.problem
+        return client.call({"a": 1, "b": 2}, timeout=10).sum == 3
+
+    def servers(*names):
+        wait_for(lambda: {s.node.name for s in cockpit.service_servers("/add")} == set(names))
+
+    assert not client.ready
+    first = offer("first", "peer")
+    assert answers()
+    second = offer("second", "client")
+    servers("first", "second")
+    first.close()
+    servers("second")
+    assert answers(), "the other one serves"
+    second.close()
+    wait_for(lambda: not client.ready)
+    third = offer("third", "client")
+    assert answers(), "the next one is found"
+    router.end()
+    wait_for(lambda: not client.ready)
+    start_router()
+    assert answers(), "and again behind a new router"
+    third.close()
+    wait_for(lambda: not client.ready)
+    offer("third", "peer")
+    assert answers(), "and when it is back by the same name, on another link"
+
+
 CAMERA = """
 import time, rosglass
 node = rosglass.connect({url!r}, "camera")
