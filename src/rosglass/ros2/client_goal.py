@@ -281,8 +281,10 @@ class Ros2ClientGoal(ClientGoal):
             return ServiceUnavailableError(
                 f"no goal could be sent to {name} within {seconds:g} s: {why}"
             )
-        if isinstance(error, TimeoutError):
+        if isinstance(error, (TimeoutError, ConnectionLostError)):
+            # It may have been accepted, or be yet: nothing is to run that nobody watches.
             self._client.ask_cancel(self.id, Time(), Promise(cancellable=False), 10.0)
+        if isinstance(error, TimeoutError):
             return TimeoutError(
                 f"the server of {name} neither accepted nor rejected goal {self.id_text} within "
                 f"{seconds:g} s; it was asked to cancel it, should it accept it yet"

@@ -8,7 +8,7 @@ import logging
 import os
 import signal
 import threading
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,11 @@ import pytest
 
 import rosglass
 from rosglass.interfaces import Library
+
+pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
+
+from rosglass.ros2.dds.replier import DdsReplier
+from rosglass.ros2.dds.requester import DdsRequester
 
 PEERS = Path(__file__).parent / "peers"
 ADD, BLOB = "example_interfaces/srv/AddTwoInts", "blob_interfaces/srv/Blob"
@@ -196,6 +201,37 @@ def test_two_of_our_clients_in_one_process_get_their_own_replies(node, dds_conne
         for c, a in ((one, 0), (two, 500))
     ]
     assert [call.result(10).sum for call, _ in calls] == [wanted for _, wanted in calls]
+
+
+def test_what_is_taken_while_it_is_received_does_not_stay(
+    start_services, node, types, wait_for, monkeypatch
+):
+    """The library keeps its samples until they are taken again, and keeps only some."""
+    origins: dict[int, Any] = {}
+    monkeypatch.setattr("rosglass.ros2.dds.cyclone_origins._origins", origins)
+    taken: list[bool] = []
+    for end in (DdsRequester, DdsReplier):
+
+        def count(self: Any, *sample: Any, original: Any = end._hasten) -> bool:
+            taken.append(original(self, *sample))
+            return taken[-1]
+
+        monkeypatch.setattr(end, "_hasten", count)
+    node.create_service_server("/kept", types[ADD], lambda r: {"sum": r.a + r.b})
+    peer = start_services("rosglass", "keeper", ["add"])
+    client = ready(node.create_service_client("/keeper/add", types[ADD]))
+    peer.ask(call="/kept", sums=[[n, 1] for n in range(200)])
+    calls = [client.call_async({"a": n, "b": 1}) for n in range(200)]
+    # Requests that wait for each other, some in another thread, and those on their way.
+    with ThreadPoolExecutor(2) as pool:
+        for each in range(100):
+            others = [pool.submit(client.call, {"a": each, "b": n}) for n in range(2)]
+            assert [other.result(10).sum for other in others] == [each, each + 1]
+    assert [call.result(10).sum for call in calls] == [n + 1 for n in range(200)]
+    assert peer.event("answers") == [n + 1 for n in range(200)]
+    wait_for(lambda: len(taken) >= 600 and not origins, what=f"{origins}")
+    assert taken.count(True) > 100
+    peer.end()
 
 
 def test_servers_that_exclude_each_other_are_named(start_services, node, types, wait_for):

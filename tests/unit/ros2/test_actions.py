@@ -21,6 +21,7 @@ from rosglass.comm import (
 from rosglass.interfaces import Library
 from rosglass.ros2 import Ros2Node
 from rosglass.ros2.action_server import _cancelable
+from rosglass.ros2.middleware import SERVER_LEFT
 
 SERVER, PUBLISHER = EndpointKind.SERVICE_SERVER, EndpointKind.PUBLISHER
 FIB = "example_interfaces/action/Fibonacci"
@@ -461,6 +462,16 @@ def test_an_acceptance_that_gets_lost_shows_by_the_status(client, peer):
     assert goal.acceptance.result(5) is True
     assert goal.status is EXECUTING
     assert goal.accepted == Time.from_parts(9, 0)
+
+
+def test_a_goal_whose_server_went_is_cancelled_should_it_run(client, peer, eventually):
+    goal = client.send_goal()
+    peer.send_goal.reply(1, None, SERVER_LEFT)
+    with pytest.raises(rosglass.ConnectionLostError, match="may have carried it out or not"):
+        goal.result(5)
+    eventually(lambda: peer.cancel_goal.sent)
+    asked = peer.cancel_type.request.decode(peer.cancel_goal.sent[0])
+    assert bytes(asked.goal_info.goal_id.uuid) == goal.id
 
 
 def test_a_goal_that_nobody_answers_is_given_up_and_cancelled(client, peer, eventually):
