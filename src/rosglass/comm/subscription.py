@@ -114,7 +114,11 @@ class Subscription(Handle):
 
     @property
     def problem(self) -> str:
-        """Why nothing can be received, in words; empty when all is well."""
+        """Why nothing can be received, in words; empty when all is well.
+
+        Also when whoever published has left, or the connection is lost; :attr:`hint` helps when
+        nobody has published yet.
+        """
         return self._problem
 
     @property
@@ -161,13 +165,13 @@ class Subscription(Handle):
         """Take the profile that was decided on; for worlds."""
         self._qos = qos
 
-    def set_problem(self, problem: str) -> None:
+    def set_problem(self, problem: str, level: int = logging.WARNING) -> None:
         """Say why nothing can be received; for worlds. Logged once for each new problem."""
         if problem == self._problem:
             return
         self._problem = problem
         if problem:
-            _log.warning("%s: %s", self.topic, problem)
+            _log.log(level, "%s: %s", self.topic, problem)
         self.events.problem.notify(problem)
 
     # -- taking ----------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,7 @@ from rosglass.comm import (
     Source,
 )
 from rosglass.errors import Error, NodeClosedError, TypeNotFoundError
+from rosglass.ros2.absence import Absence
 from rosglass.ros2.announced import similar
 from rosglass.ros2.core import Member
 from rosglass.ros2.liveliness import Liveness
@@ -83,6 +85,7 @@ class Reading(Member, Source):
             not subscription.decodes,
             self.inform,
         )
+        self._absence = Absence(core)
         self._repeats = Repeats()
         self._lock = threading.Lock()
         self._attention = threading.Lock()
@@ -194,6 +197,7 @@ class Reading(Member, Source):
         return found
 
     def _update(self, publishers: Sequence[EndpointInfo], idle: bool) -> None:
+        absence = self._absence.follow(publishers)
         changed = self._types.follow(publishers, idle)
         ours = self._types.type
         problems = self._types.problems
@@ -205,7 +209,9 @@ class Reading(Member, Source):
             elif idle:
                 self._repeats.guarded = False
             problems = problems + self._misfits(publishers)
-        self.subscription.set_problem("; ".join(problems))
+        # Who leaves is no mistake of anybody's.
+        level = logging.WARNING if problems else logging.INFO
+        self.subscription.set_problem("; ".join(problems + absence), level)
 
     def _profile(self, publishers: Sequence[EndpointInfo]) -> QoS:
         """Return the profile to ask for: the one in use, unless it leaves somebody out."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
 from dataclasses import replace
@@ -12,11 +13,14 @@ import rosglass
 from rosglass import Duration, QoS
 from rosglass.comm import (
     IMMEDIATE,
+    ConnectionState,
     DeadlineMissed,
     Durability,
+    EndpointInfo,
     EndpointKind,
     Liveliness,
     LivelinessLost,
+    NodeName,
     Reliability,
     SamplesLost,
 )
@@ -168,6 +172,42 @@ def test_subscriptions_with_another_definition_receive_us_where_names_match(
     assert "it receives our messages all the same" in told
     assert "receives nothing" not in told
     assert publisher.subscription_count() == 1
+
+
+def test_a_subscription_says_who_left_and_when_the_connection_is_lost(
+    node, middleware, robot, eventually, caplog
+):
+    subscription = node.create_subscription("/t", STRING)
+    never = node.create_subscription("/never", STRING)
+    came = threading.Event()
+    subscription.on_matched(lambda _: came.set())
+    key = robot()
+    assert came.wait(5)
+    middleware.graph.remove(key)
+    told = eventually(lambda: subscription.problem)
+    assert re.fullmatch(r"nobody has published it since \d\d:\d\d:\d\d, when /robot left", told)
+    assert [r for r in caplog.records if r.levelname == "WARNING"] == []
+    middleware.become(ConnectionState.LOST, "connection to the router lost")
+    eventually(lambda: subscription.problem == f"{told}; connection to the router lost")
+    middleware.become(ConnectionState.CONNECTED)
+    eventually(lambda: subscription.problem == told)
+    robot()
+    eventually(lambda: not subscription.problem)
+    middleware.become(ConnectionState.LOST, "connection to the router lost")
+    eventually(lambda: subscription.problem == "connection to the router lost")
+    assert never.problem == ""
+
+
+def test_nobody_misses_what_the_node_itself_published(node, middleware, eventually):
+    subscription = node.create_subscription("/t", STRING)
+    own = EndpointInfo(PUBLISHER, "/t", STRING, NodeName("/arm", "cockpit"))
+    middleware.graph.put_endpoint("own", own)
+    counts = []
+    subscription.on_matched(lambda event: counts.append(event.count), IMMEDIATE)
+    eventually(lambda: counts == [1])
+    middleware.graph.remove("own")
+    eventually(lambda: counts == [1, 0])
+    assert subscription.problem == ""
 
 
 def test_hints_at_names_that_were_meant(node, robot, asker, eventually):
