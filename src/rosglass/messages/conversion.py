@@ -2,8 +2,8 @@
 
 One rule set for all places. Integers take integers and floats without a fraction, in range;
 floats take integers and floats (a finite value that float32 cannot hold is refused); bools take
-bools; strings take str. Nothing is truncated, wrapped or guessed. Missing fields get the type's
-defaults.
+bools; strings take str. A ``byte`` also takes bytes of length 1, as rclpy writes it. Nothing is
+truncated, wrapped or guessed. Missing fields get the type's defaults.
 """
 
 from __future__ import annotations
@@ -91,6 +91,9 @@ def _number(number: Number, value: Any, path: str) -> Any:
         if number.python is bool:
             return as_bool(value)
         if number.python is int:
+            single = number.name == "byte" and isinstance(value, (bytes, bytearray))
+            if single and len(value) == 1:
+                return int.from_bytes(value, "little", signed=number.low != 0)
             found = as_int(value)
             assert number.low is not None
             assert number.high is not None
@@ -99,7 +102,8 @@ def _number(number: Number, value: Any, path: str) -> Any:
             return found
         made = as_float(value)
     except ConversionError as error:
-        raise ConversionError(path, value, f"{error.expected} ({number.name})") from None
+        also = ", or bytes of length 1" if number.name == "byte" else ""
+        raise ConversionError(path, value, f"{error.expected}{also} ({number.name})") from None
     if number.code == "f" and math.isfinite(made):
         _check_float32(made, value, path)
     return made

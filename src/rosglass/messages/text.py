@@ -29,6 +29,10 @@ def to_dict(message: Message) -> dict[str, Any]:
 
 def _dict_value(member: Member, value: Any) -> Any:
     if member.kind is not Kind.STRUCT:
+        number = member.number
+        single = isinstance(value, (bytes, bytearray)) and len(value) == 1 and not member.is_array
+        if single and number is not None and number.name == "byte":
+            return int.from_bytes(value, "little", signed=number.low != 0)
         return value
     if member.is_array:
         return [to_dict(element) if hasattr(element, "_schema__") else element for element in value]

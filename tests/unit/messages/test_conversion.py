@@ -32,6 +32,8 @@ def array_of(kind: str) -> MessageType:
         ("uint8", 2.0, 2),
         ("uint8", np.int64(7), 7),
         ("uint8", np.float32(7.0), 7),
+        ("byte", b"\xc8", 200),
+        ("byte", bytearray(b"\2"), 2),
         ("int64", -(2**63), -(2**63)),
         ("uint64", 2**64 - 1, 2**64 - 1),
         ("float64", 3, 3.0),
@@ -55,13 +57,28 @@ def test_values_that_fit(kind: str, value: Any, meant: Any) -> None:
         assert one.decode(data).data == meant
 
 
+def test_a_byte_is_written_as_rclpy_writes_it_and_read_as_a_number() -> None:
+    status = rosglass.load("diagnostic_msgs/msg/DiagnosticStatus")
+    message = status.create()
+    message.level = b"\x02"
+    assert status.decode(status.encode(message)).level == 2
+    assert message.to_dict()["level"] == 2
+    assert '"level": 2' in message.to_json()
+    signed = MessageType.from_text("t/One", "byte data\nbyte[] more", ros=1)
+    made = signed.decode(signed.encode(data=b"\xff", more=[b"\xfe", 1]))
+    assert (made.data, made.more.tolist()) == (-1, [-2, 1])
+
+
 @pytest.mark.parametrize(
     ("kind", "value", "expected"),
     [
         ("uint8", 256, "an integer from 0 to 255 (uint8)"),
         ("uint8", -1, "an integer from 0 to 255 (uint8)"),
         ("int8", 128, "an integer from -128 to 127 (int8)"),
-        ("byte", 256, "an integer from 0 to 255 (byte)"),
+        ("byte", 256, "an integer from 0 to 255, or bytes of length 1 (byte)"),
+        ("byte", b"", "an integer, or bytes of length 1 (byte)"),
+        ("byte", b"ab", "an integer, or bytes of length 1 (byte)"),
+        ("uint8", b"a", "an integer (uint8)"),
         ("int32", 1.5, "an integer (int32)"),
         ("int32", NAN, "an integer (int32)"),
         ("int32", INF, "an integer (int32)"),
