@@ -21,9 +21,7 @@ __all__ = ["connect", "default_url"]
 
 _EXAMPLE = "zenoh://127.0.0.1:7447"
 _EXAMPLES = "zenoh://127.0.0.1:7447 or dds://?domain=0"
-_KNOWN = "dds:// (ROS 2 with any DDS), zenoh:// (ROS 2 with rmw_zenoh)"
-#: Schemes that are refused in this version, and why.
-_REFUSED = {"ros1": "ROS 1 is not in this version"}
+_KNOWN = "dds:// (ROS 2 with any DDS), zenoh:// (ROS 2 with rmw_zenoh), ros1:// (ROS 1, its master)"
 #: Values of RMW_IMPLEMENTATION and what they mean; dynamic and vendor variants speak plain DDS.
 _MIDDLEWARES = {
     "rmw_zenoh_cpp": "zenoh://",
@@ -68,8 +66,15 @@ def connect(
             ``zenoh://`` alone means the router that ZENOH_SESSION_CONFIG_URI names, or one on this
             machine.
 
+            ``ros1://host:port`` of a ROS 1 master, port 11311 when left out. Options follow as in
+            ``ros1://robot?ip=192.168.1.5``: ``ip`` (host or address under which others reach this
+            machine; default: ROS_HOSTNAME, ROS_IP, or the address from which the master is
+            reached), ``tcpros_port`` and ``slave_port`` (to listen on, for firewalls; default:
+            any). ``ros1://`` alone means the master that ROS_MASTER_URI names, or one on this
+            machine.
+
             None asks the environment: ROSGLASS_URL, then RMW_IMPLEMENTATION,
-            ZENOH_SESSION_CONFIG_URI, ROS_DISTRO and ROS_DOMAIN_ID.
+            ZENOH_SESSION_CONFIG_URI, ROS_DISTRO, ROS_DOMAIN_ID and ROS_MASTER_URI.
         name: Base name of the node; None for ``rosglass_<process id>``.
         namespace: Absolute namespace of the node.
         library: Where message definitions come from; None for the shared library.
@@ -99,14 +104,19 @@ def connect(
     if library is not None and not isinstance(library, Library):
         raise ConversionError("library", library, "a rosglass.Library, or None for the shared one")
     check_flag(own_services, "own_services", "connect()")
-    if scheme not in ("dds", "zenoh") or not separator:
-        reason = _REFUSED.get(scheme, f"unknown scheme {scheme!r}" if separator else "no scheme")
+    if scheme not in ("dds", "zenoh", "ros1") or not separator:
+        reason = f"unknown scheme {scheme!r}" if separator else "no scheme"
         raise UnsupportedError(
             f"cannot connect to {url!r}: {reason}; known: {_KNOWN}, e.g. {_EXAMPLES}"
         )
     if name is None:
         number = next(_anonymous)
         name = f"rosglass_{os.getpid()}" + (f"_{number}" if number > 1 else "")
+    if scheme == "ros1":
+        from rosglass.ros1.node import Ros1Node  # noqa: PLC0415
+        from rosglass.ros1.options import Ros1Options  # noqa: PLC0415
+
+        return Ros1Node(Ros1Options.parse(url), url, name, namespace, library)
     from rosglass.ros2.arguments import Arguments  # noqa: PLC0415
 
     told = Arguments.parse(arguments)
@@ -123,7 +133,7 @@ def default_url(env: Mapping[str, str]) -> str:
 
     ROSGLASS_URL wins; otherwise RMW_IMPLEMENTATION names the middleware, as for ROS 2's own
     programs, and a Zenoh session configuration implies Zenoh. Where ROS 2 is set up, or a domain is
-    chosen, without any of these, it means DDS, ROS 2's default.
+    chosen, without any of these, it means DDS, ROS 2's default. ROS_MASTER_URI alone means ROS 1.
     """
     choice = f"pass a URL to connect(), or set ROSGLASS_URL, e.g. to {_EXAMPLES}"
     if env.get("ROSGLASS_URL"):
@@ -141,10 +151,9 @@ def default_url(env: Mapping[str, str]) -> str:
     ros2 = env.get("ROS_DISTRO") and env.get("ROS_VERSION") != "1"
     if ros2 or env.get("ROS_DOMAIN_ID") or env.get("CYCLONEDDS_URI"):
         return "dds://"
-    hint = ""
     if env.get("ROS_MASTER_URI"):
-        hint = " (ROS_MASTER_URI is set, but ROS 1 is not in this version)"
-    raise UnsupportedError(f"no robot was named{hint}: {choice}")
+        return "ros1://"
+    raise UnsupportedError(f"no robot was named: {choice}")
 
 
 def _zenoh(url: str) -> Middleware:

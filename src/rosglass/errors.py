@@ -19,6 +19,7 @@ __all__ = [
     "FieldPathError",
     "GoalRejectedError",
     "InvalidNameError",
+    "MasterError",
     "NodeClosedError",
     "ParameterError",
     "QmlError",
@@ -134,6 +135,10 @@ class GoalRejectedError(Error):
 
 class ParameterError(Error):
     """A parameter does not exist, has another type, or its node refuses the value."""
+
+
+class MasterError(Error):
+    """A ROS 1 master or node answers a question with a refusal, e.g. that it knows no such name."""
 
 
 class TransitionError(Error):

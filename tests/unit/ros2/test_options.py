@@ -92,6 +92,8 @@ def test_locators():
         ({"ROS_DISTRO": "jazzy", "ROS_VERSION": "2"}, "dds://"),
         ({"ROS_DOMAIN_ID": "7"}, "dds://"),
         ({"CYCLONEDDS_URI": "/x.xml"}, "dds://"),
+        ({"ROS_MASTER_URI": "http://r:11311"}, "ros1://"),
+        ({"ROS_MASTER_URI": "http://r:11311", "ROS_DISTRO": "jazzy"}, "dds://"),
     ],
 )
 def test_the_environment_chooses_the_world(env, url):
@@ -107,7 +109,6 @@ def test_the_environment_chooses_the_world(env, url):
             "RMW_IMPLEMENTATION=rmw_email_cpp is not known (known: rmw_zenoh_cpp, rmw_cyclonedds",
         ),
         ({"ROS_DISTRO": "noetic", "ROS_VERSION": "1"}, "no robot was named"),
-        ({"ROS_MASTER_URI": "http://r:11311"}, "ROS 1 is not in this version"),
     ],
 )
 def test_without_a_choice_the_user_is_told_the_choices(env, told):
@@ -120,7 +121,6 @@ def test_without_a_choice_the_user_is_told_the_choices(env, told):
 @pytest.mark.parametrize(
     ("url", "told"),
     [
-        ("ros1://robot:11311", "ROS 1 is not in this version; known: dds://"),
         ("mqtt://robot", "unknown scheme 'mqtt'; known: dds://"),
         ("robot:7447", "no scheme; known: dds://"),
         ("dds", "no scheme"),

@@ -1,0 +1,101 @@
+"""The ROS graph as the master has it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rosglass.comm import EndpointInfo, EndpointKind, NodeName
+from rosglass.errors import InvalidNameError
+from rosglass.interfaces import join_name
+from rosglass.ros1.names import split
+
+if TYPE_CHECKING:
+    from rosglass.ros1.master import Master
+
+__all__ = ["Graph", "full_type"]
+
+_Offers = dict[str, list[str]]
+#: What the master says of a type that nobody has told it.
+_UNKNOWN = ("", "*")
+
+
+class Graph:
+    """Who publishes, subscribes and serves what; refreshed by asking the master.
+
+    All methods but :meth:`refresh` answer from memory, from any thread.
+    """
+
+    def __init__(self) -> None:
+        self._state: tuple[_Offers, _Offers, _Offers] = ({}, {}, {})
+        self._types: dict[str, str] = {}
+
+    def refresh(self, master: Master) -> bool:
+        """Ask the master and return whether anything has changed; waits for its answer.
+
+        Raises:
+            ConnectionLostError: The master does not answer.
+            MasterError: It refuses.
+        """
+        publishers, subscribers, services = (
+            {str(name): sorted(map(str, nodes)) for name, nodes in part}
+            for part in master.call("getSystemState")
+        )
+        state = (publishers, subscribers, services)
+        types = self._types
+        topics = publishers.keys() | subscribers.keys()
+        if state != self._state or any(name not in types for name in topics):
+            types = {str(name): str(kind) for name, kind in master.call("getTopicTypes")}
+        moved = state != self._state or types != self._types
+        self._state, self._types = state, types
+        return moved
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self._state, self._types = ({}, {}, {}), {}
+
+    def topics(self) -> dict[str, list[str]]:
+        """Return every topic with its type, none where nobody has told it yet."""
+        names = self._state[0].keys() | self._state[1].keys()
+        return {name: [kind] if (kind := self.type_of(name)) else [] for name in sorted(names)}
+
+    def type_of(self, topic: str) -> str:
+        """Return a topic's type, ``pkg/msg/Type``; empty when nobody has told it."""
+        return full_type(self._types.get(topic, ""))
+
+    def services(self) -> dict[str, list[str]]:
+        """Return every service and the nodes that offer it."""
+        return dict(self._state[2])
+
+    def nodes(self) -> list[NodeName]:
+        """Return every node that offers or uses anything."""
+        found = {node for part in self._state for nodes in part.values() for node in nodes}
+        return sorted(NodeName(*split(node)) for node in found)
+
+    def endpoints(self, kind: EndpointKind, name: str) -> list[EndpointInfo]:
+        """Return who offers or uses a topic or service; the master knows no services' clients."""
+        parts = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION, EndpointKind.SERVICE_SERVER)
+        if kind not in parts:
+            return []
+        nodes = self._state[parts.index(kind)].get(name, [])
+        type_name = "" if kind is EndpointKind.SERVICE_SERVER else self.type_of(name)
+        return [EndpointInfo(kind, name, type_name, NodeName(*split(node))) for node in nodes]
+
+    def endpoints_of(self, node: NodeName) -> list[EndpointInfo]:
+        """Return everything that a node publishes, subscribes and serves."""
+        found = []
+        kinds = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION, EndpointKind.SERVICE_SERVER)
+        for kind, part in zip(kinds, self._state, strict=True):
+            for name, nodes in sorted(part.items()):
+                if node.full in nodes:
+                    found += [e for e in self.endpoints(kind, name) if e.node == node]
+        return found
+
+
+def full_type(name: str) -> str:
+    """Return a message type's full name; empty for what stands for no type."""
+    if name in _UNKNOWN:
+        return ""
+    try:
+        return join_name(name)
+    except InvalidNameError:
+        return name

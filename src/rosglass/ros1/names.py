@@ -1,0 +1,98 @@
+"""ROS 1's graph resource names: which are valid, and what they resolve to.
+
+Rules: ROS wiki, "Names"; where it and the clients differ, roscpp's ``names.cpp``.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+import socket
+import time
+
+from rosglass.errors import InvalidNameError
+
+__all__ = ["anonymous", "expand", "split", "validate_namespace", "validate_node_name"]
+
+_FORBIDDEN = re.compile(r"[^A-Za-z0-9_/]")
+_NODE_FORBIDDEN = re.compile(r"[^A-Za-z0-9_]")
+_numbers = itertools.count(1)
+
+
+def validate_node_name(name: str) -> None:
+    """Raise InvalidNameError unless `name` can be a node's base name."""
+    if not isinstance(name, str) or not name:
+        raise InvalidNameError(f"a node name must be a non-empty text, got {name!r}")
+    found = _NODE_FORBIDDEN.search(name)
+    if found:
+        hint = "; give the namespace by itself" if found.group() == "/" else ""
+        raise InvalidNameError(
+            f"node name {name!r}: {found.group()!r} at position {found.start()}; only letters, "
+            f"digits and '_' are allowed{hint}"
+        )
+
+
+def validate_namespace(namespace: str) -> None:
+    """Raise InvalidNameError unless `namespace` is a valid absolute namespace."""
+    if not isinstance(namespace, str) or not namespace:
+        raise InvalidNameError(f"a namespace must be a non-empty text, got {namespace!r}")
+    if not namespace.startswith("/"):
+        raise InvalidNameError(
+            f"namespace {namespace!r} is not absolute; write {'/' + namespace!r}"
+        )
+    _check("namespace", namespace, namespace)
+
+
+def expand(name: str, node: str, namespace: str) -> str:
+    """Return the absolute name that `name` means for a node.
+
+    Args:
+        name: ``/absolute``, ``relative`` to the namespace, or ``~private`` to the node.
+        node: The node's base name.
+        namespace: The node's absolute namespace.
+
+    Raises:
+        InvalidNameError: `name` breaks the rules; the message says where.
+    """
+    what = "name"
+    if not isinstance(name, str) or not name:
+        raise InvalidNameError(f"a {what} must be a non-empty text, got {name!r}")
+    rest = name[1:] if name.startswith("~") else name
+    _check(what, rest, name)
+    if not (name[0] in "~/" or name[0].isalpha()):
+        raise InvalidNameError(f"{what} {name!r} must begin with a letter, '/' or '~'")
+    prefix = namespace.rstrip("/")
+    if name.startswith("~"):
+        full = f"{prefix}/{node}/{rest}"
+    elif name.startswith("/"):
+        full = name
+    else:
+        full = f"{prefix}/{name}"
+    clean = re.sub(r"/{2,}", "/", full)
+    return clean.rstrip("/") or "/"
+
+
+def split(full: str) -> tuple[str, str]:
+    """Return namespace and base name of an absolute name."""
+    namespace, _, name = full.rpartition("/")
+    return namespace or "/", name
+
+
+def anonymous(name: str) -> str:
+    """Return a node name that begins with `name` and that nobody else has.
+
+    Made as rospy and roscpp do: host, process and time in milliseconds are appended.
+    """
+    host = re.sub(r"[^A-Za-z0-9_]", "_", socket.gethostname())
+    return f"{name}_{host}_{os.getpid()}_{int(time.time() * 1000)}{next(_numbers)}"
+
+
+def _check(what: str, text: str, whole: str) -> None:
+    found = _FORBIDDEN.search(text)
+    if found:
+        position = found.start() + len(whole) - len(text)
+        raise InvalidNameError(
+            f"{what} {whole!r}: {found.group()!r} at position {position}; only letters, digits, "
+            "'_' and '/' are allowed"
+        )

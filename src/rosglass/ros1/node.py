@@ -1,0 +1,270 @@
+"""The ROS 1 node: everything that :func:`rosglass.connect` hands out for ``ros1://``."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from typing import TYPE_CHECKING, Any
+
+from rosglass.comm import EndpointKind, Node, NodeName, QoS, Subscription
+from rosglass.comm.loop import check_plain
+from rosglass.interfaces import ros1_name
+from rosglass.ros1.connection import Connection
+from rosglass.ros1.core import Core
+from rosglass.ros1.names import split, validate_namespace, validate_node_name
+from rosglass.ros1.slave import Slave
+from rosglass.ros1.topics import Topics
+
+if TYPE_CHECKING:
+    import socket
+    from collections.abc import Callable
+
+    from rosglass.comm import (
+        Clock,
+        EndpointInfo,
+        Executor,
+        Handle,
+        Publisher,
+        Sample,
+        Status,
+        Time,
+    )
+    from rosglass.interfaces import Library
+    from rosglass.messages import Message, MessageType
+    from rosglass.ros1.options import Ros1Options
+
+__all__ = ["Ros1Node"]
+
+_log = logging.getLogger("rosglass.ros1")
+
+
+class Ros1Node(Node):
+    """A node of a ROS 1 graph.
+
+    Args:
+        options: Master, own address, remappings.
+        url: What it was connected with, for people to read.
+        name: Base name.
+        namespace: Absolute namespace.
+        library: Where definitions come from; None for the shared library.
+
+    Raises:
+        InvalidNameError: The name or namespace breaks ROS's rules.
+        ConnectionLostError: This machine cannot listen for connections.
+    """
+
+    wire = "ros1"
+
+    def __init__(
+        self,
+        options: Ros1Options,
+        url: str,
+        name: str,
+        namespace: str = "/",
+        library: Library | None = None,
+    ) -> None:
+        validate_node_name(name)
+        validate_namespace(namespace)
+        self.url, self.name, self.namespace = url, name, namespace
+        self._core = Core(NodeName(namespace, name), url, options, library)
+        self._topics = Topics(self._core)
+        self._core.start(Slave(self, options.address, options.slave_port), self._accept)
+
+    # -- topics ----------------------------------------------------------------------------------
+
+    def create_publisher(
+        self, topic: str, type: str | MessageType, qos: QoS | int = 10
+    ) -> Publisher:
+        """Announce `topic`; see :meth:`rosglass.comm.Node.create_publisher`."""
+        self._core.check_open()
+        return self._topics.publish(
+            self.resolve(topic), self._core.types.message(type), _profile(qos)
+        )
+
+    def create_subscription(
+        self,
+        topic: str,
+        type: str | MessageType | None = None,
+        callback: Callable[[Message], None] | None = None,
+        qos: QoS | int = 10,
+        *,
+        raw_callback: Callable[[Sample], None] | None = None,
+        executor: Executor | None = None,
+        ignore_local: bool = False,
+    ) -> Subscription:
+        """Subscribe to `topic`; see :meth:`rosglass.comm.Node.create_subscription`."""
+        self._core.check_open()
+        subscription = Subscription(
+            self.resolve(topic),
+            None if type is None else self._core.types.message(type),
+            _profile(qos),
+            executor or self._core.dispatcher,
+            callback,
+            raw_callback,
+        )
+        self._topics.subscribe(subscription, ignore_local)
+        return subscription
+
+    # -- the node's clock and names --------------------------------------------------------------
+
+    @property
+    def clock(self) -> Clock:
+        """The node's clock."""
+        return self._core.clock
+
+    def now(self) -> Time:
+        """Return the time of the node's clock."""
+        return self._core.clock.now()
+
+    def resolve(self, name: str) -> str:
+        """Return the absolute name of a topic or service; raises InvalidNameError."""
+        return self._core.resolve(name)
+
+    # -- the graph -------------------------------------------------------------------------------
+
+    def topics(self) -> dict[str, list[str]]:
+        """Return every topic in the graph with its type."""
+        return self._core.graph.topics()
+
+    def nodes(self) -> list[NodeName]:
+        """Return every node in the graph, this one included, sorted."""
+        return sorted({*self._core.graph.nodes(), self._core.name})
+
+    def publishers(self, topic: str) -> list[EndpointInfo]:
+        """Return the publishers of a topic."""
+        return self._core.graph.endpoints(EndpointKind.PUBLISHER, self.resolve(topic))
+
+    def subscriptions(self, topic: str) -> list[EndpointInfo]:
+        """Return the subscribers of a topic."""
+        return self._core.graph.endpoints(EndpointKind.SUBSCRIPTION, self.resolve(topic))
+
+    def service_servers(self, name: str) -> list[EndpointInfo]:
+        """Return the server of a service."""
+        return self._core.graph.endpoints(EndpointKind.SERVICE_SERVER, self.resolve(name))
+
+    def service_clients(self, name: str) -> list[EndpointInfo]:
+        """Return nobody: ROS 1 does not register clients."""
+        return self._core.graph.endpoints(EndpointKind.SERVICE_CLIENT, self.resolve(name))
+
+    def endpoints(self, node: str | NodeName) -> list[EndpointInfo]:
+        """Return what a node publishes, subscribes and serves; none when it is unknown."""
+        full = node.full if isinstance(node, NodeName) else self._core.expand(node)
+        return self._core.graph.endpoints_of(NodeName(*split(full)))
+
+    def on_graph_change(
+        self, callback: Callable[[], None], executor: Executor | None = None
+    ) -> Handle:
+        """Call `callback` after nodes or endpoints appeared or went; changes may be merged."""
+        self._core.check_open()
+        check_plain(callback, "on_graph_change()")
+        return self._core.graph_listeners.add(
+            lambda _: callback(), executor or self._core.dispatcher
+        )
+
+    def status(self) -> Status:
+        """Return the state of the connection and what is being done about it."""
+        return self._core.status()
+
+    def on_status_change(
+        self, callback: Callable[[Status], None], executor: Executor | None = None
+    ) -> Handle:
+        """Call `callback` with the new status whenever it changes."""
+        self._core.check_open()
+        return self._core.status_listeners.add(callback, executor or self._core.dispatcher)
+
+    def close(self) -> None:
+        """Leave the graph, close everything created from the node and end its threads.
+
+        Safe to call twice, from any thread and from callbacks.
+        """
+        self._core.close()
+
+    # -- connections, in the loop's thread -------------------------------------------------------
+
+    def _accept(self, sock: socket.socket, address: str) -> None:
+        """Take a connection in; its header says what it is for."""
+        link: Connection
+
+        def refuse(reason: str) -> None:
+            link.send_header({"error": reason})
+            link.finish(1.0)
+
+        def on_header(header: dict[str, str]) -> None:
+            if "topic" in header:
+                reason = self._topics.accept(link, header)
+            else:
+                reason = "neither topic nor service is named in the connection header"
+            if reason:
+                refuse(reason)
+
+        link = Connection(
+            self._core.loop,
+            sock,
+            on_header,
+            lambda _data, _lead: None,  # subscribers have nothing to say
+            lambda _reason: self._topics.drop(link),
+            peer=address,
+        )
+        link.accept()
+
+    # -- the slave API ---------------------------------------------------------------------------
+
+    def bus_info(self) -> list[list[Any]]:
+        """Return the connections, as ``rosnode info`` shows them."""
+        found: list[list[Any]] = []
+        for topic, publication in self._topics.published().items():
+            for link in publication.links():
+                peer = link.header.get("callerid", link.peer)
+                found.append(_bus(len(found) + 1, peer, "o", topic, True, link.peer))
+        for topic, intake in self._topics.subscribed().items():
+            for source in intake.links():
+                peer = source.name if source.connected else source.uri
+                found.append(_bus(len(found) + 1, peer, "i", topic, source.connected, source.uri))
+        return found
+
+    def bus_stats(self) -> list[Any]:
+        """Return statistics; nobody reads them, and roscpp leaves them empty, too."""
+        return [[], [], []]
+
+    def master_uri(self) -> str:
+        """Return the master's URI."""
+        return self._core.master.uri
+
+    def published(self) -> list[list[str]]:
+        """Return topic and type of all that is published."""
+        return [[t, ros1_name(p.type.name)] for t, p in sorted(self._topics.published().items())]
+
+    def subscribed(self) -> list[list[str]]:
+        """Return topic and type of all that is subscribed."""
+        return [[t, i.type_name] for t, i in sorted(self._topics.subscribed().items())]
+
+    def shut_down(self, caller: str, reason: str) -> None:
+        """End the node, because somebody else says so: another one has its name now."""
+        _log.warning("%s: closed by %s: %s", self._core.name, caller, reason or "no reason given")
+        threading.Thread(target=self.close, name="shutdown", daemon=True).start()
+
+    def parameter_changed(self, name: str, value: Any) -> None:
+        """Take a parameter that was subscribed to."""
+
+    def publishers_changed(self, topic: str, uris: list[str]) -> None:
+        """Take the publishers that a topic has now."""
+        intake = self._topics.subscribed().get(topic)
+        if intake is not None:
+            intake.publishers_changed(uris)
+
+    def request_topic(self, topic: str, protocols: list[Any]) -> list[Any]:
+        """Return how to connect to a published topic; raises KeyError when it is not."""
+        if topic not in self._topics.published():
+            raise KeyError(f"{self._core.name} does not publish {topic}")
+        if not any(isinstance(p, list) and p and p[0] == "TCPROS" for p in protocols):
+            names = ", ".join(str(p[0] if isinstance(p, list) and p else p) for p in protocols)
+            raise ValueError(f"{self._core.name} speaks TCPROS only, not {names}")
+        return ["TCPROS", *self._core.address]
+
+
+def _profile(qos: QoS | int) -> QoS:
+    return qos if isinstance(qos, QoS) else QoS(depth=qos)
+
+
+def _bus(number: int, peer: str, way: str, topic: str, up: bool, place: str) -> list[Any]:
+    return [number, peer, way, "TCPROS", topic, up, f"TCPROS connection to [{place}]"]

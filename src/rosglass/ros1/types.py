@@ -1,0 +1,148 @@
+"""Finding the types that a node's topics, services and actions have."""
+
+from __future__ import annotations
+
+import threading
+from contextlib import suppress
+from typing import TYPE_CHECKING, TypeVar
+
+from rosglass.errors import DefinitionConflictError, Error, TypeNotFoundError, UnsupportedError
+from rosglass.interfaces import full_text, join_name
+
+if TYPE_CHECKING:
+    from rosglass.interfaces import Library
+    from rosglass.messages import ActionType, MessageType, ServiceType
+
+    _T = TypeVar("_T", MessageType, ServiceType, ActionType)
+
+__all__ = ["ANY", "Types"]
+
+#: What stands for any type, and any md5 sum, in a connection header.
+ANY = "*"
+
+
+class Types:
+    """Finds types for one node: in its library, or in what publishers say of themselves.
+
+    Args:
+        library: Where definitions come from; None for the shared library.
+        url: The node's URL, for messages.
+    """
+
+    def __init__(self, library: Library | None, url: str) -> None:
+        self._library, self._url = library, url
+        self._lock = threading.Lock()
+        self._learned: dict[tuple[str, str], MessageType] = {}
+        self._texts: dict[int, str] = {}
+
+    @property
+    def library(self) -> Library:
+        """Where definitions come from."""
+        from rosglass.messages import default_library  # noqa: PLC0415 - numpy
+
+        return default_library() if self._library is None else self._library
+
+    def message(self, wanted: str | MessageType) -> MessageType:
+        """Return a message type.
+
+        Args:
+            wanted: Its name, or the type itself.
+
+        Raises:
+            TypeNotFoundError: Nobody has it, or it is not a message.
+            UnsupportedError: It is ROS 2's.
+        """
+        from rosglass.messages import MessageType  # noqa: PLC0415 - numpy
+
+        return self._find(wanted, MessageType, "message", "std_msgs/String")
+
+    def service(self, wanted: str | ServiceType) -> ServiceType:
+        """Return a service type; arguments and errors as in :meth:`message`."""
+        from rosglass.messages import ServiceType  # noqa: PLC0415 - numpy
+
+        return self._find(wanted, ServiceType, "service", "std_srvs/Trigger")
+
+    def action(self, wanted: str | ActionType) -> ActionType:
+        """Return an action type; arguments and errors as in :meth:`message`."""
+        from rosglass.messages import ActionType  # noqa: PLC0415 - numpy
+
+        return self._find(wanted, ActionType, "action", "actionlib_tutorials/Fibonacci")
+
+    def learn(self, name: str, md5: str, text: str) -> MessageType:
+        """Return the type that a publisher's connection header describes.
+
+        It is in the library afterwards, unless that has another definition of the name: then it
+        serves for this node's subscriptions only.
+
+        Args:
+            name: As in the header, ``pkg/Type``.
+            md5: Its sum.
+            text: Its full definition; may be empty.
+
+        Raises:
+            TypeNotFoundError: The text is missing or is not what the sum is of, and nobody else
+                has the definition.
+            DefinitionError: The text breaks a rule.
+            InvalidNameError: `name` is no type's name.
+        """
+        full = join_name(name)
+        with self._lock:
+            found = self._learned.get((full, md5))
+        if found is None:
+            found = self._known(full, md5) or self._from_text(full, md5, text)
+            with self._lock:
+                found = self._learned.setdefault((full, md5), found)
+        return found
+
+    def text(self, kind: MessageType) -> str:
+        """Return a type's definition with all that it needs, as connection headers carry it."""
+        known = self._texts.get(id(kind.definition))
+        if known is None:
+            known = self._texts[id(kind.definition)] = full_text(kind.definition)
+        return known
+
+    def _known(self, full: str, md5: str) -> MessageType | None:
+        from rosglass.messages import MessageType, load  # noqa: PLC0415 - numpy
+
+        with suppress(Error):
+            found = load(full, ros=1, library=self._library, hash=md5)
+            if isinstance(found, MessageType):
+                return found
+        return None
+
+    def _from_text(self, full: str, md5: str, text: str) -> MessageType:
+        from rosglass.messages import MessageType  # noqa: PLC0415 - numpy
+
+        if not text.strip():
+            raise TypeNotFoundError(
+                f"{full}: its publisher sends no definition, and no other one with md5 {md5} is "
+                "known; add it with Library.add_path()"
+            )
+        found = MessageType.from_text(full, text, ros=1)
+        if found.md5 != md5:
+            raise TypeNotFoundError(
+                f"{full}: its publisher announces md5 {md5}, but the definition it sends has "
+                f"{found.md5}; add the right one with Library.add_path()"
+            )
+        with suppress(DefinitionConflictError):
+            self.library.add(found.definition)
+        return found
+
+    def _find(self, wanted: object, kind: type[_T], word: str, example: str) -> _T:
+        from rosglass.messages import load  # noqa: PLC0415 - numpy
+
+        found = wanted
+        if isinstance(wanted, str):
+            found = load(wanted, ros=1, library=self._library)
+        if not isinstance(found, kind):
+            article = "an" if word == "action" else "a"
+            raise TypeNotFoundError(
+                f"{found!r} is not {article} {word} type; give a name such as {example} "
+                f"or what rosglass.load(..., ros=1) returns for {article} {word}"
+            )
+        if found.ros != 1:
+            raise UnsupportedError(
+                f"{found.name} is ROS 2's definition, and {self._url} is a ROS 1 graph; "
+                f"load it with rosglass.load({found.name!r}, ros=1)"
+            )
+        return found
