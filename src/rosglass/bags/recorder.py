@@ -7,6 +7,7 @@ import re
 import threading
 import time
 from collections import Counter, deque
+from concurrent.futures import wait
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Iterable
 
-    from rosglass.comm import Node, Sample, Subscription
+    from rosglass.comm import Node, Promise, Sample, Subscription
     from rosglass.messages import MessageType
 
 __all__ = ["COMPRESSIONS", "Recorder", "RecordingStatus"]
@@ -39,6 +40,8 @@ COMPRESSIONS = {
 _FLUSH = 1.0
 #: Samples that a subscription keeps while the writer is busy.
 _DEPTH = 1000
+#: Seconds that the robot may take to tell a definition, and that closing still waits for it.
+_FETCH, _LAST_FETCH = 5.0, 2.0
 #: Seconds that closing waits for what was received to be written.
 _PATIENCE = 60.0
 
@@ -71,8 +74,9 @@ class Recorder(Handle):
     """Writes topics into an MCAP file, each as its publishers offer it, until it is closed.
 
     Messages are stored as received, with the definitions of their types, so that the file can be
-    played anywhere; types that nobody can describe are stored by name and hash. What the file
-    holds is complete up to a second before a crash.
+    played anywhere; types that nobody can describe are stored by name and hash. Messages of a type
+    that the robot has to be asked for wait for its answer. What the file holds is complete up to a
+    second before a crash.
 
     Args:
         node: Where to listen.
@@ -83,8 +87,8 @@ class Recorder(Handle):
         exclude: Regular expression; topics whose whole name matches are never recorded.
         hidden: Whether hidden topics (of actions, say) are among "all".
         compression: ``zstd``, ``lz4`` or ``none``.
-        memory: Bytes of messages that may wait for the disk; what comes beyond is dropped,
-            counted and logged.
+        memory: Bytes of messages that may wait for the disk, or for their type; what comes beyond
+            is dropped, counted and logged.
 
     Raises:
         BagError: The file cannot be written, or an argument makes no sense.
@@ -125,6 +129,9 @@ class Recorder(Handle):
         self._failed: dict[str, str] = {}
         self._counts: dict[str, int] = {}
         self._channels: dict[tuple[str, str, str], int] = {}
+        #: Definitions that the robot is asked for, and the messages that wait for them.
+        self._fetches: dict[tuple[str, str], Promise[Any]] = {}
+        self._held: dict[tuple[str, str], list[tuple[str, Sample]]] = {}
         self._closed = False
         try:
             self._file = self.path.open("xb")
@@ -152,7 +159,11 @@ class Recorder(Handle):
         if self._failure:
             raise BagError(self._failure)
         with self._lock:
-            problems = dict(self._failed)
+            problems = dict(self._failed) | {
+                topic: f"its type {name} is being fetched from the robot; its messages wait for it"
+                for (name, _), held in self._held.items()
+                for topic, _ in held[:1]
+            }
             types = Counter(topic for topic, _ in self._subscriptions)
             for (topic, _), subscription in self._subscriptions.items():
                 # Each of several is told that the others are there.
@@ -217,13 +228,11 @@ class Recorder(Handle):
                 return
             self._begun.add((topic, type_name))
         try:
-            subscription = self._node.create_subscription(
-                topic,
-                type_name,
-                qos=QoS.best_available(_DEPTH),
-                raw_callback=lambda sample: self._receive(topic, sample),
-                executor=IMMEDIATE,
-            )
+            subscription = self._open(topic, type_name)
+            if subscription.type is None:
+                # Its definition is not here: what comes until the robot has told it counts, too.
+                subscription.close()
+                subscription = self._open(topic, OpaqueType(type_name))
         except Error as error:
             if topic not in self._failed:
                 _log.warning("%s is not recorded: %s", topic, error)
@@ -237,6 +246,15 @@ class Recorder(Handle):
             closed = self._closed
         if closed:
             subscription.close()
+
+    def _open(self, topic: str, kind: str | MessageType) -> Subscription:
+        return self._node.create_subscription(
+            topic,
+            kind,
+            qos=QoS.best_available(_DEPTH),
+            raw_callback=lambda sample: self._receive(topic, sample),
+            executor=IMMEDIATE,
+        )
 
     def _receive(self, topic: str, sample: Sample) -> None:
         size = len(sample.data)
@@ -256,13 +274,19 @@ class Recorder(Handle):
         try:
             while True:
                 with self._lock:
-                    self._lock.wait_for(lambda: self._queue or self._closed, _FLUSH)
+                    self._lock.wait_for(lambda: self._queue or self._closed or self._told(), _FLUSH)
                     batch, closed = list(self._queue), self._closed
                     self._queue.clear()
-                    self._waiting = 0
+                    held = [len(sample.data) for each in self._held.values() for _, sample in each]
+                    self._waiting = sum(held)
                     lost, self._lost = self._lost, {}
                 for topic, sample in batch:
-                    self._write(topic, sample)
+                    if not self._hold(topic, sample):
+                        self._write(topic, sample, sample.type)
+                if closed and not batch:
+                    wait([self._fetches[key] for key in self._held], _LAST_FETCH)
+                for key in self._told() if not closed or batch else list(self._held):
+                    self._release(key)
                 if lost:
                     told = ", ".join(f"{count} of {topic}" for topic, count in lost.items())
                     _log.warning("%s: too much for the disk, lost %s", self.path, told)
@@ -280,11 +304,47 @@ class Recorder(Handle):
         finally:
             self._file.close()
 
-    def _write(self, topic: str, sample: Sample) -> None:
+    def _hold(self, topic: str, sample: Sample) -> bool:
+        """Keep a message whose type is not known yet; returns whether that was necessary."""
+        kind = sample.type
+        key = (kind.name, kind.rihs01)
+        if not isinstance(kind, OpaqueType) or (topic, *key) in self._channels:
+            return False
+        if key not in self._fetches:
+            try:
+                self._fetches[key] = self._node.fetch_type_async(
+                    kind.name, hash=kind.rihs01, timeout=_FETCH
+                )
+            except Error as error:
+                self._failed[topic] = f"recorded as bytes: {error}"
+                return False
+        with self._lock:
+            self._held.setdefault(key, []).append((topic, sample))
+        return True
+
+    def _told(self) -> list[tuple[str, str]]:
+        """Return the types that messages wait for no longer."""
+        return [key for key in self._held if self._fetches[key].done()]
+
+    def _release(self, key: tuple[str, str]) -> None:
+        """Write the messages that waited for a type, which may have remained unknown."""
+        with self._lock:
+            held = self._held.pop(key)
+        fetch, known, reason = self._fetches[key], None, ""
+        try:
+            known = fetch.result(0)
+        except Error as error:
+            reason = f"recorded as bytes: {error}"
+        for topic, sample in held:
+            self._write(topic, sample, sample.type if known is None else known)
+            if reason:
+                self._failed[topic] = reason
+
+    def _write(self, topic: str, sample: Sample, kind: MessageType) -> None:
         key = (topic, sample.type.name, sample.type.rihs01)
         channel = self._channels.get(key)
         if channel is None:
-            channel = self._channels[key] = self._register(topic, sample.type)
+            channel = self._channels[key] = self._register(topic, kind)
         received = sample.received.nanoseconds
         self._writer.add_message(
             channel,

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 import rosglass
+from rosglass.bags import Recorder, open_bag
 from rosglass.errors import TypeNotFoundError
 from rosglass.interfaces import Library, MemoryProvider
 from rosglass.messages import OpaqueType
@@ -107,6 +108,27 @@ def test_topics(robot, cockpit, wait_for) -> None:
     wait_for(publisher.subscription_count)
     publisher.publish(parts=[{}])
     assert process.event("command") == {"state": 3, "parts": [{"a": 5}], "name": ""}
+
+
+def test_what_comes_before_the_definition_is_recorded(
+    url, folders, cockpit, wait_for, tmp_path
+) -> None:
+    library = Library()
+    library.add_path(folders["truth"])
+    node = cockpit()
+    path = tmp_path / "state.mcap"
+    with rosglass.connect(url, "robot", library=library) as robot:
+        publisher = robot.create_publisher("/state", STATE)
+        with Recorder(node, path, ["/state"]) as recorder:
+            wait_for(publisher.subscription_count)
+            for number in range(200):
+                publisher.publish(state=number, name="first")
+            wait_for(lambda: recorder.status().messages >= 200)
+            assert recorder.status().problems == {}
+    with open_bag(path) as bag:
+        found = [message.channel.type().decode(message.data) for message in bag.messages()]
+    assert [message.state for message in found] == list(range(200))
+    assert {message.name for message in found} == {"first"}
 
 
 def test_publishing_first(robot, cockpit, wait_for) -> None:
