@@ -16,14 +16,21 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
 
-def wait_for(condition: Callable[[], Any], timeout: float = 10.0, what: str = "") -> Any:
-    """Return the first true value of `condition`, which must come within `timeout` seconds."""
+def wait_for(
+    condition: Callable[[], Any], timeout: float = 10.0, what: str | Callable[[], str] = ""
+) -> Any:
+    """Return the first true value of `condition`, which must come within `timeout` seconds.
+
+    `what` says what was waited for; called, when it can be, only if that did not come.
+    """
     deadline = time.monotonic() + timeout
     while True:
         value = condition()
         if value:
             return value
-        assert time.monotonic() < deadline, f"not within {timeout} s: {what or condition}"
+        if time.monotonic() >= deadline:
+            told = what() if callable(what) else what
+            pytest.fail(f"not within {timeout} s: {told or condition}")
         time.sleep(0.01)
 
 

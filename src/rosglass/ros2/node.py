@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from rosglass.comm import EndpointKind, Node, NodeName, QoS, Subscription
 from rosglass.comm.flags import check_flag
 from rosglass.comm.loop import check_plain
+from rosglass.errors import UnsupportedError
 from rosglass.ros2.arguments import NO_ARGUMENTS
 from rosglass.ros2.core import Core
 from rosglass.ros2.furniture import Furniture
@@ -96,9 +97,8 @@ class Ros2Node(Node):
         """Announce `topic`; see :meth:`rosglass.comm.Node.create_publisher`."""
         self._core.check_open()
         self._core.types.ensure(type)
-        return Ros2Publisher(
-            self._core, self.resolve(topic), self._core.types.message(type), _profile(qos)
-        )
+        full = self.resolve(topic)
+        return Ros2Publisher(self._core, full, self._core.types.message(type), _profile(qos, full))
 
     def create_subscription(
         self,
@@ -118,7 +118,7 @@ class Ros2Node(Node):
         subscription = Subscription(
             full,
             type_if_known(self._core, full, type),
-            _profile(qos),
+            _profile(qos, full),
             executor or self._core.dispatcher,
             callback,
             raw_callback,
@@ -132,7 +132,7 @@ class Ros2Node(Node):
         """Return a client; see :meth:`rosglass.comm.Node.create_service_client`."""
         self._core.check_open()
         self._core.types.ensure(type)
-        profile = _service_profile(qos)
+        profile = _service_profile(qos, name)
         return Ros2ServiceClient(self._core, self._core.resolve(name, "service"), type, profile)
 
     def create_service_server(
@@ -147,7 +147,7 @@ class Ros2Node(Node):
         """Offer a service; see :meth:`rosglass.comm.Node.create_service_server`."""
         self._core.check_open()
         self._core.types.ensure(type)
-        profile = _service_profile(qos)
+        profile = _service_profile(qos, name)
         full = self._core.resolve(name, "service")
         return Ros2ServiceServer(self._core, full, type, callback, profile, executor)
 
@@ -298,12 +298,15 @@ class Ros2Node(Node):
         return node.full if isinstance(node, NodeName) else self._core.expand(node)
 
 
-def _service_profile(qos: QoS | None) -> QoS:
+def _service_profile(qos: QoS | None, place: str) -> QoS:
     usual = QoS.services()
-    return usual if qos is None else _profile(qos).for_subscription((usual,))
+    return usual if qos is None else _profile(qos, place).for_subscription((usual,))
 
 
-def _profile(qos: QoS | int) -> QoS:
+def _profile(qos: QoS | int, place: str) -> QoS:
     if isinstance(qos, QoS):
         return qos
-    return QoS(depth=qos)
+    try:
+        return QoS(depth=qos)
+    except UnsupportedError as error:
+        raise UnsupportedError(f"{place}: {error}") from None

@@ -88,7 +88,12 @@ def test_we_receive_what_the_peer_publishes(dds_connect, both_ways, type_name, p
     node = dds_connect("cockpit")
     subscription = node.create_subscription(topic("from", type_name), type_name)
     sample = subscription.wait(10)
-    assert sample is not None, (subscription.problem or node.status(), both_ways.output)
+    assert sample is not None, (
+        subscription.problem,
+        node.status(),
+        node.publishers(subscription.topic),
+        both_ways.output,
+    )
     sample.type.validate(sample.data)
     received = peer_values.summary(sample.message().to_dict())
     assert received == peer_values.summary(peer_values.VALUES[type_name])
@@ -114,7 +119,7 @@ def test_the_peer_receives_what_we_publish(
             received[event.get("received")] = event.get("value")
         return publisher.topic in received
 
-    wait_for(arrived, what=f"our message at the peer, which said: {both_ways.output}")
+    wait_for(arrived, what=lambda: f"our message at the peer, which said: {both_ways.output}")
     assert received[publisher.topic] == peer_values.summary(peer_values.VALUES[type_name])
 
 

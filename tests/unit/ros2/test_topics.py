@@ -24,10 +24,10 @@ from rosglass.comm import (
     Reliability,
     SamplesLost,
 )
+from rosglass.comm.watchdog import Watchdog
 from rosglass.interfaces import Library
 from rosglass.messages import OpaqueType
 from rosglass.ros2 import Ros2Node
-from rosglass.ros2.watchdog import Watchdog
 
 PUBLISHER, SUBSCRIPTION = EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION
 STRING, TWIST = "std_msgs/msg/String", "geometry_msgs/msg/Twist"
@@ -208,6 +208,12 @@ def test_nobody_misses_what_the_node_itself_published(node, middleware, eventual
     middleware.graph.remove("own")
     eventually(lambda: counts == [1, 0])
     assert subscription.problem == ""
+
+
+@pytest.mark.parametrize("create", ["create_subscription", "create_publisher"])
+def test_a_profile_that_is_none_is_refused_by_topic(node, create):
+    with pytest.raises(rosglass.UnsupportedError, match=r"^/arm/t: .*QoS.preset\('sensor_data'\)"):
+        getattr(node, create)("t", STRING, qos="sensor_data")
 
 
 def test_hints_at_names_that_were_meant(node, robot, asker, eventually):
