@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 from rosglass.comm import ActionClient, CancelAnswer, EndpointKind, Executor, Promise, Time
 from rosglass.comm.promise import check_timeout
+from rosglass.comm.readiness import Readiness
+from rosglass.comm.similar import similar
 from rosglass.errors import (
     ConnectionLostError,
     ConversionError,
@@ -22,10 +24,8 @@ from rosglass.errors import (
 from rosglass.ros2.action_ends import ActionEnds
 from rosglass.ros2.action_types import CANCEL_REASONS, NO_ID, SEND_GOAL, goal_info, part
 from rosglass.ros2.action_version import ActionVersion
-from rosglass.ros2.announced import similar
 from rosglass.ros2.client_goal import Ros2ClientGoal
 from rosglass.ros2.core import Member
-from rosglass.ros2.readiness import Readiness
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

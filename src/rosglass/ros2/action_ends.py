@@ -6,6 +6,7 @@ import logging
 from typing import TYPE_CHECKING, Protocol
 
 from rosglass.comm import EndpointKind, Handle, QoS
+from rosglass.comm.complaints import Complaints
 from rosglass.errors import DecodeError
 from rosglass.ros2.action_types import (
     CANCEL_GOAL,
@@ -17,7 +18,6 @@ from rosglass.ros2.action_types import (
     part,
     stamp_of,
 )
-from rosglass.ros2.complaints import Complaints
 from rosglass.ros2.repeats import Repeats
 from rosglass.ros2.service_client import Ros2ServiceClient
 

@@ -22,7 +22,6 @@ __all__ = [
     "missing",
     "nodes_of",
     "rivals",
-    "similar",
 ]
 
 
@@ -225,14 +224,3 @@ def identity(peer: EndpointInfo) -> bytes | str:
 def nodes_of(peers: Iterable[EndpointInfo]) -> str:
     """Return the names of the nodes that peers belong to, for people."""
     return ", ".join(sorted({peer.node.full for peer in peers}))
-
-
-def similar(name: str, known: Iterable[str]) -> str:
-    """Return a hint at a known name that `name` may stand for, empty when there is none."""
-    import difflib  # noqa: PLC0415 - only needed to explain an error
-
-    names = [other for other in known if other != name]
-    base = name.rpartition("/")[2]
-    near = [other for other in names if other.rpartition("/")[2] == base]
-    near += difflib.get_close_matches(name, names, 2, 0.8)
-    return f"; did you mean {' or '.join(dict.fromkeys(near[:2]))}?" if near else ""

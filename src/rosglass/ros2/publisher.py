@@ -18,16 +18,16 @@ from rosglass.comm import (
     PublisherEvents,
     Sample,
 )
+from rosglass.comm.similar import similar
+from rosglass.comm.watchdog import Watchdog
 from rosglass.errors import (
     ConversionError,
     NodeClosedError,
     TypeNotFoundError,
     UnsupportedError,
 )
-from rosglass.ros2.announced import similar
 from rosglass.ros2.core import Member
 from rosglass.ros2.matching import conflict_events, conflicts, words
-from rosglass.ros2.watchdog import Watchdog
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

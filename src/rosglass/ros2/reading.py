@@ -15,15 +15,15 @@ from rosglass.comm import (
     SamplesLost,
     Source,
 )
+from rosglass.comm.similar import similar
+from rosglass.comm.watchdog import Watchdog
 from rosglass.errors import Error, NodeClosedError, TypeNotFoundError
 from rosglass.ros2.absence import Absence
-from rosglass.ros2.announced import similar
 from rosglass.ros2.core import Member
 from rosglass.ros2.liveliness import Liveness
 from rosglass.ros2.matching import conflict_events, conflicts, words
 from rosglass.ros2.repeats import Repeats
 from rosglass.ros2.topic_types import TopicTypes
-from rosglass.ros2.watchdog import Watchdog
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

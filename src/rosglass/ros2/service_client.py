@@ -11,6 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import Call, EndpointKind, QoS, ServiceClient
 from rosglass.comm.promise import check_timeout
+from rosglass.comm.readiness import Readiness
+from rosglass.comm.receiving import check_may_wait
+from rosglass.comm.similar import similar
 from rosglass.errors import (
     ConnectionLostError,
     ConversionError,
@@ -29,12 +32,9 @@ from rosglass.ros2.announced import (
     mismatches,
     nodes_of,
     rivals,
-    similar,
 )
 from rosglass.ros2.core import Member
 from rosglass.ros2.middleware import CALL_DROPPED, SERVER_LEFT
-from rosglass.ros2.readiness import Readiness
-from rosglass.ros2.receiving import check_may_wait
 from rosglass.ros2.requests import Link, Request
 
 if TYPE_CHECKING:

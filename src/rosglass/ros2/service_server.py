@@ -9,10 +9,10 @@ from concurrent.futures import CancelledError, Future
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import Dispatcher, EndpointKind, QoS, ServiceServer
+from rosglass.comm.complaints import Complaints
 from rosglass.comm.loop import LoopExecutor, executor_for
 from rosglass.errors import DecodeError, Error, NodeClosedError
 from rosglass.ros2.announced import Announced, mismatches, nodes_of
-from rosglass.ros2.complaints import Complaints
 from rosglass.ros2.core import Member
 
 if TYPE_CHECKING:

@@ -53,6 +53,7 @@ if TYPE_CHECKING:
 __all__ = ["TypeFetcher"]
 
 _log = logging.getLogger("rosglass.ros2")
+_REMEDY = "add the definition with Library.add_path(), or --definitions FOLDER on the command line"
 
 #: Seconds that a node has to answer, and after which the next one is asked meanwhile.
 _TIMEOUT, _HEDGE = 5.0, 1.0
@@ -277,7 +278,7 @@ class TypeFetcher(Member):
                 want,
                 f"{nodes_of(users.get(name, want.endpoints))} announces no type hash and sends no "
                 "definitions (ROS 2 Humble and older, or a program that is not built on rcl)"
-                f"{_told(want)}; add the definition with Library.add_path()",
+                f"{_told(want)}; {_REMEDY}",
                 now,
             )
         return ""
@@ -378,7 +379,7 @@ class TypeFetcher(Member):
         if self._core.middleware.announces_requests and "/msg/" not in want.name:
             told += (
                 ". Over DDS, ROS 2 nodes announce a service by the hash of its request, and do not "
-                "find its type by that when asked: add the definition with Library.add_path()"
+                f"find its type by that when asked: {_REMEDY}"
             )
         return told
 

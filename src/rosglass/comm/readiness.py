@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from rosglass.comm import Listeners
 from rosglass.comm.promise import check_timeout
+from rosglass.comm.receiving import check_may_wait
 from rosglass.errors import ConversionError
-from rosglass.ros2.receiving import check_may_wait
 
 if TYPE_CHECKING:
     from collections.abc import Callable

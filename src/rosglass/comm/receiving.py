@@ -16,6 +16,7 @@ __all__ = ["check_may_wait"]
 _BEGINNINGS = (
     "rosglass.ros2.dds.",
     "rosglass.ros2.zenoh.",
+    "rosglass.ros1.io_loop",
     "rosglass.comm.worker",
     "rosglass.comm.timers",
 )
