@@ -185,3 +185,35 @@ def test_interfaces() -> None:
     found = interfaces()
     assert found is not None
     assert [one.name for one in found if one.is_loopback] in ([], ["lo"])
+
+
+def test_ctrl_c_during_an_import_that_tells_it_in_its_own_way() -> None:
+    done = run_python(
+        "import sys\n"
+        "from rosglass.cli import main, program\n"
+        "def imports(_):\n"
+        "    try: raise KeyboardInterrupt\n"
+        "    except KeyboardInterrupt as error: raise ImportError('numpy failed') from error\n"
+        "program._run = imports\n"
+        "sys.exit(main(['topic']))\n",
+        stdout=subprocess.DEVNULL,
+    )
+    assert (done.returncode, done.stderr) == (130, "")
+
+
+def test_definitions_from_a_folder(tmp_path: Path) -> None:
+    package = tmp_path / "my_msgs"
+    (package / "msg").mkdir(parents=True)
+    (package / "package.xml").write_text("<package><name>my_msgs</name></package>")
+    (package / "msg" / "State.msg").write_text("uint8 state\n")
+    command = "import sys; from rosglass.cli import main; sys.exit(main(sys.argv[1:]))"
+
+    def show(*options: str) -> subprocess.CompletedProcess[str]:
+        arguments = [sys.executable, "-c", command, "interface", *options]
+        return subprocess.run(arguments, capture_output=True, text=True, check=False)
+
+    listed = show("list", "my_msgs", "--definitions", str(tmp_path))
+    assert (listed.returncode, listed.stdout) == (0, "my_msgs/msg/State\n")
+    assert show("list", "my_msgs").returncode == 1
+    wrong = show("list", "--definitions", str(tmp_path / "none"))
+    assert (wrong.returncode, "is not a folder" in wrong.stderr) == (1, True)

@@ -5,7 +5,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-__all__ = ["main"]
+__all__ = ["is_interrupt", "main"]
 
 
 def main(argv: "Sequence[str] | None" = None) -> int:
@@ -19,9 +19,20 @@ def main(argv: "Sequence[str] | None" = None) -> int:
         from rosglass.cli.program import run
 
         return run(argv)
-    except KeyboardInterrupt:
+    except BaseException as error:
+        if isinstance(error, SystemExit) or not is_interrupt(error):
+            raise
         import signal
 
         # Whatever still ends now can be cut short by pressing it again.
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         return 130
+
+
+def is_interrupt(error: "BaseException | None") -> bool:
+    """Return whether Ctrl-C is behind an error: modules in C tell it as an ImportError."""
+    while error is not None:
+        if isinstance(error, KeyboardInterrupt):
+            return True
+        error = error.__cause__ or error.__context__
+    return False

@@ -22,6 +22,7 @@ __all__ = [
     "TIMEOUT",
     "End",
     "add_connection_options",
+    "add_definitions_option",
     "connect",
     "find",
     "natural",
@@ -55,6 +56,7 @@ def add_connection_options(
     group.add_argument(
         "--node-name", default="", metavar="NAME", help="default: one that nobody else has"
     )
+    add_definitions_option(group)
     group.add_argument(
         "--timeout",
         type=seconds,
@@ -68,6 +70,18 @@ def add_connection_options(
         ),
     )
     parser.set_defaults(ros_arguments=[])
+
+
+def add_definitions_option(parser: argparse._ActionsContainer) -> None:
+    """Declare the option that says where definitions of types are, besides the usual places."""
+    parser.add_argument(
+        "--definitions",
+        action="append",
+        default=[],
+        metavar="FOLDER",
+        help="a package or workspace with definitions that the robot does not tell; may be "
+        "repeated",
+    )
 
 
 def connect(args: argparse.Namespace, *, own_services: bool = False) -> Node:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rosglass.cli.completion import complete
-from rosglass.cli.connecting import add_connection_options, connect
+from rosglass.cli.connecting import add_connection_options, add_definitions_option, connect
 from rosglass.cli.output import Style, add_output_options, note, print_json, template
 from rosglass.cli.subcommands import Subcommands
 
@@ -31,6 +31,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     sub.add_argument("text", nargs="?", default="", help="only names that contain it")
     sub.add_argument("--kind", choices=("msg", "srv", "action"), help="only these")
     sub.add_argument("--ros1", action="store_true", help="ROS 1's types")
+    add_definitions_option(sub)
     add_output_options(sub)
 
 

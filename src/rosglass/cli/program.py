@@ -11,6 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 import rosglass
+from rosglass.cli import is_interrupt
 from rosglass.cli.completion import is_completing, offer
 from rosglass.cli.subcommands import Parser, add_verbose
 
@@ -105,24 +106,32 @@ def run(argv: Sequence[str] | None = None) -> int:
     try:
         code = _run(list(sys.argv[1:] if argv is None else argv))
         sys.stdout.flush()
-    except rosglass.Error as error:
+    except Exception as error:
+        if is_interrupt(error):
+            raise KeyboardInterrupt from error
+        return _explain(error)
+    return code
+
+
+def _explain(error: Exception) -> int:
+    """Tell what went wrong, in words; returns the exit code. Our own faults are raised again."""
+    if isinstance(error, rosglass.Error):
         return _fail(str(error))
-    except ModuleNotFoundError as error:
+    if isinstance(error, ModuleNotFoundError):
         extra = _EXTRA_OF.get((error.name or "").partition(".")[0])
-        if extra is None:
-            raise
-        return _fail(
-            f"this command needs the package {error.name}, which is not installed; "
-            f'install it with: pip install "rosglass[{extra}]"'
-        )
-    except BrokenPipeError:
+        if extra is not None:
+            return _fail(
+                f"this command needs the package {error.name}, which is not installed; "
+                f'install it with: pip install "rosglass[{extra}]"'
+            )
+    if isinstance(error, BrokenPipeError):
         _drop_output()
         return 141  # as programs end that SIGPIPE ends
-    except OSError as error:
+    if isinstance(error, OSError):
         _drop_output()
         where = f"{error.filename}: " if error.filename else ""
         return _fail(f"{where}{error.strerror or error}")
-    return code
+    raise error
 
 
 def _run(arguments: list[str]) -> int:
@@ -138,6 +147,8 @@ def _run(arguments: list[str]) -> int:
     args.arguments, args.ros_arguments = rest, told
     level = {0: logging.WARNING, 1: logging.INFO}.get(args.verbose, logging.DEBUG)
     logging.basicConfig(level=level, format="%(levelname)s %(name)s: %(message)s")
+    for folder in getattr(args, "definitions", ()):
+        import_module("rosglass.messages").default_library().add_path(folder)
     return int(import_module(COMMANDS[args.command][0]).run(args))
 
 

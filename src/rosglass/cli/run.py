@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rosglass.cli.connecting import add_definitions_option
 from rosglass.errors import QmlError, UnsupportedError
 
 if TYPE_CHECKING:
@@ -54,6 +55,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         default=2.0,
         help="when to take the screenshot (default: %(default)s)",
     )
+    add_definitions_option(parser)
     parser.set_defaults(arguments=[], ros_arguments=[])
     parser.epilog = (
         "What follows --ros-args is for ROS, as with ros2 run: -r chatter:=talk, -p speed:=1.5 and "

@@ -392,7 +392,8 @@ class Library:
         known = "; ".join(f"{place} has {actual}" for actual, place in tried.items())
         raise DefinitionConflictError(
             f"no definition of {name} has the hash {wanted} that the peer announces: {known}. Add "
-            "the peer's definition with Library.add_path() or source its workspace"
+            "the peer's definition with Library.add_path(), or --definitions FOLDER on the command "
+            "line, or source its workspace"
         )
 
     def _views(self, ros: int) -> Iterator[tuple[Resolver, list[Provider], bool]]:
@@ -450,7 +451,10 @@ class Library:
             text += f" Did you mean {' or '.join(close)}?"
         if any(n.split("/")[0] + "/" + n.split("/")[2] == wanted for n in other):
             text += f" ROS {3 - ros} has it."
-        return f"{text} Source its workspace, or add its folder with Library.add_path()"
+        return (
+            f"{text} Source its workspace, or add its folder with Library.add_path(), or "
+            "--definitions FOLDER on the command line"
+        )
 
 
 def _full_names(name: str) -> list[str]:
