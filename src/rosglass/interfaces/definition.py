@@ -52,12 +52,15 @@ class FieldType:
         size: Element count of a fixed array, maximum of a bounded sequence, otherwise None.
         string_bound: Maximum length of a bounded string, in UTF-8 bytes (wstring: UTF-16 units),
             otherwise None.
+        letter: Whether a ``char`` is IDL's own, whose hash differs: a ``.msg`` file's is an
+            ``uint8`` to rosidl. Both are numbers from 0 to 255 here.
     """
 
     name: str
     array: ArrayKind = ArrayKind.NONE
     size: int | None = None
     string_bound: int | None = None
+    letter: bool = False
 
     @property
     def is_compound(self) -> bool:

@@ -26,13 +26,14 @@ if TYPE_CHECKING:
 __all__ = ["announced_hashes", "full_text", "md5", "rihs01", "type_description"]
 
 # type_description_interfaces/msg/FieldType's constants. rosidl turns a .msg file's char into IDL's
-# uint8, so its id is 3 and not FIELD_TYPE_CHAR (AddTwoInts' official hash depends on it).
+# uint8, so its id is 3 (AddTwoInts' official hash depends on it); IDL's own has FIELD_TYPE_CHAR.
 _TYPE_IDS = {
     "int8": 2, "uint8": 3, "int16": 4, "uint16": 5, "int32": 6, "uint32": 7, "int64": 8,
     "uint64": 9, "float32": 10, "float64": 11, "char": 3, "bool": 15, "byte": 16, "string": 17,
     "wstring": 18,
 }  # fmt: skip
 _NESTED_ID = 1
+_LETTER_ID = 13
 _BOUNDED_STRING_OFFSET = 4
 _ARRAY_OFFSETS = {
     ArrayKind.NONE: 0,
@@ -239,7 +240,8 @@ def _describe_message(
             _describe_message(_nested(definition, field, nested), nested, described)
             continue
         bound = kind.string_bound or 0
-        type_id = _TYPE_IDS[kind.name] + offset + (_BOUNDED_STRING_OFFSET if bound else 0)
+        basic = _LETTER_ID if kind.letter else _TYPE_IDS[kind.name]
+        type_id = basic + offset + (_BOUNDED_STRING_OFFSET if bound else 0)
         fields.append(_field(field.name, type_id, capacity, bound, default=default))
     if not fields:
         fields.append(_field(_PLACEHOLDER, _TYPE_IDS["uint8"]))

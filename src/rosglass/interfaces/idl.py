@@ -8,6 +8,7 @@ comments, and takes minutes for a constant in three pairs of parentheses.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.errors import DefinitionError
@@ -233,7 +234,7 @@ class _Parser:
             raise self._lexer.error(
                 "there are no arrays of arrays; put the inner one into a struct", opening
             )
-        return FieldType(base.name, ArrayKind.FIXED, size, base.string_bound)
+        return replace(base, array=ArrayKind.FIXED, size=size)
 
     def _typedef(self) -> None:
         base = self._type()
@@ -301,7 +302,7 @@ class _Parser:
             bound = self._count()
             self._lexer.take(">")
             return FieldType(basic, string_bound=bound)
-        return FieldType(basic)
+        return FieldType(basic, letter=basic == "char")
 
     def _sequence(self, token: Token) -> FieldType:
         self._lexer.take("<")
@@ -316,7 +317,7 @@ class _Parser:
         if self._lexer.accept(","):
             kind, size = ArrayKind.BOUNDED, self._count()
         self._lexer.take(">")
-        return FieldType(inner.name, kind, size, inner.string_bound)
+        return replace(inner, array=kind, size=size)
 
     def _named(self, token: Token) -> FieldType:
         path = self._path(token)

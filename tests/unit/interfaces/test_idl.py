@@ -13,6 +13,8 @@ from rosglass.interfaces import (
     parse_idl,
     rihs01,
 )
+from rosglass.interfaces.hashes import type_description
+from rosglass.messages import MessageType
 
 GENERATED = r"""
 // generated from rosidl_adapter/resource/msg.idl.em
@@ -330,3 +332,13 @@ def test_arguments_are_checked() -> None:
         parse_idl(b"", "a/B")  # type: ignore[arg-type]
     with pytest.raises(DefinitionError, match="the limit is"):
         parse_idl(" " * (4 * 1024 * 1024 + 1), "a/B")
+
+
+def test_a_char_of_idl_is_described_as_such() -> None:
+    """rosidl_generator_type_description: char is FIELD_TYPE_CHAR; a .msg file's is uint8."""
+    text = wrapped("char a; sequence<char> b; char c[3]; sequence<char, 4> d; uint8 e;")
+    definition = message(text, "a/msg/B")
+    found = type_description(definition)["type_description"]["fields"]
+    assert [field["type"]["type_id"] for field in found] == [13, 13 + 144, 13 + 48, 13 + 96, 3]
+    kind = MessageType(definition)
+    assert kind.decode(kind.encode(a=200, b=[1])).a == 200
