@@ -1,0 +1,323 @@
+"""Fixtures for tests with real ROS 1 peers: rosmaster, rospy, roscpp and the commands."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import os
+import shutil
+import socket
+import subprocess
+import xmlrpc.client
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+import rosglass
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from rosglass.comm import Node
+
+PEERS = Path(__file__).parent / "peers"
+#: Debian's own interpreter: rospy is installed there, not in our environment.
+PYTHON = "/usr/bin/python3"
+INSTALL = (
+    "ROS 1 is not installed: sudo apt-get install python3-rosmaster python3-rospy "
+    "python3-actionlib rostopic rosservice python3-rosbag rosbash"
+)
+INSTALL_CPP = (
+    "roscpp is not installed: sudo apt-get install g++ pkg-config libroscpp-dev libactionlib-dev"
+)
+
+
+def free_port() -> int:
+    """Return a port of the loopback interface that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def needs(*programs: str) -> None:
+    """Skip the test unless all of these programs are in Debian's place."""
+    missing = [name for name in programs if not Path("/usr/bin", name).exists()]
+    if missing:
+        pytest.skip(f"{INSTALL} (missing: {', '.join(missing)})")
+
+
+class RosMaster:
+    """A rosmaster process on a port of its own.
+
+    Attributes:
+        port: Where it listens.
+        uri: As in ROS_MASTER_URI.
+        url: As :func:`rosglass.connect` takes it.
+        home: ROS_HOME of everything that runs with it: logs, pid files.
+    """
+
+    def __init__(self, start_program: Callable[..., Any], home: Path) -> None:
+        self.port, self.home = free_port(), home
+        self.uri, self.url = f"http://127.0.0.1:{self.port}", f"ros1://127.0.0.1:{self.port}"
+        self._start_program = start_program
+        self._process: Any = None
+        self.start()
+
+    def env(self, **more: str) -> dict[str, str]:
+        """Return an environment that has nothing but ROS 1 and this master."""
+        return {
+            "PATH": "/usr/bin:/bin",
+            "HOME": str(self.home),
+            "ROS_HOME": str(self.home),
+            "ROS_LOG_DIR": str(self.home / "log"),
+            "ROS_MASTER_URI": self.uri,
+            "ROS_IP": "127.0.0.1",
+            "LANG": "C.UTF-8",
+            "PYTHONUNBUFFERED": "1",
+            **more,
+        }
+
+    def start(self) -> None:
+        """Start it, and return when it answers."""
+        command = ("/usr/bin/rosmaster", "--core", "-p", str(self.port))
+        self._process = self._start_program(*command, env=self.env())
+        for _ in range(1000):
+            with suppress(OSError, xmlrpc.client.Error):
+                self.call("getPid")
+                return
+            if self._process.popen.poll() is not None:
+                break
+            with suppress(subprocess.TimeoutExpired):
+                self._process.popen.wait(0.02)
+        pytest.fail(f"rosmaster does not start:\n{''.join(self._process.output)}")
+
+    def kill(self) -> None:
+        """Kill it: nodes get no farewell, and the next one has forgotten everything."""
+        self._process.end()
+
+    def restart(self) -> None:
+        """Kill it and start another one on the same port."""
+        self.kill()
+        self.start()
+
+    def call(self, method: str, *arguments: Any) -> Any:
+        """Call its XML-RPC API as ``/test``; return the value, fail the test without success."""
+        with xmlrpc.client.ServerProxy(self.uri) as server:
+            code, told, value = getattr(server, method)("/test", *arguments)
+        assert code == 1, f"{method}{arguments}: {told}"
+        return value
+
+
+class Peer:
+    """A peer process that obeys requests, each answered by its number; see peers/README.md."""
+
+    def __init__(self, process: Any) -> None:
+        self.process, self.pid = process, process.pid
+        self._numbers = itertools.count(1)
+
+    def start(self, do: str, **plan: Any) -> int:
+        """Send a request without waiting; return its number, for :meth:`answer`."""
+        number = next(self._numbers)
+        self.process.ask(do=do, number=number, **plan)
+        return number
+
+    def answer(self, number: int, timeout: float = 20.0) -> Any:
+        """Return what a request led to; fail the test if it failed there."""
+        found = self.process.event(f"answer {number}", timeout)
+        if "error" in found:
+            pytest.fail(f"the peer failed:\n{found['error']}")
+        return found.get("value")
+
+    def call(self, do: str, timeout: float = 20.0, **plan: Any) -> Any:
+        """Send a request and return what it led to."""
+        return self.answer(self.start(do, **plan), timeout)
+
+    def event(self, key: str, timeout: float = 20.0, **otherwise: Any) -> Any:
+        """Return the value of the next event of this name that the peer told by itself."""
+        return self.process.event(key, timeout, **otherwise)
+
+    def end(self) -> None:
+        """Kill it: nobody is told."""
+        self.process.end()
+
+
+@pytest.fixture(scope="module")
+def start_master(
+    start_program: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory
+) -> Callable[[], RosMaster]:
+    """Start a master of the test's own; killed when the module's tests are done."""
+    needs("rosmaster")
+    return lambda: RosMaster(start_program, tmp_path_factory.mktemp("ros_home"))
+
+
+@pytest.fixture(scope="module")
+def master(start_master: Callable[[], RosMaster]) -> RosMaster:
+    """The module's master; a test that restarts it should rather use ``start_master``."""
+    return start_master()
+
+
+@pytest.fixture
+def connect(request: pytest.FixtureRequest) -> Iterator[Callable[..., Node]]:
+    """Connect to the module's master, or to another ``url``; nodes are closed at the end."""
+    nodes: list[Node] = []
+
+    def connect(
+        name: str, namespace: str = "/", *, url: str = "", wait: bool = True, **more: Any
+    ) -> Node:
+        where = url or request.getfixturevalue("master").url
+        if "ip=" not in where:
+            where += ("&" if "?" in where else "?") + "ip=127.0.0.1"
+        node = rosglass.connect(where, name, namespace, **more)
+        nodes.append(node)
+        if wait:
+            request.getfixturevalue("wait_for")(
+                lambda: node.status().state.value == "connected", what=lambda: str(node.status())
+            )
+        return node
+
+    yield connect
+    for node in nodes:
+        node.close()
+
+
+@pytest.fixture(scope="module")
+def start_rospy(
+    start_program: Callable[..., Any], request: pytest.FixtureRequest
+) -> Callable[..., Peer]:
+    """Start a rospy peer: ``start_rospy(name, *arguments, master=..., env=...)``."""
+    needs("rosmaster")
+    if not Path("/usr/lib/python3/dist-packages/rospy").is_dir():
+        pytest.skip(INSTALL)
+
+    def start_rospy(
+        name: str = "rospy_peer",
+        *arguments: str,
+        master: RosMaster | None = None,
+        env: dict[str, str] | None = None,
+    ) -> Peer:
+        home = master or request.getfixturevalue("master")
+        command = (PYTHON, str(PEERS / "rospy_peer.py"), name, *arguments)
+        peer = Peer(start_program(*command, env=home.env(**(env or {}))))
+        peer.event("ready")
+        return peer
+
+    return start_rospy
+
+
+@pytest.fixture(scope="module")
+def rospy_peer(start_rospy: Callable[..., Peer]) -> Peer:
+    """The module's rospy node ``/rospy_peer``."""
+    return start_rospy()
+
+
+@pytest.fixture(scope="session")
+def roscpp_program(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    """Build the roscpp peer of all peers/roscpp_*.cpp; what was built before is kept."""
+    compiler, pkg_config = shutil.which("g++"), shutil.which("pkg-config")
+    if compiler is None or pkg_config is None or not Path("/usr/include/ros/ros.h").exists():
+        pytest.skip(INSTALL_CPP)
+    cache = getattr(request.config, "cache", None)  # -p no:cacheprovider leaves none
+    folder = tmp_path_factory.mktemp("roscpp") if cache is None else cache.mkdir("roscpp")
+    shared = b"".join(path.read_bytes() for path in sorted(PEERS.glob("roscpp_*.hpp")))
+    objects = []
+    for source in sorted(PEERS.glob("roscpp_*.cpp")):
+        version = hashlib.sha256(source.read_bytes() + shared).hexdigest()[:16]
+        built = folder / f"{source.stem}_{version}.o"
+        if not built.exists():
+            made = built.with_name(f"{os.getpid()}_{built.name}")
+            flags = [
+                "-std=c++17",
+                "-O1",
+                "-DBOOST_BIND_GLOBAL_PLACEHOLDERS",
+                "-I",
+                str(PEERS),
+                "-c",
+                str(source),
+                "-o",
+                str(made),
+            ]
+            subprocess.run([compiler, *flags], check=True)
+            made.rename(built)
+        objects.append(built)
+    names = hashlib.sha256("".join(path.name for path in objects).encode()).hexdigest()[:16]
+    program = folder / f"roscpp_peer_{names}"
+    if not program.exists():
+        made = program.with_name(f"{os.getpid()}_{program.name}")
+        asked = [pkg_config, "--libs", "roscpp"]
+        libraries = subprocess.run(asked, check=True, capture_output=True, text=True).stdout
+        rest = ["-lactionlib", "-lboost_thread", "-lboost_system", "-lpthread"]
+        command = [compiler, *map(str, objects), "-o", str(made), *libraries.split(), *rest]
+        subprocess.run(command, check=True)
+        made.rename(program)
+    return program
+
+
+@pytest.fixture(scope="module")
+def start_roscpp(
+    start_program: Callable[..., Any], roscpp_program: Path, request: pytest.FixtureRequest
+) -> Callable[..., Peer]:
+    """Start a roscpp peer: ``start_roscpp(name, *arguments, master=..., env=...)``."""
+
+    def start_roscpp(
+        name: str = "roscpp_peer",
+        *arguments: str,
+        master: RosMaster | None = None,
+        env: dict[str, str] | None = None,
+    ) -> Peer:
+        home = master or request.getfixturevalue("master")
+        command = (str(roscpp_program), name, *arguments)
+        peer = Peer(start_program(*command, env=home.env(**(env or {}))))
+        peer.event("ready")
+        return peer
+
+    return start_roscpp
+
+
+@pytest.fixture(scope="module")
+def roscpp_peer(start_roscpp: Callable[..., Peer]) -> Peer:
+    """The module's roscpp node ``/roscpp_peer``."""
+    return start_roscpp()
+
+
+@pytest.fixture
+def tool(master: RosMaster) -> Callable[..., str]:
+    """Run a ROS 1 command such as ``tool("rostopic", "list")``; return what it prints."""
+
+    def tool(*command: str, timeout: float = 20.0, status: int | None = 0, stdin: str = "") -> str:
+        needs(command[0])
+        done = subprocess.run(
+            command,
+            env=master.env(),
+            input=stdin,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=timeout,
+            check=False,
+        )
+        assert status is None or done.returncode == status, f"{command}:\n{done.stdout}"
+        return done.stdout
+
+    return tool
+
+
+@pytest.fixture
+def start_tool(
+    master: RosMaster, start_program: Callable[..., Any]
+) -> Iterator[Callable[..., Any]]:
+    """Start a ROS 1 command that runs until the test ends; its lines are in ``.output``."""
+    started: list[Any] = []
+
+    def start_tool(*command: str) -> Any:
+        needs(command[0])
+        process = start_program(*command, env=master.env())
+        started.append(process)
+        return process
+
+    yield start_tool
+    for process in started:
+        process.end()
