@@ -255,6 +255,18 @@ def test_a_peer_that_is_killed_leaves_and_another_takes_over(dds_connect, cyclon
     assert two.publisher != one.publisher
 
 
+def test_a_subscription_says_who_left(dds_connect, wait_for):
+    subscription = dds_connect("cockpit").create_subscription("/relay", STRING)
+    for name in ("robot", "spare"):
+        robot = dds_connect(name)
+        publisher = linked(robot.create_publisher("/relay", STRING), wait_for)
+        publisher.publish(data=name)
+        assert subscription.wait(10).message().data == name
+        wait_for(lambda: not subscription.problem, what="no problem while somebody publishes")
+        robot.close()
+        wait_for(lambda name=name: f"when /{name} left" in subscription.problem)
+
+
 # -- between our own ------------------------------------------------------------------------------
 
 
