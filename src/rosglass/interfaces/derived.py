@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from rosglass.interfaces.definition import InterfaceDefinition
 
-__all__ = ["derive", "derived_from", "service_event"]
+__all__ = ["compose", "derive", "derived_from", "service_event"]
 
 _UUID = "unique_identifier_msgs/msg/UUID"
 _TIME = "builtin_interfaces/msg/Time"
@@ -92,6 +92,35 @@ def derive(owner: InterfaceDefinition, suffix: str) -> InterfaceDefinition | Non
         build = table.get(suffix)
         return build(owner) if build else None
     return None
+
+
+def compose(
+    name: str, find: Callable[[str], InterfaceDefinition | None]
+) -> ActionDefinition | None:
+    """Return a ROS 1 action whose file is missing, as in packages without sources.
+
+    Args:
+        name: Full type name, ``pkg/action/Type``.
+        find: Returns the definition of a message, None when there is none.
+
+    Returns:
+        The action that the messages generated from it show, None unless all are there.
+    """
+    package, _, base = name.split("/")
+    names = [f"{package}/msg/{base}{suffix}" for suffix in ("Goal", "Result", "Feedback")]
+    parts = [part for part in map(find, names) if isinstance(part, Definition)]
+    if len(parts) < len(names) or find(f"{package}/msg/{base}ActionGoal") is None:
+        return None
+    goal, result, feedback = parts
+    return ActionDefinition(
+        name=name,
+        ros=1,
+        goal=goal,
+        result=result,
+        feedback=feedback,
+        text="\n---\n".join(part.text.rstrip("\n") for part in parts),
+        source=Source(f"{goal.source.provider}, composed of its messages", goal.source.file),
+    )
 
 
 def service_event(service: ServiceDefinition) -> Definition:

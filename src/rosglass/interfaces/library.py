@@ -17,7 +17,7 @@ from rosglass.errors import (
     UnsupportedError,
 )
 from rosglass.interfaces.definition import Definition, parts_of
-from rosglass.interfaces.derived import derive, derived_from
+from rosglass.interfaces.derived import compose, derive, derived_from
 from rosglass.interfaces.distributions import Distributions
 from rosglass.interfaces.folders import Folders, workspace
 from rosglass.interfaces.hashes import announced_hashes, check_definition, md5
@@ -333,6 +333,8 @@ class Library:
             derived = derive(owner, suffix) if owner is not None else None
             if derived is not None:
                 return derived
+        if ros == 1 and "/action/" in name:
+            return compose(name, lambda part: self._choose(part, 1, chain, check=check))
         return None
 
     def _choose(

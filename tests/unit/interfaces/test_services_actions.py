@@ -235,3 +235,25 @@ def test_kinds_of_a_short_name(library: Library) -> None:
 def test_what_is_not_implied(library: Library, name: str, ros: int) -> None:
     with pytest.raises((TypeNotFoundError, ValueError)):
         library.definition(name, ros)
+
+
+@pytest.mark.parametrize("name", ["pkg/action/Count", "pkg/Count"])
+def test_an_action_of_ros1_whose_file_is_missing(name: str) -> None:
+    made = Library()
+    made.add_text("pkg/action/Count", ACTION, ros=1)
+    library = Library()
+    for part in ("Goal", "Result", "Feedback", "ActionGoal"):
+        with pytest.raises(TypeNotFoundError):
+            library.definition(name, ros=1)
+        text = made.definition(f"pkg/Count{part}", ros=1)
+        assert isinstance(text, Definition)
+        library.add_text(f"pkg/Count{part}", text.text, ros=1)
+    action, original = library.definition(name, ros=1), made.definition(name, ros=1)
+    assert isinstance(action, ActionDefinition)
+    assert isinstance(original, ActionDefinition)
+    assert action.name == "pkg/action/Count"
+    assert md5(action) == md5(original)
+    assert names(action.feedback) == [("float32", "done")]
+    assert "composed of its messages" in action.source.provider
+    reparsed = parse_action(action.text, action.name, ros=1)
+    assert names(reparsed.goal) == [("int32", "order")]
