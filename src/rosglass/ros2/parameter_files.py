@@ -10,20 +10,18 @@ from __future__ import annotations
 import base64
 import binascii
 import math
-import os
 import re
-import tempfile
-from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import yaml
 
+from rosglass.comm.text_files import read_text, write_text
 from rosglass.errors import InvalidNameError, ParameterError
 from rosglass.ros2.names import validate_node_name
 
 if TYPE_CHECKING:
+    import os
     from collections.abc import Iterator, Mapping
 
     from rosglass.comm import ParameterValue
@@ -89,18 +87,7 @@ def matches(pattern: str, node: str) -> bool:
 
 def read(path: str | os.PathLike[str]) -> ParameterFile:
     """Read a parameter file; raises ParameterError with file, line and column."""
-    if not isinstance(path, (str, os.PathLike)):
-        raise ParameterError(f"a parameter file is given by its path, got {path!r}")
-    label = os.fspath(path)
-    try:
-        size = Path(label).stat().st_size
-        if size > _MAX_SIZE:
-            raise ParameterError(f"{label} has {size} bytes, too many for a parameter file")
-        text = Path(label).read_text(encoding="utf-8")
-    except OSError as error:
-        raise ParameterError(f"{label} cannot be read: {error.strerror or error}") from None
-    except UnicodeDecodeError as error:
-        raise ParameterError(f"{label} is not UTF-8 text (byte {error.start})") from None
+    text, label = read_text(path, _MAX_SIZE)
     return parse(text, label)
 
 
@@ -141,22 +128,7 @@ def dump(nodes: Mapping[str, Mapping[str, ParameterValue]]) -> str:
 
 def write(path: str | os.PathLike[str], nodes: Mapping[str, Mapping[str, ParameterValue]]) -> None:
     """Write a parameter file, in one go; raises ParameterError when that is not possible."""
-    target = Path(path)
-    try:
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(dump(nodes))
-            mask = os.umask(0)
-            os.umask(mask)
-            Path(name).chmod(0o666 & ~mask)
-            Path(name).replace(target)
-        except BaseException:
-            with suppress(OSError):
-                Path(name).unlink()
-            raise
-    except OSError as error:
-        raise ParameterError(f"{target} cannot be written: {error.strerror or error}") from None
+    write_text(path, dump(nodes))
 
 
 class _Reader:
