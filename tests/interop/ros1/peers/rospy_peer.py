@@ -34,11 +34,11 @@ class Peer:
             sys.stdout.flush()
 
     def plain(self, value):
-        """Return `value` as plain data: times as [secs, nsecs], long arrays as length and sum."""
+        """Return `value` as plain data; more than 100 bytes become their number and sum."""
         if isinstance(value, genpy.Message):
             return {name: self.plain(getattr(value, name)) for name in value.__slots__}
         if isinstance(value, (genpy.Time, genpy.Duration)):
-            return [value.secs, value.nsecs]
+            return {"secs": value.secs, "nsecs": value.nsecs}
         if isinstance(value, bytes):
             return [len(value), zlib.crc32(value)] if len(value) > 100 else list(value)
         if isinstance(value, (list, tuple)):
