@@ -7,7 +7,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, TypeVar
 
 from rosglass.errors import DefinitionConflictError, Error, TypeNotFoundError, UnsupportedError
-from rosglass.interfaces import full_text, join_name
+from rosglass.interfaces import full_text, join_name, split_name
 
 if TYPE_CHECKING:
     from rosglass.interfaces import Library
@@ -63,9 +63,19 @@ class Types:
         return self._find(wanted, ServiceType, "service", "std_srvs/Trigger")
 
     def action(self, wanted: str | ActionType) -> ActionType:
-        """Return an action type; arguments and errors as in :meth:`message`."""
+        """Return an action type; arguments and errors as in :meth:`message`.
+
+        Its name may also be that of its message as a whole, ``pkg/TypeAction``, by which ROS 1's
+        own tools know it.
+        """
         from rosglass.messages import ActionType  # noqa: PLC0415 - numpy
 
+        if isinstance(wanted, str) and wanted.endswith("Action"):
+            package, kind, base = split_name(wanted)
+            if kind != "action" and base != "Action":
+                with suppress(TypeNotFoundError):
+                    name = f"{package}/action/{base.removesuffix('Action')}"
+                    return self._find(name, ActionType, "action", "actionlib_tutorials/Fibonacci")
         return self._find(wanted, ActionType, "action", "actionlib_tutorials/Fibonacci")
 
     def learn(self, name: str, md5: str, text: str) -> MessageType:
@@ -92,6 +102,35 @@ class Types:
             found = self._known(full, md5) or self._from_text(full, md5, text)
             with self._lock:
                 found = self._learned.setdefault((full, md5), found)
+        return found
+
+    def announced_service(self, name: str, md5: str) -> ServiceType:
+        """Return the service type that a server says it offers; it sends no definition.
+
+        Args:
+            name: Full name, ``pkg/srv/Type``; empty when the server does not tell.
+            md5: Its sum, ``*`` for any.
+
+        Raises:
+            TypeNotFoundError: Nobody has the definition.
+            DefinitionConflictError: The definitions that are known have other sums.
+            DefinitionError: The definition breaks a rule.
+            InvalidNameError: `name` is no type's name.
+        """
+        from rosglass.messages import ServiceType, load  # noqa: PLC0415 - numpy
+
+        if not name:
+            raise TypeNotFoundError("its server does not tell its type; name it")
+        hint = (
+            "ROS 1 servers send no definitions: add the robot's package with Library.add_path(), "
+            "or its folder to ROS_PACKAGE_PATH"
+        )
+        try:
+            found = load(name, ros=1, library=self._library, hash="" if md5 == ANY else md5)
+        except (TypeNotFoundError, DefinitionConflictError) as error:
+            raise type(error)(f"{error}. {hint}") from None
+        if not isinstance(found, ServiceType):
+            raise TypeNotFoundError(f"{name} is not a service type here. {hint}")
         return found
 
     def text(self, kind: MessageType) -> str:

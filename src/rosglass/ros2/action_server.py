@@ -15,9 +15,10 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import ActionServer, Dispatcher, EndpointKind, Time
+from rosglass.comm.goal_runner import GoalRunner
 from rosglass.comm.inorder import InOrder
 from rosglass.comm.loop import LoopExecutor, executor_for
-from rosglass.errors import ConversionError, Error, NodeClosedError
+from rosglass.errors import ConversionError, NodeClosedError
 from rosglass.ros2.action_types import (
     CANCEL_GOAL,
     CODES,
@@ -55,8 +56,6 @@ _RESULT_TIMEOUT = 900.0
 _MAX_ENDED = 500
 #: Seconds after its acceptance in which a client asks for a goal's result: closing waits for that.
 _ASKING = 1.0
-#: Seconds in all that closing waits for goals to notice.
-_PATIENCE = 2.0
 #: ``action_msgs/srv/CancelGoal``'s return codes.
 _NONE, _REJECTED, _UNKNOWN, _TERMINATED = range(4)
 
@@ -92,14 +91,14 @@ class Ros2ActionServer(ActionServer, Member):
             plain = callable(callback) and not inspect.iscoroutinefunction(callback)
             if callback is not None and not plain:
                 raise ConversionError(word, callback, "a plain function, or None", name)
-        self._core, self._execute, self._accept, self._cancel = core, execute, accept, cancel
+        self._core, self._accept, self._cancel = core, accept, cancel
         self._decider = chosen
-        self._runner = chosen if executor is not None or isinstance(chosen, LoopExecutor) else None
+        given = executor is not None or isinstance(chosen, LoopExecutor)
+        self._runner = GoalRunner(name, execute, chosen if given else None, _log)
         self._types = types = ActionTypes.of(self.type, core.types)
         self._lock = threading.Lock()
         self._goals: dict[bytes, Ros2ServerGoal] = {}
         self._deciding: set[bytes] = set()
-        self._threads: set[threading.Thread] = set()
         self._closed = False
         self._publishing = InOrder()
         #: Runs the protocol: neither the middleware's threads nor users' callbacks hold it up.
@@ -154,20 +153,16 @@ class Ros2ActionServer(ActionServer, Member):
                 return
             self._closed = True
             goals = list(self._goals.values())
-            threads = [t for t in self._threads if t is not threading.current_thread()]
         if self._core.forked:
             return
+        self._runner.close()
         for goal in goals:
             goal.close()
         self._await_questions(goals)
         for end in (*self._services, self._feedback, self._status):
             end.close()
         self._desk.close()
-        until = time.monotonic() + _PATIENCE
-        for thread in threads:
-            thread.join(max(0.0, until - time.monotonic()))
-            if thread.is_alive():
-                _log.warning("%s still runs %.0f s after closing", thread.name, _PATIENCE)
+        self._runner.join()
         self._core.remove(self)
 
     def _await_questions(self, goals: Sequence[Ros2ServerGoal]) -> None:
@@ -265,95 +260,7 @@ class Ros2ActionServer(ActionServer, Member):
         answer.set_result({"accepted": accepted, "stamp": stamp.to_dict() if accepted else {}})
         if accepted:
             self.publish_status()
-            self._start(goal)
-
-    # -- executing -------------------------------------------------------------------------------
-
-    def _start(self, goal: Ros2ServerGoal) -> None:
-        if self._runner is not None:
-            self._runner.post(lambda: self._run(goal))
-            return
-        thread = threading.Thread(
-            target=self._run_in_thread,
-            args=(goal,),
-            name=f"{self.name} {goal.id_text}",
-            daemon=True,
-        )
-        with self._lock:
-            self._threads.add(thread)
-        try:
-            thread.start()
-        except RuntimeError as error:
-            with self._lock:
-                self._threads.discard(thread)
-            _log.error("%s: aborting goal %s: %s", self.name, goal.id_text, error)
-            goal.close()
-
-    def _run_in_thread(self, goal: Ros2ServerGoal) -> None:
-        try:
-            self._run(goal)
-        finally:
-            with self._lock:
-                self._threads.discard(threading.current_thread())
-
-    def _run(self, goal: Ros2ServerGoal) -> None:
-        if not goal.start():
-            if goal.status.is_active:
-                goal.conclude(None)  # cancelled before its turn
-            return
-        try:
-            result: Any = self._execute(goal)
-        except BaseException as error:
-            self._failed(goal, error)
-            return
-        if not inspect.iscoroutine(result):
-            self._conclude(goal, result)
-        elif isinstance(self._runner, LoopExecutor):
-            future = self._runner.run(result)
-            future.add_done_callback(lambda done: self._finish(goal, done))
-        else:
-            result.close()
-            self._failed(goal, TypeError("execute must be an async def to be awaited"))
-
-    def _finish(self, goal: Ros2ServerGoal, done: Future[Any]) -> None:
-        """Take the end of a coroutine."""
-        try:
-            result = done.result(0)
-        except BaseException as error:
-            self._failed(goal, error)
-        else:
-            self._conclude(goal, result)
-
-    def _conclude(self, goal: Ros2ServerGoal, result: Any) -> None:
-        if not goal.status.is_active:
-            if result is not None and not self._closed:
-                _log.warning(
-                    "%s: goal %s has ended as %s already; what execute returned is dropped",
-                    self.name,
-                    goal.id_text,
-                    goal.status.value,
-                )
-            return
-        try:
-            goal.conclude(result)
-        except Error as error:
-            _log.error(
-                "%s: the result of goal %s does not fit, the goal is aborted: %s",
-                self.name,
-                goal.id_text,
-                error,
-            )
-            goal.close()
-
-    def _failed(self, goal: Ros2ServerGoal, error: BaseException) -> None:
-        if not (self._closed and isinstance(error, NodeClosedError)):
-            _log.error(
-                "%s: execute failed on goal %s, which is aborted",
-                self.name,
-                goal.id_text,
-                exc_info=error,
-            )
-        goal.close()
+            self._runner.start(goal)
 
     # -- cancelling ------------------------------------------------------------------------------
 

@@ -122,6 +122,10 @@ class Ros2ServerGoal(ServerGoal):
             waiting = self._settle(status, made)
         self._publish(waiting)
 
+    def fail(self, error: BaseException) -> None:  # noqa: ARG002 - ROS 2 has no room for it
+        """End it as failed, unless it has ended."""
+        self.close()
+
     def finish(self, status: GoalStatus, result: Any, *, strict: bool = True) -> None:
         """End it.
 

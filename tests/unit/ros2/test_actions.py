@@ -1236,7 +1236,7 @@ def test_closing_from_execute_does_not_hang(client, robot, eventually):
 
 
 def test_a_goal_that_ignores_the_end_is_left_to_its_thread(client, robot, monkeypatch, caplog):
-    monkeypatch.setattr("rosglass.ros2.action_server._PATIENCE", 0.05)
+    monkeypatch.setattr("rosglass.comm.goal_runner._PATIENCE", 0.05)
     started, release = threading.Event(), threading.Event()
 
     def execute(_):
