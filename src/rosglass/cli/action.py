@@ -20,6 +20,7 @@ from rosglass.cli.output import (
 )
 from rosglass.cli.subcommands import Subcommands
 from rosglass.cli.values import parse_fields, split_type
+from rosglass.cli.worlds import spelled
 
 if TYPE_CHECKING:
     import argparse
@@ -74,7 +75,14 @@ def _list(args: argparse.Namespace) -> int:
         print_json([{"action": name, "types": types} for name, types in found.items()])
         return 0
     for name, types in found.items():
-        print(name + (style(f" [{', '.join(types)}]", "dim") if args.types else ""))
+        print(
+            name
+            + (
+                style(f" [{', '.join(spelled(node, t) for t in types)}]", "dim")
+                if args.types
+                else ""
+            )
+        )
     if not found:
         note("there are no actions here; rosglass doctor looks why")
     return 0
@@ -95,12 +103,12 @@ def _info(args: argparse.Namespace) -> int:
         print_json(
             {
                 "action": name, "types": types,
-                "servers": [describe(end)["node"] for end in servers],
-                "clients": [describe(end)["node"] for end in clients],
+                "servers": [describe(node, end)["node"] for end in servers],
+                "clients": [describe(node, end)["node"] for end in clients],
             }
         )  # fmt: skip
         return 0
-    print(f"{style(name, 'bold')} [{', '.join(types)}]")
+    print(f"{style(name, 'bold')} [{', '.join(spelled(node, t) for t in types)}]")
     for what, ends in (("server", servers), ("client", clients)):
         for end in ends:
             print(f"  action {what} {style(end.node, 'cyan')}")

@@ -38,8 +38,8 @@ TIMEOUT = 10.0
 _DISCOVERY = 3.0
 #: Seconds after which a command says what it is waiting for.
 _PATIENCE = 2.0
-#: Seconds without news after which the graph counts as known.
-_QUIET = {"zenoh": 0.3, "dds": 0.7}
+#: Seconds without news after which the graph counts as known; ROS 1's master knows it at once.
+_QUIET = {"zenoh": 0.3, "dds": 0.7, "ros1": 0.0}
 
 
 def add_connection_options(
@@ -50,8 +50,8 @@ def add_connection_options(
     group.add_argument(
         "--url",
         default="",
-        help="address of the robot, e.g. zenoh://192.168.1.5:7447 or dds://?domain=5; default: "
-        "ROSGLASS_URL, or what ROS 2's own variables say",
+        help="address of the robot, e.g. zenoh://192.168.1.5:7447, dds://?domain=5 or "
+        "ros1://192.168.1.5:11311; default: ROSGLASS_URL, or what ROS's own variables say",
     )
     group.add_argument(
         "--node-name", default="", metavar="NAME", help="default: one that nobody else has"
@@ -126,7 +126,7 @@ def settle(node: Node, least: float = 0.0) -> None:
         nonlocal moved
         moved = time.monotonic()
 
-    quiet = _QUIET.get(node.url.partition(":")[0], 0.5)
+    quiet = _QUIET[node.url.partition(":")[0]]
     with node.on_graph_change(touch):
         while time.monotonic() < min(max(moved + quiet, began + least), began + 5.0):
             time.sleep(0.05)
@@ -154,7 +154,7 @@ def find(node: Node, look: Callable[[], _T], timeout: float) -> _T:
 
     What is not there is not waited for as long as for a robot that has not answered yet.
     """
-    wait(node, look, min(timeout, _DISCOVERY))
+    wait(node, look, min(timeout, _DISCOVERY if _QUIET[node.url.partition(":")[0]] else 0.0))
     settle(node)
     return look()
 

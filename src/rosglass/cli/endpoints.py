@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rosglass.cli.worlds import is_ros1
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rosglass.comm import EndpointInfo
+    from rosglass.comm import EndpointInfo, Node
 
 __all__ = ["Problem", "describe", "problems", "short"]
 
@@ -26,8 +28,11 @@ class Problem(NamedTuple):
     fix: str
 
 
-def describe(end: EndpointInfo) -> dict[str, Any]:
-    """Return an endpoint as JSON has it."""
+def describe(node: Node, end: EndpointInfo) -> dict[str, Any]:
+    """Return an endpoint of the node's graph as JSON has it."""
+    if is_ros1(node):
+        found = {"kind": end.kind.value, "name": end.name, "node": str(end.node), "type": end.type}
+        return found | ({"md5": end.type_hash} if end.type_hash else {})
     qos = end.qos
     return {
         "kind": end.kind.value,

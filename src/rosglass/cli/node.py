@@ -9,6 +9,7 @@ from rosglass.cli.connecting import add_connection_options, connect, find, settl
 from rosglass.cli.endpoints import describe
 from rosglass.cli.output import Style, add_output_options, note, print_json
 from rosglass.cli.subcommands import Subcommands
+from rosglass.cli.worlds import is_hidden, spelled
 
 if TYPE_CHECKING:
     import argparse
@@ -64,21 +65,20 @@ def _list(args: argparse.Namespace) -> int:
 
 
 def _info(args: argparse.Namespace) -> int:
-    from rosglass.ros2.names import hidden
-
     style = Style(args)
     with connect(args) as node:
         name = "/" + args.node.lstrip("/")
         if not find(node, lambda: name in _others(node), args.timeout):
             return _unknown(node, name)
-        ends = [end for end in node.endpoints(name) if args.hidden or not hidden(end.name)]
+        ends = [end for end in node.endpoints(name) if args.hidden or not is_hidden(node, end.name)]
     if args.json:
-        print_json({"node": name, "endpoints": [describe(end) for end in ends]})
+        print_json({"node": name, "endpoints": [describe(node, end) for end in ends]})
         return 0
     print(style(name, "bold"))
     kinds: dict[str, list[str]] = {}
     for end in ends:
-        kinds.setdefault(end.kind.value, []).append(f"{end.name} [{end.type}]")
+        shown = f" [{spelled(node, end.type)}]" if end.type else ""
+        kinds.setdefault(end.kind.value, []).append(end.name + shown)
     for kind, lines in kinds.items():
         print(style(f"  {kind}s:", "cyan"))
         for line in sorted(set(lines)):

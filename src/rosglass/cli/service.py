@@ -20,6 +20,7 @@ from rosglass.cli.output import (
 )
 from rosglass.cli.subcommands import Subcommands
 from rosglass.cli.values import parse_fields, split_type
+from rosglass.cli.worlds import is_hidden, spelled
 
 if TYPE_CHECKING:
     import argparse
@@ -62,17 +63,22 @@ def _finish(parser: argparse.ArgumentParser) -> None:
 
 
 def _list(args: argparse.Namespace) -> int:
-    from rosglass.ros2.names import hidden
-
     style = Style(args)
     with connect(args) as node:
         settle(node)
-        found = {s: k for s, k in node.services().items() if args.hidden or not hidden(s)}
+        found = {s: k for s, k in node.services().items() if args.hidden or not is_hidden(node, s)}
     if args.json:
         print_json([{"service": name, "types": types} for name, types in found.items()])
         return 0
     for name, types in found.items():
-        print(name + (style(f" [{', '.join(types)}]", "dim") if args.types else ""))
+        print(
+            name
+            + (
+                style(f" [{', '.join(spelled(node, t) for t in types)}]", "dim")
+                if args.types
+                else ""
+            )
+        )
     if not found:
         note("there are no services here; rosglass doctor looks why")
     return 0
@@ -89,14 +95,14 @@ def _info(args: argparse.Namespace) -> int:
         note(f"nobody offers or calls {name}; rosglass service list shows what there is")
         return 1
     if args.json:
-        print_json({"service": name, "endpoints": [describe(end) for end in ends]})
+        print_json({"service": name, "endpoints": [describe(node, end) for end in ends]})
         return 0
-    print(f"{style(name, 'bold')} [{', '.join(sorted({end.type for end in ends}))}]")
+    print(f"{style(name, 'bold')} [{', '.join(sorted({spelled(node, end.type) for end in ends}))}]")
     for end in ends:
         print(f"  {end.kind.value} {style(end.node, 'cyan')}")
-        for key in ("type", "type_hash", "response_hash", "gid"):
-            if describe(end)[key]:
-                print(f"    {key}: {short(describe(end)[key])}")
+        for key, value in describe(node, end).items():
+            if key in ("type", "md5", "type_hash", "response_hash", "gid") and value:
+                print(f"    {key}: {short(value)}")
     return 0
 
 

@@ -24,8 +24,11 @@ from rosglass.cli.subcommands import Subcommands
 from rosglass.cli.topic_echo import echo
 from rosglass.cli.topic_rates import measure
 from rosglass.cli.values import parse_fields, profile, split_type
+from rosglass.cli.worlds import is_hidden, is_ros1, spelled
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from rosglass.comm import Node
 
 __all__ = ["configure", "run"]
@@ -152,12 +155,10 @@ def _rate(text: str) -> float:
 
 
 def _list(args: argparse.Namespace) -> int:
-    from rosglass.ros2.names import hidden
-
     style = Style(args)
     with connect(args) as node:
         settle(node)
-        found = {t: k for t, k in node.topics().items() if args.hidden or not hidden(t)}
+        found = {t: k for t, k in node.topics().items() if args.hidden or not is_hidden(node, t)}
         counts = {t: (len(node.publishers(t)), len(node.subscriptions(t))) for t in found}
     if args.count_topics:
         print(len(found))
@@ -173,7 +174,7 @@ def _list(args: argparse.Namespace) -> int:
         return 0
     for topic, kinds in found.items():
         several = style(f"  {len(kinds)} types!", "red") if len(kinds) > 1 else ""
-        shown = style(f" [{', '.join(kinds)}]", "dim") if args.types else several
+        shown = style(f" [{_types(node, kinds)}]", "dim") if args.types else several
         print(topic + shown)
     if not found:
         note(f"there are no topics on {args.url or 'this graph'}; rosglass doctor looks why")
@@ -190,17 +191,23 @@ def _info(args: argparse.Namespace) -> int:
         if not ends:
             return _unknown(node, topic)
     if args.json:
-        print_json({"topic": topic, "endpoints": [describe(end) for end in ends]})
+        print_json({"topic": topic, "endpoints": [describe(node, end) for end in ends]})
         return 0
-    print(f"{style(topic, 'bold')} [{', '.join(sorted({end.type for end in ends}))}]")
+    print(f"{style(topic, 'bold')} [{_types(node, {end.type for end in ends})}]")
     for problem in problems(ends):
         print(style(f"  {problem.text}", "red"))
     for end in ends:
         print(f"  {end.kind.value} {style(end.node, 'cyan')}")
-        for key, value in describe(end).items():
-            if key not in ("kind", "name", "node") and value:
+        # In ROS 1, a topic's type is one for all: it is above.
+        above = ("kind", "name", "node", *(("type",) if is_ros1(node) else ()))
+        for key, value in describe(node, end).items():
+            if key not in above and value:
                 print(f"    {key}: {short(value)}")
     return 0
+
+
+def _types(node: Node, names: Iterable[str]) -> str:
+    return ", ".join(sorted(spelled(node, name) for name in names))
 
 
 def _publish(args: argparse.Namespace) -> int:
@@ -247,7 +254,8 @@ def _announced(node: Node, topic: str, timeout: float) -> str:
         return found[0]
     if found:
         raise TypeNotFoundError(f"{topic} has several types, say which: {', '.join(found)}")
-    raise TypeNotFoundError(f"nobody uses {topic} yet: say its type, e.g. std_msgs/msg/String")
+    example = spelled(node, "std_msgs/msg/String")
+    raise TypeNotFoundError(f"nobody uses {topic} yet: say its type, e.g. {example}")
 
 
 def _unknown(node: Node, topic: str) -> int:

@@ -81,7 +81,9 @@ def _delay(sample: Sample, failure: list[str]) -> float | None:
 
     try:
         stamp = sample.message()["header.stamp"]
-        return float(sample.received_ns - stamp.sec * 10**9 - stamp.nanosec) / 1e9
+        words = ("secs", "nsecs") if sample.wire == "ros1" else ("sec", "nanosec")
+        sent = stamp[words[0]] * 10**9 + stamp[words[1]]
+        return float(sample.received_ns - sent) / 1e9
     except (Error, AttributeError) as error:
         failure.append(f"its messages have no header.stamp: {error}")
         return None

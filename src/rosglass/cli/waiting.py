@@ -73,7 +73,9 @@ class Reasons:
         reason = self._reason(silent)
         if reason and reason != self._told:
             self._told = reason
-            note(f"{self._subscription.topic}: {reason}")
+            # Definitions that contradict each other take pages.
+            shown = reason.partition("\n")[0].rstrip() if self._quiet else reason
+            note(f"{self._subscription.topic}: {shown}")
         return reason
 
     def _reason(self, silent: float) -> str:

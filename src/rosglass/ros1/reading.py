@@ -137,6 +137,6 @@ class Reading(Source):
             f"{link.name} publishes {self._intake.topic} as {header.get('type')} with md5 "
             f"{header.get('md5sum')}, asked for was {ros1_name(wanted.name)} with md5 "
             f"{wanted.md5}: nothing is received from it; subscribe without a type to take what it "
-            f"sends, or add its definition to the library. Theirs:\n{theirs}\nOurs:\n"
+            f"sends, or add its definition to the library.\nTheirs:\n{theirs}\nOurs:\n"
             f"{self._core.types.text(wanted).strip()}"
         )

@@ -1,0 +1,49 @@
+"""What differs between ROS 1 and ROS 2 in what commands show and ask for."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import argparse
+
+    from rosglass.comm import Node
+
+__all__ = ["is_hidden", "is_ros1", "names_ros1", "spelled"]
+
+
+def is_ros1(node: Node) -> bool:
+    """Return whether a node is in a ROS 1 graph."""
+    return node.wire == "ros1"
+
+
+def names_ros1(args: argparse.Namespace) -> bool:
+    """Return whether the options, or else the environment, name a ROS 1 master."""
+    import os
+
+    from rosglass.connection import default_url
+    from rosglass.errors import Error
+
+    url = args.url
+    with suppress(Error):
+        url = url or default_url(os.environ)
+    return str(url).lower().startswith("ros1:")
+
+
+def is_hidden(node: Node, name: str) -> bool:
+    """Return whether lists leave a name out; ROS 1 hides none."""
+    from rosglass.ros2.names import hidden
+
+    return not is_ros1(node) and hidden(name)
+
+
+def spelled(node: Node, type_name: str) -> str:
+    """Return a type's name as the node's world spells it: ``pkg/Type`` in ROS 1."""
+    from rosglass.errors import InvalidNameError
+    from rosglass.interfaces import ros1_name
+
+    if is_ros1(node):
+        with suppress(InvalidNameError):  # nobody has told the type yet
+            return ros1_name(type_name)
+    return type_name
