@@ -50,6 +50,16 @@ class LoopExecutor(Executor):
                 where,
             ) from None
 
+    @property
+    def is_current(self) -> bool:
+        """Whether the calling thread runs the loop just now."""
+        import asyncio  # noqa: PLC0415 - only for those who use it
+
+        try:
+            return asyncio.get_running_loop() is self._loop
+        except RuntimeError:
+            return False
+
     def post(self, job: Callable[[], None]) -> None:
         """Run `job` in the loop soon."""
         try:

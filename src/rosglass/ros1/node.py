@@ -7,30 +7,35 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import EndpointKind, Node, NodeName, QoS, Subscription
+from rosglass.comm.flags import check_flag
 from rosglass.comm.loop import check_plain
 from rosglass.interfaces import ros1_name
 from rosglass.ros1.connection import Connection
 from rosglass.ros1.core import Core
 from rosglass.ros1.names import split, validate_namespace, validate_node_name
+from rosglass.ros1.services import Services
 from rosglass.ros1.slave import Slave
 from rosglass.ros1.topics import Topics
 
 if TYPE_CHECKING:
     import socket
-    from collections.abc import Callable
+    from collections.abc import Awaitable, Callable
 
     from rosglass.comm import (
+        Answer,
         Clock,
         EndpointInfo,
         Executor,
         Handle,
         Publisher,
         Sample,
+        ServiceClient,
+        ServiceServer,
         Status,
         Time,
     )
     from rosglass.interfaces import Library
-    from rosglass.messages import Message, MessageType
+    from rosglass.messages import Message, MessageType, ServiceType
     from rosglass.ros1.options import Ros1Options
 
 __all__ = ["Ros1Node"]
@@ -68,6 +73,7 @@ class Ros1Node(Node):
         self.url, self.name, self.namespace = url, name, namespace
         self._core = Core(NodeName(namespace, name), url, options, library)
         self._topics = Topics(self._core)
+        self._services = Services(self._core)
         self._core.start(Slave(self, options.address, options.slave_port), self._accept)
 
     # -- topics ----------------------------------------------------------------------------------
@@ -105,6 +111,47 @@ class Ros1Node(Node):
         self._topics.subscribe(subscription, ignore_local)
         return subscription
 
+    # -- services --------------------------------------------------------------------------------
+
+    def create_service_client(
+        self,
+        name: str,
+        type: str | ServiceType | None = None,
+        qos: QoS | None = None,
+        *,
+        persistent: bool = False,
+    ) -> ServiceClient:
+        """Return a client of a service; see :meth:`rosglass.comm.Node.create_service_client`.
+
+        Args:
+            name: Absolute, relative or private service name.
+            type: Type name or type; None takes the type that the server announces.
+            qos: Kept for who asks: ROS 1 has none.
+            persistent: Whether all calls go through one connection, one after the other. It saves
+                most of a call's time, and is made anew when it is lost. Otherwise each call has a
+                connection of its own, as ROS 1 does, and calls do not wait for each other.
+        """
+        self._core.check_open()
+        check_flag(persistent, "persistent", name)
+        return self._services.client(self.resolve(name), type, qos, persistent)
+
+    def create_service_server(
+        self,
+        name: str,
+        type: str | ServiceType,
+        callback: Callable[[Message], Answer | Awaitable[Answer]],
+        qos: QoS | None = None,
+        *,
+        executor: Executor | None = None,
+    ) -> ServiceServer:
+        """Offer a service; see :meth:`rosglass.comm.Node.create_service_server`.
+
+        Raises:
+            ServiceError: This node offers it already.
+        """
+        self._core.check_open()
+        return self._services.serve(self.resolve(name), type, callback, qos, executor)
+
     # -- the node's clock and names --------------------------------------------------------------
 
     @property
@@ -130,6 +177,14 @@ class Ros1Node(Node):
         """Return every node in the graph, this one included, sorted."""
         return sorted({*self._core.graph.nodes(), self._core.name})
 
+    def services(self) -> dict[str, list[str]]:
+        """Return every service in the graph with its type.
+
+        Only a service's server knows its type: the first time, the servers are asked in the
+        background, and the graph changes as they answer.
+        """
+        return self._services.listing()
+
     def publishers(self, topic: str) -> list[EndpointInfo]:
         """Return the publishers of a topic."""
         return self._core.graph.endpoints(EndpointKind.PUBLISHER, self.resolve(topic))
@@ -139,8 +194,9 @@ class Ros1Node(Node):
         return self._core.graph.endpoints(EndpointKind.SUBSCRIPTION, self.resolve(topic))
 
     def service_servers(self, name: str) -> list[EndpointInfo]:
-        """Return the server of a service."""
-        return self._core.graph.endpoints(EndpointKind.SERVICE_SERVER, self.resolve(name))
+        """Return the server of a service, with its type once it has told it."""
+        found = self._core.graph.endpoints(EndpointKind.SERVICE_SERVER, self.resolve(name))
+        return self._services.described(found)
 
     def service_clients(self, name: str) -> list[EndpointInfo]:
         """Return nobody: ROS 1 does not register clients."""
@@ -149,7 +205,7 @@ class Ros1Node(Node):
     def endpoints(self, node: str | NodeName) -> list[EndpointInfo]:
         """Return what a node publishes, subscribes and serves; none when it is unknown."""
         full = node.full if isinstance(node, NodeName) else self._core.expand(node)
-        return self._core.graph.endpoints_of(NodeName(*split(full)))
+        return self._services.described(self._core.graph.endpoints_of(NodeName(*split(full))))
 
     def on_graph_change(
         self, callback: Callable[[], None], executor: Executor | None = None
@@ -178,6 +234,7 @@ class Ros1Node(Node):
         Safe to call twice, from any thread and from callbacks.
         """
         self._core.close()
+        self._services.close()
 
     # -- connections, in the loop's thread -------------------------------------------------------
 
@@ -192,6 +249,8 @@ class Ros1Node(Node):
         def on_header(header: dict[str, str]) -> None:
             if "topic" in header:
                 reason = self._topics.accept(link, header)
+            elif "service" in header:
+                reason = self._services.accept(link, header)
             else:
                 reason = "neither topic nor service is named in the connection header"
             if reason:
@@ -201,11 +260,15 @@ class Ros1Node(Node):
             self._core.loop,
             sock,
             on_header,
-            lambda _data, _lead: None,  # subscribers have nothing to say
-            lambda _reason: self._topics.drop(link),
+            lambda data, _: self._services.take(link, data),  # subscribers have nothing to say
+            lambda _: self._drop(link),
             peer=address,
         )
         link.accept()
+
+    def _drop(self, link: Connection) -> None:
+        self._topics.drop(link)
+        self._services.drop(link)
 
     # -- the slave API ---------------------------------------------------------------------------
 

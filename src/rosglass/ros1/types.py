@@ -133,7 +133,7 @@ class Types:
             raise TypeNotFoundError(f"{name} is not a service type here. {hint}")
         return found
 
-    def text(self, kind: MessageType) -> str:
+    def text(self, kind: MessageType | ServiceType) -> str:
         """Return a type's definition with all that it needs, as connection headers carry it."""
         known = self._texts.get(id(kind.definition))
         if known is None:

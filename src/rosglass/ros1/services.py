@@ -1,0 +1,175 @@
+"""A node's services: which it offers, and the types of those that others offer."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from rosglass.comm import Dispatcher, EndpointKind, QoS
+from rosglass.comm.loop import LoopExecutor
+from rosglass.errors import ConversionError, ServiceError
+from rosglass.ros1.errands import Errands
+from rosglass.ros1.service_client import Ros1ServiceClient
+from rosglass.ros1.service_server import Ros1ServiceServer
+from rosglass.ros1.service_types import ServiceTypes
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable
+
+    from rosglass.comm import Answer, EndpointInfo, Executor
+    from rosglass.messages import Message, ServiceType
+    from rosglass.ros1.connection import Connection
+    from rosglass.ros1.core import Core
+    from rosglass.ros1.master import Master
+
+__all__ = ["Services"]
+
+
+class Services:
+    """Servers by name, and what clients share.
+
+    Args:
+        core: The node.
+
+    Attributes:
+        errands: Runs lookups; calls must not queue behind what topics wait for.
+        types: What others' servers say of themselves.
+    """
+
+    def __init__(self, core: Core) -> None:
+        self._core = core
+        self._lock = threading.Lock()
+        self._servers: dict[str, Ros1ServiceServer] = {}
+        #: A server that goes and one that comes must reach the master in this order.
+        self._registering = threading.Lock()
+        self.errands = Errands(f"{core.name.name} lookups")
+        self.types = ServiceTypes(core, self.errands)
+
+    # -- making ----------------------------------------------------------------------------------
+
+    def client(
+        self, name: str, type: ServiceType | str | None, qos: QoS | None, persistent: bool
+    ) -> Ros1ServiceClient:
+        """Return a new client of a service."""
+        profile = _profile(qos, name)
+        made = Ros1ServiceClient(self._core, self, name, type, profile, persistent)
+        self._core.add(made)
+        return made
+
+    def serve(
+        self,
+        name: str,
+        type: ServiceType | str,
+        callback: Callable[[Message], Answer | Awaitable[Answer]],
+        qos: QoS | None,
+        executor: Executor | None,
+    ) -> Ros1ServiceServer:
+        """Offer a service.
+
+        Raises:
+            ServiceError: The node offers it already.
+        """
+        made = Ros1ServiceServer(
+            self._core, self, name, type, callback, _profile(qos, name), executor
+        )
+        with self._lock:
+            taken = name in self._servers
+            if not taken:
+                self._servers[name] = made
+        if taken:
+            raise ServiceError(
+                f"{self._core.name} offers {name} already, and in ROS 1 a service has one server: "
+                "close that one first"
+            )
+        self._core.add(made)
+        return made
+
+    # -- connections, in the loop's thread -------------------------------------------------------
+
+    def accept(self, link: Connection, header: dict[str, str]) -> str:
+        """Take a client's connection; return why not, empty when it is taken."""
+        server = self._servers.get(header.get("service", ""))
+        if server is None:
+            return f"{self._core.name} does not offer {header.get('service')}"
+        return server.accept(link, header)
+
+    def take(self, link: Connection, data: bytes | memoryview) -> None:
+        """Take a request."""
+        server = self._servers.get(link.header.get("service", ""))
+        if server is not None:
+            server.take(link, data)
+
+    def drop(self, link: Connection) -> None:
+        """Forget a client's connection that has ended."""
+        server = self._servers.get(link.header.get("service", ""))
+        if server is not None:
+            server.drop(link)
+
+    # -- the master ------------------------------------------------------------------------------
+
+    def register(self, name: str, master: Master) -> None:
+        """Tell the master of a server, unless it is closed by now."""
+        with self._registering:
+            if name in self._servers:
+                master.call("registerService", name, self._uri, self._core.uri)
+
+    def unregister(self, name: str, master: Master) -> None:
+        """Tell the master that a server is gone, unless there is another one by now."""
+        with self._registering:
+            if name not in self._servers:
+                master.call("unregisterService", name, self._uri)
+
+    def end(self, server: Ros1ServiceServer) -> None:
+        """Forget a server."""
+        with self._lock:
+            if self._servers.get(server.name) is server:
+                del self._servers[server.name]
+
+    @property
+    def _uri(self) -> str:
+        host, port = self._core.address
+        return f"rosrpc://[{host}]:{port}" if ":" in host else f"rosrpc://{host}:{port}"
+
+    # -- what there is ---------------------------------------------------------------------------
+
+    def serves_here(self, name: str) -> bool:
+        """Return whether only the thread that asks can answer a service."""
+        server = self._servers.get(name)
+        if server is None or server.problem:
+            return False
+        executor = server.executor
+        return isinstance(executor, (Dispatcher, LoopExecutor)) and executor.is_current
+
+    def listing(self) -> dict[str, list[str]]:
+        """Return every service with its type, none as long as its server has not told it."""
+        names = sorted(self._core.graph.services())
+        return {name: [kind] if (kind := self._type_of(name)[0]) else [] for name in names}
+
+    def described(self, found: list[EndpointInfo]) -> list[EndpointInfo]:
+        """Return endpoints, those of services with their types."""
+        return [
+            replace(one, type=told[0], type_hash=told[1])
+            if one.kind is EndpointKind.SERVICE_SERVER and (told := self._type_of(one.name))[0]
+            else one
+            for one in found
+        ]
+
+    def _type_of(self, name: str) -> tuple[str, str]:
+        """Return a service's type and md5 sum, empty as long as they are not known."""
+        own = self._servers.get(name)
+        nodes = self._core.graph.services().get(name, [])
+        if own is not None and nodes == [self._core.name.full]:
+            return own.type.name, own.type.md5
+        peer = self.types.of(name)
+        return ("", "") if peer is None else (peer.type, peer.md5)
+
+    def close(self) -> None:
+        """Look nothing up any more; the members are closed by the node."""
+        self.errands.close()
+
+
+def _profile(qos: QoS | None, name: str) -> QoS:
+    if qos is not None and not isinstance(qos, QoS):
+        raise ConversionError("qos", qos, "a rosglass.QoS, or None for the usual one", name)
+    return qos or QoS.services()
