@@ -14,7 +14,7 @@ from typing import Any
 
 from rosglass.errors import ParameterError
 
-__all__ = ["flat", "from_wire", "nested", "pruned", "to_wire"]
+__all__ = ["flat", "from_wire", "pruned", "same", "to_wire"]
 
 _LOWEST, _GREATEST = -(2**31), 2**31 - 1
 #: XML 1.0, section 2.2; a carriage return is legal there, but arrives as a line feed (2.11).
@@ -65,24 +65,23 @@ def flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]
             yield name, value
 
 
-def nested(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the namespace that parameters make, their names cut at each ``/``."""
-    root: dict[str, Any] = {}
-    for name, value in values.items():
-        *parts, last = name.split("/")
-        place = root
-        for part in parts:
-            place = place.setdefault(part, {})
-        place[last] = value
-    return root
-
-
 def pruned(value: Any) -> Any:
     """Return a value without empty namespaces: the master says "not set" with them, too."""
     if not isinstance(value, dict):
         return value
     kept = ((key, pruned(item)) for key, item in value.items())
     return {key: item for key, item in kept if item != {}}
+
+
+def same(one: Any, other: Any) -> bool:
+    """Return whether nothing has changed; 1, 1.0 and True are not the same."""
+    if type(one) is not type(other):
+        return False
+    if isinstance(one, dict):
+        return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
+    if isinstance(one, list):
+        return len(one) == len(other) and all(map(same, one, other))
+    return bool(one == other) or (one != one and other != other)  # noqa: PLR0124 - not a number
 
 
 def _to_wire(name: str, value: object, depth: int) -> Any:

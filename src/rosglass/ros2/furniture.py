@@ -18,9 +18,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.comm import Handle, Node
+    from rosglass.comm.logger import NodeLogger
     from rosglass.ros2.core import Core
     from rosglass.ros2.parameters import Ros2Parameters
-    from rosglass.ros2.rosout import NodeLogger, Rosout
+    from rosglass.ros2.rosout import Rosout
 
 __all__ = ["Furniture"]
 
