@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from rosglass.comm import EndpointKind, NodeName, QoS
 from rosglass.interfaces import ros1_name
 from rosglass.ros1.intake import Intake
+from rosglass.ros1.names import split
 from rosglass.ros1.publication import Publication
 from rosglass.ros1.publisher import Ros1Publisher
 from rosglass.ros1.reading import Reading
 from rosglass.ros1.types import ANY
 
 if TYPE_CHECKING:
-    from rosglass.comm import QoS, Subscription
+    from rosglass.comm import EndpointInfo, Subscription
     from rosglass.messages import MessageType
     from rosglass.ros1.connection import Connection
     from rosglass.ros1.core import Core
@@ -26,11 +29,16 @@ class Topics:
 
     Args:
         core: The node.
+
+    Attributes:
+        registering: Held while the master is told of a topic: who ends and who begins at the same
+            time must not take the other's registration away.
     """
 
     def __init__(self, core: Core) -> None:
         self._core = core
         self._lock = threading.Lock()
+        self.registering = threading.Lock()
         self._publications: dict[str, Publication] = {}
         self._intakes: dict[str, Intake] = {}
 
@@ -44,16 +52,21 @@ class Topics:
             publication = self._publications.get(topic)
             new = publication is None
             if publication is None:
-                publication = Publication(self._core, topic, type)
-            made = Ros1Publisher(publication, type, qos, self._end_publisher, self._core.dispatcher)
+                publication = Publication(self._core, self, topic, type)
+            made = Ros1Publisher(self._core, publication, type, qos, self._end_publisher)
             publication.join(made)
             self._publications[topic] = publication
         if new:
             self._core.add(publication)
+        elif self._core.closed:
+            made.close()
+            self._core.check_open()
         return made
 
-    def subscribe(self, subscription: Subscription, ignore_local: bool) -> None:
-        """Feed a subscription from now on."""
+    def subscribe(
+        self, subscription: Subscription, wanted: MessageType | str | None, ignore_local: bool
+    ) -> None:
+        """Feed a subscription from now on; `wanted` is the type it was created with."""
         topic = subscription.topic
         with self._lock:
             intake = self._intakes.get(topic)
@@ -61,10 +74,17 @@ class Topics:
             if intake is None:
                 kind = subscription.type
                 name = ANY if kind is None else ros1_name(kind.name)
-                intake = self._intakes[topic] = Intake(self._core, topic, name)
-            intake.join(Reading(self._core, intake, subscription, ignore_local, self._end_reading))
+                intake = self._intakes[topic] = Intake(self._core, self, topic, name)
+            intake.join(
+                Reading(
+                    self._core, intake, subscription, wanted, ignore_local, self._end_reading
+                )
+            )
         if new:
             self._core.add(intake)
+        elif self._core.closed:
+            subscription.close()
+            self._core.check_open()
 
     def accept(self, link: Connection, header: dict[str, str]) -> str:
         """Take a subscriber's connection; return why not, empty when it is taken."""
@@ -79,6 +99,29 @@ class Topics:
         if publication is not None:
             publication.drop(link)
 
+    def publishers(self, topic: str) -> list[EndpointInfo]:
+        """Return a topic's publishers: whom the master names, and what connections tell of them."""
+        known: dict[NodeName, tuple[str, bool]] = {}
+        publication, intake = self._publications.get(topic), self._intakes.get(topic)
+        for link in intake.links() if intake is not None else ():
+            if link.connected:
+                latches = link.header.get("latching") == "1"
+                known[NodeName(*split(link.name))] = link.header.get("md5sum", ""), latches
+        if publication is not None:
+            latches = any(publisher.latched for publisher in publication.publishers)
+            known[self._core.name] = publication.type.md5, latches
+        found = []
+        for end in self._core.graph.endpoints(EndpointKind.PUBLISHER, topic):
+            md5, latches = known.get(end.node, ("", False))
+            qos = QoS.latched() if latches else end.qos
+            found.append(replace(end, type_hash=md5, qos=qos))
+        return found
+
+    def latched(self, topic: str) -> list[memoryview]:
+        """Return the last message of each latched publisher of a topic."""
+        publication = self._publications.get(topic)
+        return [] if publication is None else publication.latched()
+
     def published(self) -> dict[str, Publication]:
         """Return what is published, by topic."""
         return dict(self._publications)
@@ -88,20 +131,19 @@ class Topics:
         return dict(self._intakes)
 
     def _end_publisher(self, publisher: Ros1Publisher) -> None:
+        publication = publisher.publication
         with self._lock:
-            publication = self._publications.get(publisher.topic)
-            last = publication is not None and publication.leave(publisher)
-            if last:
+            last = publication.leave(publisher)
+            if last and self._publications.get(publisher.topic) is publication:
                 del self._publications[publisher.topic]
-        if publication is not None and last:
+        if last:
             publication.close()
 
     def _end_reading(self, reading: Reading) -> None:
-        topic = reading.subscription.topic
+        intake = reading.intake
         with self._lock:
-            intake = self._intakes.get(topic)
-            last = intake is not None and intake.leave(reading)
-            if last:
-                del self._intakes[topic]
-        if intake is not None and last:
+            last = intake.leave(reading)
+            if last and self._intakes.get(intake.topic) is intake:
+                del self._intakes[intake.topic]
+        if last:
             intake.close()
