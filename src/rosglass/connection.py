@@ -82,8 +82,9 @@ def connect(
             and ``--`` can rename the node, its topics and services (``-r chatter:=talk``,
             ``-r __node:=left``, ``-r __ns:=/arm``), set parameters (``-p speed:=1.5``,
             ``--params-file robot.yaml``) and log levels (``--log-level debug``).
-        own_services: Whether other nodes find what every ROS 2 node offers: its parameters, its
-            log, descriptions of its types. They appear shortly after connecting.
+        own_services: Whether other nodes find what every node offers: in ROS 2 its parameters, its
+            log, descriptions of its types; in ROS 1 its log and services for log levels. They
+            appear shortly after connecting.
 
     Raises:
         ConversionError: A part of the URL, an environment variable or an option is not valid.
@@ -116,7 +117,9 @@ def connect(
         from rosglass.ros1.node import Ros1Node  # noqa: PLC0415
         from rosglass.ros1.options import Ros1Options  # noqa: PLC0415
 
-        return Ros1Node(Ros1Options.parse(url), url, name, namespace, library)
+        return Ros1Node(
+            Ros1Options.parse(url), url, name, namespace, library, own_services=own_services
+        )
     from rosglass.ros2.arguments import Arguments  # noqa: PLC0415
 
     told = Arguments.parse(arguments)

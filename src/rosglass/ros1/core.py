@@ -169,6 +169,11 @@ class Core:
         """Whether this process is a fork of the one that the node belongs to."""
         return self._process != os.getpid()
 
+    def runs_here(self) -> bool:
+        """Return whether the calling thread is one of the node's own."""
+        threads = (self._worker, self.dispatcher, self.own_dispatcher, self.loop)
+        return any(thread.is_current for thread in threads)
+
     def resolve(self, name: str) -> str:
         """Return the absolute name of a topic, service or parameter, which may be remapped.
 
@@ -374,3 +379,7 @@ class _Door:
             except OSError:  # nobody waits any more
                 return
             self._accept(sock, f"{address[0]}:{address[1]}")
+
+    def end(self, _: str) -> None:
+        """Let nobody in any more."""
+        self._listener.close()

@@ -12,14 +12,15 @@ from rosglass.comm.loop import check_plain
 from rosglass.interfaces import ros1_name
 from rosglass.ros1.connection import Connection
 from rosglass.ros1.core import Core
-from rosglass.ros1.names import split, validate_namespace, validate_node_name
+from rosglass.ros1.furniture import Furniture
+from rosglass.ros1.names import absolute_namespace, split, validate_node_name
 from rosglass.ros1.services import Services
 from rosglass.ros1.slave import Slave
 from rosglass.ros1.topics import Topics
 
 if TYPE_CHECKING:
     import socket
-    from collections.abc import Awaitable, Callable
+    from collections.abc import Awaitable, Callable, Mapping
 
     from rosglass.comm import (
         Answer,
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
         EndpointInfo,
         Executor,
         Handle,
+        ParameterClient,
         Publisher,
         Sample,
         ServiceClient,
@@ -34,9 +36,12 @@ if TYPE_CHECKING:
         Status,
         Time,
     )
+    from rosglass.comm.logger import NodeLogger
     from rosglass.interfaces import Library
     from rosglass.messages import Message, MessageType, ServiceType
     from rosglass.ros1.options import Ros1Options
+    from rosglass.ros1.parameter_server import ParameterServer
+    from rosglass.ros1.parameters import Ros1Parameters
 
 __all__ = ["Ros1Node"]
 
@@ -52,6 +57,9 @@ class Ros1Node(Node):
         name: Base name.
         namespace: Absolute namespace.
         library: Where definitions come from; None for the shared library.
+        parameters: Private parameters that the program was started with, by their names.
+        own_services: Whether other nodes find what every ROS 1 node offers: its log, and services
+            for its log levels.
 
     Raises:
         InvalidNameError: The name or namespace breaks ROS's rules.
@@ -67,14 +75,19 @@ class Ros1Node(Node):
         name: str,
         namespace: str = "/",
         library: Library | None = None,
+        parameters: Mapping[str, Any] | None = None,
+        *,
+        own_services: bool = False,
     ) -> None:
         validate_node_name(name)
-        validate_namespace(namespace)
+        namespace = absolute_namespace(namespace, "namespace", relative=False)
         self.url, self.name, self.namespace = url, name, namespace
         self._core = Core(NodeName(namespace, name), url, options, library)
         self._topics = Topics(self._core)
         self._services = Services(self._core)
+        self._furniture = Furniture(self, self._core, self._topic_names, parameters or {})
         self._core.start(Slave(self, options.address, options.slave_port), self._accept)
+        self._furniture.open(own_services)
 
     # -- topics ----------------------------------------------------------------------------------
 
@@ -152,6 +165,38 @@ class Ros1Node(Node):
         self._core.check_open()
         return self._services.serve(self.resolve(name), type, callback, qos, executor)
 
+    # -- parameters and the log ------------------------------------------------------------------
+
+    @property
+    def parameters(self) -> Ros1Parameters:
+        """This node's own parameters: those in its private namespace."""
+        self._core.check_open()
+        return self._furniture.parameters
+
+    @property
+    def parameter_server(self) -> ParameterServer:
+        """The master's parameter server: every parameter, under whatever name."""
+        return self._furniture.server
+
+    def create_parameter_client(self, node: str | NodeName) -> ParameterClient:
+        """Return a client of another node's parameters; `node` is its full name.
+
+        Any other absolute namespace will do, too.
+
+        Raises:
+            InvalidNameError: The name breaks ROS's rules.
+        """
+        from rosglass.ros1.parameter_client import Ros1ParameterClient  # noqa: PLC0415
+
+        self._core.check_open()
+        full = node.full if isinstance(node, NodeName) else self._core.expand(node)
+        return Ros1ParameterClient(self._core, self._furniture.server, full)
+
+    @property
+    def logger(self) -> NodeLogger:
+        """The node's logger, whose messages go to ``/rosout``, too."""
+        return self._furniture.logger
+
     # -- the node's clock and names --------------------------------------------------------------
 
     @property
@@ -187,7 +232,7 @@ class Ros1Node(Node):
 
     def publishers(self, topic: str) -> list[EndpointInfo]:
         """Return the publishers of a topic."""
-        return self._core.graph.endpoints(EndpointKind.PUBLISHER, self.resolve(topic))
+        return self._topics.publishers(self.resolve(topic))
 
     def subscriptions(self, topic: str) -> list[EndpointInfo]:
         """Return the subscribers of a topic."""
@@ -306,8 +351,12 @@ class Ros1Node(Node):
         _log.warning("%s: closed by %s: %s", self._core.name, caller, reason or "no reason given")
         threading.Thread(target=self.close, name="shutdown", daemon=True).start()
 
-    def parameter_changed(self, name: str, value: Any) -> None:
-        """Take a parameter that was subscribed to."""
+    def parameter_changed(self, name: str, value: Any) -> None:  # noqa: ARG002 - it may be old
+        """Look at a parameter that was subscribed to."""
+        self._furniture.server.changed(name)
+
+    def _topic_names(self) -> list[str]:
+        return sorted({*self._topics.published(), *self._topics.subscribed()})
 
     def publishers_changed(self, topic: str, uris: list[str]) -> None:
         """Take the publishers that a topic has now."""

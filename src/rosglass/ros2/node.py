@@ -39,6 +39,7 @@ if TYPE_CHECKING:
         Status,
         Time,
     )
+    from rosglass.comm.logger import NodeLogger
     from rosglass.comm.node import Result
     from rosglass.interfaces import Library
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
@@ -46,7 +47,6 @@ if TYPE_CHECKING:
     from rosglass.ros2.middleware import Middleware
     from rosglass.ros2.parameter_client import Ros2ParameterClient
     from rosglass.ros2.parameters import Ros2Parameters
-    from rosglass.ros2.rosout import NodeLogger
 
 __all__ = ["Ros2Node"]
 
