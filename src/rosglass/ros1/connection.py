@@ -6,35 +6,41 @@ Protocol: ROS wiki, "ROS/TCPROS". Everything here runs in the loop's thread, exc
 from __future__ import annotations
 
 import errno
+import logging
 import os
 import socket
-import struct
 import threading
-from collections import deque
 from typing import TYPE_CHECKING
 
 from rosglass.errors import DecodeError
-from rosglass.ros1.header import MAX_HEADER, encode_header, parse_header
+from rosglass.ros1.header import encode_header, parse_header
+from rosglass.ros1.incoming import CHUNK, MAX_FRAME, Incoming
 from rosglass.ros1.io_loop import READ, WRITE
+from rosglass.ros1.outgoing import Frame, Outgoing
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from rosglass.ros1.io_loop import IoLoop
+    from rosglass.ros1.io_loop import IoLoop, Later
 
     Buffer = bytes | bytearray | memoryview
+    Received = bytes | memoryview
 
 __all__ = ["MAX_FRAME", "Connection"]
 
-#: Longest frame taken in bytes: what a length says beyond it is garbage, as roscpp has it.
-MAX_FRAME = 1_000_000_000
-#: Bytes read at once; frames that do not fit get a buffer of their own.
-_CHUNK = 64 * 1024
+_log = logging.getLogger("rosglass.ros1")
 #: Most reads in a row: other sockets must have their turn.
 _ROUNDS = 16
-#: Parts of a frame that the system takes at once.
-_MOST_PARTS = 256
-_length = struct.Struct("<I")
+#: Seconds that the other end may take to connect and to send its header.
+_HEADER_LIMIT = 10.0
+#: Seconds of silence before the other end is asked for a sign of life, between such questions, and
+#: how many: a robot without power is noticed after some 15 s.
+_KEEPALIVE = (("TCP_KEEPIDLE", 5), ("TCP_KEEPINTVL", 3), ("TCP_KEEPCNT", 3))
+#: Seconds to wait, in :meth:`Connection.drain`, for another thread that reads just now.
+_TURN = 0.1
+#: Bytes at one look after which a connection is not left to itself any more: the other end must not
+#: be held up by a full socket.
+_MUCH = 64 * 1024
 _PENDING = (errno.EINPROGRESS, errno.EWOULDBLOCK, errno.EAGAIN)
 
 
@@ -44,15 +50,15 @@ class Connection:
     Args:
         loop: Waits for the socket.
         sock: Connected, or about to be; belongs to the connection from now on.
-        on_header: Called with the peer's header. Nothing is read before it returns.
-        on_frame: Called with each frame's content, and the byte in front of its length.
+        on_header: Called with the peer's header, before anything else is handed on.
+        on_frame: Called with each frame's content, and the byte in front of its length; big
+            contents are read-only views. From another thread than the loop's in :meth:`drain`.
         on_closed: Called once with the reason, empty when it was closed from here.
         lead: Bytes in front of each frame's length: 1 for a service's responses, else 0.
 
     Attributes:
-        peer: The other end's address, for people.
+        peer: The other end's name once it is known, else its address; for people.
         header: The peer's header; empty before it came.
-        lost: Frames that made room for newer ones before they were sent.
         on_room: Called when everything is sent; None for nobody.
     """
 
@@ -61,34 +67,34 @@ class Connection:
         loop: IoLoop,
         sock: socket.socket,
         on_header: Callable[[dict[str, str]], None],
-        on_frame: Callable[[bytes | bytearray, int], None],
+        on_frame: Callable[[Received, int], None],
         on_closed: Callable[[str], None],
         *,
         lead: int = 0,
         peer: str = "",
     ) -> None:
         self.peer, self.header = peer, dict[str, str]()
-        self.lost = 0
         self.on_room: Callable[[], None] | None = None
         self._loop, self._sock = loop, sock
         self._on_header, self._on_frame, self._on_closed = on_header, on_frame, on_closed
-        self._lead = lead
-        self._chunk = bytearray(_CHUNK)
-        self._view = memoryview(self._chunk)
-        self._start = self._end = 0
-        self._big: bytearray | None = None
-        self._big_view = memoryview(b"")
-        self._big_lead = 0
+        self._incoming = Incoming(peer, lead, self._take)
+        #: Held while the socket is read from, never while anybody is called.
+        self._io = threading.Lock()
+        #: Held while frames are handed on, in order; by the thread with this number.
+        self._turn = threading.Lock()
+        self._turn_of = 0
         self._lock = threading.Lock()
-        #: Frames to send, each in parts; the first may be sent in part.
-        self._outgoing: deque[list[Buffer]] = deque()
-        self._begun = False
+        self._outgoing = Outgoing()
         self._connected = False
-        self._reading = True
+        self._reading = self._hurried = True
         self._closed = False
+        self._limit: Later | None = None
         sock.setblocking(False)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        for name, value in _KEEPALIVE:
+            if (option := getattr(socket, name, None)) is not None:
+                sock.setsockopt(socket.IPPROTO_TCP, option, value)
 
     @classmethod
     def dial(
@@ -97,12 +103,16 @@ class Connection:
         address: tuple[str, int],
         header: Mapping[str, str],
         on_header: Callable[[dict[str, str]], None],
-        on_frame: Callable[[bytes | bytearray, int], None],
+        on_frame: Callable[[Received, int], None],
         on_closed: Callable[[str], None],
         *,
         lead: int = 0,
     ) -> Connection:
-        """Connect to a resolved address and send a header; from the loop's thread."""
+        """Connect to a resolved address and send a header; from the loop's thread.
+
+        Raises:
+            OSError: There can be no more sockets.
+        """
         family = socket.AF_INET6 if ":" in address[0] else socket.AF_INET
         sock = socket.socket(family, socket.SOCK_STREAM)
         place = f"{address[0]}:{address[1]}"
@@ -113,18 +123,36 @@ class Connection:
             loop.call(lambda: made.end(os.strerror(failure)))
             return made
         made._connected = failure == 0
-        loop.watch(sock, READ | WRITE, made)
+        made._begin()
         return made
 
     def accept(self) -> None:
         """Begin with a socket that was accepted."""
         self._connected = True
-        self._loop.watch(self._sock, READ, self)
+        self._begin()
+
+    def _begin(self) -> None:
+        self._limit = self._loop.after(_HEADER_LIMIT, self._expire)
+        self._watch()
+
+    def _expire(self) -> None:
+        what = "it sent no connection header" if self._connected else "no answer"
+        self.end(f"{what} within {_HEADER_LIMIT:.0f} s")
 
     @property
     def closed(self) -> bool:
         """Whether it has ended."""
         return self._closed
+
+    @property
+    def lost(self) -> int:
+        """How many frames made room for newer ones before they were sent."""
+        return self._outgoing.lost
+
+    @property
+    def received(self) -> int:
+        """How many bytes have come."""
+        return self._incoming.total
 
     def waiting(self) -> int:
         """Return how many frames wait to be sent; from any thread."""
@@ -134,49 +162,37 @@ class Connection:
 
     def send_header(self, fields: Mapping[str, str]) -> None:
         """Send this end's header; from any thread."""
-        self.send([encode_header(fields)])
+        self.send_frame(Frame([encode_header(fields)], kept=True))
 
     def send(self, parts: Sequence[Buffer], keep: int = 0) -> None:
-        """Send a frame, of which the parts carry length and all; from any thread, without waiting.
+        """Send a frame, of which the parts carry length and all; see :meth:`send_frame`."""
+        self.send_frame(Frame(parts), keep)
+
+    def send_frame(self, frame: Frame, keep: int = 0, keep_bytes: int = 0) -> None:
+        """Send a frame; from any thread, without waiting.
 
         What the socket does not take at once is copied: the caller may reuse its buffers.
 
         Args:
-            parts: The frame's bytes.
+            frame: The frame.
             keep: How many frames may wait to be sent; the oldest makes room. 0 for any number.
+            keep_bytes: How many bytes may wait, besides the newest frame; 0 for any number.
         """
         with self._lock:
             if self._closed:
                 return
-            rest: Sequence[Buffer] = parts if len(parts) <= _MOST_PARTS else [b"".join(parts)]
-            if not self._outgoing and self._connected:
-                sent = self._write(rest)
-                if sent is None:
+            sent = 0
+            first = not self._outgoing
+            if first and self._connected:
+                sent = self._write(frame.parts)
+                if sent == frame.size:
                     return
-                self._begun = sent > 0
-                rest = _after(rest, sent)
-                if not rest:
-                    self._begun = False
-                    return
-            self._outgoing.append([bytes(part) for part in rest])
-            if keep and len(self._outgoing) - self._begun > keep:
-                self._make_room()
-            first = len(self._outgoing) == 1
+            self._outgoing.add(frame, sent, keep, keep_bytes)
         if first:
             self._loop.call(self._watch)
 
-    def _make_room(self) -> None:
-        """Drop the oldest frame of which nothing was sent."""
-        if self._begun:
-            begun = self._outgoing.popleft()
-            self._outgoing.popleft()
-            self._outgoing.appendleft(begun)
-        else:
-            self._outgoing.popleft()
-        self.lost += 1
-
-    def _write(self, parts: Sequence[Buffer]) -> int | None:
-        """Send what the socket takes; return how much, None when the connection is at its end."""
+    def _write(self, parts: Sequence[memoryview]) -> int:
+        """Send what the socket takes; return how much."""
         try:
             return self._sock.sendmsg(parts)
         except (BlockingIOError, InterruptedError):
@@ -184,22 +200,14 @@ class Connection:
         except OSError as error:
             reason = error.strerror or str(error)
             self._loop.call(lambda: self.end(reason))
-            return None
+            return 0
 
     def _send_waiting(self) -> None:
-        emptied = False
         with self._lock:
-            while self._outgoing and not self._closed:
-                frame = self._outgoing[0]
-                sent = self._write(frame)
-                if not sent:
-                    break
-                rest = _after(frame, sent)
-                self._begun = bool(rest)
-                if rest:
-                    self._outgoing[0] = rest
-                    break
-                self._outgoing.popleft()
+            if self._closed or not self._outgoing:
+                emptied = not self._closed
+            else:
+                self._outgoing.send(self._write)
                 emptied = not self._outgoing
         if emptied:
             self._watch()
@@ -209,9 +217,22 @@ class Connection:
     # -- receiving -------------------------------------------------------------------------------
 
     def pause(self, reading: bool) -> None:
-        """Say whether to read; what comes meanwhile waits in the socket."""
+        """Say whether to read and hand on; what comes meanwhile waits. In the loop's thread."""
         self._reading = reading
+        self._incoming.stopped = self._closed or not reading
         self._watch()
+        if reading:
+            self._loop.call(self._go_on)
+
+    def _go_on(self) -> None:
+        if self._reading and not self._closed and self._turn.acquire(blocking=False):
+            self._receive(go_on=True)
+
+    def hurry(self, hurried: bool) -> None:
+        """Say whether to read as soon as something comes, or about ten times a second."""
+        if hurried != self._hurried and not self._closed:
+            self._hurried = hurried
+            self._watch()
 
     def ready(self, events: int) -> None:
         """Send and receive; called by the loop."""
@@ -222,92 +243,99 @@ class Connection:
             if failure:
                 self.end(os.strerror(failure))
                 return
+            if self._sock.getsockname() == self._sock.getpeername():
+                # Nobody listens there: TCP found the port to come from free to go to.
+                self.end(os.strerror(errno.ECONNREFUSED))
+                return
             self._connected = True
+            events |= WRITE
         if events & WRITE:
             self._send_waiting()
-        if events & READ:
-            self.receive()
+        if events & READ and self._turn.acquire(blocking=False):
+            before = self._incoming.total
+            self._receive()
+            if not self._hurried and self._incoming.total - before > _MUCH:
+                self.hurry(True)
 
-    def receive(self) -> None:
-        """Take in what has come."""
+    def drain(self) -> None:
+        """Hand on what waits in the socket; from any thread, while nobody hurries."""
+        me = threading.get_ident()
+        if self._hurried or self._closed or self._turn_of == me:
+            return
+        # Whoever reads just now hands on the same messages.
+        if self._turn.acquire(timeout=_TURN):
+            self._receive()
+
+    def _receive(self, go_on: bool = False) -> None:
+        """Take in what has come; with the turn, which ends here."""
+        self._turn_of = threading.get_ident()
         try:
+            if go_on:
+                self._incoming.feed(b"")
             for _ in range(_ROUNDS):
-                if self._closed or not self._receive_some():
+                if not self._receive_some():
                     return
         except DecodeError as error:
-            self.end(str(error))
+            self._lose(str(error))
+        finally:
+            self._turn_of = 0
+            self._turn.release()
 
     def _receive_some(self) -> bool:
         """Read once; return whether there may be more."""
-        room = self._big_view if self._big is not None else self._view[self._end :]
+        incoming = self._incoming
+        room, data = incoming.room, b""
         try:
-            count = self._sock.recv_into(room)
+            with self._io:
+                if self._closed or not self._reading:
+                    return False
+                if room is None:
+                    data = self._sock.recv(CHUNK)
+                    count, most = len(data), CHUNK
+                else:
+                    count, most = self._sock.recv_into(room), len(room)
         except (BlockingIOError, InterruptedError):
             return False
         except OSError as error:
-            self.end(error.strerror or str(error))
+            self._lose(error.strerror or str(error))
             return False
         if not count:
-            self.end("the other end closed the connection")
+            self._lose("the other end closed the connection")
             return False
-        full = count == len(room)
-        if self._big is None:
-            self._end += count
-            self._cut()
-            return full or self._big is not None
-        self._big_view = self._big_view[count:]
-        if not self._big_view:
-            frame, self._big = self._big, None
-            self._on_frame(frame, self._big_lead)
-        return True
+        if room is None:
+            incoming.feed(data)
+        else:
+            incoming.filled(count)
+        return count == most
 
-    def _cut(self) -> None:
-        """Hand on the frames that are complete."""
-        lead, chunk = self._lead, self._chunk
-        while not self._closed:
-            # Only once the header is there, frames have the byte in front.
-            front = lead if self.header else 0
-            body = self._start + front + _length.size
-            if body > self._end:
-                break
-            (size,) = _length.unpack_from(chunk, self._start + front)
-            first = chunk[self._start] if front else 0
-            if size > (MAX_FRAME if self.header else MAX_HEADER):
-                what = "a message" if self.header else "the header"
-                raise DecodeError(
-                    f"connection with {self.peer}", f"{what} claims to have {size} bytes"
-                )
-            if body + size <= self._end:
-                self._start = body + size
-                self._take(bytes(self._view[body : body + size]), first)
-            elif front + _length.size + size > _CHUNK:
-                self._begin_big(size, body, first)
-                return
-            else:
-                break
-        rest = self._end - self._start
-        if self._start and rest:
-            chunk[:rest] = chunk[self._start : self._end]
-        self._start, self._end = 0, rest
-
-    def _begin_big(self, size: int, body: int, first: int) -> None:
-        self._big, self._big_lead = bytearray(size), first
-        view = memoryview(self._big)
-        there = self._end - body
-        view[:there] = self._view[body : self._end]
-        self._big_view = view[there:]
-        self._start = self._end = 0
-
-    def _take(self, data: bytes, first: int) -> None:
-        if self.header:
+    def _take(self, data: Received, first: int) -> None:
+        if not self.header:
+            self._take_header(bytes(data))
+            return
+        try:
             self._on_frame(data, first)
+        except Exception:
+            _log.exception("%s: a message could not be taken", self.peer)
+
+    def _take_header(self, data: bytes) -> None:
+        fields = parse_header(data)
+        if not fields:
+            raise DecodeError(f"TCPROS from {self.peer}", "the connection header is empty")
+        self.header = fields
+        self.peer = fields.get("callerid", "") or self.peer
+        if self._limit is not None:
+            self._limit.cancel()
+        if (error := fields.get("error")) is not None:
+            self.end(f"{self.peer} refuses: {error or 'it does not say why'}")
             return
-        self.header = parse_header(data)
-        self.peer = self.header.get("callerid", "") or self.peer
-        if error := self.header.get("error"):
-            self.end(f"{self.peer} refuses: {error}")
-            return
-        self._on_header(self.header)
+        self._on_header(fields)
+
+    def _lose(self, reason: str) -> None:
+        """End it, from whichever thread noticed."""
+        if self._loop.is_current:
+            self.end(reason)
+        else:
+            self._loop.call(lambda: self.end(reason))
 
     # -- the end ---------------------------------------------------------------------------------
 
@@ -317,43 +345,36 @@ class Connection:
 
     def finish(self, patience: float) -> None:
         """End it once everything is sent, or after `patience` seconds; in the loop's thread."""
-        self.on_room = lambda: self.end("")
+        if self._closed:
+            return
         if not self._outgoing:
             self.end("")
-        else:
-            self._loop.after(patience, lambda: self.end(""))
+            return
+        self.on_room = lambda: self.end("")
+        self._loop.linger(self, True)
+        self._loop.after(patience, lambda: self.end(""))
 
     def end(self, reason: str) -> None:
         """End it, and say why; in the loop's thread."""
         with self._lock:
             if self._closed:
                 return
-            self._closed = True
+            self._closed = self._incoming.stopped = True
             self._outgoing.clear()
+        if self._limit is not None:
+            self._limit.cancel()
+        self._loop.linger(self, False)
         self._loop.watch(self._sock, 0, self)
-        self._sock.close()
+        with self._io:
+            self._sock.close()
         self._on_closed(reason)
 
     def _watch(self) -> None:
         if self._closed:
             return
         sending = bool(self._outgoing) or not self._connected
-        self._loop.watch(
-            self._sock, (READ if self._reading else 0) | (WRITE if sending else 0), self
-        )
+        events = (READ if self._reading else 0) | (WRITE if sending else 0)
+        self._loop.watch(self._sock, events, self, hurry=self._hurried)
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} with {self.peer}>"
-
-
-def _after(parts: Sequence[Buffer], sent: int) -> list[Buffer]:
-    """Return what is left of `parts` after so many bytes."""
-    rest: list[Buffer] = []
-    for part in parts:
-        view = memoryview(part).cast("B")
-        if sent >= len(view):
-            sent -= len(view)
-        else:
-            rest.append(view[sent:] if sent else view)
-            sent = 0
-    return rest

@@ -3,119 +3,22 @@
 from __future__ import annotations
 
 import logging
-import socket
 import threading
 import time
 from typing import TYPE_CHECKING, Any
 
-from rosglass.errors import ConnectionLostError, ConversionError, MasterError
-from rosglass.ros1.connection import Connection
 from rosglass.ros1.core import Member
-from rosglass.ros1.master import call_node, reason_of
-from rosglass.ros1.types import ANY
+from rosglass.ros1.publisher_link import PublisherLink
 
 if TYPE_CHECKING:
     from rosglass.ros1.core import Core
     from rosglass.ros1.master import Master
     from rosglass.ros1.reading import Reading
+    from rosglass.ros1.topics import Topics
 
-__all__ = ["Intake", "Link"]
+__all__ = ["Intake"]
 
 _log = logging.getLogger("rosglass.ros1")
-#: Seconds between attempts to reach a publisher, the first and the longest.
-_RETRY, _LONGEST_RETRY = 0.5, 5.0
-
-
-class Link:
-    """A publisher of the topic, as long as the master names it; all in the loop's thread.
-
-    Args:
-        intake: Whom it belongs to.
-        uri: The publisher's API.
-
-    Attributes:
-        header: What the publisher said of itself; empty before it is connected.
-        problem: Why it is not connected; empty when it is, or about to be.
-        latched: The last message of a publisher that latches.
-    """
-
-    def __init__(self, intake: Intake, uri: str) -> None:
-        self.intake, self.uri = intake, uri
-        self.header: dict[str, str] = {}
-        self.problem = ""
-        self.latched: bytes | bytearray | None = None
-        self._core = intake.core
-        self._connection: Connection | None = None
-        self._gone = False
-        self._delay = _RETRY
-        self._begin()
-
-    @property
-    def name(self) -> str:
-        """The publishing node's full name, or its URI as long as that is not known."""
-        return self.header.get("callerid", "") or self.uri
-
-    @property
-    def connected(self) -> bool:
-        """Whether messages can come."""
-        return bool(self.header)
-
-    def end(self) -> None:
-        """Forget the publisher."""
-        self._gone = True
-        if self._connection is not None:
-            self._connection.end("")
-
-    def _begin(self) -> None:
-        if not self._gone and not self._core.closed:
-            self._core.errands.run(self._ask)
-
-    def _ask(self) -> None:
-        """Ask the publisher where to connect; on a thread that may wait."""
-        topic = self.intake.topic
-        try:
-            answer = call_node(self.uri, "requestTopic", self._core.name.full, topic, [["TCPROS"]])
-            address = _address(answer, f"{self.uri} for {topic}")
-        except (ConnectionLostError, MasterError, ConversionError) as error:
-            reason = str(error)
-            self._core.loop.call(lambda: self._fail(reason))
-        else:
-            self._core.loop.call(lambda: self._connect(address))
-
-    def _connect(self, address: tuple[str, int]) -> None:
-        if self._gone:
-            return
-        header = {
-            "callerid": self._core.name.full,
-            "md5sum": ANY,
-            "tcp_nodelay": "1",
-            "topic": self.intake.topic,
-            "type": ANY,
-        }
-        self._connection = Connection.dial(
-            self._core.loop, address, header, self._on_header, self._on_frame, self._fail
-        )
-
-    def _on_header(self, header: dict[str, str]) -> None:
-        self.header, self.problem, self._delay = header, "", _RETRY
-        self.intake.greet(self)
-
-    def _on_frame(self, data: bytes | bytearray, _: int) -> None:
-        received = time.time_ns()
-        if self.header.get("latching") == "1":
-            self.latched = data
-        for reading in self.intake.readings:
-            reading.take(self, data, received)
-
-    def _fail(self, reason: str) -> None:
-        """Try again later: the master names it still."""
-        self._connection, self.header, self.latched = None, {}, None
-        if self._gone or self._core.closed:
-            return
-        self.problem = reason
-        self.intake.part(self)
-        self._core.loop.after(self._delay, self._begin)
-        self._delay = min(_LONGEST_RETRY, 2 * self._delay)
 
 
 class Intake(Member):
@@ -123,34 +26,53 @@ class Intake(Member):
 
     Args:
         core: The node.
+        topics: The node's topics.
         topic: Absolute topic name.
         type_name: What the master is told, ``pkg/Type``; ``*`` for any.
+
+    Attributes:
+        readings: The subscriptions; replaced, never changed: the loop's thread goes through them
+            for each message.
+        eager: Whether somebody waits for messages.
     """
 
-    def __init__(self, core: Core, topic: str, type_name: str) -> None:
+    def __init__(self, core: Core, topics: Topics, topic: str, type_name: str) -> None:
         self.core, self.topic = core, topic
         self.type_name = type_name
-        self._lock = threading.Lock()
-        #: Replaced, never changed: the loop's thread goes through it for each message.
         self.readings: tuple[Reading, ...] = ()
-        self._links: dict[str, Link] = {}
+        self.eager = True
+        self._topics = topics
+        self._lock = threading.Lock()
+        self._links: dict[str, PublisherLink] = {}
         self._closed = False
+        #: Which master was told of it, counted from 0, and how often one told of publishers.
+        self._epoch, self._updates = -1, 0
 
-    def links(self) -> list[Link]:
+    def links(self) -> list[PublisherLink]:
         """Return the publishers, from any thread."""
         return list(self._links.values())
 
+    # -- subscriptions ---------------------------------------------------------------------------
+
     def join(self, reading: Reading) -> None:
         """Feed a subscription from now on, with latched messages first; from any thread."""
+        with self._lock:
+            self.readings = (*self.readings, reading)
         self.core.loop.call(lambda: self._join(reading))
 
     def _join(self, reading: Reading) -> None:
-        self.readings = (*self.readings, reading)
         for link in self.links():
             if link.connected:
-                reading.meet(link)
-                if link.latched is not None:
-                    reading.take(link, link.latched, time.time_ns())
+                reading.meet(link, lambda link=link: self._catch_up(reading, link))  # type: ignore[misc]
+        self.attend()
+
+    def _catch_up(self, reading: Reading, link: PublisherLink) -> None:
+        """Give a subscription that came late what it would have got on a connection of its own."""
+        if link.uri == self.core.uri:
+            for data in self._topics.latched(self.topic):
+                reading.take(link, data, time.time_ns())
+        elif link.latched is not None:
+            reading.take(link, link.latched, time.time_ns())
 
     def leave(self, reading: Reading) -> bool:
         """Feed a subscription no more; return whether it was the last one."""
@@ -158,79 +80,125 @@ class Intake(Member):
             self.readings = tuple(one for one in self.readings if one is not reading)
             return not self.readings
 
-    def greet(self, link: Link) -> None:
-        """Let the subscriptions know that a publisher is connected."""
-        for reading in self.readings:
-            reading.meet(link)
-        self.core.wake()
+    def attend(self) -> None:
+        """Have messages handed on as they come only while somebody waits; from any thread."""
+        eager = any(one.subscription.watched for one in self.readings)
+        if eager != self.eager:
+            self.eager = eager
+            self.core.loop.call(self._attend)
 
-    def part(self, link: Link) -> None:
+    def _attend(self) -> None:
+        for link in self.links():
+            link.attend(self.eager)
+
+    def drain(self) -> None:
+        """Hand on what waits in the sockets; from any thread."""
+        for link in self.links():
+            link.drain()
+
+    # -- publishers, in the loop's thread --------------------------------------------------------
+
+    def greet(self, link: PublisherLink) -> None:
+        """Let the subscriptions know that a publisher is connected; it waits until they do."""
+        readings = list(self.readings)
+        left = len(readings) + 1
+
+        def decided() -> None:
+            nonlocal left
+            left -= 1
+            if not left:
+                link.resume()
+                self.core.wake()
+
+        for reading in readings:
+            reading.meet(link, decided)
+        decided()
+
+    def part(self, link: PublisherLink) -> None:
         """Let the subscriptions know that a publisher is not connected any more."""
-        _log.debug("%s: %s: %s", self.topic, link.uri, link.problem)
+        _log.debug("%s: %s", self.topic, link.problem)
+        for reading in self.readings:
+            reading.part(link)
+        if link.epoch != self._epoch:
+            # No master knows it any more: it was kept as long as it sent something.
+            self._forget(link)
         self.core.wake()
 
     def publishers_changed(self, uris: list[str]) -> None:
         """Connect with who is new, and forget who has gone; from any thread."""
+        self._updates += 1
         self.core.loop.call(lambda: self._take_publishers(uris))
+
+    def _take_answer(self, uris: list[str], updates: int) -> None:
+        # What the master told meanwhile, because it knows us now, is newer than its answer.
+        if updates == self._updates:
+            self._take_publishers(uris)
 
     def _take_publishers(self, uris: list[str]) -> None:
         if self._closed:
             return
         for uri in self._links.keys() - set(uris):
-            self._links.pop(uri).end()
+            link = self._links[uri]
+            # A master that was restarted knows but those who told it: others go on publishing.
+            if link.epoch == self._epoch or not link.connected:
+                self._forget(link)
         for uri in uris:
-            if uri not in self._links:
-                self._links[uri] = Link(self, uri)
+            known = self._links.get(uri)
+            if known is None:
+                self._links[uri] = PublisherLink(self, uri, self._epoch)
+            else:
+                known.epoch = self._epoch
         self.core.wake()
+
+    def _forget(self, link: PublisherLink) -> None:
+        self._links.pop(link.uri, None)
+        link.end()
+        for reading in self.readings:
+            reading.part(link)
 
     # -- as a member -----------------------------------------------------------------------------
 
     def register(self, master: Master) -> None:
         """Tell the master, and connect with the publishers it names."""
-        uris: Any = master.call("registerSubscriber", self.topic, self.type_name, self.core.uri)
-        self.publishers_changed([str(uri) for uri in uris])
+        self._epoch += 1
+        updates = self._updates
+        told: Any = ()
+        with self._topics.registering:
+            told = master.call("registerSubscriber", self.topic, self.type_name, self.core.uri)
+        uris = [str(uri) for uri in told]
+        self.core.loop.call(lambda: self._take_answer(uris, updates))
 
     def unregister(self, master: Master) -> None:
-        """Tell the master that it is subscribed here no more."""
-        master.call("unregisterSubscriber", self.topic, self.core.uri)
+        """Tell the master that it is subscribed here no more, unless it is again."""
+        with self._topics.registering:
+            if self.core.closed or self.topic not in self._topics.subscribed():
+                master.call("unregisterSubscriber", self.topic, self.core.uri)
 
     def follow(self, moved: bool, idle: bool) -> None:
         """Let the subscriptions tell what has changed."""
         for reading in self.readings:
             reading.follow(moved, idle)
+        if idle:
+            # The rate of what comes may be another one now.
+            self.eager = any(one.subscription.watched for one in self.readings)
+            self.core.loop.call(self._attend)
 
     def close(self) -> None:
-        """End the connections."""
-        if self._closed:
-            return
-        self._closed = True
+        """End the subscriptions and the connections."""
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+            readings = self.readings
+        for reading in readings:
+            reading.close()
         self.core.loop.call(self._end)
         self.core.remove(self)
 
     def _end(self) -> None:
-        for link in self._links.values():
+        for link in self.links():
             link.end()
         self._links.clear()
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.topic}>"
-
-
-def _address(answer: Any, place: str) -> tuple[str, int]:
-    """Return the resolved address in an answer to requestTopic.
-
-    Raises:
-        MasterError: It offers no TCPROS.
-        ConnectionLostError: The host is not known here.
-    """
-    if not (isinstance(answer, (list, tuple)) and len(answer) >= 3 and answer[0] == "TCPROS"):
-        raise MasterError(f"{place} offers no TCPROS, but {answer!r:.80}")
-    host, port = str(answer[1]), answer[2]
-    try:
-        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
-    except (OSError, OverflowError, TypeError) as error:
-        raise ConnectionLostError(
-            f"{place} says to connect to {host}:{port}, but {reason_of(error)}: set ROS_IP or "
-            "ROS_HOSTNAME for that node to what this machine knows, or add the name to /etc/hosts"
-        ) from error
-    return str(found[0][4][0]), int(found[0][4][1])

@@ -16,11 +16,15 @@ from typing import TYPE_CHECKING, Protocol
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-__all__ = ["IoLoop", "Ready"]
+__all__ = ["READ", "WRITE", "IoLoop", "Later", "Ready"]
 
 _log = logging.getLogger("rosglass.ros1")
 #: Seconds that closing waits for a handler that is still running.
 _PATIENCE = 2.0
+#: Seconds that sockets with something left to send keep a closed loop going.
+_LINGER = 1.0
+#: Seconds between looks at the sockets that nobody waits for.
+_LEISURE = 0.1
 READ, WRITE = selectors.EVENT_READ, selectors.EVENT_WRITE
 
 
@@ -30,15 +34,34 @@ class Ready(Protocol):
     def ready(self, events: int) -> None:
         """Do what the socket is ready for: READ, WRITE or both."""
 
+    def end(self, reason: str) -> None:
+        """Close the socket: the loop ends, or :meth:`ready` failed for that reason."""
+
+
+class Later:
+    """A job that the loop runs later; in the loop's thread only."""
+
+    __slots__ = ("job",)
+
+    def __init__(self, job: Callable[[], None]) -> None:
+        self.job: Callable[[], None] | None = job
+
+    def cancel(self) -> None:
+        """Do not run it; safe after it has run."""
+        self.job = None
+
 
 class IoLoop:
     """Calls handlers when their sockets are ready, and jobs when asked to, on one daemon thread."""
 
     def __init__(self, name: str) -> None:
         self._selector = selectors.DefaultSelector()
+        #: Sockets that are looked at now and then: one look for all costs next to nothing.
+        self._unhurried = selectors.DefaultSelector()
+        self._next_look = 0.0
         self._lock = threading.Lock()
         self._jobs: deque[Callable[[], None]] = deque()
-        self._later: list[tuple[float, int, Callable[[], None]]] = []
+        self._later: list[tuple[float, int, Later]] = []
         self._numbers = itertools.count()
         self._wake_in, self._wake_out = socket.socketpair()
         for end in (self._wake_in, self._wake_out):
@@ -46,6 +69,8 @@ class IoLoop:
         self._selector.register(self._wake_out, READ, None)
         self._awake = False
         self._closed = False
+        self._deadline = 0.0
+        self._lingering: set[Ready] = set()
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
         self._thread.start()
 
@@ -56,84 +81,146 @@ class IoLoop:
 
     @property
     def closed(self) -> bool:
-        """Whether it runs nothing any more."""
+        """Whether it was closed; it runs on for a moment while something is left to send."""
         return self._closed
 
     # -- from any thread -------------------------------------------------------------------------
 
     def call(self, job: Callable[[], None]) -> None:
-        """Run `job` in the loop's thread soon; forgotten when the loop is closed."""
+        """Run `job` in the loop's thread soon; forgotten when the loop has ended."""
         self._jobs.append(job)
         with self._lock:
-            if self._awake or self._closed:
+            if self._awake:
                 return
             self._awake = True
             with suppress(OSError):
                 self._wake_in.send(b"\0")
 
     def close(self) -> None:
-        """End the thread and forget all sockets, which stay open; safe to call twice."""
+        """End all handlers and the thread, once what :meth:`linger` was told of is sent.
+
+        Safe to call twice, and from the loop's own thread, which ends soon after then.
+        """
         with self._lock:
             if self._closed:
                 return
+            self._deadline = time.monotonic() + _LINGER
             self._closed = True
             with suppress(OSError):
                 self._wake_in.send(b"\0")
         if self.is_current:
             return
-        self._thread.join(_PATIENCE)
+        self._thread.join(_LINGER + _PATIENCE)
         if self._thread.is_alive():
             _log.warning("%s still runs %.0f s after closing", self._thread.name, _PATIENCE)
 
     # -- in the loop's thread --------------------------------------------------------------------
 
-    def after(self, delay: float, job: Callable[[], None]) -> None:
-        """Run `job` after `delay` seconds; only from the loop's thread."""
-        heapq.heappush(self._later, (time.monotonic() + delay, next(self._numbers), job))
+    def after(self, delay: float, job: Callable[[], None]) -> Later:
+        """Run `job` after `delay` seconds, unless it is cancelled; only from the loop's thread."""
+        later = Later(job)
+        heapq.heappush(self._later, (time.monotonic() + delay, next(self._numbers), later))
+        return later
 
-    def watch(self, sock: socket.socket, events: int, handler: Ready) -> None:
-        """Call `handler` when `sock` is ready for `events`, 0 for none; from the loop's thread."""
-        known = sock.fileno() in self._selector.get_map()
-        if not events:
-            if known:
-                self._selector.unregister(sock)
-        elif known:
-            self._selector.modify(sock, events, handler)
-        else:
-            self._selector.register(sock, events, handler)
+    def watch(
+        self, sock: socket.socket, events: int, handler: Ready, *, hurry: bool = True
+    ) -> None:
+        """Call `handler` when `sock` is ready for `events`, 0 for none; from the loop's thread.
+
+        Args:
+            sock: The socket.
+            events: READ, WRITE, both or 0.
+            handler: Whom to call.
+            hurry: Whether at once for READ, too; else about ten times a second.
+        """
+        soon = events if hurry else events & ~READ
+        _set(self._selector, sock, soon, handler)
+        _set(self._unhurried, sock, events & ~soon, handler)
+
+    def linger(self, handler: Ready, lasting: bool) -> None:
+        """Say whether the loop, when it is closed, runs on until the handler is done."""
+        (self._lingering.add if lasting else self._lingering.discard)(handler)
 
     def _work(self) -> None:
-        while not self._closed:
-            timeout = None
-            if self._later:
-                timeout = max(0.0, self._later[0][0] - time.monotonic())
-            for key, events in self._selector.select(timeout):
+        while not self._closed or (self._lingering and time.monotonic() < self._deadline):
+            for key, events in self._selector.select(self._pause()):
                 if key.data is None:
                     self._wake()
                 else:
                     self._run(key.data, events)
+            now = time.monotonic()
+            if now >= self._next_look and len(self._unhurried.get_map()):
+                self._next_look = now + _LEISURE
+                for key, events in self._unhurried.select(0):
+                    self._run(key.data, events)
             while self._later and self._later[0][0] <= time.monotonic():
-                self._run_job(heapq.heappop(self._later)[2])
+                job = heapq.heappop(self._later)[2].job
+                if job is not None:
+                    self._run_job(job)
             for _ in range(len(self._jobs)):
                 self._run_job(self._jobs.popleft())
-        self._selector.close()
-        self._wake_in.close()
-        self._wake_out.close()
+        self._finish()
+
+    def _pause(self) -> float | None:
+        """Return how long to wait for sockets, in seconds."""
+        if self._jobs:
+            return 0.0
+        pauses = []
+        if self._closed:
+            pauses.append(self._deadline - time.monotonic())
+        while self._later and self._later[0][2].job is None:
+            heapq.heappop(self._later)
+        if self._later:
+            pauses.append(self._later[0][0] - time.monotonic())
+        if len(self._unhurried.get_map()):
+            pauses.append(self._next_look - time.monotonic())
+        return max(0.0, min(pauses)) if pauses else None
+
+    def _finish(self) -> None:
+        """End what is left: nobody else would close these sockets."""
+        while self._jobs:
+            self._run_job(self._jobs.popleft())
+        selectors = (self._selector, self._unhurried)
+        left = {key.data for one in selectors for key in one.get_map().values()}
+        for handler in left - {None}:
+            self._run_job(lambda handler=handler: handler.end(""))  # type: ignore[misc]
+        for selector in selectors:
+            selector.close()
+        with self._lock:
+            self._awake = True  # nobody is to be woken any more
+            self._wake_in.close()
+            self._wake_out.close()
 
     def _wake(self) -> None:
-        with self._lock:
+        # In this order, and together: a byte that is read must not be one that was sent since.
+        with self._lock, suppress(OSError):
             self._awake = False
-        with suppress(OSError):
             self._wake_out.recv(4096)
 
     def _run(self, handler: Ready, events: int) -> None:
         try:
             handler.ready(events)
-        except Exception:
+        except Exception as error:
             _log.exception("%s failed", handler)
+            reason = f"an error of ours, {error!r}"
+            # Whatever it did not take would make it fail again, at once and for ever.
+            self._run_job(lambda: handler.end(reason))
 
     def _run_job(self, job: Callable[[], None]) -> None:
         try:
             job()
         except Exception:
             _log.exception("%s: a job failed", self._thread.name)
+
+
+def _set(
+    selector: selectors.BaseSelector, sock: socket.socket, events: int, handler: Ready
+) -> None:
+    known = sock.fileno() in selector.get_map()
+    if not events:
+        if known:
+            selector.unregister(sock)
+    elif known:
+        selector.modify(sock, events, handler)
+    else:
+        selector.register(sock, events, handler)

@@ -64,9 +64,15 @@ class Topics:
         return made
 
     def subscribe(
-        self, subscription: Subscription, wanted: MessageType | str | None, ignore_local: bool
+        self, subscription: Subscription, ignore_local: bool, type_name: str = ""
     ) -> None:
-        """Feed a subscription from now on; `wanted` is the type it was created with."""
+        """Feed a subscription from now on.
+
+        Args:
+            subscription: Whom to feed.
+            ignore_local: Whether to leave out what this node publishes itself.
+            type_name: The type that is asked for when nobody here has its definition.
+        """
         topic = subscription.topic
         with self._lock:
             intake = self._intakes.get(topic)
@@ -74,10 +80,11 @@ class Topics:
             if intake is None:
                 kind = subscription.type
                 name = ANY if kind is None else ros1_name(kind.name)
+                name = ros1_name(type_name) if type_name else name
                 intake = self._intakes[topic] = Intake(self._core, self, topic, name)
             intake.join(
                 Reading(
-                    self._core, intake, subscription, wanted, ignore_local, self._end_reading
+                    self._core, intake, subscription, type_name, ignore_local, self._end_reading
                 )
             )
         if new:

@@ -15,10 +15,10 @@ from rosglass.comm import (
     SamplesLost,
     Source,
 )
+from rosglass.comm.absence import Absence
 from rosglass.comm.similar import similar
 from rosglass.comm.watchdog import Watchdog
 from rosglass.errors import Error, NodeClosedError, TypeNotFoundError
-from rosglass.ros2.absence import Absence
 from rosglass.ros2.core import Member
 from rosglass.ros2.liveliness import Liveness
 from rosglass.ros2.matching import conflict_events, conflicts, words
@@ -85,7 +85,7 @@ class Reading(Member, Source):
             not subscription.decodes,
             self.inform,
         )
-        self._absence = Absence(core)
+        self._absence = Absence(core.name, core.status)
         self._repeats = Repeats()
         self._lock = threading.Lock()
         self._attention = threading.Lock()

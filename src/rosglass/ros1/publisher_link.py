@@ -1,0 +1,194 @@
+"""One publisher of a topic that the node subscribes to, as long as the master names it."""
+
+from __future__ import annotations
+
+import socket
+import time
+from typing import TYPE_CHECKING, Any
+
+from rosglass.errors import ConnectionLostError, ConversionError, MasterError
+from rosglass.ros1.connection import Connection
+from rosglass.ros1.master import call_node, reason_of
+from rosglass.ros1.types import ANY
+
+if TYPE_CHECKING:
+    from rosglass.ros1.intake import Intake
+
+    Received = bytes | memoryview
+
+__all__ = ["PublisherLink"]
+
+#: Seconds between attempts to reach a publisher, the first and the longest.
+_RETRY, _LONGEST_RETRY = 0.5, 5.0
+#: Bytes per second up to which what nobody waits for may lie in the socket for a tenth of a second.
+_LITTLE = 256 * 1024
+#: Shortest time in seconds over which that is measured.
+_WINDOW = 0.5
+_UNKNOWN_HOST = (
+    "set ROS_IP or ROS_HOSTNAME for that node to what this machine knows, or add the name to "
+    "/etc/hosts"
+)
+
+
+class PublisherLink:
+    """A publisher of the topic, as long as the master names it; all in the loop's thread.
+
+    Args:
+        intake: Whom it belongs to.
+        uri: The publisher's API.
+        epoch: Which master named it.
+
+    Attributes:
+        header: What the publisher said of itself; empty before it is connected.
+        name: The publishing node's full name, or its URI as long as that is not known.
+        problem: Why it is not connected; empty when it is, or about to be.
+        latched: The last message of a publisher that latches.
+        epoch: Which master, of those that were started one after the other, named it last.
+        ended: Whether it is forgotten.
+    """
+
+    def __init__(self, intake: Intake, uri: str, epoch: int) -> None:
+        self.intake, self.uri, self.name, self.epoch = intake, uri, uri, epoch
+        self.header: dict[str, str] = {}
+        self.problem = ""
+        self.latched: Received | None = None
+        self.ended = False
+        self._core = intake.core
+        self._connection: Connection | None = None
+        self._addresses: list[tuple[str, int]] = []
+        self._latches = False
+        self._delay = _RETRY
+        self._measured_at, self._measured, self._rate = time.monotonic(), 0, float("inf")
+        self._begin()
+
+    @property
+    def connected(self) -> bool:
+        """Whether messages can come."""
+        return bool(self.header)
+
+    def end(self) -> None:
+        """Forget the publisher."""
+        self.ended = True
+        if self._connection is not None:
+            self._connection.end("")
+
+    def resume(self) -> None:
+        """Hand on messages: it is decided who understands them."""
+        if self._connection is not None:
+            self._connection.pause(reading=True)
+
+    def attend(self, eager: bool) -> None:
+        """Read at once what comes, or leave it in the socket for a while if that is not much."""
+        connection, now = self._connection, time.monotonic()
+        if connection is None:
+            return
+        if now - self._measured_at >= _WINDOW:
+            came = connection.received - self._measured
+            self._rate = came / (now - self._measured_at)
+            self._measured_at, self._measured = now, connection.received
+        connection.hurry(eager or not self.header or self._rate > _LITTLE)
+
+    def drain(self) -> None:
+        """Hand on what waits in the socket; from any thread."""
+        connection = self._connection
+        if connection is not None:
+            connection.drain()
+
+    # -- connecting ------------------------------------------------------------------------------
+
+    def _begin(self) -> None:
+        if not self.ended and not self._core.closed:
+            self._core.errands.run(self._ask)
+
+    def _ask(self) -> None:
+        """Ask the publisher where to connect; on a thread that may wait."""
+        topic = self.intake.topic
+        reason, found = "", list[tuple[str, int]]()
+        try:
+            answer = call_node(self.uri, "requestTopic", self._core.name.full, topic, [["TCPROS"]])
+            found = _addresses(answer, f"{self.uri} for {topic}")
+        except (ConnectionLostError, MasterError, ConversionError) as error:
+            unknown = isinstance(error.__cause__, socket.gaierror)
+            reason = f"{error}: {_UNKNOWN_HOST}" if unknown else str(error)
+        self._core.loop.call(lambda: self._connect(found, reason))
+
+    def _connect(self, addresses: list[tuple[str, int]], reason: str = "") -> None:
+        """Try the first of the addresses, the others when that fails."""
+        if self.ended:
+            return
+        if not addresses:
+            self._fail(reason)
+            return
+        self._addresses = addresses[1:]
+        header = {
+            "callerid": self._core.name.full,
+            "md5sum": ANY,
+            "message_definition": "",
+            "tcp_nodelay": "1",
+            "topic": self.intake.topic,
+            "type": ANY,
+        }
+        try:
+            self._connection = Connection.dial(
+                self._core.loop, addresses[0], header, self._on_header, self._on_frame, self._fail
+            )
+        except OSError as error:
+            self._fail(reason_of(error))
+
+    def _on_header(self, header: dict[str, str]) -> None:
+        connection = self._connection
+        assert connection is not None
+        connection.pause(reading=False)  # until it is decided who understands it
+        self.header, self.problem, self._delay, self._addresses = header, "", _RETRY, []
+        self.name = header.get("callerid", "") or self.uri
+        self._latches = header.get("latching") == "1"
+        self._measured_at, self._measured, self._rate = time.monotonic(), 0, float("inf")
+        self.intake.greet(self)
+
+    def _on_frame(self, data: Received, _: int) -> None:
+        received = time.time_ns()
+        if self._latches:
+            self.latched = data
+        for reading in self.intake.readings:
+            reading.take(self, data, received)
+
+    def _fail(self, reason: str) -> None:
+        """Try again later: the master names it still."""
+        addresses, was_connected = self._addresses, self.connected
+        self._connection, self.header, self.latched = None, {}, None
+        self._addresses = []
+        if self.ended or self._core.closed:
+            return
+        if addresses and not was_connected:
+            self._connect(addresses)
+            return
+        what = "was lost" if was_connected else "cannot be received from"
+        self.problem = f"{self.name} {what}: {reason}; trying again"
+        self.intake.part(self)
+        if not self.ended:
+            self._core.loop.after(self._delay, self._begin)
+            self._delay = min(_LONGEST_RETRY, 2 * self._delay)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.name}>"
+
+
+def _addresses(answer: Any, place: str) -> list[tuple[str, int]]:
+    """Return the resolved addresses in an answer to requestTopic; waits for the name service.
+
+    Raises:
+        MasterError: It offers no TCPROS.
+        ConnectionLostError: The host is not known here.
+    """
+    if not (isinstance(answer, (list, tuple)) and len(answer) >= 3 and answer[0] == "TCPROS"):
+        raise MasterError(f"{place} offers no TCPROS, but {answer!r:.80}")
+    host, port = str(answer[1]), answer[2]
+    if type(port) is not int or not 0 < port < 65536:
+        raise ConnectionLostError(f"{place} says to connect to port {port!r:.80}")
+    try:
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+    except (OSError, UnicodeError) as error:
+        raise ConnectionLostError(
+            f"{place} says to connect to {host}:{port}, but {reason_of(error)}"
+        ) from error
+    return list(dict.fromkeys((str(one[4][0]), int(one[4][1])) for one in found))
