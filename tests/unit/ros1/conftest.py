@@ -1,0 +1,287 @@
+"""A ROS 1 master in this process, and nodes that know it."""
+
+from __future__ import annotations
+
+import itertools
+import socket
+import socketserver
+import threading
+import time
+import xmlrpc.client
+import xmlrpc.server
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+import rosglass
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from rosglass.ros1 import Ros1Node
+
+_pids = itertools.count(1)
+
+
+class _Server(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCServer):
+    daemon_threads = True
+    block_on_close = False
+    allow_reuse_address = True
+
+
+class FakeParameters:
+    """The master's parameter API; each method returns the whole answer.
+
+    Attributes:
+        tree: All parameters, as nested dicts.
+        followers: Node APIs by the name that they follow.
+        tells: Whether followers are told of changes.
+    """
+
+    def __init__(self) -> None:
+        self.tree: dict[str, Any] = {}
+        self.followers: dict[str, set[str]] = {}
+        self.tells = True
+
+    def _getParam(self, _: str, name: str) -> Any:  # noqa: N802 - the API's name
+        try:
+            return [1, "", self._at(name)]
+        except KeyError:
+            return [-1, f"Parameter [{name}] is not set", 0]
+
+    def _hasParam(self, _: str, name: str) -> Any:  # noqa: N802
+        return [1, name, self._getParam("", name)[0] == 1]
+
+    def _getParamNames(self, _: str) -> Any:  # noqa: N802
+        return [1, "", list(self._names(self.tree, ""))]
+
+    def _setParam(self, node: str, name: str, value: Any) -> Any:  # noqa: N802
+        *spaces, last = name.strip("/").split("/")
+        place = self.tree
+        for space in spaces:
+            if not isinstance(place.get(space), dict):
+                place[space] = {}
+            place = place[space]
+        place[last] = value
+        self._tell_followers(name, value, node)
+        return [1, "", 0]
+
+    def _deleteParam(self, _: str, name: str) -> Any:  # noqa: N802
+        space, _, last = name.rpartition("/")
+        try:
+            del self._at(space)[last]
+        except KeyError:
+            return [-1, f"Parameter [{name}] is not set", 0]
+        self._tell_followers(name, {}, "")
+        return [1, "", 0]
+
+    def _searchParam(self, node: str, name: str) -> Any:  # noqa: N802
+        first, _, rest = name.partition("/")
+        space = node
+        while True:
+            if self._hasParam("", f"{space}/{first}")[2]:
+                return [1, "", f"{space}/{first}" + (f"/{rest}" if rest else "")]
+            if not space:
+                return [-1, f"Cannot find parameter [{name}]", ""]
+            space = space.rpartition("/")[0]
+
+    def _subscribeParam(self, _: str, api: str, name: str) -> Any:  # noqa: N802
+        self.followers.setdefault(name, set()).add(api)
+        code, _, value = self._getParam("", name)
+        return [1, "", value if code == 1 else {}]
+
+    def _unsubscribeParam(self, _: str, api: str, name: str) -> Any:  # noqa: N802
+        self.followers.get(name, set()).discard(api)
+        return [1, "", 1]
+
+    def _tell_followers(self, name: str, value: Any, node: str) -> None:
+        # Like rosmaster, by the name that has changed, with a slash at its end.
+        for followed, apis in self.followers.items():
+            if self.tells and f"{name}/".startswith(f"{followed}/"):
+                for api in apis:
+                    arguments = (api, f"{name}/", value)
+                    threading.Thread(target=_tell_parameter, args=arguments, daemon=True).start()
+        del node
+
+    def _at(self, name: str) -> Any:
+        found: Any = self.tree
+        for part in [part for part in name.split("/") if part]:
+            if not isinstance(found, dict):
+                raise KeyError(name)
+            found = found[part]
+        return found
+
+    def _names(self, tree: dict[str, Any], space: str) -> Any:
+        for key, value in tree.items():
+            if isinstance(value, dict):
+                yield from self._names(value, f"{space}/{key}")
+            else:
+                yield f"{space}/{key}"
+
+
+class FakeMaster(FakeParameters):
+    """The part of the master's API that registers topics and services.
+
+    Attributes:
+        port: Where it listens, also after it was stopped and started again.
+        publishers: Node, its API's URI and the type of each publisher, by topic and node.
+        services: Node, service URI and the node's API's URI, by service.
+        calls: Names of all methods that were called.
+        answers: Functions that answer methods instead, by name; they return the whole answer.
+    """
+
+    def __init__(self) -> None:
+        self.port = 0
+        self.calls: list[str] = []
+        self.answers: dict[str, Callable[..., Any]] = {}
+        self._lock = threading.Lock()
+        self.start()
+
+    def start(self) -> None:
+        """Start with nobody registered, and no parameters."""
+        FakeParameters.__init__(self)
+        self.publishers: dict[str, dict[str, str]] = {}
+        self.subscribers: dict[str, dict[str, str]] = {}
+        self.types: dict[str, str] = {}
+        self.services: dict[str, tuple[str, str, str]] = {}
+        self.pid = next(_pids)
+        self._server = _Server(("127.0.0.1", self.port), logRequests=False, allow_none=True)
+        self.port = self._server.server_address[1]
+        self._server.register_instance(self)
+        run = self._server.serve_forever
+        self._thread = threading.Thread(target=run, args=(0.02,), daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Answer nobody any more."""
+        self._server.shutdown()
+        self._server.server_close()
+        self._thread.join(5)
+
+    @property
+    def url(self) -> str:
+        """As :func:`rosglass.connect` takes it."""
+        return f"ros1://127.0.0.1:{self.port}?ip=127.0.0.1"
+
+    def offer(self, service: str, port: int, node: str = "/robot", host: str = "127.0.0.1") -> None:
+        """Register a service that a test serves itself."""
+        self.services[service] = (node, f"rosrpc://{host}:{port}", f"http://{host}:1/")
+
+    def _dispatch(self, method: str, arguments: tuple[Any, ...]) -> Any:
+        self.calls.append(method)
+        if method in self.answers:
+            return self.answers[method](*arguments)
+        with self._lock:
+            return getattr(self, f"_{method}")(*arguments)
+
+    def _getPid(self, _: str) -> Any:  # noqa: N802 - the API's name
+        return [1, "", self.pid]
+
+    def _getSystemState(self, _: str) -> Any:  # noqa: N802
+        return [
+            1,
+            "",
+            [
+                [[topic, list(nodes)] for topic, nodes in self.publishers.items() if nodes],
+                [[topic, list(nodes)] for topic, nodes in self.subscribers.items() if nodes],
+                [[name, [entry[0]]] for name, entry in self.services.items()],
+            ],
+        ]
+
+    def _getTopicTypes(self, _: str) -> Any:  # noqa: N802
+        return [1, "", [[topic, kind] for topic, kind in self.types.items()]]
+
+    def _registerService(self, node: str, name: str, uri: str, api: str) -> Any:  # noqa: N802
+        self.services[name] = (node, uri, api)
+        return [1, "", 1]
+
+    def _unregisterService(self, _: str, name: str, uri: str) -> Any:  # noqa: N802
+        if self.services.get(name, ("", ""))[1] == uri:
+            del self.services[name]
+            return [1, "", 1]
+        return [1, "", 0]
+
+    def _lookupService(self, _: str, name: str) -> Any:  # noqa: N802
+        if name not in self.services:
+            return [-1, "no provider", ""]
+        return [1, "", self.services[name][1]]
+
+    def _registerPublisher(self, node: str, topic: str, kind: str, api: str) -> Any:  # noqa: N802
+        self.publishers.setdefault(topic, {})[node] = api
+        self.types[topic] = kind
+        self._tell(topic)
+        return [1, "", list(self.subscribers.get(topic, {}).values())]
+
+    def _unregisterPublisher(self, node: str, topic: str, _: str) -> Any:  # noqa: N802
+        found = self.publishers.get(topic, {}).pop(node, None)
+        self._tell(topic)
+        return [1, "", int(found is not None)]
+
+    def _registerSubscriber(self, node: str, topic: str, kind: str, api: str) -> Any:  # noqa: N802
+        self.subscribers.setdefault(topic, {})[node] = api
+        self.types.setdefault(topic, kind)
+        return [1, "", list(self.publishers.get(topic, {}).values())]
+
+    def _unregisterSubscriber(self, node: str, topic: str, _: str) -> Any:  # noqa: N802
+        found = self.subscribers.get(topic, {}).pop(node, None)
+        return [1, "", int(found is not None)]
+
+    def _tell(self, topic: str) -> None:
+        publishers = list(self.publishers.get(topic, {}).values())
+        for api in list(self.subscribers.get(topic, {}).values()):
+            threading.Thread(target=_update, args=(api, topic, publishers), daemon=True).start()
+
+
+def _update(api: str, topic: str, publishers: list[str]) -> None:
+    with suppress(OSError, xmlrpc.client.Error), xmlrpc.client.ServerProxy(api) as proxy:
+        proxy.publisherUpdate("/master", topic, publishers)
+
+
+def _tell_parameter(api: str, name: str, value: Any) -> None:
+    with suppress(OSError, xmlrpc.client.Error), xmlrpc.client.ServerProxy(api) as proxy:
+        proxy.paramUpdate("/master", name, value)
+
+
+@pytest.fixture
+def master() -> Iterator[FakeMaster]:
+    """A master of the test's own."""
+    made = FakeMaster()
+    yield made
+    made.stop()
+
+
+@pytest.fixture
+def connect(master: FakeMaster) -> Iterator[Callable[..., Ros1Node]]:
+    """Connect a node to the master; it is closed at the end."""
+    nodes: list[Any] = []
+
+    def connect(name: str, namespace: str = "/", url: str = "", **more: Any) -> Any:
+        nodes.append(rosglass.connect(url or master.url, name, namespace, **more))
+        return nodes[-1]
+
+    yield connect
+    for node in nodes:
+        node.close()
+
+
+@pytest.fixture(scope="session")
+def eventually() -> Callable[..., Any]:
+    """Return the first true value of a condition; fail after 10 s."""
+
+    def eventually(condition: Callable[[], Any], timeout: float = 10.0) -> Any:
+        deadline = time.monotonic() + timeout
+        while not (value := condition()):
+            assert time.monotonic() < deadline, f"not within {timeout} s: {condition}"
+            time.sleep(0.01)
+        return value
+
+    return eventually
+
+
+@pytest.fixture
+def free_port() -> int:
+    """A port that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
