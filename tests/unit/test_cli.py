@@ -138,7 +138,7 @@ def test_ctrl_c_while_modules_are_loaded_leaves_no_traceback() -> None:
         "import sys, signal\n"
         "class Finder:\n"
         "    def find_spec(self, name, *_):\n"
-        "        if name == 'argparse': signal.raise_signal(signal.SIGINT)\n"
+        "        if name == 'rosglass.cli.program': signal.raise_signal(signal.SIGINT)\n"
         "sys.meta_path.insert(0, Finder())\n"
         "from rosglass.cli import main\n"
         "sys.exit(main(['--help']))",
