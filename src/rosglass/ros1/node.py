@@ -6,7 +6,7 @@ import logging
 import threading
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import EndpointKind, Node, NodeName, QoS, Subscription
+from rosglass.comm import EndpointKind, History, Node, NodeName, QoS, Subscription
 from rosglass.comm.flags import check_flag
 from rosglass.comm.loop import check_plain
 from rosglass.interfaces import ros1_name
@@ -14,6 +14,7 @@ from rosglass.ros1.connection import Connection
 from rosglass.ros1.core import Core
 from rosglass.ros1.furniture import Furniture
 from rosglass.ros1.names import absolute_namespace, split, validate_node_name
+from rosglass.ros1.reading import type_if_known
 from rosglass.ros1.services import Services
 from rosglass.ros1.slave import Slave
 from rosglass.ros1.topics import Topics
@@ -113,15 +114,18 @@ class Ros1Node(Node):
     ) -> Subscription:
         """Subscribe to `topic`; see :meth:`rosglass.comm.Node.create_subscription`."""
         self._core.check_open()
+        full = self.resolve(topic)
+        kind = type_if_known(self._core, full, type)
         subscription = Subscription(
-            self.resolve(topic),
-            None if type is None else self._core.types.message(type),
+            full,
+            kind,
             _profile(qos),
             executor or self._core.dispatcher,
             callback,
             raw_callback,
         )
-        self._topics.subscribe(subscription, ignore_local)
+        asked = type if kind is None and isinstance(type, str) else ""
+        self._topics.subscribe(subscription, ignore_local, asked)
         return subscription
 
     # -- services --------------------------------------------------------------------------------
@@ -375,6 +379,8 @@ class Ros1Node(Node):
 
 
 def _profile(qos: QoS | int) -> QoS:
+    if type(qos) is int and qos == 0:
+        return QoS(history=History.KEEP_ALL)  # as roscpp and rospy have it
     return qos if isinstance(qos, QoS) else QoS(depth=qos)
 
 

@@ -37,17 +37,19 @@ __all__ = ["Reading", "type_if_known"]
 _PUBLISHER = EndpointKind.PUBLISHER
 
 
-def type_if_known(core: Core, topic: str, wanted: str) -> MessageType | None:
-    """Return the type of that name; None when its publishers have to tell it.
+def type_if_known(core: Core, topic: str, wanted: MessageType | str | None) -> MessageType | None:
+    """Return the type that a subscription was asked for; None when publishers have to tell it.
 
     Raises:
         TypeNotFoundError: Nobody has a definition, and nobody is seen to publish that type.
         UnsupportedError: It is ROS 2's.
     """
+    if wanted is None:
+        return None
     try:
         return core.types.message(wanted)
     except TypeNotFoundError:
-        if core.graph.type_of(topic) == join_name(wanted):
+        if isinstance(wanted, str) and core.graph.type_of(topic) == join_name(wanted):
             return None
         raise
 
