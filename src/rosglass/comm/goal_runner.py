@@ -53,7 +53,7 @@ class GoalRunner:
         execute: Called with the goal.
         executor: Where; None for a thread for each goal.
         log: Where failures are told.
-        over: Called with each goal once its callback has returned; None for nobody.
+        over: Called each time that a goal's callback has returned; None for nobody.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class GoalRunner:
         execute: Callable[[Any], Any],
         executor: Executor | None,
         log: logging.Logger,
-        over: Callable[[Any], None] | None = None,
+        over: Callable[[], None] | None = None,
     ) -> None:
         self._name, self._execute, self._executor, self._log = name, execute, executor, log
         self._over = over
@@ -90,7 +90,7 @@ class GoalRunner:
                 self._threads.discard(thread)
             self._log.error("%s: aborting goal %s: %s", self._name, goal.id_text, error)
             goal.fail(error)
-            self._ended(goal)
+            self._ended()
 
     def close(self) -> None:
         """Take note that goals end because their server closes."""
@@ -117,13 +117,13 @@ class GoalRunner:
         if not goal.start():
             if goal.status.is_active:
                 goal.conclude(None)  # cancelled before its turn
-            self._ended(goal)
+            self._ended()
             return
         try:
             result: Any = self._execute(goal)
         except BaseException as error:
             self._failed(goal, error)
-            self._ended(goal)
+            self._ended()
             return
         if inspect.iscoroutine(result) and isinstance(self._executor, LoopExecutor):
             future = self._executor.run(result)
@@ -134,7 +134,7 @@ class GoalRunner:
             self._failed(goal, TypeError("execute must be an async def to be awaited"))
         else:
             self._conclude(goal, result)
-        self._ended(goal)
+        self._ended()
 
     def _finish(self, goal: Runnable, done: Future[Any]) -> None:
         """Take the end of a coroutine."""
@@ -144,7 +144,7 @@ class GoalRunner:
             self._failed(goal, error)
         else:
             self._conclude(goal, result)
-        self._ended(goal)
+        self._ended()
 
     def _conclude(self, goal: Runnable, result: Any) -> None:
         if not goal.status.is_active:
@@ -177,6 +177,6 @@ class GoalRunner:
             )
         goal.fail(error)
 
-    def _ended(self, goal: Runnable) -> None:
+    def _ended(self) -> None:
         if self._over is not None:
-            self._over(goal)
+            self._over()

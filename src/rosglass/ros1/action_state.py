@@ -7,10 +7,11 @@ the transitions that actionlib's clients in C++ and Python have in common.
 from __future__ import annotations
 
 from enum import Enum, IntEnum
+from typing import NamedTuple
 
 from rosglass.comm import GoalStatus
 
-__all__ = ["CommState", "CommStateMachine", "ServerState", "TerminalState"]
+__all__ = ["CommState", "CommStateMachine", "ServerState", "Step", "TerminalState"]
 
 
 class ServerState(IntEnum):
@@ -165,6 +166,18 @@ _ENDS = {
 }
 
 
+class Step(NamedTuple):
+    """One of the states that a goal goes through.
+
+    Attributes:
+        state: The state.
+        status: What that is in all worlds.
+    """
+
+    state: CommState
+    status: GoalStatus
+
+
 class CommStateMachine:
     """Where a goal is, as its client knows; changed by what is heard.
 
@@ -202,7 +215,7 @@ class CommStateMachine:
             return GoalStatus.CANCELING
         return GoalStatus.EXECUTING if self.executed else GoalStatus.PENDING
 
-    def hear(self, said: ServerState) -> list[CommState]:
+    def hear(self, said: ServerState) -> list[Step]:
         """Take what the server says of the goal.
 
         Raises:
@@ -218,7 +231,7 @@ class CommStateMachine:
         self.heard = said
         return self._go(*steps)
 
-    def finish(self, said: ServerState) -> list[CommState]:
+    def finish(self, said: ServerState) -> list[Step]:
         """Take the result, which says how the goal ended; nothing happens when it was done already.
 
         Raises:
@@ -233,7 +246,7 @@ class CommStateMachine:
         self.heard = said
         return self._go(*steps, CommState.DONE)
 
-    def cancel(self) -> list[CommState]:
+    def cancel(self) -> list[Step]:
         """Take note that the server is being asked to cancel the goal.
 
         One that is being cancelled, or has ended, stays where it is.
@@ -242,15 +255,17 @@ class CommStateMachine:
             return self._go(CommState.WAITING_FOR_CANCEL_ACK)
         return []
 
-    def lose(self) -> list[CommState]:
+    def lose(self) -> list[Step]:
         """Take note that nobody will hear of the goal any more."""
         if self.state is CommState.DONE:
             return []
         self.heard = ServerState.LOST
         return self._go(CommState.DONE)
 
-    def _go(self, *steps: CommState) -> list[CommState]:
-        for step in steps:
-            self.state = step
-            self.executed |= step in (CommState.ACTIVE, CommState.PREEMPTING)
-        return list(steps)
+    def _go(self, *states: CommState) -> list[Step]:
+        steps = []
+        for state in states:
+            self.state = state
+            self.executed |= state in (CommState.ACTIVE, CommState.PREEMPTING)
+            steps.append(Step(state, self.status))
+        return steps

@@ -7,7 +7,7 @@ Layer".
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rosglass.comm import QoS, Time
 from rosglass.errors import DecodeError
@@ -76,7 +76,9 @@ class ActionTypes:
         return cls(action, goal, types.message(_CANCEL_TYPE), status, result, feedback)
 
 
-def assemble(name: str, goal: MessageType, result: MessageType, feedback: MessageType) -> Any:
+def assemble(
+    name: str, goal: MessageType, result: MessageType, feedback: MessageType
+) -> ActionType:
     """Return the action whose goal, result and feedback these topics carry.
 
     Args:
@@ -88,12 +90,11 @@ def assemble(name: str, goal: MessageType, result: MessageType, feedback: Messag
     from rosglass.messages import ActionType  # noqa: PLC0415 - numpy
 
     base = name.replace("/action/", "/msg/")
-    parts = [
-        kind.definition.nested[f"{base}{word}"]
-        for kind, word in ((goal, "Goal"), (result, "Result"), (feedback, "Feedback"))
-    ]
-    text = "\n---\n".join(each.text.rstrip("\n") for each in parts)
-    return ActionType(ActionDefinition(name, 1, *parts, text=text, source=parts[0].source))
+    asked = goal.definition.nested[f"{base}Goal"]
+    told = result.definition.nested[f"{base}Result"]
+    heard = feedback.definition.nested[f"{base}Feedback"]
+    text = "\n---\n".join(each.text.rstrip("\n") for each in (asked, told, heard))
+    return ActionType(ActionDefinition(name, 1, asked, told, heard, text, asked.source))
 
 
 def part(action: str, name: str) -> str:

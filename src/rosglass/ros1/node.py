@@ -10,6 +10,7 @@ from rosglass.comm import EndpointKind, History, Node, NodeName, QoS, Subscripti
 from rosglass.comm.flags import check_flag
 from rosglass.comm.loop import check_plain
 from rosglass.interfaces import ros1_name
+from rosglass.ros1.action_types import actions
 from rosglass.ros1.connection import Connection
 from rosglass.ros1.core import Core
 from rosglass.ros1.furniture import Furniture
@@ -32,14 +33,18 @@ if TYPE_CHECKING:
         ParameterClient,
         Publisher,
         Sample,
+        ServerGoal,
         ServiceClient,
         ServiceServer,
         Status,
         Time,
     )
     from rosglass.comm.logger import NodeLogger
+    from rosglass.comm.node import Result
     from rosglass.interfaces import Library
-    from rosglass.messages import Message, MessageType, ServiceType
+    from rosglass.messages import ActionType, Message, MessageType, ServiceType
+    from rosglass.ros1.action_client import Ros1ActionClient
+    from rosglass.ros1.action_server import Ros1ActionServer
     from rosglass.ros1.options import Ros1Options
     from rosglass.ros1.parameter_server import ParameterServer
     from rosglass.ros1.parameters import Ros1Parameters
@@ -168,6 +173,60 @@ class Ros1Node(Node):
         """
         self._core.check_open()
         return self._services.serve(self.resolve(name), type, callback, qos, executor)
+
+    # -- actions ---------------------------------------------------------------------------------
+
+    def create_action_client(
+        self, name: str, type: str | ActionType | None = None
+    ) -> Ros1ActionClient:
+        """Return a client of an action; see :meth:`rosglass.comm.Node.create_action_client`."""
+        from rosglass.ros1.action_client import Ros1ActionClient  # noqa: PLC0415
+
+        self._core.check_open()
+        wanted = None if type is None else self._core.types.action(type)
+        return Ros1ActionClient(self._core, self._topics, self.resolve(name), wanted)
+
+    def create_action_server(
+        self,
+        name: str,
+        type: str | ActionType,
+        execute: Callable[[ServerGoal], Result | Awaitable[Result]],
+        *,
+        accept: Callable[[Message], bool] | None = None,
+        cancel: Callable[[ServerGoal], bool] | None = None,
+        executor: Executor | None = None,
+        simple: bool = False,
+    ) -> Ros1ActionServer:
+        """Offer an action; see :meth:`rosglass.comm.Node.create_action_server`.
+
+        Args:
+            name: Absolute, relative or private action name.
+            type: Type name or type.
+            execute: Called with each accepted goal.
+            accept: Told the goal; returns whether it is accepted.
+            cancel: Told the goal; returns whether a request to cancel it is accepted.
+            executor: Where the callbacks run.
+            simple: Whether one goal is executed at a time, as by actionlib's SimpleActionServer: a
+                newer one asks it to end, and is executed after it.
+        """
+        from rosglass.ros1.action_server import Ros1ActionServer  # noqa: PLC0415
+
+        self._core.check_open()
+        return Ros1ActionServer(
+            self._core,
+            self._topics,
+            self.resolve(name),
+            self._core.types.action(type),
+            execute,
+            accept,
+            cancel,
+            executor,
+            simple,
+        )
+
+    def actions(self) -> dict[str, list[str]]:
+        """Return every action in the graph with its type."""
+        return actions(self._core.graph)
 
     # -- parameters and the log ------------------------------------------------------------------
 

@@ -1,0 +1,511 @@
+"""Sending goals to actionlib servers.
+
+Protocol: ROS wiki, "actionlib/DetailedDescription".
+"""
+
+from __future__ import annotations
+
+import copy
+import itertools
+import logging
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+from rosglass.comm import ActionClient, CancelAnswer, EndpointKind, Executor, Promise, Time
+from rosglass.comm.inorder import InOrder
+from rosglass.comm.promise import check_timeout
+from rosglass.comm.readiness import Readiness
+from rosglass.comm.similar import similar
+from rosglass.errors import (
+    ConversionError,
+    DecodeError,
+    Error,
+    NodeClosedError,
+    ServiceUnavailableError,
+    TimeoutError,  # noqa: A004 - the field's own word
+)
+from rosglass.ros1.action_discovery import ActionDiscovery
+from rosglass.ros1.action_ends import ActionEnds
+from rosglass.ros1.action_types import (
+    FEEDBACK,
+    RESULT,
+    STATUS,
+    ActionTypes,
+    actions,
+    part,
+    state_of,
+    time_of,
+)
+from rosglass.ros1.cancelling import Entry, Sweep
+from rosglass.ros1.client_goal import Ros1ClientGoal
+from rosglass.ros1.core import Member
+from rosglass.ros1.master import call_node
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from rosglass.comm import ClientGoal, GoalStatus, Handle, Sample
+    from rosglass.messages import ActionType, Message
+    from rosglass.ros1.action_state import CommState
+    from rosglass.ros1.core import Core
+    from rosglass.ros1.topics import Topics
+
+__all__ = ["Ros1ActionClient"]
+
+_log = logging.getLogger("rosglass.ros1")
+#: Seconds without a status message, of which there are five a second usually, after which the
+#: server is asked whether it is alive; and that it may take to answer.
+_SILENCE, _ANSWER = 5.0, 5.0
+#: Seconds after which a server has told of the goals that it knew when it was connected.
+_SETTLED = 1.0
+#: Goals of this process; actionlib's clients number theirs alike.
+_numbers = itertools.count(1)
+
+
+class Ros1ActionClient(ActionClient, Member):
+    """An action client; made by :meth:`Node.create_action_client`.
+
+    Args:
+        core: The node it belongs to.
+        topics: The node's topics.
+        name: Absolute action name.
+        wanted: The type; None for the one that the server's topics tell.
+
+    Attributes:
+        core: The node it belongs to.
+        jobs: Where all that happens to the client and its goals happens, one after the other.
+    """
+
+    listed = False
+
+    def __init__(self, core: Core, topics: Topics, name: str, wanted: ActionType | None) -> None:
+        self.name, self.core = name, core
+        self.jobs = InOrder()
+        self.type = None
+        self._topics = topics
+        self._lock = threading.Lock()
+        self._goals: dict[str, Ros1ClientGoal] = {}
+        self._ends: ActionEnds | None = None
+        self._discovery: ActionDiscovery | None = None
+        #: The server that goals are sent to; empty while none is there.
+        self._server, self._since, self._epoch = "", 0.0, 0
+        #: What each server said last of its goals, and when it was last known to be alive.
+        self._lists: dict[str, dict[str, Entry]] = {}
+        self._heard: dict[str, float] = {}
+        self._asked: set[str] = set()
+        self._sweeps: list[Sweep] = []
+        self._waiting: list[tuple[Time | None, Promise[CancelAnswer]]] = []
+        self._closed = False
+        self._warned = self._garbage = ""
+        self._readiness = Readiness(name, lambda: self.ready, self._check_open, core.dispatcher)
+        if wanted is None:
+            self._discovery = ActionDiscovery(core, topics, name)
+        else:
+            self._speak(ActionTypes.of(wanted, core.types))
+        core.add(self)
+        core.wake()
+
+    # -- who is there ----------------------------------------------------------------------------
+
+    @property
+    def closed(self) -> bool:
+        """Whether :meth:`close` was called, of the client or of its node."""
+        return self._closed or self.core.closed
+
+    @property
+    def ready(self) -> bool:
+        """Whether a server is there that understands the goals.
+
+        As actionlib has it: it tells the status of its goals, and is connected on all five topics.
+        """
+        return bool(self._server) and not self._closed
+
+    @property
+    def server(self) -> str:
+        """Full name of the node that goals are sent to; empty while none is there."""
+        return "" if self._closed else self._server
+
+    @property
+    def problem(self) -> str:
+        """Why goals cannot be sent, in words; empty when all is well."""
+        if self._closed:
+            return "the client is closed"
+        problems = self._conflicts()
+        if not problems and not self.ready:
+            problems.append(self._absence())
+        return "; ".join(problems)
+
+    @property
+    def goals(self) -> Sequence[ClientGoal]:
+        """The goals of this client that have not ended, in order of sending."""
+        return tuple(self._live())
+
+    def wait_for_server(self, timeout: float | None = None) -> bool:
+        """Wait for a server; see :meth:`rosglass.comm.ActionClient.wait_for_server`."""
+        return self._readiness.wait(timeout)
+
+    def on_ready_change(
+        self, callback: Callable[[bool], None], executor: Executor | None = None
+    ) -> Handle:
+        """Call `callback` with :attr:`ready` whenever it changes."""
+        return self._readiness.add(callback, executor)
+
+    # -- goals -----------------------------------------------------------------------------------
+
+    def send_goal(
+        self,
+        goal: Message | dict[str, Any] | None = None,
+        /,
+        *,
+        on_feedback: Callable[[Message], None] | None = None,
+        on_status_change: Callable[[GoalStatus], None] | None = None,
+        on_comm_state_change: Callable[[CommState], None] | None = None,
+        on_done: Callable[[ClientGoal], None] | None = None,
+        executor: Executor | None = None,
+        timeout: float | None = 10.0,
+    ) -> Ros1ClientGoal:
+        """Send a goal, as soon as a server is there; see :meth:`comm.ActionClient.send_goal`.
+
+        Args:
+            goal: A message or a dict of fields; missing fields, and None, get the defaults.
+            on_feedback: Called with each feedback.
+            on_status_change: Called with each new status.
+            on_comm_state_change: Called with each new state of actionlib's own.
+            on_done: Called with the goal when it has ended, one way or another.
+            executor: Where callbacks run; None for the node's own dispatcher thread.
+            timeout: Seconds for the server to appear and to tell that it knows the goal; servers
+                may keep it waiting (PENDING) for as long as they like. None for ever.
+        """
+        self._check_open()
+        timeout = check_timeout(timeout, self.name)
+        if executor is not None and not isinstance(executor, Executor):
+            raise ConversionError("executor", executor, "a rosglass.comm.Executor", self.name)
+        kind = self.type
+        if kind is not None:
+            value: Any = kind.goal.create(goal)
+        elif goal is None or hasattr(goal, "to_dict") or isinstance(goal, dict):
+            value = copy.deepcopy(goal)  # the caller may change it meanwhile
+        else:
+            raise ConversionError("", goal, "a message or a dict of fields", self.name)
+        now = self.core.clock.now()
+        id_text = f"{self.core.name.full}-{next(_numbers)}-{now.sec}.{now.nanosec:09d}"
+        made = Ros1ClientGoal(self, id_text, now, value, timeout, typed=kind is not None)
+        if on_feedback is not None:
+            made.on_feedback(on_feedback, executor)
+        if on_status_change is not None:
+            made.on_status_change(on_status_change, executor)
+        if on_comm_state_change is not None:
+            made.on_comm_state_change(on_comm_state_change, executor)
+        if on_done is not None:
+            if not callable(on_done):
+                raise ConversionError("on_done", on_done, "something that can be called", self.name)
+            made.done.on_done(lambda _: on_done(made), executor)
+        with self._lock:
+            if not self._closed:
+                self._goals[id_text] = made
+        self.jobs.add(lambda: self._begin(made))
+        return made
+
+    def cancel_all(self, timeout: float | None = 10.0) -> Promise[CancelAnswer]:
+        """Ask the server to cancel all its goals; returns at once."""
+        self._check_open()
+        return self._sweep(None, check_timeout(timeout, self.name))
+
+    def cancel_before(self, time: Time, timeout: float | None = 10.0) -> Promise[CancelAnswer]:
+        """Ask the server to cancel all goals with a time stamp at or before `time`.
+
+        In ROS 1 the stamp is the sender's, see :attr:`Ros1ClientGoal.stamp`. Servers of actionlib
+        cancel goals with such a stamp that come later, too.
+        """
+        self._check_open()
+        timeout = check_timeout(timeout, self.name)
+        if not isinstance(time, Time) or not 0 < time.nanoseconds < 2**32 * 1_000_000_000:
+            told = "a rosglass.Time after 1970 and before 2106; cancel_all() cancels all goals"
+            raise ConversionError("time", time, told, self.name)
+        return self._sweep(time, timeout)
+
+    def _sweep(self, until: Time | None, timeout: float | None) -> Promise[CancelAnswer]:
+        answer: Promise[CancelAnswer] = Promise(
+            f"{self.name} has not told that it cancels goals",
+            self.core.dispatcher,
+            cancellable=False,
+        )
+
+        def give_up() -> None:
+            if any(waiting is answer for _, waiting in self._waiting):
+                why = self.problem or "its server appeared too late"
+                told = f"{self.name} could not be asked to cancel within {timeout or 0.0:g} s: "
+                answer.fail(ServiceUnavailableError(told + why))
+            answer.fail(
+                TimeoutError(
+                    f"{self.name} did not tell within {timeout or 0.0:g} s that all goals are "
+                    "cancelled. It may cancel them all the same: watch their status"
+                )
+            )
+            self._waiting = [entry for entry in self._waiting if entry[1] is not answer]
+            self._sweeps = [sweep for sweep in self._sweeps if sweep.answer is not answer]
+
+        if timeout is not None:
+            self.core.timers.after(timeout, lambda: self.jobs.add(give_up))
+        self.jobs.add(lambda: self._begin_sweep(until, answer))
+        return answer
+
+    # -- what goals ask of it, in its jobs -------------------------------------------------------
+
+    def send(self, goal: dict[str, Any]) -> None:
+        """Publish a goal; raises ConversionError."""
+        if self._ends is not None:
+            self._ends.send_goal(goal)
+
+    def ask_cancel(self, id_text: str) -> None:
+        """Publish a request to cancel one goal."""
+        if self._ends is not None and not self._closed:
+            self._ends.send_cancel(id_text, Time())
+
+    def forget(self, goal: Ros1ClientGoal) -> None:
+        """Let a goal go that has ended."""
+        with self._lock:
+            self._goals.pop(goal.id_text, None)
+
+    def ended(self) -> NodeClosedError:
+        """Return the error of goals whose client was closed."""
+        told = f"the client of {self.name} was closed before the goal ended, which goes on"
+        return NodeClosedError(told)
+
+    # -- jobs ------------------------------------------------------------------------------------
+
+    def _begin(self, goal: Ros1ClientGoal) -> None:
+        if self.closed:
+            goal.lose(self.ended())
+            return
+        goal.begin()
+        if self._server and not goal.over:
+            goal.send(self._server, self._epoch)
+
+    def _begin_sweep(self, until: Time | None, answer: Promise[CancelAnswer]) -> None:
+        if self.closed:
+            answer.fail(NodeClosedError(f"the client of {self.name} was closed"))
+            return
+        for goal in self._live():
+            if not goal.sent and (until is None or goal.stamp <= until):
+                goal.cancel()
+        if not self._server or self._ends is None:
+            self._waiting.append((until, answer))
+            return
+        before = dict(self._lists.get(self._server, {}))
+        self._sweeps.append(Sweep(until, answer, before))
+        self._ends.send_cancel("", until or Time())
+
+    def _take_status(self, server: str, message: Message) -> None:
+        entries = {
+            each.goal_id.id: Entry(state_of(each), each.text, time_of(each.goal_id.stamp))
+            for each in message.status_list
+        }
+        self._lists[server], self._heard[server] = entries, time.monotonic()
+        self._look()
+        for goal in self._live():
+            entry = entries.get(goal.id_text)
+            if entry is None:
+                goal.miss(server)
+            else:
+                goal.hear(server, entry.state, entry.text)
+        if server == self._server:
+            self._sweeps = [sweep for sweep in self._sweeps if not sweep.hear(entries)]
+
+    def _take_result(self, message: Message) -> None:
+        goal = self._goals.get(message.status.goal_id.id)
+        if goal is not None:
+            goal.finish(state_of(message.status), message.status.text, message.result)
+
+    def _take_feedback(self, message: Message) -> None:
+        goal = self._goals.get(message.status.goal_id.id)
+        if goal is not None:
+            goal.hear_feedback(message.feedback)
+
+    def _look(self) -> None:
+        """Look which server is there, and let it have what waits for one."""
+        ends = self._ends
+        if ends is None or self._closed:
+            return
+        tellers = ends.tellers()
+        for known in (self._lists, self._heard):
+            for name in known.keys() - tellers.keys():
+                known.pop(name)
+        complete = sorted(name for name in self._heard if not ends.missing(name))
+        if self._server in complete:
+            return
+        was, self._server = self._server, next(iter(complete), "")
+        if not self._server:
+            if was:
+                self._readiness.update()
+            return
+        self._since, self._epoch = time.monotonic(), self._epoch + 1
+        for goal in self._live():
+            if not goal.sent and not goal.over:
+                goal.send(self._server, self._epoch)
+        waiting, self._waiting = self._waiting, []
+        for until, answer in waiting:
+            self._begin_sweep(until, answer)
+        self._readiness.update()
+
+    def _watch(self) -> None:
+        """Look whether the servers of goals are still there."""
+        self._look()
+        ends = self._ends
+        if ends is None or self._closed:
+            return
+        tellers = ends.tellers()
+        settled = time.monotonic() - self._since >= _SETTLED
+        for goal in self._live():
+            goal.watch(tellers, self._epoch, settled)
+        for server in {goal.server for goal in self._live() if goal.sent}:
+            silent = time.monotonic() - self._heard.get(server, time.monotonic())
+            if silent >= _SILENCE and server not in self._asked:
+                self._asked.add(server)
+                self.core.errands.run(lambda s=server, u=tellers[server]: self._ask(s, u))  # type: ignore[misc]
+
+    def _ask(self, server: str, uri: str) -> None:
+        """Ask a silent server whether it lives: it may be one that tells changes only."""
+        problem = ""
+        try:
+            call_node(uri, "getPid", self.core.name.full, timeout=_ANSWER)
+        except Error as error:
+            problem = str(error)
+        self.jobs.add(lambda: self._take_life(server, problem))
+
+    def _take_life(self, server: str, problem: str) -> None:
+        self._asked.discard(server)
+        heard = self._heard.get(server)
+        if heard is None:
+            return
+        if not problem:
+            self._heard[server] = time.monotonic()
+        elif time.monotonic() - heard >= _SILENCE:  # it said nothing meanwhile either
+            self._heard.pop(server)
+            self._server = "" if self._server == server else self._server
+            self._readiness.update()
+            for goal in self._live():
+                if goal.server == server:
+                    goal.lose_server(f"fell silent ({problem}) before")
+
+    def _live(self) -> list[Ros1ClientGoal]:
+        with self._lock:
+            return list(self._goals.values())
+
+    # -- what comes, in the loop's thread --------------------------------------------------------
+
+    def _on_status(self, sample: Sample) -> None:
+        server = sample.publisher.decode()
+        self.jobs.add(lambda: self._decoded(lambda: self._take_status(server, sample.message())))
+
+    def _on_result(self, sample: Sample) -> None:
+        def take() -> None:
+            self._decoded(lambda: self._take_result(sample.message()))
+
+        # After the feedback that arrived with it on another connection.
+        self.core.loop.call(lambda: self.jobs.add(take))
+
+    def _on_feedback(self, sample: Sample) -> None:
+        self.jobs.add(lambda: self._decoded(lambda: self._take_feedback(sample.message())))
+
+    def _decoded(self, job: Callable[[], None]) -> None:
+        """Run `job`, which decodes a message; what is none is told of once."""
+        try:
+            job()
+        except DecodeError as error:
+            if str(error) != self._garbage:
+                self._garbage = str(error)
+                _log.warning("%s: what its server sends cannot be decoded: %s", self.name, error)
+
+    # -- following the graph ---------------------------------------------------------------------
+
+    def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - links change by themselves
+        """Follow the graph: the type, whether a server is there, goals whose server went."""
+        if self._closed:
+            return
+        if self._discovery is not None:
+            types = self._discovery.look()
+            if types is not None:
+                self._speak(types)
+                self._discovery.close()
+                self._discovery = None
+        problem = "; ".join(self._conflicts())
+        if problem and problem != self._warned:
+            _log.warning("%s: %s", self.name, problem)
+        self._warned = problem
+        self.jobs.add(self._watch)
+
+    def _speak(self, types: ActionTypes) -> None:
+        """Open the topics."""
+        heard = {
+            STATUS: self._on_status,
+            RESULT: self._on_result,
+            FEEDBACK: self._on_feedback,
+        }
+        ends = ActionEnds(self.core, self._topics, self.name, types, heard)
+        with self._lock:
+            self.type = types.action
+            closed = self._closed
+            if not closed:
+                self._ends = ends
+        if closed:
+            ends.close()
+
+    def _conflicts(self) -> list[str]:
+        """Say what a person has to mend."""
+        discovery, ends = self._discovery, self._ends
+        if discovery is not None:
+            return [discovery.problem] if discovery.problem else []
+        return [] if ends is None else ends.troubles()
+
+    def _absence(self) -> str:
+        """Say why no server is there although nothing is wrong."""
+        ends, graph = self._ends, self.core.graph
+        connecting = "" if ends is None else ends.absence(self._heard)
+        if connecting:
+            return connecting
+        offered = [
+            name
+            for name in actions(graph)
+            if graph.endpoints(EndpointKind.PUBLISHER, self.core.resolve(part(name, STATUS)))
+        ]
+        kind = "" if self.type is None else f" [{self.type.name}]"
+        if self.name in offered:
+            return f"the server of {self.name} is not connected yet"
+        return (
+            f"no server offers the action {self.name}{kind} on {self.core.url} "
+            f"({self.core.status()}){similar(self.name, offered)}"
+        )
+
+    # -- the end ---------------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """End the waiting for goals, which go on, and withdraw the client; safe to call twice."""
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+            ends, discovery = self._ends, self._discovery
+        if self.core.forked:
+            return
+        self.jobs.add(self._end)
+        for end in (ends, discovery):
+            if end is not None:
+                end.close()
+        self._readiness.close()
+        self.core.remove(self)
+
+    def _end(self) -> None:
+        for goal in self._live():
+            goal.lose(self.ended())
+        error = NodeClosedError(f"the client of {self.name} was closed before the server told it")
+        answers = [sweep.answer for sweep in self._sweeps] + [each[1] for each in self._waiting]
+        self._sweeps, self._waiting = [], []
+        for answer in answers:
+            answer.fail(error)
+
+    def _check_open(self) -> None:
+        self.core.check_open()
+        if self._closed:
+            raise NodeClosedError(f"the client of {self.name} is closed; create another one")
