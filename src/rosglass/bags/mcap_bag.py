@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import heapq
 import logging
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from mcap.reader import NonSeekingReader, SeekingReader
 
 from rosglass.bags.bag import Bag, BagMessage, Channel
 from rosglass.bags.qos_text import read_profiles
+from rosglass.comm import QoS
 from rosglass.errors import BagError
 from rosglass.interfaces.names import join_name
 
@@ -48,7 +50,9 @@ class McapBag(Bag):
         except BaseException:
             self._file.close()
             raise
-        self.channels = tuple(sorted(self._known.values(), key=lambda c: (c.topic, c.type_name)))
+        self._merge()
+        found = set(self._known.values())
+        self.channels = tuple(sorted(found, key=lambda c: (c.topic, c.type_name, c.offered != ())))
         if self._foreign:
             told = ", ".join(f"{topic} ({what})" for topic, what in sorted(self._foreign.items()))
             self._note(f"these topics are not ROS messages and are left out: {told}")
@@ -138,16 +142,32 @@ class McapBag(Bag):
                 what += f" described by {schema.encoding}"
             self._foreign[channel.topic] = what
             return
+        told = channel.metadata
+        offered: tuple[QoS, ...]
+        if wire == "ros1":
+            offered = (QoS.latched(),) if told.get("latching", "") in ("1", "true") else ()
+        else:
+            offered = read_profiles(told.get("offered_qos_profiles", ""))
         self._known[number] = Channel(
             channel.topic,
             join_name(schema.name),
             wire,
             schema.data.decode("utf-8", "replace"),
             language or "msg",
-            channel.metadata.get("topic_type_hash", ""),
-            read_profiles(channel.metadata.get("offered_qos_profiles", "")),
+            told.get("topic_type_hash", ""),
+            offered,
             count,
         )
+
+    def _merge(self) -> None:
+        """Make one channel of those that differ in nothing but who published."""
+        groups: dict[Channel, list[int]] = {}
+        for number, channel in self._known.items():
+            groups.setdefault(replace(channel, count=0), []).append(number)
+        for channel, numbers in groups.items():
+            counts = [self._known[number].count for number in numbers]
+            merged = replace(channel, count=-1 if -1 in counts else sum(counts))
+            self._known.update(dict.fromkeys(numbers, merged))
 
     def _note(self, problem: str) -> None:
         self.problem = f"{self.problem}; {problem}" if self.problem else problem

@@ -64,7 +64,8 @@ class PlayerStatus:
 class Player(Handle):
     """Publishes what a recording holds, until its end or until it is closed.
 
-    ROS 1 recordings are played to ROS 2 graphs, too: messages are translated on the way.
+    ROS 1 recordings are played to ROS 2 graphs and the reverse, too: messages are translated on
+    the way.
 
     Args:
         node: Who publishes.
@@ -269,12 +270,10 @@ class Player(Handle):
         found = channel.type()
         convert = None
         if channel.wire != self._node.wire:
-            if self._node.wire != "cdr":
-                raise BagError("ROS 2 recordings cannot be played to ROS 1")
-            from rosglass.bags.ros1_to_ros2 import Converter  # noqa: PLC0415 - only for ROS 1
+            from rosglass.messages import Translation  # noqa: PLC0415 - only for the other ROS's
 
-            converter = Converter(found)
-            found, convert = converter.type, converter.convert
+            translation = Translation(found)
+            found, convert = translation.type, translation.encode
         publisher = self._node.create_publisher(topic, found, channel.profile())
         self._publishers.append(publisher)
         if convert is None:
@@ -384,7 +383,8 @@ class Player(Handle):
     def _tell_time(self) -> None:
         assert self._clock is not None
         seconds, rest = divmod(self._position, _NS)
-        self._clock.publish(clock={"sec": seconds, "nanosec": rest})
+        words = ("secs", "nsecs") if self._node.wire == "ros1" else ("sec", "nanosec")
+        self._clock.publish(clock={words[0]: seconds, words[1]: rest})
         self._clock_due = time.monotonic() + self._clock_period
 
     def _send_latched(self, before: int) -> None:

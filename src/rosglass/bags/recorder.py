@@ -1,4 +1,4 @@
-"""Recording topics into an MCAP file."""
+"""Recording topics into a file: MCAP, or a ROS 1 bag."""
 
 from __future__ import annotations
 
@@ -12,13 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mcap.writer import CompressionType, Writer
-
-import rosglass
-from rosglass.bags.qos_text import write_profiles
+from rosglass.bags.recording_file import create
 from rosglass.comm import IMMEDIATE, Handle, QoS
 from rosglass.errors import BagError, Error, NodeClosedError
-from rosglass.interfaces import full_text
 from rosglass.messages import OpaqueType
 
 if TYPE_CHECKING:
@@ -28,14 +24,9 @@ if TYPE_CHECKING:
     from rosglass.comm import Node, Promise, Sample, Subscription
     from rosglass.messages import MessageType
 
-__all__ = ["COMPRESSIONS", "Recorder", "RecordingStatus"]
+__all__ = ["Recorder", "RecordingStatus"]
 
 _log = logging.getLogger("rosglass.bags")
-COMPRESSIONS = {
-    "none": CompressionType.NONE,
-    "lz4": CompressionType.LZ4,
-    "zstd": CompressionType.ZSTD,
-}
 #: Seconds of recording that a power failure may cost.
 _FLUSH = 1.0
 #: Samples that a subscription keeps while the writer is busy.
@@ -71,22 +62,24 @@ class RecordingStatus:
 
 
 class Recorder(Handle):
-    """Writes topics into an MCAP file, each as its publishers offer it, until it is closed.
+    """Writes topics into a file, each as its publishers offer it, until it is closed.
 
     Messages are stored as received, with the definitions of their types, so that the file can be
     played anywhere; types that nobody can describe are stored by name and hash. Messages of a type
     that the robot has to be asked for wait for its answer. What the file holds is complete up to a
-    second before a crash.
+    second before a crash (a ROS 1 bag then needs ``rosbag reindex``).
 
     Args:
         node: Where to listen.
-        path: File to write; it must not exist.
+        path: File to write; it must not exist. From ROS 1, a name that ends with ``.bag`` makes a
+            ROS 1 bag; any other makes an MCAP file.
         topics: Names of topics, absolute or relative; empty for all that there are and that
             appear later, hidden ones excepted.
         include: Regular expression; topics whose whole name matches are recorded as well.
         exclude: Regular expression; topics whose whole name matches are never recorded.
         hidden: Whether hidden topics (of actions, say) are among "all".
-        compression: ``zstd``, ``lz4`` or ``none``.
+        compression: ``zstd`` (MCAP only), ``lz4``, ``bz2`` (ROS 1 bags only) or ``none``; empty for
+            ``zstd`` in MCAP, and none in ROS 1 bags, as ``rosbag record`` has it.
         memory: Bytes of messages that may wait for the disk, or for their type; what comes beyond
             is dropped, counted and logged.
 
@@ -104,17 +97,14 @@ class Recorder(Handle):
         include: str = "",
         exclude: str = "",
         hidden: bool = False,
-        compression: str = "zstd",
+        compression: str = "",
         memory: int = 256 * 2**20,
     ) -> None:
-        if node.wire != "cdr":
-            raise BagError(f"only ROS 2 topics can be recorded, and {node.url} is none of its URLs")
         if isinstance(topics, str):
             raise BagError(f"topics are given as a list, e.g. [{topics!r}]")
-        if compression not in COMPRESSIONS:
-            raise BagError(f"compression {compression!r} is unknown: {', '.join(COMPRESSIONS)}")
         self.path = Path(path)
         self._node, self._memory, self._hidden = node, memory, hidden
+        self._ros2 = node.wire == "cdr"
         self._topics = frozenset(node.resolve(topic) for topic in topics)
         self._include = _expression(include, "include")
         self._exclude = _expression(exclude, "exclude")
@@ -128,22 +118,12 @@ class Recorder(Handle):
         self._begun: set[tuple[str, str]] = set()
         self._failed: dict[str, str] = {}
         self._counts: dict[str, int] = {}
-        self._channels: dict[tuple[str, str, str], int] = {}
+        self._channels: dict[tuple[str, str, str, bytes], int] = {}
         #: Definitions that the robot is asked for, and the messages that wait for them.
         self._fetches: dict[tuple[str, str], Promise[Any]] = {}
         self._held: dict[tuple[str, str], list[tuple[str, Sample]]] = {}
         self._closed = False
-        try:
-            self._file = self.path.open("xb")
-        except OSError as error:
-            hints = {
-                FileExistsError: "; choose another name",
-                FileNotFoundError: f": make the folder {self.path.parent} first",
-            }
-            hint = hints.get(type(error), "")
-            raise BagError(f"{self.path} cannot be written: {error.strerror}{hint}") from error
-        self._writer: Any = Writer(self._file, compression=COMPRESSIONS[compression])
-        self._writer.start(profile="ros2", library=f"rosglass {rosglass.__version__}")
+        self._file = create(self.path, node.wire, compression)
         self._thread = threading.Thread(target=self._work, name="recorder", daemon=True)
         self._thread.start()
         self._graph = node.on_graph_change(self._follow)
@@ -206,7 +186,9 @@ class Recorder(Handle):
         for topic in sorted(found):
             if not self._wants(topic):
                 continue
-            for type_name in sorted({p.type for p in self._node.publishers(topic)}):
+            types = {p.type for p in self._node.publishers(topic)}
+            # In ROS 1, a connection says what is sent, and the master may not know.
+            for type_name in sorted(types) if self._ros2 else ("",):
                 self._subscribe(topic, type_name)
 
     def _wants(self, topic: str) -> bool:
@@ -217,7 +199,7 @@ class Recorder(Handle):
         if self._include is not None:
             chosen = bool(self._include.fullmatch(topic))
         else:
-            hidden = any(part.startswith("_") for part in topic.split("/"))
+            hidden = self._ros2 and any(part.startswith("_") for part in topic.split("/"))
             chosen = not self._topics and (self._hidden or not hidden)
         return chosen and bool(self._node.publishers(topic))
 
@@ -228,8 +210,8 @@ class Recorder(Handle):
                 return
             self._begun.add((topic, type_name))
         try:
-            subscription = self._open(topic, type_name)
-            if subscription.type is None:
+            subscription = self._open(topic, type_name or None)
+            if subscription.type is None and type_name:
                 # Its definition is not here: what comes until the robot has told it counts, too.
                 subscription.close()
                 subscription = self._open(topic, OpaqueType(type_name))
@@ -247,7 +229,7 @@ class Recorder(Handle):
         if closed:
             subscription.close()
 
-    def _open(self, topic: str, kind: str | MessageType) -> Subscription:
+    def _open(self, topic: str, kind: str | MessageType | None) -> Subscription:
         return self._node.create_subscription(
             topic,
             kind,
@@ -291,12 +273,12 @@ class Recorder(Handle):
                     told = ", ".join(f"{count} of {topic}" for topic, count in lost.items())
                     _log.warning("%s: too much for the disk, lost %s", self.path, told)
                 if time.monotonic() - flushed > _FLUSH:
-                    self._writer.flush()
+                    self._file.flush()
                     flushed = time.monotonic()
-                self._size = self._file.tell()
+                self._size = self._file.size()
                 if closed and not batch:
                     break
-            self._writer.finish()
+            self._file.finish()
         except Exception as error:
             reason = getattr(error, "strerror", None) or error
             self._failure = f"{self.path} cannot be written: {reason}; nothing more is recorded"
@@ -307,8 +289,11 @@ class Recorder(Handle):
     def _hold(self, topic: str, sample: Sample) -> bool:
         """Keep a message whose type is not known yet; returns whether that was necessary."""
         kind = sample.type
+        # ROS 1's publishers have told their definitions already, or never will.
+        if not isinstance(kind, OpaqueType) or not self._ros2:
+            return False
         key = (kind.name, kind.rihs01)
-        if not isinstance(kind, OpaqueType) or (topic, *key) in self._channels:
+        if self._key(topic, sample) in self._channels:
             return False
         if key not in self._fetches:
             try:
@@ -341,32 +326,28 @@ class Recorder(Handle):
                 self._failed[topic] = reason
 
     def _write(self, topic: str, sample: Sample, kind: MessageType) -> None:
-        key = (topic, sample.type.name, sample.type.rihs01)
+        key = self._key(topic, sample)
         channel = self._channels.get(key)
         if channel is None:
-            channel = self._channels[key] = self._register(topic, kind)
-        received = sample.received.nanoseconds
-        self._writer.add_message(
-            channel,
-            log_time=received,
-            data=bytes(sample.data),
-            publish_time=received if sample.sent is None else sample.sent.nanoseconds,
-            sequence=max(0, sample.sequence) & 0xFFFFFFFF,
-        )
+            channel = self._channels[key] = self._file.channel(
+                topic, kind, self._offered(topic, sample), key[-1]
+            )
+        self._file.write(channel, sample)
         self._counts[topic] = self._counts.get(topic, 0) + 1
 
-    def _register(self, topic: str, found: MessageType) -> int:
-        if isinstance(found, OpaqueType):
-            schema = self._writer.register_schema(found.name, "", b"")
-        else:
-            text = full_text(found.definition).encode()
-            schema = self._writer.register_schema(found.name, "ros2msg", text)
-        profiles = [endpoint.qos for endpoint in self._node.publishers(topic)]
-        metadata: dict[str, Any] = {
-            "offered_qos_profiles": write_profiles(dict.fromkeys(profiles)),
-            "topic_type_hash": found.rihs01,
-        }
-        return int(self._writer.register_channel(topic, "cdr", schema, metadata))
+    def _key(self, topic: str, sample: Sample) -> tuple[str, str, str, bytes]:
+        """Return what a channel of the file has in common."""
+        kind = sample.type
+        told = kind.rihs01 if self._ros2 else kind.md5
+        return topic, kind.name, told, sample.publisher if self._file.by_publisher else b""
+
+    def _offered(self, topic: str, sample: Sample) -> list[QoS]:
+        """Return the quality of service of those who may have sent a message."""
+        publishers = self._node.publishers(topic)
+        if self._file.by_publisher:
+            name = sample.publisher.decode(errors="replace")
+            publishers = [end for end in publishers if end.node.full == name]
+        return [end.qos for end in publishers]
 
 
 def _expression(text: str, what: str) -> re.Pattern[str] | None:

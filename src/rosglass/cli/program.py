@@ -32,7 +32,7 @@ COMMANDS = {
     "param": ("rosglass.cli.param", "read and set the parameters of nodes"),
     "node": ("rosglass.cli.node", "look at nodes"),
     "interface": ("rosglass.cli.interface", "look at types of messages, services and actions"),
-    "record": ("rosglass.cli.record", "record topics into an MCAP file"),
+    "record": ("rosglass.cli.record", "record topics into an MCAP file or a ROS 1 bag"),
     "play": ("rosglass.cli.play", "play a recording: MCAP, ROS 2 bag or ROS 1 bag"),
     "doctor": ("rosglass.cli.doctor", "find what keeps this machine and the robot apart"),
     "router": ("rosglass.cli.router", "run a Zenoh router for ROS 2 (rmw_zenoh)"),

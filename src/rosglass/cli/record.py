@@ -1,4 +1,4 @@
-"""``rosglass record``: write topics into an MCAP file."""
+"""``rosglass record``: write topics into an MCAP file or a ROS 1 bag."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--output",
         metavar="FILE.mcap",
         type=Path,
-        help="file to write; default: recording_<date>_<time>.mcap",
+        help="file to write; default: recording_<date>_<time>.mcap; from ROS 1 also FILE.bag",
     )
     parser.add_argument(
         "-a", "--all", action="store_true", help="record all topics; this is the default"
@@ -65,9 +65,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--compression",
-        choices=("zstd", "lz4", "none"),
-        default="zstd",
-        help="how the file is compressed (default: %(default)s)",
+        choices=("zstd", "lz4", "bz2", "none"),
+        default="",
+        help="how the file is compressed (default: zstd; .bag: none, lz4 or bz2, default none)",
     )
     parser.add_argument("-q", "--quiet", action="store_true", help="show no progress")
     add_connection_options(parser)
@@ -79,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
     from rosglass.bags import Recorder
 
     path = args.output or Path(f"recording_{datetime.now():%Y-%m-%d_%H-%M-%S}")
-    if path.suffix != ".mcap":
+    if path.suffix not in (".mcap", ".bag"):
         path = path.with_name(f"{path.name}.mcap")
     if args.all and args.topics:
         raise Error("--all and names of topics exclude each other")
