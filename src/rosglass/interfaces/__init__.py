@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rosglass.interfaces.counterparts import Counterparts, Pair, PairedField
 from rosglass.interfaces.definition import (
     ActionDefinition,
     ArrayKind,
@@ -41,6 +42,7 @@ __all__ = [
     "ActionDefinition",
     "ArrayKind",
     "Constant",
+    "Counterparts",
     "Definition",
     "Distributions",
     "Field",
@@ -49,6 +51,8 @@ __all__ = [
     "InterfaceDefinition",
     "Library",
     "MemoryProvider",
+    "Pair",
+    "PairedField",
     "Provider",
     "ServiceDefinition",
     "Source",

@@ -4,6 +4,7 @@ from rosglass.messages.loading import ActionType, ServiceType, default_library, 
 from rosglass.messages.message import Message, type_of
 from rosglass.messages.opaque import OpaqueType
 from rosglass.messages.sequences import MessageSequence
+from rosglass.messages.translation import ServiceTranslation, Translation
 from rosglass.messages.types import Constants, MessageType
 
 __all__ = [
@@ -13,7 +14,9 @@ __all__ = [
     "MessageSequence",
     "MessageType",
     "OpaqueType",
+    "ServiceTranslation",
     "ServiceType",
+    "Translation",
     "default_library",
     "load",
     "type_of",

@@ -17,6 +17,7 @@ from rosglass.messages.conversion import array_packer, as_bool, as_float, as_int
 from rosglass.messages.layout import START, Cursor, Knowledge
 from rosglass.messages.runtime import MAX_EMPTY, as_list, odd, own, write_wide
 from rosglass.messages.schema import Kind
+from rosglass.messages.sequences import same_bytes
 from rosglass.messages.source import Source, packer
 
 if TYPE_CHECKING:
@@ -289,7 +290,11 @@ class Writer:
         line = self.source.line
         line(f"{items} = {value}")
         to_list = self.source.bind(as_list, "as_list")
-        line(f"if type({items}) is not list: {items} = {to_list}({items})")
+        block = self._block(member, items)
+        if block:
+            line(f"if {block} is None and type({items}) is not list: {items} = {to_list}({items})")
+        else:
+            line(f"if type({items}) is not list: {items} = {to_list}({items})")
         count = str(member.fixed_count)
         strange = self.source.bind(odd, "odd")
         if member.fixed_count is not None:
@@ -312,13 +317,35 @@ class Writer:
         stride = layout.constant_stride(schema, self.wire)
         simple = layout.leaves(schema) < layout.MANY
         if stride is not None and stride[0] == stride[1] and schema.members and simple:
-            self._records(schema, stride[0], head, item, count)
+            self._records(schema, stride[0], head, item, count, block)
             return
         with self._loop(head, lambda known: layout.after_schema(known, self.wire, schema)):
             self.check_holder(schema, item)
             self.fields(schema, item)
 
-    def _records(self, schema: Schema, size: int, head: str, item: str, count: str) -> None:
+    def _block(self, member: Member, items: str) -> str:
+        """Emit the search for elements whose bytes can be written as they are.
+
+        Returns the local that holds them, or None in it; empty where elements have gaps.
+        """
+        schema = member.struct
+        stride = None if schema is None else layout.constant_stride(schema, self.wire)
+        if schema is None or stride is None or not layout.all_numbers(schema):
+            return ""
+        size = layout.min_size(schema, self.wire)
+        if stride != (size, size):
+            return ""
+        block, same = self.source.fresh("k"), self.source.bind(same_bytes, "same_bytes")
+        kept = self.source.bind(schema, "schema")
+        self.source.line(
+            f"{block} = None if type({items}) is list else "
+            f"{same}({items}, {kept}, {size}, {self.wire.big})"
+        )
+        return block
+
+    def _records(
+        self, schema: Schema, size: int, head: str, item: str, count: str, block: str
+    ) -> None:
         """Write messages of one size without a gap between them."""
         self._zeros()
         self._open_list()
@@ -327,6 +354,10 @@ class Writer:
         self._pad(align, count)
         self._zeros()
         after = self.cursor.copy()
+        if block:
+            items = head.removesuffix(":").rpartition(" ")[2]
+            self.source.line(f"if {block} is not None: add({block})")
+            head = f"for {item} in () if {block} is not None else {items}:"
         with self.source.block(head):
             self.check_holder(schema, item)
             self.cursor.known = Knowledge(align, 0) if self.wire.aligned else START

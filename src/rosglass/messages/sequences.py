@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rosglass.messages.message import Message
     from rosglass.messages.schema import Schema
 
-__all__ = ["MessageSequence", "record_type"]
+__all__ = ["MessageSequence", "record_type", "same_bytes"]
 
 _lock = threading.RLock()
 
@@ -139,6 +139,26 @@ class MessageSequence(MutableSequence["Message"]):
             else:
                 made = numpy.array([_row(item) for item in self._all()], dtype)
         return made  # type: ignore[no-any-return]
+
+
+def same_bytes(value: Any, schema: Schema, size: int, big: bool) -> memoryview | None:
+    """Return the bytes of elements that nobody has looked at, if they are what is to be written.
+
+    Args:
+        value: The array.
+        schema: What its elements are to be.
+        size: Bytes of each, which leave no gap.
+        big: Their byte order.
+    """
+    if not isinstance(value, MessageSequence) or value._items is not None:
+        return None
+    codec = value._codec
+    if codec.schema is not schema or codec.stride != (size, size) or codec.wire.big != big:
+        return None
+    end = value._start + value._count * size
+    if end > len(value._buffer):
+        return None  # decoding says what is wrong
+    return memoryview(value._buffer)[value._start : end]
 
 
 def _row(message: Message) -> tuple[Any, ...]:
