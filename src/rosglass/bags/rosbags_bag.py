@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rosbags.highlevel import AnyReader
+from rosbags.rosbag1 import Reader
 
 from rosglass.bags.bag import Bag, BagMessage, Channel
 from rosglass.bags.qos_text import profile
@@ -30,7 +31,8 @@ class RosbagsBag(Bag):
     def __init__(self, path: Path) -> None:
         self.path = path
         try:
-            self._reader: Any = AnyReader([path])
+            # AnyReader refuses whole bags for one definition that is missing or wrong.
+            self._reader: Any = Reader(path) if path.suffix == ".bag" else AnyReader([path])
             self._reader.open()
         except Exception as error:  # whatever the damage leads to, in whichever library below
             raise BagError(
@@ -38,7 +40,7 @@ class RosbagsBag(Bag):
                 "(.mcap), ROS 2 bags (a folder with metadata.yaml, .db3) and ROS 1 bags (.bag)"
             ) from error
         self._open = True
-        wire = "cdr" if self._reader.is2 else "ros1"
+        wire = "ros1" if isinstance(self._reader, Reader) or not self._reader.is2 else "cdr"
         grouped: dict[Channel, list[Any]] = {}
         for connection in self._reader.connections:
             grouped.setdefault(_channel(connection, wire), []).append(connection)

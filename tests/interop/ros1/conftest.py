@@ -6,6 +6,7 @@ import hashlib
 import itertools
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import xmlrpc.client
@@ -320,4 +321,8 @@ def start_tool(
 
     yield start_tool
     for process in started:
+        # rosbag hands this on to the program that it started; it would outlive being killed.
+        process.popen.send_signal(signal.SIGINT)
+        with suppress(subprocess.TimeoutExpired):
+            process.popen.wait(10)
         process.end()

@@ -97,3 +97,13 @@ def do_unsubscribe(peer, topic):
 def do_count(peer, topic):
     """Return how many messages a subscription received."""
     return peer.kept["count", topic][0]
+
+
+def do_time(peer):
+    """Return the node's time in seconds, which follows /clock with use_sim_time."""
+    return rospy.get_time()
+
+
+def do_sources(peer, topic):
+    """Return how many publishers a subscription is connected to."""
+    return peer.kept["subscriber", topic].get_num_connections()

@@ -1,0 +1,231 @@
+"""Recording from ROS 1 and playing to it, with rosbag, rospy and rosbags as judges."""
+
+from __future__ import annotations
+
+import base64
+import time
+from typing import TYPE_CHECKING
+
+import pytest
+from mcap.reader import make_reader
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag1 import Reader, Writer
+
+import rosglass
+from rosglass.bags import Player, Recorder, open_bag
+from rosglass.comm import Durability
+from rosglass.errors import BagError
+from rosglass.messages import OpaqueType
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+STRING, GRID = "std_msgs/String", "nav_msgs/OccupancyGrid"
+CELLS = {"info": {"width": 2, "height": 1, "resolution": 0.25}, "data": [-1, 100]}
+
+
+@pytest.fixture(params=["a.mcap", "a.bag", "lz4.bag", "bz2.bag"])
+def recording(request, connect, rospy_peer, tmp_path, wait_for) -> Path:
+    """Five texts of rospy, then five of ours, and a map from before."""
+    rospy_peer.call("publish", topic="/map", type=GRID, value=CELLS, latch=True)
+    rospy_peer.call("publish", topic="/words", type=STRING)
+    robot, ears = connect("robot"), connect("ears")
+    ours = robot.create_publisher("/words", STRING)
+    path = tmp_path / request.param
+    compression = request.param.partition(".")[0].replace("a", "")
+    with Recorder(ears, path, ["/words", "/map"], compression=compression) as recorder:
+        wait_for(ours.subscription_count)
+        wait_for(lambda: rospy_peer.call("connections", topic="/words"))
+        for number in range(5):
+            value = {"data": f"rospy {number}"}
+            rospy_peer.call("publish", topic="/words", type=STRING, value=value)
+            time.sleep(0.05)
+        wait_for(lambda: recorder.status().messages == 6)
+        for number in range(5):
+            ours.publish(data=f"ours {number}")
+            time.sleep(0.05)
+        wait_for(lambda: recorder.status().messages == 11)
+    status = recorder.status()
+    assert status.topics == {"/map": 1, "/words": 10}
+    assert not status.dropped
+    assert not status.problems
+    for topic in ("/map", "/words"):
+        rospy_peer.call("unpublish", topic=topic)
+    robot.close()
+    return path
+
+
+def test_recordings_are_read_by_others_and_by_us(recording, tool):
+    texts = [f"rospy {number}" for number in range(5)] + [f"ours {number}" for number in range(5)]
+    if recording.suffix == ".bag":
+        told = tool("rosbag", "info", str(recording))
+        lines = [line.split() for line in told.splitlines()]
+        assert ["messages:", "11"] in lines
+        assert ["/words", "10", "msgs", ":", STRING, "(2", "connections)"] in lines
+        assert any(line[-5:] == ["/map", "1", "msg", ":", GRID] for line in lines)
+        compression = recording.stem if recording.stem in ("lz4", "bz2") else "none"
+        assert ["compression:", compression] in [line[:2] for line in lines]
+        with AnyReader([recording]) as reader:
+            found = {
+                (c.topic, c.ext.callerid, c.ext.latching, c.msgcount) for c in reader.connections
+            }
+            assert [
+                reader.deserialize(data, c.msgtype).data
+                for c, _, data in reader.messages()
+                if c.topic == "/words"
+            ] == texts
+        assert found == {
+            ("/map", "/rospy_peer", 1, 1),
+            ("/words", "/rospy_peer", 0, 5),
+            ("/words", "/robot", 0, 5),
+        }
+    else:
+        with recording.open("rb") as file:
+            reader = make_reader(file)
+            assert reader.get_header().profile == "ros1"
+            summary = reader.get_summary()
+            callers = {
+                (c.topic, c.metadata["callerid"], c.metadata["latching"])
+                for c in summary.channels.values()
+            }
+            assert {s.encoding for s in summary.schemas.values()} == {"ros1msg"}
+            assert {s.name for s in summary.schemas.values()} == {STRING, GRID}
+            assert {c.message_encoding for c in summary.channels.values()} == {"ros1"}
+        assert callers == {
+            ("/map", "/rospy_peer", "1"),
+            ("/words", "/rospy_peer", "0"),
+            ("/words", "/robot", "0"),
+        }
+    with open_bag(recording) as bag:
+        grid, words = bag.channels
+        assert (grid.topic, grid.count, words.topic, words.count) == ("/map", 1, "/words", 10)
+        assert grid.profile().durability is Durability.TRANSIENT_LOCAL
+        assert words.profile().durability is Durability.VOLATILE
+        kind = words.type()
+        found = [kind.decode(m.data, wire="ros1").data for m in bag.messages([words])]
+    assert found == texts
+
+
+def test_a_recording_plays_to_rospy_as_it_was(recording, connect, rospy_peer, wait_for):
+    node = connect("player")
+    rospy_peer.call("subscribe", topic="/words", type=STRING)
+    with open_bag(recording) as bag, Player(node, bag, delay=0, paused=True) as player:
+        assert not player.problems
+        wait_for(lambda: rospy_peer.call("sources", topic="/words"))
+        player.resume()
+        told = [rospy_peer.event("received") for _ in range(10)]
+        # The map was sent before rospy asks for it.
+        rospy_peer.call("subscribe", topic="/map", type=GRID)
+        grid = rospy_peer.event("received")
+        assert player.wait(10)
+    assert [each["value"]["data"] for each in told] == [
+        *(f"rospy {number}" for number in range(5)),
+        *(f"ours {number}" for number in range(5)),
+    ]
+    assert told[0]["header"]["md5sum"] == rosglass.load(STRING, ros=1).md5
+    assert grid["value"]["data"] == CELLS["data"]
+    assert grid["header"]["latching"] == "1"
+    for topic in ("/words", "/map"):
+        rospy_peer.call("unsubscribe", topic=topic)
+
+
+def test_rosbag_plays_our_recording_to_us(connect, rospy_peer, tmp_path, wait_for, start_tool):
+    robot, ears = connect("robot"), connect("ears")
+    ours = robot.create_publisher("/again", STRING, rosglass.QoS.latched())
+    ours.publish(data="once")
+    with Recorder(ears, tmp_path / "again.bag", ["/again"]) as recorder:
+        wait_for(lambda: recorder.status().messages)
+    robot.close()
+    start_tool("rosbag", "play", "--quiet", "--keep-alive", str(tmp_path / "again.bag"))
+    assert ears.create_subscription("/again").wait(10).message().data == "once"
+
+
+def test_a_bag_of_an_unknown_type_plays_by_the_definition_it_holds(connect, tmp_path, rospy_peer):
+    text = "uint8 LEVEL=3\nstring[] words\nduration wait\n"
+    kind = rosglass.MessageType.from_text("secret_msgs/Vault", text, ros=1)
+    data = kind.encode({"words": ["gold", "café"], "wait": {"secs": -1, "nsecs": 5}}, wire="ros1")
+    path = tmp_path / "secret.bag"
+    with Writer(path) as writer:
+        connection = writer.add_connection(
+            "/vault", "secret_msgs/msg/Vault", msgdef=text, md5sum=kind.md5, latching=1
+        )
+        writer.write(connection, 1_000_000_000, data)
+    node = connect("player")
+    with open_bag(path) as bag, Player(node, bag, delay=0.1) as player:
+        player.wait(10)
+        rospy_peer.call("subscribe", topic="/vault")
+        received = rospy_peer.event("received")
+    assert received["header"]["type"] == "secret_msgs/Vault"
+    assert received["header"]["md5sum"] == kind.md5
+    assert received["header"]["message_definition"].strip() == text.strip()
+    assert base64.b64decode(received["raw"]) == data
+    rospy_peer.call("unsubscribe", topic="/vault")
+
+
+def test_the_clock_of_a_recording_drives_rospy(connect, start_master, start_rospy, tmp_path):
+    kind = rosglass.load(STRING, ros=1)
+    path = tmp_path / "old.bag"
+    with Writer(path) as writer:
+        connection = writer.add_connection(
+            "/words", "std_msgs/msg/String", msgdef="string data\n", md5sum=kind.md5
+        )
+        for second in range(20):
+            data = kind.encode({"data": str(second)}, wire="ros1")
+            writer.write(connection, (1000 + second) * 1_000_000_000, data)
+    master = start_master()
+    master.call("setParam", "/use_sim_time", True)
+    peer = start_rospy("follower", master=master)
+    node = connect("player", url=master.url)
+    with open_bag(path) as bag, Player(node, bag, rate=5, clock=50, delay=0.1) as player:
+        times = [peer.call("time") for _ in range(40) if not time.sleep(0.05)]
+        assert not player.wait(0)
+    assert times == sorted(times)
+    assert 1000 <= times[-1] <= 1020
+    assert times[-1] - times[0] > 2
+    peer.end()
+
+
+def test_a_publisher_without_definition_is_recorded_as_bytes(connect, tmp_path, wait_for):
+    robot, ears = connect("robot"), connect("ears")
+    secret = robot.create_publisher("/sealed", OpaqueType("sealed_msgs/msg/Box", "a" * 32, ros=1))
+    with Recorder(ears, tmp_path / "sealed.bag", ["/sealed"]) as recorder:
+        wait_for(secret.subscription_count)
+        secret.publish_serialized(b"\x01\x02")
+        wait_for(lambda: recorder.status().messages, what=lambda: str(recorder.status()))
+    with Reader(tmp_path / "sealed.bag") as reader:
+        ((connection, _, data),) = reader.messages()
+    assert (connection.msgtype, connection.digest, bytes(data)) == (
+        "sealed_msgs/msg/Box", "a" * 32, b"\x01\x02",
+    )  # fmt: skip
+    with open_bag(tmp_path / "sealed.bag") as bag:
+        assert [message.data for message in bag.messages()] == [b"\x01\x02"]
+
+
+def test_all_topics_are_recorded_whatever_their_names(connect, start_master, tmp_path, wait_for):
+    url = start_master().url
+    robot, ears = connect("robot", "/left_arm", url=url), connect("ears", url=url)
+    private = robot.create_publisher("~_state", STRING)
+    with Recorder(ears, tmp_path / "all", exclude="/rosout.*") as recorder:
+        wait_for(private.subscription_count)
+        private.publish(data="a")
+        late = robot.create_publisher("late", "std_msgs/Empty")
+        wait_for(late.subscription_count)
+        late.publish()
+        wait_for(lambda: recorder.status().messages == 2, what=lambda: str(recorder.status()))
+    assert recorder.status().topics == {"/left_arm/late": 1, "/left_arm/robot/_state": 1}
+
+
+@pytest.mark.parametrize(
+    ("name", "compression", "reason"),
+    [
+        ("a.bag", "zstd", "compression 'zstd': none, lz4, bz2"),
+        ("a.mcap", "bz2", "compression 'bz2': zstd, lz4, none"),
+        ("there.bag", "", "choose another name"),
+        ("no/where.bag", "", "make the folder"),
+    ],
+)
+def test_what_cannot_be_written_is_refused(connect, tmp_path, name, compression, reason):
+    (tmp_path / "there.bag").write_text("mine")
+    with pytest.raises(BagError, match=reason):
+        Recorder(connect("ears"), tmp_path / name, compression=compression)
+    assert (tmp_path / "there.bag").read_text() == "mine"
