@@ -272,7 +272,8 @@ class Robot:
                 step=3 * width,
                 data=picture.reshape(-1),
             )
-        self._send["/camera/camera_info"].publish(telemetry.camera_info(stamp))
+        info = self._send["/camera/camera_info"]
+        info.publish(telemetry.camera_info(stamp, info.type.ros))
         compressed = self._send.get("/camera/image_raw/compressed")
         if compressed is not None and compressed.subscription_count():
             import cv2  # noqa: PLC0415 - an extra

@@ -45,7 +45,7 @@ _GRAVITY = 9.81
 
 def header(stamp: Time, frame: str) -> Fields:
     """Return a ``std_msgs/msg/Header``."""
-    return {"stamp": stamp.to_dict(), "frame_id": frame}
+    return {"stamp": stamp, "frame_id": frame}
 
 
 def _vector(x: float, y: float, z: float) -> Fields:
@@ -216,7 +216,7 @@ def occupancy_grid(cells: npt.NDArray[np.int8], resolution: float, stamp: Time) 
     return {
         "header": header(stamp, "map"),
         "info": {
-            "map_load_time": stamp.to_dict(),
+            "map_load_time": stamp,
             "resolution": resolution,
             "width": columns,
             "height": rows,
@@ -229,18 +229,22 @@ def occupancy_grid(cells: npt.NDArray[np.int8], resolution: float, stamp: Time) 
     }
 
 
-def camera_info(stamp: Time) -> Fields:
-    """Return ``sensor_msgs/msg/CameraInfo``: a camera without distortion."""
+def camera_info(stamp: Time, ros: int = 2) -> Fields:
+    """Return ``sensor_msgs/msg/CameraInfo``: a camera without distortion; ROS 1's if `ros` is 1."""
     k = [FOCAL, 0.0, WIDTH / 2, 0.0, FOCAL, HEIGHT / 2, 0.0, 0.0, 1.0]
+    matrices = {
+        "d": [0.0] * 5,
+        "k": k,
+        "r": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        "p": [FOCAL, 0.0, WIDTH / 2, 0.0, 0.0, FOCAL, HEIGHT / 2, 0.0, 0.0, 0.0, 1.0, 0.0],
+    }
     return {
         "header": header(stamp, "camera_optical_frame"),
         "width": WIDTH,
         "height": HEIGHT,
         "distortion_model": "plumb_bob",
-        "d": [0.0] * 5,
-        "k": k,
-        "r": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-        "p": [FOCAL, 0.0, WIDTH / 2, 0.0, 0.0, FOCAL, HEIGHT / 2, 0.0, 0.0, 0.0, 1.0, 0.0],
+        # ROS 2 forbids capitals in the names of fields.
+        **({name.upper(): value for name, value in matrices.items()} if ros == 1 else matrices),
     }
 
 

@@ -33,7 +33,7 @@ class Transport:
         name: Its name, as ROS's image_transport knows it.
         type: Message type.
         fields: Paths of the message's fields that `read` needs.
-        read: Makes a picture from those fields.
+        read: Makes a picture from the two parts of the stamp and those fields.
     """
 
     name: str
@@ -51,7 +51,10 @@ class Transport:
         The function raises DecodeError for malformed samples and UnsupportedError for pictures
         that cannot be shown.
         """
-        get = type.path(*self.fields, wire=wire)
+        # ROS 1 has other names for the two parts of a time.
+        stamp = ("secs", "nsecs") if type.ros == 1 else ("sec", "nanosec")
+        header = [f"header.stamp.{part}" for part in stamp]
+        get = type.path(*header, *self.fields, wire=wire)
         read = self.read
         return lambda sample: read(*get(sample.data))
 
@@ -98,19 +101,18 @@ def _read_compressed(sec: int, nanosec: int, frame_id: str, format: str, data: A
     return decompress(data, format, _stamp(sec, nanosec), frame_id)
 
 
-_HEADER = ("header.stamp.sec", "header.stamp.nanosec", "header.frame_id")
 #: Every transport that can be shown.
 TRANSPORTS = {
     "raw": Transport(
         "raw",
         "sensor_msgs/msg/Image",
-        (*_HEADER, "height", "width", "encoding", "is_bigendian", "step", "data"),
+        ("header.frame_id", "height", "width", "encoding", "is_bigendian", "step", "data"),
         _read_raw,
     ),
     "compressed": Transport(
         "compressed",
         "sensor_msgs/msg/CompressedImage",
-        (*_HEADER, "format", "data"),
+        ("header.frame_id", "format", "data"),
         _read_compressed,
     ),
 }
