@@ -37,7 +37,7 @@ _anonymous = itertools.count(1)
 def connect(
     url: str | None = None,
     name: str | None = None,
-    namespace: str = "/",
+    namespace: str | None = None,
     *,
     library: Library | None = None,
     arguments: Sequence[str] = (),
@@ -70,18 +70,26 @@ def connect(
             ``ros1://robot?ip=192.168.1.5``: ``ip`` (host or address under which others reach this
             machine; default: ROS_HOSTNAME, ROS_IP, or the address from which the master is
             reached), ``tcpros_port`` and ``slave_port`` (to listen on, for firewalls; default:
-            any). ``ros1://`` alone means the master that ROS_MASTER_URI names, or one on this
-            machine.
+            any), ``anonymous=true`` (append to the node's name what makes it the only one: a
+            second node of a name ends the first one). ``ros1://`` alone means the master that
+            ROS_MASTER_URI names, or one on this machine.
 
             None asks the environment: ROSGLASS_URL, then RMW_IMPLEMENTATION,
             ZENOH_SESSION_CONFIG_URI, ROS_DISTRO, ROS_DOMAIN_ID and ROS_MASTER_URI.
-        name: Base name of the node; None for ``rosglass_<process id>``.
-        namespace: Absolute namespace of the node.
+        name: Base name of the node; None for one that nobody else has, ``rosglass_<process id>``;
+            in ROS 1 with host and time, too.
+        namespace: Absolute namespace of the node; None for ROS_NAMESPACE in ROS 1, which
+            counts for ``/``, too, else ``/``.
         library: Where message definitions come from; None for the shared library.
         arguments: A command line such as ``sys.argv``: what stands in it between ``--ros-args``
             and ``--`` can rename the node, its topics and services (``-r chatter:=talk``,
             ``-r __node:=left``, ``-r __ns:=/arm``), set parameters (``-p speed:=1.5``,
             ``--params-file robot.yaml``) and log levels (``--log-level debug``).
+
+            In ROS 1: ``chatter:=talk`` for topics, services and parameters, ``_speed:=1.5`` for
+            private parameters, ``__name:=left``, ``__ns:=/arm``, ``__ip:=192.168.1.5``,
+            ``__hostname:=panel`` and ``__master:=http://robot:11311``, anywhere; between
+            ``--ros-args`` and ``--`` also ``-r chatter:=talk`` and ``-p speed:=1.5``.
         own_services: Whether other nodes find what every node offers: in ROS 2 its parameters, its
             log, descriptions of its types; in ROS 1 its log and services for log levels. They
             appear shortly after connecting.
@@ -110,21 +118,29 @@ def connect(
         raise UnsupportedError(
             f"cannot connect to {url!r}: {reason}; known: {_KNOWN}, e.g. {_EXAMPLES}"
         )
-    if name is None:
-        number = next(_anonymous)
-        name = f"rosglass_{os.getpid()}" + (f"_{number}" if number > 1 else "")
     if scheme == "ros1":
+        from rosglass.ros1.arguments import Arguments as Ros1Arguments  # noqa: PLC0415
         from rosglass.ros1.node import Ros1Node  # noqa: PLC0415
         from rosglass.ros1.options import Ros1Options  # noqa: PLC0415
 
+        options = Ros1Options.parse(url, arguments=Ros1Arguments.parse(arguments))
         return Ros1Node(
-            Ros1Options.parse(url), url, name, namespace, library, own_services=own_services
+            options,
+            url,
+            options.node_name(name),
+            options.namespace(namespace),
+            library,
+            options.arguments.parameters,
+            own_services=own_services,
         )
+    if name is None:
+        number = next(_anonymous)
+        name = f"rosglass_{os.getpid()}" + (f"_{number}" if number > 1 else "")
     from rosglass.ros2.arguments import Arguments  # noqa: PLC0415
 
     told = Arguments.parse(arguments)
     name = told.node_name(name)
-    namespace = told.namespace(name, namespace)
+    namespace = told.namespace(name, "/" if namespace is None else namespace)
     middleware = _dds(url) if scheme == "dds" else _zenoh(url)
     from rosglass.ros2.node import Ros2Node  # noqa: PLC0415
 

@@ -77,8 +77,6 @@ class Ros1ActionClient(ActionClient, Member):
         jobs: Where all that happens to the client and its goals happens, one after the other.
     """
 
-    listed = False
-
     def __init__(self, core: Core, topics: Topics, name: str, wanted: ActionType | None) -> None:
         self.name, self.core = name, core
         self.jobs = InOrder()

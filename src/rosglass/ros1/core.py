@@ -5,7 +5,6 @@ from __future__ import annotations
 import atexit
 import logging
 import os
-import socket
 import threading
 from abc import abstractmethod
 from contextlib import suppress
@@ -21,44 +20,48 @@ from rosglass.comm import (
     Timers,
     Worker,
 )
-from rosglass.errors import ConnectionLostError, Error, MasterError, NodeClosedError
-from rosglass.ros1.address import is_loopback
+from rosglass.errors import Error, NodeClosedError
+from rosglass.ros1.address import bracketed, own_address
+from rosglass.ros1.door import Door, listen
 from rosglass.ros1.errands import Errands
 from rosglass.ros1.graph import Graph
-from rosglass.ros1.io_loop import READ, IoLoop
+from rosglass.ros1.io_loop import IoLoop
 from rosglass.ros1.master import Master
 from rosglass.ros1.names import expand
+from rosglass.ros1.registrations import Registrations
+from rosglass.ros1.slave import Slave
 from rosglass.ros1.types import Types
 
 if TYPE_CHECKING:
+    import socket
     from collections.abc import Callable
 
-    from rosglass.comm import NodeName
+    from rosglass.comm import EndpointKind, NodeName
     from rosglass.interfaces import Library
     from rosglass.ros1.options import Ros1Options
-    from rosglass.ros1.slave import Slave
+    from rosglass.ros1.slave import SlaveApi
 
 __all__ = ["Core", "Member"]
 
 _log = logging.getLogger("rosglass.ros1")
-#: Seconds between looks at the master, which tells nobody when it was restarted.
+#: Seconds between the members' regular looks.
 _POLL = 1.0
-#: Seconds that closing waits for the master.
-_FAREWELL = 2.0
-_BACKLOG = 128
+#: Seconds that closing waits until listeners were told that somebody else has closed the node.
+_TELLING = 1.0
 
 
 class Member(Handle):
     """Something created from a node: it is registered with the master, and ends with the node.
 
     Attributes:
-        listed: Whether the master's state of the system shows it once it is registered.
+        place: As what the master shows it once it is registered, and under which name: it is
+            registered again should it be missing there. None for what the master does not show.
     """
 
-    listed = True
+    place: tuple[EndpointKind, str] | None = None
 
     def register(self, master: Master) -> None:
-        """Tell the master of it; called on the node's own thread, again after its restart.
+        """Tell the master of it; called on a thread that may wait, again after its restart.
 
         Raises:
             ConnectionLostError: The master does not answer; this is called again then.
@@ -67,6 +70,10 @@ class Member(Handle):
 
     def unregister(self, master: Master) -> None:
         """Tell the master that it is gone; called on a thread that may wait."""
+
+    def lacks(self, publishers: int) -> bool:  # noqa: ARG002 - most have none
+        """Return whether it is connected with fewer publishers than the master knows."""
+        return False
 
     def follow(self, moved: bool, idle: bool) -> None:
         """Follow the graph; called on the node's own thread, and may take its time.
@@ -115,6 +122,7 @@ class Core:
         self, name: NodeName, url: str, options: Ros1Options, library: Library | None
     ) -> None:
         self.name, self.url, self.options = name, url, options
+        self._new_names = options.arguments.remappings(name.name, name.namespace)
         self.master = Master(options.master, name.full)
         self.graph, self.types = Graph(), Types(library, url)
         self.graph_listeners: Listeners[None] = Listeners(merge=True)
@@ -127,37 +135,54 @@ class Core:
         self._lock = threading.Lock()
         self._closed = False
         self._process = os.getpid()
+        self.address, self.uri = ("", 0), ""
+        self._doors: list[Door] = []
         self._members: dict[Member, None] = {}
-        #: Members that the master was told of since it was started.
-        self._registered: set[Member] = set()
         self._moved = False
-        self._master_pid = -1
+        self._telling = threading.Lock()
         self._status = Status(ConnectionState.CONNECTING, f"looking for {options.master}")
-        self._listener = self._listen()
-        self.address = (options.address, self._listener.getsockname()[1])
-        self.slave: Slave | None = None
+        sockets: list[socket.socket] = []
+        try:
+            for port in (options.tcpros_port, options.slave_port):
+                sockets += [listen(options.address, port, url)]
+        except BaseException:
+            for sock in sockets:
+                sock.close()
+            raise
+        self._tcpros, self._slave = sockets
+        #: All addresses that the node's own API has had.
+        self.uris: set[str] = set()
+        self.move(options.address or own_address())
         self.loop = IoLoop(f"{name.name} connections")
+        self._registrations = Registrations(self)
         self._worker = Worker(f"{name.name} graph", self._follow, _POLL)
 
-    def start(self, slave: Slave, accept: Callable[[socket.socket, str], None]) -> None:
+    def start(self, api: SlaveApi, accept: Callable[[socket.socket, str], None]) -> None:
         """Begin to listen, and to look for the master.
 
         Args:
-            slave: The node's API.
+            api: What the master and others can ask.
             accept: Called in the loop's thread with each connection and its address.
         """
-        self.slave = slave
-        door = _Door(self._listener, accept)
-        self.loop.call(lambda: self.loop.watch(self._listener, READ, door))
+        self._doors = [
+            Door(self.loop, self._tcpros, accept),
+            Door(self.loop, self._slave, Slave(api).accept),
+        ]
+        for door in self._doors:
+            self.loop.call(door.open)
         # Threads that hand on messages must not meet an interpreter that is being taken down.
         atexit.register(self.close)
-        self._worker.wake()
+        self._registrations.start()
 
-    @property
-    def uri(self) -> str:
-        """Where the node's own API is reached."""
-        assert self.slave is not None
-        return self.slave.uri
+    def move(self, host: str) -> bool:
+        """Let the node be reached under another host name or address; return whether it is."""
+        place = (host, self._tcpros.getsockname()[1])
+        moved = place != self.address
+        if moved:
+            self.address = place
+            self.uri = f"http://{bracketed(host)}:{self._slave.getsockname()[1]}/"
+            self.uris.add(self.uri)
+        return moved
 
     @property
     def closed(self) -> bool:
@@ -171,7 +196,13 @@ class Core:
 
     def runs_here(self) -> bool:
         """Return whether the calling thread is one of the node's own."""
-        threads = (self._worker, self.dispatcher, self.own_dispatcher, self.loop)
+        threads = (
+            self._worker,
+            self._registrations,
+            self.dispatcher,
+            self.own_dispatcher,
+            self.loop,
+        )
         return any(thread.is_current for thread in threads)
 
     def resolve(self, name: str) -> str:
@@ -181,7 +212,7 @@ class Core:
             InvalidNameError: The name breaks ROS's rules.
         """
         full = self.expand(name)
-        return self.options.remapped(full)
+        return self._new_names.get(full, full)
 
     def expand(self, name: str) -> str:
         """Return the absolute name of anything, not remapped; raises InvalidNameError."""
@@ -204,6 +235,7 @@ class Core:
         if self._closed:
             member.close()
         self.check_open()
+        self._registrations.wake()
         self.wake()
 
     def remove(self, member: Member) -> None:
@@ -211,7 +243,7 @@ class Core:
         with self._lock:
             known = self._members.pop(member, ...) is None
         if known and not self._closed:
-            self.errands.run(lambda: self._unregister(member))
+            self._registrations.forget(member)
 
     def members(self) -> list[Member]:
         """Return all members."""
@@ -219,7 +251,7 @@ class Core:
             return list(self._members)
 
     def wake(self) -> None:
-        """Look at the master and let the members follow soon."""
+        """Let the members follow soon; from any thread."""
         self._moved = True
         self._worker.wake()
 
@@ -229,71 +261,82 @@ class Core:
             return Status(ConnectionState.CLOSED, "left behind by a fork; connect again here")
         return self._status
 
-    def close(self) -> None:
-        """Close every member, leave the graph and end the threads; safe to call twice."""
+    def tell(self, status: Status) -> None:
+        """Take a new status, and tell it; one that comes after the end is ignored."""
+        with self._telling:
+            if status == self._status or self._status.state is ConnectionState.CLOSED:
+                return
+            self._status = status
+        self.status_listeners.notify(status)
+
+    def shut_down(self, caller: str, reason: str) -> None:
+        """Close the node soon, because somebody else says so; from any thread.
+
+        Args:
+            caller: Who says so.
+            reason: Why, in the caller's words.
+        """
+        threading.Thread(
+            target=self._shut_down, args=(caller, reason), name="shutdown", daemon=True
+        ).start()
+
+    def _shut_down(self, caller: str, reason: str) -> None:
+        told = f"closed by {caller}: {reason or 'no reason given'}"
+        owner = ""
+        with suppress(Error):
+            owner = self._registrations.owner()
+        if not owner and len(self.uris) > 1 and "same name" in reason:
+            return  # who has the name now is this node, under its new address
+        if owner and owner not in told:
+            told += f"; {owner} has the name {self.name} now"
+        _log.warning("%s: %s", self.name, told)
+        self.close(told)
+
+    def close(self, reason: str = "closed") -> None:
+        """Close every member, leave the graph and end the threads; safe to call twice.
+
+        Takes about two seconds when the master does not answer.
+
+        Args:
+            reason: What the status says from now on.
+        """
+        if self.forked:
+            self._closed = True
+            return  # the threads did not come along
         with self._lock:
             if self._closed:
                 return
             self._closed = True
-            atexit.unregister(self.close)
-            if self.forked:
-                return  # the threads did not come along
             members = list(self._members)
+        atexit.unregister(self.close)
         self.clock.close()
         for member in reversed(members):
-            member.close()
-        self._take_leave(members)
+            try:
+                member.close()
+            except Exception:  # noqa: PERF203 - the others must be closed all the same
+                _log.exception("%s cannot be closed", member)
         self.timers.close()
+        self._registrations.close()
         self._worker.close()
         self.errands.close()
-        if self.slave is not None:
-            self.slave.close()
+        for door in self._doors:
+            self.loop.call(door.end)
         self.loop.close()
-        self._listener.close()
         self.graph.clear()
-        self._tell(Status(ConnectionState.CLOSED, "closed"))
+        self.tell(Status(ConnectionState.CLOSED, reason))
         self.graph_listeners.clear()
+        if reason != "closed":
+            # Nobody here has asked for it: who listens must know.
+            told = threading.Event()
+            self.dispatcher.post(told.set)
+            told.wait(_TELLING)
+        else:
+            self.status_listeners.clear()
         self.dispatcher.close()
         self.own_dispatcher.close()
-        self.status_listeners.clear()
-
-    def _take_leave(self, members: list[Member]) -> None:
-        """Unregister all members, and end what takes too long; the master may be gone."""
-        if self._status.state is not ConnectionState.CONNECTED:
-            return
-
-        def leave() -> None:
-            with suppress(Error):
-                for member in members:
-                    if member in self._registered:
-                        member.unregister(self.master)
-
-        farewell = threading.Thread(target=leave, daemon=True)
-        farewell.start()
-        farewell.join(_FAREWELL)
-
-    def _unregister(self, member: Member) -> None:
-        if member in self._registered:
-            self._registered.discard(member)
-            with suppress(ConnectionLostError, MasterError):
-                member.unregister(self.master)
-        self.wake()
-
-    # -- following the master --------------------------------------------------------------------
 
     def _follow(self, idle: bool) -> None:
         moved, self._moved = self._moved, False
-        try:
-            self._find_master()
-            refused = self._register()
-            moved = self.graph.refresh(self.master) or moved
-            self._check_registered()
-        except ConnectionLostError as error:
-            self._lose(str(error))
-        except MasterError as error:
-            self._tell(Status(ConnectionState.LOST, f"{error}; trying again every second"))
-        else:
-            self._tell(Status(ConnectionState.CONNECTED, refused))
         for member in self.members():
             # Another thread may close the node, or this member, meanwhile.
             with suppress(NodeClosedError):
@@ -305,81 +348,3 @@ class Core:
                     _log.exception("%s cannot follow the graph", member)
         if moved:
             self.graph_listeners.notify(None)
-
-    def _find_master(self) -> None:
-        """Notice a master that was restarted: it has forgotten everybody."""
-        pid = self.master.call("getPid")
-        if pid != self._master_pid:
-            self._master_pid = pid
-            self._registered.clear()
-
-    def _check_registered(self) -> None:
-        """Notice a master that forgot everybody although its process number is the same."""
-        listed = any(member.listed for member in self._registered)
-        if listed and self.name not in self.graph.nodes():
-            self._registered.clear()
-            self.wake()
-
-    def _register(self) -> str:
-        """Tell the master of members it does not know; return what it has against some."""
-        refused = ""
-        for member in self.members():
-            if member in self._registered or self._closed:
-                continue
-            try:
-                member.register(self.master)
-                self._registered.add(member)
-                if member not in self.members():  # closed meanwhile
-                    self._unregister(member)
-            except MasterError as error:
-                refused = str(error)
-                _log.warning("%s: %s", member, error)
-        return refused
-
-    def _lose(self, reason: str) -> None:
-        was = self._status.state
-        state = ConnectionState.CONNECTING if self._master_pid < 0 else ConnectionState.LOST
-        if was is ConnectionState.CONNECTED:
-            _log.warning("%s: %s", self.url, reason)
-        self._tell(Status(state, f"{reason}; trying again every second"))
-
-    def _tell(self, status: Status) -> None:
-        if status != self._status and not (self._closed and status.state.value != "closed"):
-            self._status = status
-            self.status_listeners.notify(status)
-
-    def _listen(self) -> socket.socket:
-        place = "127.0.0.1" if is_loopback(self.options.address) else ""
-        listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-        try:
-            listener.bind((place, self.options.tcpros_port))
-            listener.listen(_BACKLOG)
-            listener.setblocking(False)
-        except OSError as error:
-            listener.close()
-            raise ConnectionLostError(
-                f"{self.url}: cannot listen on port {self.options.tcpros_port}: {error.strerror}"
-            ) from error
-        return listener
-
-
-class _Door:
-    """Accepts connections."""
-
-    def __init__(
-        self, listener: socket.socket, accept: Callable[[socket.socket, str], None]
-    ) -> None:
-        self._listener, self._accept = listener, accept
-
-    def ready(self, _: int) -> None:
-        """Take in whoever waits."""
-        while True:
-            try:
-                sock, address = self._listener.accept()
-            except OSError:  # nobody waits any more
-                return
-            self._accept(sock, f"{address[0]}:{address[1]}")
-
-    def end(self, _: str) -> None:
-        """Let nobody in any more."""
-        self._listener.close()

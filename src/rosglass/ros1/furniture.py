@@ -47,8 +47,6 @@ class Furniture(Member):
         server: The master's parameter server.
     """
 
-    listed = False
-
     def __init__(
         self,
         node: Ros1Node,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import time
+from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.comm import EndpointInfo, EndpointKind, NodeName
 from rosglass.errors import InvalidNameError
@@ -17,6 +18,27 @@ __all__ = ["Graph", "full_type"]
 _Offers = dict[str, list[str]]
 #: What the master says of a type that nobody has told it.
 _UNKNOWN = ("", "*")
+#: Seconds between questions for types that nobody had told the last time.
+_LATE = 5.0
+
+
+class _Seen(NamedTuple):
+    """The graph at one moment.
+
+    Attributes:
+        publishers: Nodes by topic.
+        subscribers: Nodes by topic.
+        services: The node of each service, in a list.
+        types: Type of each topic, as the master tells it.
+    """
+
+    publishers: _Offers
+    subscribers: _Offers
+    services: _Offers
+    types: dict[str, str]
+
+
+_NOTHING = _Seen({}, {}, {}, {})
 
 
 class Graph:
@@ -26,8 +48,8 @@ class Graph:
     """
 
     def __init__(self) -> None:
-        self._state: tuple[_Offers, _Offers, _Offers] = ({}, {}, {})
-        self._types: dict[str, str] = {}
+        self._seen = _NOTHING
+        self._asked = 0.0
 
     def refresh(self, master: Master) -> bool:
         """Ask the master and return whether anything has changed; waits for its answer.
@@ -35,40 +57,48 @@ class Graph:
         Raises:
             ConnectionLostError: The master does not answer.
             MasterError: It refuses.
+            TypeError: Its answer has another form than ROS 1's.
+            ValueError: As before.
         """
         publishers, subscribers, services = (
             {str(name): sorted(map(str, nodes)) for name, nodes in part}
             for part in master.call("getSystemState")
         )
-        state = (publishers, subscribers, services)
-        types = self._types
-        topics = publishers.keys() | subscribers.keys()
-        if state != self._state or any(name not in types for name in topics):
+        known = self._seen
+        types = known.types
+        offers = (publishers, subscribers, services)
+        missing = any(name not in types for name in (*publishers, *subscribers))
+        if offers != known[:3] or (missing and time.monotonic() - self._asked > _LATE):
+            self._asked = time.monotonic()
             types = {str(name): str(kind) for name, kind in master.call("getTopicTypes")}
-        moved = state != self._state or types != self._types
-        self._state, self._types = state, types
-        return moved
+        seen = _Seen(*offers, types)
+        self._seen = seen
+        return seen != known
 
     def clear(self) -> None:
         """Forget everything."""
-        self._state, self._types = ({}, {}, {}), {}
+        self._seen = _NOTHING
 
     def topics(self) -> dict[str, list[str]]:
         """Return every topic with its type, none where nobody has told it yet."""
-        names = self._state[0].keys() | self._state[1].keys()
-        return {name: [kind] if (kind := self.type_of(name)) else [] for name in sorted(names)}
+        seen = self._seen
+        found = {}
+        for name in sorted(seen.publishers.keys() | seen.subscribers.keys()):
+            kind = full_type(seen.types.get(name, ""))
+            found[name] = [kind] if kind else []
+        return found
 
     def type_of(self, topic: str) -> str:
         """Return a topic's type, ``pkg/msg/Type``; empty when nobody has told it."""
-        return full_type(self._types.get(topic, ""))
+        return full_type(self._seen.types.get(topic, ""))
 
     def services(self) -> dict[str, list[str]]:
         """Return every service and the nodes that offer it."""
-        return dict(self._state[2])
+        return dict(self._seen.services)
 
     def nodes(self) -> list[NodeName]:
         """Return every node that offers or uses anything."""
-        found = {node for part in self._state for nodes in part.values() for node in nodes}
+        found = {node for part in self._seen[:3] for nodes in part.values() for node in nodes}
         return sorted(NodeName(*split(node)) for node in found)
 
     def endpoints(self, kind: EndpointKind, name: str) -> list[EndpointInfo]:
@@ -76,7 +106,7 @@ class Graph:
         parts = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION, EndpointKind.SERVICE_SERVER)
         if kind not in parts:
             return []
-        nodes = self._state[parts.index(kind)].get(name, [])
+        nodes = self._seen[:3][parts.index(kind)].get(name, [])
         type_name = "" if kind is EndpointKind.SERVICE_SERVER else self.type_of(name)
         return [EndpointInfo(kind, name, type_name, NodeName(*split(node))) for node in nodes]
 
@@ -84,7 +114,7 @@ class Graph:
         """Return everything that a node publishes, subscribes and serves."""
         found = []
         kinds = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION, EndpointKind.SERVICE_SERVER)
-        for kind, part in zip(kinds, self._state, strict=True):
+        for kind, part in zip(kinds, self._seen[:3], strict=True):
             for name, nodes in sorted(part.items()):
                 if node.full in nodes:
                     found += [e for e in self.endpoints(kind, name) if e.node == node]

@@ -7,6 +7,7 @@ import threading
 import time
 from typing import TYPE_CHECKING, Any
 
+from rosglass.comm import EndpointKind
 from rosglass.ros1.core import Member
 from rosglass.ros1.publisher_link import PublisherLink
 
@@ -157,6 +158,15 @@ class Intake(Member):
             reading.part(link)
 
     # -- as a member -----------------------------------------------------------------------------
+
+    @property
+    def place(self) -> tuple[EndpointKind, str]:  # type: ignore[override]
+        """As what the master shows it."""
+        return EndpointKind.SUBSCRIPTION, self.topic
+
+    def lacks(self, publishers: int) -> bool:
+        """Return whether fewer publishers are connected."""
+        return sum(link.connected for link in self.links()) < publishers
 
     def register(self, master: Master) -> None:
         """Tell the master, and connect with the publishers it names."""

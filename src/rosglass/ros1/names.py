@@ -13,7 +13,7 @@ import time
 
 from rosglass.errors import InvalidNameError
 
-__all__ = ["anonymous", "expand", "split", "validate_namespace", "validate_node_name"]
+__all__ = ["absolute_namespace", "anonymous", "expand", "split", "validate_node_name"]
 
 _FORBIDDEN = re.compile(r"[^A-Za-z0-9_/]")
 _NODE_FORBIDDEN = re.compile(r"[^A-Za-z0-9_]")
@@ -24,6 +24,8 @@ def validate_node_name(name: str) -> None:
     """Raise InvalidNameError unless `name` can be a node's base name."""
     if not isinstance(name, str) or not name:
         raise InvalidNameError(f"a node name must be a non-empty text, got {name!r}")
+    if not name[0].isalpha() and not _NODE_FORBIDDEN.match(name):
+        raise InvalidNameError(f"node name {name!r} must begin with a letter")
     found = _NODE_FORBIDDEN.search(name)
     if found:
         hint = "; give the namespace by itself" if found.group() == "/" else ""
@@ -33,15 +35,23 @@ def validate_node_name(name: str) -> None:
         )
 
 
-def validate_namespace(namespace: str) -> None:
-    """Raise InvalidNameError unless `namespace` is a valid absolute namespace."""
-    if not isinstance(namespace, str) or not namespace:
-        raise InvalidNameError(f"a namespace must be a non-empty text, got {namespace!r}")
-    if not namespace.startswith("/"):
-        raise InvalidNameError(
-            f"namespace {namespace!r} is not absolute; write {'/' + namespace!r}"
-        )
-    _check("namespace", namespace, namespace)
+def absolute_namespace(text: str, what: str, *, relative: bool = True) -> str:
+    """Return a namespace as nodes have it: absolute, without a slash at its end.
+
+    Args:
+        text: As written; ``arm`` means ``/arm``, as ROS has it for ROS_NAMESPACE and ``__ns``.
+        what: Where it stands, for the error.
+        relative: Whether the first slash may be missing.
+
+    Raises:
+        InvalidNameError: It breaks ROS's rules.
+    """
+    if not isinstance(text, str) or not text:
+        raise InvalidNameError(f"a {what} must be a non-empty text, got {text!r}")
+    if not relative and not text.startswith("/"):
+        raise InvalidNameError(f"{what} {text!r} is not absolute; write {'/' + text!r}")
+    _check(what, text, text)
+    return "/" + "/".join(part for part in text.split("/") if part)
 
 
 def expand(name: str, node: str, namespace: str) -> str:
@@ -55,13 +65,12 @@ def expand(name: str, node: str, namespace: str) -> str:
     Raises:
         InvalidNameError: `name` breaks the rules; the message says where.
     """
-    what = "name"
     if not isinstance(name, str) or not name:
-        raise InvalidNameError(f"a {what} must be a non-empty text, got {name!r}")
+        raise InvalidNameError(f"a name must be a non-empty text, got {name!r}")
     rest = name[1:] if name.startswith("~") else name
-    _check(what, rest, name)
+    _check("name", rest, name)
     if not (name[0] in "~/" or name[0].isalpha()):
-        raise InvalidNameError(f"{what} {name!r} must begin with a letter, '/' or '~'")
+        raise InvalidNameError(f"name {name!r} must begin with a letter, '/' or '~'")
     prefix = namespace.rstrip("/")
     if name.startswith("~"):
         full = f"{prefix}/{node}/{rest}"
@@ -85,7 +94,7 @@ def anonymous(name: str) -> str:
     Made as rospy and roscpp do: host, process and time in milliseconds are appended.
     """
     host = re.sub(r"[^A-Za-z0-9_]", "_", socket.gethostname())
-    return f"{name}_{host}_{os.getpid()}_{int(time.time() * 1000)}{next(_numbers)}"
+    return f"{name}_{host}_{os.getpid()}_{int(time.time() * 1000)}_{next(_numbers)}"
 
 
 def _check(what: str, text: str, whole: str) -> None:

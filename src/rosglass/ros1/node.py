@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import logging
-import threading
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import EndpointKind, History, Node, NodeName, QoS, Subscription
@@ -17,7 +15,6 @@ from rosglass.ros1.furniture import Furniture
 from rosglass.ros1.names import absolute_namespace, split, validate_node_name
 from rosglass.ros1.reading import type_if_known
 from rosglass.ros1.services import Services
-from rosglass.ros1.slave import Slave
 from rosglass.ros1.topics import Topics
 
 if TYPE_CHECKING:
@@ -50,8 +47,6 @@ if TYPE_CHECKING:
     from rosglass.ros1.parameters import Ros1Parameters
 
 __all__ = ["Ros1Node"]
-
-_log = logging.getLogger("rosglass.ros1")
 
 
 class Ros1Node(Node):
@@ -92,7 +87,7 @@ class Ros1Node(Node):
         self._topics = Topics(self._core)
         self._services = Services(self._core)
         self._furniture = Furniture(self, self._core, self._topic_names, parameters or {})
-        self._core.start(Slave(self, options.address, options.slave_port), self._accept)
+        self._core.start(self, self._accept)
         self._furniture.open(own_services)
 
     # -- topics ----------------------------------------------------------------------------------
@@ -411,8 +406,7 @@ class Ros1Node(Node):
 
     def shut_down(self, caller: str, reason: str) -> None:
         """End the node, because somebody else says so: another one has its name now."""
-        _log.warning("%s: closed by %s: %s", self._core.name, caller, reason or "no reason given")
-        threading.Thread(target=self.close, name="shutdown", daemon=True).start()
+        self._core.shut_down(caller, reason)
 
     def parameter_changed(self, name: str, value: Any) -> None:  # noqa: ARG002 - it may be old
         """Look at a parameter that was subscribed to."""

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, unquote, urlsplit
 
 from rosglass.errors import ConversionError
-from rosglass.ros1.address import own_address, parse_uri
+from rosglass.ros1.address import bracketed, check_host, given_address, parse_uri
+from rosglass.ros1.arguments import NO_ARGUMENTS
+from rosglass.ros1.names import absolute_namespace, anonymous
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from rosglass.ros1.arguments import Arguments
+
 __all__ = ["Ros1Options"]
 
 _PORT = 11311
+_EXAMPLE = "a URL such as ros1://robot:11311?ip=192.168.1.5"
+_OPTIONS = ("anonymous", "ip", "slave_port", "tcpros_port")
 
 
 @dataclass(frozen=True)
@@ -24,62 +30,124 @@ class Ros1Options:
 
     Attributes:
         master: URI of the master.
-        address: Host or address under which others reach this node.
+        address: Host or address under which others reach this node; empty to find it out.
+        source: Who gave the address, for messages, such as ``ROS_IP``; empty when nobody did.
         tcpros_port: Where connections are accepted; 0 for any free port.
         slave_port: Where the node's API is served; 0 for any free port.
-        remappings: New absolute name for each absolute name.
+        anonymous: Whether something is to be appended to the node's name that makes it unique.
+        arguments: What the program was told.
     """
 
     master: str
-    address: str
+    address: str = ""
+    source: str = ""
     tcpros_port: int = 0
     slave_port: int = 0
-    remappings: Mapping[str, str] = field(default_factory=dict)
+    anonymous: bool = False
+    arguments: Arguments = NO_ARGUMENTS
 
     @classmethod
-    def parse(cls, url: str, env: Mapping[str, str] = os.environ) -> Ros1Options:
-        """Return what a URL says, and the environment where it says nothing.
+    def parse(
+        cls,
+        url: str,
+        env: Mapping[str, str] = os.environ,
+        arguments: Arguments = NO_ARGUMENTS,
+    ) -> Ros1Options:
+        """Return what a URL says, what the arguments say, and the environment about the rest.
 
         Args:
             url: ``ros1://host:port?ip=...``; without host, ROS_MASTER_URI, or this machine.
             env: ROS_MASTER_URI, ROS_IP and ROS_HOSTNAME in it count.
+            arguments: They win over the environment; the URL is what somebody asked for most
+                expressly, and wins over both.
 
         Raises:
             ConversionError: A part of the URL or an environment variable is not valid.
         """
-        parts = urlsplit(url)
         try:
+            parts = urlsplit(url)
             host, port = parts.hostname, parts.port
         except ValueError as error:
-            told = f"a URL such as ros1://robot:11311 ({error})"
-            raise ConversionError("url", url, told) from error
-        if parts.path not in ("", "/") or parts.fragment or parts.username:
-            raise ConversionError("url", url, "a URL such as ros1://robot:11311?ip=192.168.1.5")
-        options = dict(parse_qsl(parts.query, keep_blank_values=True))
-        for name in options:
-            if name not in ("ip", "tcpros_port", "slave_port"):
-                raise ConversionError(
-                    f"url option {name}", url, "one of ip, tcpros_port, slave_port"
-                )
-        master = env.get("ROS_MASTER_URI", "").strip()
-        if host:
-            shown = f"[{host}]" if ":" in host else host
-            master = f"http://{unquote(shown)}:{port or _PORT}"
-        elif not master:
-            master = f"http://localhost:{port or _PORT}"
-        master_host, _ = parse_uri(master, "ROS_MASTER_URI" if not host else "url")
-        address = options.get("ip", "") or own_address(env, master_host)
-        slave_port, tcpros_port = (
-            _port(options.get(name, "0"), name) for name in ("slave_port", "tcpros_port")
+            raise ConversionError("url", url, f"{_EXAMPLE} ({error})") from error
+        if parts.path not in ("", "/") or parts.fragment or "@" in parts.netloc:
+            raise ConversionError("url", url, _EXAMPLE)
+        options = _options(parts.query, url)
+        if host or port:
+            master = f"http://{bracketed(unquote(host or 'localhost'))}:{port or _PORT}"
+            source = "url"
+        elif arguments.master:
+            master, source = arguments.master, "__master"
+        else:
+            master, source = env.get("ROS_MASTER_URI", "").strip(), "ROS_MASTER_URI"
+            master = master or f"http://localhost:{_PORT}"
+        parse_uri(master, source)
+        if not master.startswith("http://"):
+            raise ConversionError(source, master, "a URI such as http://robot:11311")
+        if "ip" in options:
+            address, told = check_host(options["ip"], "url option ip"), "ip"
+        elif arguments.address:
+            address, told = arguments.address, "__ip"
+        else:
+            address, told = given_address(env)
+        return cls(
+            master.rstrip("/"),
+            address,
+            told,
+            _port(options, "tcpros_port") or arguments.tcpros_port,
+            _port(options, "slave_port"),
+            _flag(options, "anonymous"),
+            arguments,
         )
-        return cls(master.rstrip("/"), address, tcpros_port, slave_port)
 
-    def remapped(self, full: str) -> str:
-        """Return what an absolute name is replaced with; itself, unless remapped."""
-        return self.remappings.get(full, full)
+    def node_name(self, name: str | None) -> str:
+        """Return the node's base name.
+
+        Args:
+            name: The program's own choice, which ``__name`` replaces; None for a name that nobody
+                else has: in ROS, a second node of a name ends the first one.
+        """
+        if self.arguments.name:
+            return self.arguments.name
+        return anonymous(name or "rosglass") if name is None or self.anonymous else name
+
+    def namespace(self, given: str | None, env: Mapping[str, str] = os.environ) -> str:
+        """Return the node's namespace.
+
+        Args:
+            given: The program's own choice, which ``__ns`` replaces; None and ``/``, where names
+                begin anyway, for ROS_NAMESPACE.
+            env: ROS_NAMESPACE in it counts.
+
+        Raises:
+            InvalidNameError: The namespace breaks ROS's rules.
+        """
+        if self.arguments.namespace:
+            return self.arguments.namespace
+        if given not in (None, "/"):
+            return absolute_namespace(given, "namespace", relative=False)
+        return absolute_namespace(env.get("ROS_NAMESPACE", "").strip() or "/", "ROS_NAMESPACE")
 
 
-def _port(text: str, name: str) -> int:
-    if not text.isdigit() or int(text) > 65535:
+def _options(query: str, url: str) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for name, value in parse_qsl(query, keep_blank_values=True):
+        if name not in _OPTIONS:
+            raise ConversionError(f"url option {name}", url, f"one of {', '.join(_OPTIONS)}")
+        if name in found or not value:
+            raise ConversionError(f"url option {name}", url, "each option once, with a value")
+        found[name] = value
+    return found
+
+
+def _port(options: Mapping[str, str], name: str) -> int:
+    text = options.get(name, "0")
+    if not (text.isascii() and text.isdecimal()) or int(text) > 65535:
         raise ConversionError(f"url option {name}", text, "a port number from 0 to 65535")
     return int(text)
+
+
+def _flag(options: Mapping[str, str], name: str) -> bool:
+    text = options.get(name, "false").lower()
+    if text not in ("true", "false"):
+        raise ConversionError(f"url option {name}", text, "true or false")
+    return text == "true"

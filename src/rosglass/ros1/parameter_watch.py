@@ -161,8 +161,6 @@ class ParameterWatches:
 class ParameterWatch(Member):
     """A name that the node follows: registered with the master like a subscription."""
 
-    listed = False
-
     def __init__(self, core: Core, watches: ParameterWatches, name: str) -> None:
         self.name = name
         self._core, self._watches = core, watches

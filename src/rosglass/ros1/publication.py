@@ -212,6 +212,11 @@ class Publication(Member):
             self.publishers = [one for one in self.publishers if one is not publisher]
             return not self.publishers
 
+    @property
+    def place(self) -> tuple[EndpointKind, str]:  # type: ignore[override]
+        """As what the master shows it."""
+        return EndpointKind.PUBLISHER, self.topic
+
     def register(self, master: Master) -> None:
         """Tell the master."""
         name = ros1_name(self.type.name)

@@ -29,6 +29,8 @@ _TOPIC, _TYPE = "/rosout", "rosgraph_msgs/Log"
 _NO_TOPICS = "/rosout_disable_topics_generation"
 #: Latched, as rospy and roscpp have it.
 _QOS = QoS(depth=1000, durability=QoS.latched().durability)
+#: Seconds that the first messages wait for the node ``/rosout``: latched is only the last one.
+_PATIENCE = 2.0
 #: ``rosgraph_msgs/Log``'s levels by the least of Python's that they stand for.
 _LEVELS = ((50, 16), (40, 8), (30, 4), (20, 2))
 _DEBUG = 1
@@ -41,8 +43,6 @@ def logger_name(node: str) -> str:
 
 class _Flush(Member):
     """Closes a handler as its node closes."""
-
-    listed = False
 
     def __init__(self, handler: RosoutHandler, core: Core) -> None:
         self._handler, self._core = handler, core
@@ -68,7 +68,9 @@ class Rosout:
         self._quiet = node.parameter_server.subscribe(_NO_TOPICS)
         self.logger = NodeLogger(name, logging.getLogger())
         self.logger.setLevel(logging.INFO)
-        self._handler = RosoutHandler(name, self._announce, self._fields, lambda: not core.forked)
+        self._handler = RosoutHandler(
+            name, self._announce, self._fields, lambda: not core.forked, _PATIENCE
+        )
         self.logger.addHandler(self._handler)
         self._library = LibraryLog(self._handler, core.runs_here)
 

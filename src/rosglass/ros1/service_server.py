@@ -9,7 +9,7 @@ import time
 from concurrent.futures import CancelledError, Future
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import QoS, ServiceServer
+from rosglass.comm import EndpointKind, QoS, ServiceServer
 from rosglass.comm.complaints import Complaints
 from rosglass.comm.loop import LoopExecutor, executor_for
 from rosglass.errors import DecodeError, Error, ServiceError
@@ -271,17 +271,24 @@ class Ros1ServiceServer(ServiceServer, Member):
     # -- as a member -----------------------------------------------------------------------------
 
     @property
-    def listed(self) -> bool:  # type: ignore[override]
-        """Whether the master knows it: not while another node has taken its place."""
-        return not self._usurpers()
+    def place(self) -> tuple[EndpointKind, str] | None:  # type: ignore[override]
+        """As what the master shows it; None while it shows another node's, which has it now."""
+        nodes = self._core.graph.services().get(self.name, [])
+        ours = not nodes or self._core.name.full in nodes
+        return (EndpointKind.SERVICE_SERVER, self.name) if ours else None
 
     def register(self, master: Master) -> None:
         """Tell the master."""
-        self._services.register(self.name, master)
+        master.call("registerService", self.name, self._uri, self._core.uri)
 
     def unregister(self, master: Master) -> None:
         """Tell the master that it is gone."""
-        self._services.unregister(self.name, master)
+        master.call("unregisterService", self.name, self._uri)
+
+    @property
+    def _uri(self) -> str:
+        host, port = self._core.address
+        return f"rosrpc://[{host}]:{port}" if ":" in host else f"rosrpc://{host}:{port}"
 
     def follow(self, moved: bool, idle: bool) -> None:
         """Follow the graph: who offers the service, and whether the master has forgotten it."""
@@ -290,22 +297,10 @@ class Ros1ServiceServer(ServiceServer, Member):
         nodes = self._core.graph.services().get(self.name, [])
         if self._core.name.full in nodes:
             self._seen = True
-        elif self._seen and not nodes:
-            # Who had taken it over has gone, or somebody removed it: it is served still.
-            self._seen = False
-            self._core.errands.run(self._return)
         problem = self.problem if self._usurpers() else ""
         if problem and problem != self._warned:
             _log.warning("%s: %s", self.name, problem)
         self._warned = problem
-
-    def _return(self) -> None:
-        if not self._closed:
-            try:
-                self.register(self._core.master)
-            except Error as error:
-                _log.warning("%s cannot be registered again: %s", self.name, error)
-                self._seen = True  # at the next look
 
     def close(self) -> None:
         """Withdraw the service; requests without response end unanswered. Safe to call twice."""
@@ -317,9 +312,10 @@ class Ros1ServiceServer(ServiceServer, Member):
             sessions = list(self._sessions.values())
         if self._core.forked:
             return
-        self._services.end(self)
         for session in sessions:
             self._core.loop.call(session.close)
         self._core.remove(self)
+        # Last: the farewell of this server must not remove the registration of the next one.
+        self._services.end(self)
         for future in running:
             future.cancel()

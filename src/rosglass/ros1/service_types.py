@@ -37,8 +37,6 @@ class ServiceTypes(Member):
         errands: Runs lookups.
     """
 
-    listed = False
-
     def __init__(self, core: Core, errands: Errands) -> None:
         self._core, self._errands = core, errands
         self._lock = threading.Lock()

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import logging
 import os
+import reprlib
+import socket
 import socketserver
 import threading
+import xmlrpc.client
 import xmlrpc.server
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Protocol
-
-from rosglass.ros1.address import is_loopback
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,7 +22,10 @@ if TYPE_CHECKING:
 __all__ = ["Slave", "SlaveApi"]
 
 _log = logging.getLogger("rosglass.ros1")
-_MOST_BYTES = 10_000_000
+#: Longest call in bytes: a parameter that changed comes whole.
+_MOST_BYTES = 64 * 2**20
+#: Connections at a time; the master, and each tool that asks, has one.
+_MOST_CONNECTIONS = 100
 
 
 class SlaveApi(Protocol):
@@ -57,7 +62,10 @@ class SlaveApi(Protocol):
 class _Handler(xmlrpc.server.SimpleXMLRPCRequestHandler):
     protocol_version = "HTTP/1.1"
     rpc_paths = ()
+    #: Seconds without a call after which a connection is closed.
     timeout = 30
+    #: Small answers must not wait for the peer's acknowledgement of the header.
+    disable_nagle_algorithm = True
 
     def log_message(self, *_: Any) -> None:
         """Write nothing to standard error."""
@@ -65,40 +73,34 @@ class _Handler(xmlrpc.server.SimpleXMLRPCRequestHandler):
     def do_POST(self) -> None:  # noqa: N802 - named by the standard library
         """Answer a call, unless it is of a length that no call has."""
         length = self.headers.get("content-length", "")
-        if not length.isdigit() or int(length) > _MOST_BYTES:
+        if not (length.isascii() and length.isdecimal()) or int(length) > _MOST_BYTES:
             self.send_error(400, "no content length, or too large")
+            self.close_connection = True
+            return
+        if self.headers.get("content-encoding", "identity") != "identity":
+            self.send_error(501, "no encoding is understood")
             self.close_connection = True
             return
         super().do_POST()
 
 
-class _Server(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCServer):
-    daemon_threads = True
-    block_on_close = False
-    request_queue_size = 128
-
-    def handle_error(self, *_: Any) -> None:
-        """Log, instead of writing to standard error: somebody went away, or sent garbage."""
-        _log.debug("a call of the node's API failed", exc_info=True)
-
-
-class Slave:
-    """Serves the slave API on a port of its own, on daemon threads.
+class Slave(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCDispatcher):
+    """Answers the slave API, each connection on a daemon thread of its own.
 
     Args:
         api: Who answers.
-        address: Host under which others reach this node.
-        port: To listen on; 0 for any.
-
-    Attributes:
-        uri: Where it is reached.
     """
 
-    def __init__(self, api: SlaveApi, address: str, port: int = 0) -> None:
+    daemon_threads = True
+    block_on_close = False
+    #: What the request handler asks of its server.
+    logRequests = False  # noqa: N815 - named by the standard library
+
+    def __init__(self, api: SlaveApi) -> None:
+        super().__init__(allow_none=True)
         self._api = api
-        place = "127.0.0.1" if is_loopback(address) else ""
-        self._server = _Server((place, port), _Handler, False, True, None)
-        self.uri = f"http://{address}:{self._server.server_address[1]}/"
+        self._lock = threading.Lock()
+        self._connections = 0
         for name, method in (
             ("getBusStats", lambda _: api.bus_stats()),
             ("getBusInfo", lambda _: api.bus_info()),
@@ -109,35 +111,81 @@ class Slave:
             ("shutdown", self._shutdown),
             ("paramUpdate", self._parameter_changed),
             ("publisherUpdate", self._publishers_changed),
-            ("requestTopic", lambda _, topic, protocols: api.request_topic(topic, protocols)),
+            ("requestTopic", self._request_topic),
         ):
-            self._server.register_function(_answering(name, method), name)
-        self._thread = threading.Thread(
-            target=self._server.serve_forever, kwargs={"poll_interval": 0.5}, daemon=True
+            self.register_function(_answering(name, method), name)
+
+    def accept(self, sock: socket.socket, address: str) -> None:
+        """Serve a connection, unless there are far too many; in the loop's thread."""
+        with self._lock:
+            crowded = self._connections >= _MOST_CONNECTIONS
+            self._connections += not crowded
+        if crowded:
+            _log.warning("%s: refused, %d connections are served", address, _MOST_CONNECTIONS)
+            sock.close()
+            return
+        try:
+            self.process_request(sock, address)
+        except RuntimeError:  # no more threads
+            _log.warning("%s: refused, there are too many threads", address)
+            self.shutdown_request(sock)
+
+    def _marshaled_dispatch(self, data: Any, *arguments: Any, **named: Any) -> Any:
+        if b"<!DOCTYPE" in data:
+            # It could be made to fill the memory.
+            fault = xmlrpc.client.Fault(1, "calls have no document type")
+            return xmlrpc.client.dumps(fault, methodresponse=True).encode()
+        return super()._marshaled_dispatch(data, *arguments, **named)
+
+    # -- what socketserver asks ------------------------------------------------------------------
+
+    def finish_request(self, request: Any, client_address: Any) -> None:
+        """Serve a connection until it ends; on its own thread."""
+        _Handler(request, client_address, self)  # type: ignore[arg-type]
+
+    def shutdown_request(self, request: Any) -> None:
+        """Close a connection."""
+        with self._lock:
+            self._connections -= 1
+        with suppress(OSError):
+            request.shutdown(socket.SHUT_WR)
+        request.close()
+
+    def handle_error(self, *_: Any) -> None:
+        """Log, instead of writing to standard error: somebody went away, or sent garbage."""
+        _log.debug("a call of the node's API failed", exc_info=True)
+
+    # -- calls -----------------------------------------------------------------------------------
+
+    def _shutdown(self, caller: object, reason: object = "") -> int:
+        self._api.shut_down(_text(caller, "caller_id"), _text(reason, "msg"))
+        return 0
+
+    def _parameter_changed(self, caller: object, name: object, value: Any) -> int:
+        _text(caller, "caller_id")
+        self._api.parameter_changed(_text(name, "parameter_key"), value)
+        return 0
+
+    def _publishers_changed(self, caller: object, topic: object, uris: object) -> int:
+        _text(caller, "caller_id")
+        if not isinstance(uris, list):
+            raise TypeError("publishers is no list")
+        self._api.publishers_changed(
+            _text(topic, "topic"), [_text(uri, "publishers") for uri in uris]
         )
-        self._thread.name = "slave API"
-        self._thread.start()
-
-    def close(self) -> None:
-        """Answer nothing any more; safe to call twice."""
-        # From another thread: one of the server's own may be the one that closes the node.
-        threading.Thread(target=self._stop, daemon=True).start()
-
-    def _stop(self) -> None:
-        self._server.shutdown()
-        self._server.server_close()
-
-    def _shutdown(self, caller: str, reason: str = "") -> int:
-        self._api.shut_down(str(caller), str(reason))
         return 0
 
-    def _parameter_changed(self, _: str, name: str, value: Any) -> int:
-        self._api.parameter_changed(str(name), value)
-        return 0
+    def _request_topic(self, caller: object, topic: object, protocols: object) -> list[Any]:
+        _text(caller, "caller_id")
+        if not isinstance(protocols, list):
+            raise TypeError("protocols is no list")
+        return self._api.request_topic(_text(topic, "topic"), protocols)
 
-    def _publishers_changed(self, _: str, topic: str, uris: list[str]) -> int:
-        self._api.publishers_changed(str(topic), [str(uri) for uri in uris])
-        return 0
+
+def _text(value: object, what: str) -> str:
+    if not isinstance(value, str):
+        raise TypeError(f"{what} is no text, but {reprlib.repr(value)}")
+    return value
 
 
 def _answering(name: str, method: Callable[..., Any]) -> Callable[..., list[Any]]:
@@ -147,7 +195,7 @@ def _answering(name: str, method: Callable[..., Any]) -> Callable[..., list[Any]
         try:
             return [1, "", method(*arguments)]
         except (TypeError, ValueError, KeyError) as error:
-            return [-1, f"{name}: {error}", 0]
+            return [-1, f"{name}: {error.args[0] if error.args else error}", 0]
         except Exception as error:
             _log.exception("%s failed", name)
             return [0, f"{name} failed: {error}", 0]

@@ -1,0 +1,245 @@
+"""What the master knows of a node, kept true; and the graph, as the master tells it.
+
+The master tells nobody when it was restarted and has forgotten everybody, or when its calls do not
+get through: it is asked once a second.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import deque
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from rosglass.comm import ConnectionState, EndpointKind, Status
+from rosglass.comm.complaints import Complaints
+from rosglass.errors import ConnectionLostError, Error, MasterError
+from rosglass.ros1.address import doubt, own_address, parse_uri
+
+if TYPE_CHECKING:
+    from rosglass.ros1.core import Core, Member
+
+__all__ = ["Registrations"]
+
+_log = logging.getLogger("rosglass.ros1")
+#: Seconds between looks at the master.
+_POLL = 1.0
+#: Seconds that closing waits for the master, and then for calls that were cut.
+_FAREWELL, _END = 1.5, 0.5
+#: Looks at a publisher without connection until the master is asked about it.
+_LOOKS = 2
+#: Seconds that the master may take to tell who has the node's name.
+_PATIENCE = 1.0
+
+
+class Registrations:
+    """Registers a node's members with the master, on a thread of its own, which may wait.
+
+    Args:
+        core: The node.
+    """
+
+    def __init__(self, core: Core) -> None:
+        self._core = core
+        self._wanted = threading.Event()
+        self._closing = False
+        #: Members that the master knows, and those that it may know.
+        self._registered: set[Member] = set()
+        self._tried: set[Member] = set()
+        self._leaving: deque[Member] = deque()
+        self._complaints = Complaints()
+        self._answered = False
+        #: Why others may not reach the node, for the address that was looked at.
+        self._doubt, self._doubted = "", ""
+        #: How many looks in a row missed a publisher, by topic.
+        self._missed: dict[str, int] = {}
+        self._thread = threading.Thread(
+            target=self._work, name=f"{core.name.name} master", daemon=True
+        )
+
+    @property
+    def is_current(self) -> bool:
+        """Whether this is its own thread."""
+        return self._thread is threading.current_thread()
+
+    def start(self) -> None:
+        """Begin to look for the master."""
+        self._thread.start()
+
+    def wake(self) -> None:
+        """Look at the members soon; from any thread."""
+        self._wanted.set()
+
+    def forget(self, member: Member) -> None:
+        """Unregister a member that is closed, soon; from any thread."""
+        self._leaving.append(member)
+        self._wanted.set()
+
+    def close(self) -> None:
+        """Unregister all, and end the thread; takes two seconds if the master does not answer."""
+        self._closing = True
+        self._wanted.set()
+        if self.is_current:
+            self._leave()
+        elif self._thread.is_alive():
+            self._thread.join(_FAREWELL)
+        self._core.master.close()
+        if not self.is_current and self._thread.is_alive():
+            self._thread.join(_END)
+
+    def owner(self) -> str:
+        """Return the URI of the node that has this node's name; empty if it is this one, or nobody.
+
+        Raises:
+            ConnectionLostError: The master does not answer.
+        """
+        core = self._core
+        try:
+            uri = core.master.call("lookupNode", core.name.full, timeout=_PATIENCE)
+        except MasterError:
+            return ""
+        return "" if uri in core.uris else str(uri)
+
+    # -- the thread ------------------------------------------------------------------------------
+
+    def _work(self) -> None:
+        while not self._closing:
+            self._wanted.clear()
+            try:
+                self._look()
+            except Exception:
+                _log.exception("%s failed", self._thread.name)
+            self._wanted.wait(_POLL)
+        self._leave()
+
+    def _look(self) -> None:
+        core = self._core
+        moved = False
+        try:
+            taker = self._find()
+            if taker:
+                core.shut_down(core.master.uri, f"{taker} has the name {core.name} now")
+                return
+            self._locate()
+            self._unregister()
+            refused = self._register()
+            moved = core.graph.refresh(core.master)
+            self._compare()
+        except ConnectionLostError as error:
+            self._lose(str(error))
+        except MasterError as error:
+            core.tell(Status(ConnectionState.LOST, f"{error}; trying again every second"))
+        except (TypeError, ValueError) as error:
+            self._lose(f"{core.master.uri} answers, but not as a ROS 1 master does: {error}")
+        else:
+            self._answered = True
+            self._look_at_address()
+            problems = [problem for problem in (*refused, self._doubt) if problem]
+            core.tell(Status(ConnectionState.CONNECTED, "; ".join(problems)))
+        if moved:
+            core.wake()
+
+    def _find(self) -> str:
+        """Notice a master that was restarted; return who has taken the node's name."""
+        core = self._core
+        if not self._registered:
+            core.master.call("getPid")
+            return ""
+        try:
+            uri = core.master.call("lookupNode", core.name.full)
+        except MasterError:
+            # Nobody has the name: the master has forgotten everybody.
+            self._registered.clear()
+            self._tried.clear()
+            self._leaving.clear()
+            return ""
+        return "" if uri in core.uris else str(uri)
+
+    def _locate(self) -> None:
+        """Find out under which address others reach the node: it may have changed network."""
+        core = self._core
+        if not core.options.address and core.move(own_address(core.master.reached_from)):
+            # The master gets the new address with the registrations.
+            self._registered.clear()
+
+    def _unregister(self) -> None:
+        while self._leaving:
+            member = self._leaving[0]
+            if member in self._tried:
+                with suppress(MasterError):
+                    member.unregister(self._core.master)
+                self._tried.discard(member)
+                self._registered.discard(member)
+            self._leaving.popleft()
+
+    def _register(self) -> list[str]:
+        """Tell the master of members it does not know; return what it has against some."""
+        refused = []
+        for member in self._core.members():
+            if member in self._registered or self._closing:
+                continue
+            # It may know the member although its answer got lost.
+            self._tried.add(member)
+            try:
+                member.register(self._core.master)
+                self._registered.add(member)
+            except MasterError as error:
+                self._tried.discard(member)
+                refused.append(str(error))
+                if self._complaints.fresh((member, str(error))):
+                    _log.warning("%s: %s", member, error)
+        return refused
+
+    def _compare(self) -> None:
+        """Look whether the master shows the members as they are, and tell it again if not."""
+        core = self._core
+        for member in list(self._registered):
+            if member.place is None:
+                continue
+            kind, name = member.place
+            forgotten = core.name not in {end.node for end in core.graph.endpoints(kind, name)}
+            if kind is EndpointKind.SUBSCRIPTION and not forgotten:
+                forgotten = self._misses(member, name)
+            if forgotten:
+                self._registered.discard(member)
+                self._wanted.set()
+
+    def _misses(self, member: Member, topic: str) -> bool:
+        """Return whether to ask about a topic's publishers: the master's calls may be lost."""
+        there = len(self._core.graph.endpoints(EndpointKind.PUBLISHER, topic))
+        if not member.lacks(there):
+            self._missed.pop(topic, None)
+            return False
+        # At first it may be about to tell, or the publisher about to answer.
+        looks = self._missed[topic] = self._missed.get(topic, 0) + 1
+        return looks == _LOOKS or looks % (10 * _LOOKS) == 0
+
+    def _look_at_address(self) -> None:
+        core = self._core
+        if core.address[0] != self._doubted:
+            self._doubted = core.address[0]
+            master, _ = parse_uri(core.master.uri, "master")
+            self._doubt = doubt(self._doubted, core.options.source, master)
+            if self._doubt:
+                _log.warning("%s: %s", core.url, self._doubt)
+
+    def _lose(self, reason: str) -> None:
+        core = self._core
+        state = ConnectionState.LOST if self._answered else ConnectionState.CONNECTING
+        if core.status().state is ConnectionState.CONNECTED:
+            _log.warning("%s: %s", core.url, reason)
+        core.tell(Status(state, f"{reason}; trying again every second"))
+
+    def _leave(self) -> None:
+        core = self._core
+        with suppress(ConnectionLostError):
+            for member in [*self._leaving, *self._tried]:
+                if member in self._tried:
+                    self._tried.discard(member)
+                    try:
+                        member.unregister(core.master)
+                    except ConnectionLostError:
+                        raise
+                    except Error as error:
+                        _log.debug("%s: %s", member, error)
