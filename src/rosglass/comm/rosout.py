@@ -25,6 +25,8 @@ _MAX_WAITING = _MAX_RATE = 1000
 _MAX_TEXT = 32 * 1024
 #: Pause of the publishing thread; it is woken when there is something to do.
 _PAUSE = 3600.0
+#: Seconds between looks for the first subscription.
+_GLANCE = 0.02
 _FORMATTER = logging.Formatter("%(message)s")
 
 
@@ -40,6 +42,8 @@ class RosoutHandler(logging.Handler):
             before the publisher: what waits is still sent.
         fields: Returns the message's fields; called in the thread that logs.
         alive: Whether this process is the one that the node belongs to.
+        patience: Seconds that the first messages wait for a subscription, where those that come
+            later would miss them.
     """
 
     def __init__(
@@ -48,8 +52,10 @@ class RosoutHandler(logging.Handler):
         announce: Callable[[RosoutHandler], Publisher],
         fields: Callable[[logging.LogRecord], dict[str, Any]],
         alive: Callable[[], bool],
+        patience: float = 0.0,
     ) -> None:
         super().__init__()
+        self._patience = patience
         self._label, self._announce = name, announce
         self._fields, self._alive = fields, alive
         self._waiting: deque[dict[str, Any]] = deque()
@@ -113,6 +119,8 @@ class RosoutHandler(logging.Handler):
         with suppress(Error, OSError):
             self.open()
         publisher = self._publisher
+        if publisher is not None:
+            self._await_subscription(publisher)
         while self._waiting:
             fields = self._waiting.popleft()
             with suppress(Error, OSError):
@@ -122,6 +130,12 @@ class RosoutHandler(logging.Handler):
             lost, self._lost = self._lost, 0
             with suppress(Error, OSError):
                 publisher.publish(self._fields(self._loss(lost)))
+
+    def _await_subscription(self, publisher: Publisher) -> None:
+        patience, self._patience = self._patience, 0.0
+        end = time.monotonic() + patience
+        while not (self._closed or publisher.subscription_count()) and time.monotonic() < end:
+            time.sleep(_GLANCE)
 
     def _loss(self, lost: int) -> logging.LogRecord:
         told = "%d log messages were left out: there are too many"

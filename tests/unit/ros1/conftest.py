@@ -126,6 +126,7 @@ class FakeMaster(FakeParameters):
     Attributes:
         port: Where it listens, also after it was stopped and started again.
         publishers: Node, its API's URI and the type of each publisher, by topic and node.
+        nodes: API's URI of each node that has registered anything.
         services: Node, service URI and the node's API's URI, by service.
         calls: Names of all methods that were called.
         answers: Functions that answer methods instead, by name; they return the whole answer.
@@ -145,6 +146,7 @@ class FakeMaster(FakeParameters):
         self.subscribers: dict[str, dict[str, str]] = {}
         self.types: dict[str, str] = {}
         self.services: dict[str, tuple[str, str, str]] = {}
+        self.nodes: dict[str, str] = {}
         self.pid = next(_pids)
         self._server = _Server(("127.0.0.1", self.port), logRequests=False, allow_none=True)
         self.port = self._server.server_address[1]
@@ -173,10 +175,19 @@ class FakeMaster(FakeParameters):
         if method in self.answers:
             return self.answers[method](*arguments)
         with self._lock:
+            if method.startswith("register"):
+                self.nodes[arguments[0]] = arguments[-1]
+            elif method == "subscribeParam":
+                self.nodes[arguments[0]] = arguments[1]
             return getattr(self, f"_{method}")(*arguments)
 
     def _getPid(self, _: str) -> Any:  # noqa: N802 - the API's name
         return [1, "", self.pid]
+
+    def _lookupNode(self, _: str, name: str) -> Any:  # noqa: N802
+        if name not in self.nodes:
+            return [-1, f"unknown node [{name}]", ""]
+        return [1, "", self.nodes[name]]
 
     def _getSystemState(self, _: str) -> Any:  # noqa: N802
         return [
@@ -191,6 +202,12 @@ class FakeMaster(FakeParameters):
 
     def _getTopicTypes(self, _: str) -> Any:  # noqa: N802
         return [1, "", [[topic, kind] for topic, kind in self.types.items()]]
+
+    def _lookupNode(self, _: str, node: str) -> Any:  # noqa: N802
+        topics = [*self.publishers.values(), *self.subscribers.values()]
+        found = [nodes[node] for nodes in topics if node in nodes]
+        found += [api for name, _, api in self.services.values() if name == node]
+        return [1, "", found[0]] if found else [-1, f"unknown node [{node}]", ""]
 
     def _registerService(self, node: str, name: str, uri: str, api: str) -> Any:  # noqa: N802
         self.services[name] = (node, uri, api)
