@@ -111,8 +111,14 @@ class DdsDiscovery:
             more = more or bool(news)
             with self._lock:
                 for found in news:
-                    self._seen.put_endpoint(found, reader=topic is BuiltinTopic.SUBSCRIPTION)
+                    self._put_endpoint(found, reader=topic is BuiltinTopic.SUBSCRIPTION)
         return more
+
+    def _put_endpoint(self, found: Discovered, *, reader: bool) -> None:
+        try:
+            self._seen.put_endpoint(found, reader=reader)
+        except Exception:  # the others' news must not go with it
+            _log.exception("what DDS tells of endpoint %s is not understood", found.guid.hex())
 
     def _take_participants(self) -> None:
         """Take them first, always: they are what the others belong to."""

@@ -92,17 +92,21 @@ class SampleWriter:
         self._slice = min(self._patience, _SLICE)
         self._lock = threading.Lock()
         self._closed = False
-        self._topic = make_topic(participant.entity, topic, dds_type)
-        try:
-            policies = qos_of(qos, writer=True, user_data=user_data)
-            if qos.reliability is Reliability.RELIABLE:
-                policies.wait_at_most(self._slice)
-            self.entity = cyclone.create_writer(participant.entity, self._topic, policies, place)
-        except BaseException:
-            cyclone.delete(self._topic)
-            raise
-        self.guid = cyclone.guid(self.entity)
-        self._type = cyclone.sertype(self.entity)
+        with participant.in_use():
+            self._topic = make_topic(participant.entity, topic, dds_type)
+            try:
+                policies = qos_of(qos, writer=True, user_data=user_data)
+                if qos.reliability is Reliability.RELIABLE:
+                    policies.wait_at_most(self._slice)
+                self.entity = cyclone.create_writer(
+                    participant.entity, self._topic, policies, place
+                )
+                self.guid = cyclone.guid(self.entity)
+                self._type = cyclone.sertype(self.entity)
+            except BaseException:
+                cyclone.delete(self._topic)
+                raise
+            participant.before_leaving(self.entity, self._stop)
 
     def write(self, parts: Sequence[bytes | bytearray | memoryview]) -> None:
         """Send a payload that comes in one part or several.
@@ -144,7 +148,15 @@ class SampleWriter:
         else:
             self._participant.lingering.add(self.entity, self._delete)
 
+    def _stop(self) -> None:
+        """Let nobody write any more, nor be about to: all goes with the participant."""
+        self._closed = True
+        # Not for ever: it may be this very thread that was interrupted by a signal.
+        if self._lock.acquire(timeout=_PATIENCE):
+            self._lock.release()
+
     def _delete(self) -> None:
+        self._participant.before_leaving(self.entity, None)
         cyclone.delete(self.entity)
         # The topic keeps the type alive that a write in another thread may be using.
         with self._lock:
@@ -193,37 +205,44 @@ class SampleReader:
         self._eager = True
         self._lost = self._count = 0
         self._visited = 0.0
-        self._busy = threading.Lock()
+        self._busy, self._changing = threading.Lock(), threading.RLock()
         self._batch = Batch(describe)
         policies = qos_of(qos, writer=False, user_data=user_data)
         if qos.history is History.KEEP_LAST:
             policies.set_history(max(qos.depth, _MIN_DEPTH))
-        self._topic = make_topic(participant.entity, topic, dds_type)
-        try:
-            self.entity = cyclone.create_reader(participant.entity, self._topic, policies, place)
-            self.guid = cyclone.guid(self.entity)
-            self._events = Event.NONE if on_matched is None else Event.SUBSCRIPTION_MATCHED
-            participant.pump.watch(self.entity, self._events | Event.DATA_AVAILABLE, self._serve)
-        except BaseException:
-            cyclone.delete(self._topic)
-            raise
+        self._events = Event.NONE if on_matched is None else Event.SUBSCRIPTION_MATCHED
+        with participant.in_use():
+            self._topic = make_topic(participant.entity, topic, dds_type)
+            try:
+                self.entity = cyclone.create_reader(
+                    participant.entity, self._topic, policies, place
+                )
+                self.guid = cyclone.guid(self.entity)
+                events = self._events | Event.DATA_AVAILABLE
+                participant.pump.watch(self.entity, events, self._serve)
+            except BaseException:
+                cyclone.delete(self._topic)
+                raise
 
     def set_eager(self, eager: bool) -> None:
         """Say whether samples are handed on as they come, or some thirty times a second."""
-        if eager == self._eager or self._closed:
-            return
-        self._eager = eager
-        with suppress(NodeClosedError):
+        with self._changing, suppress(NodeClosedError):
+            if eager == self._eager or self._closed:
+                return
+            self._eager = eager
             set_events(self.entity, self._events | (Event.DATA_AVAILABLE if eager else Event.NONE))
             self._participant.pump.visit(self.entity, None if eager else self._visit)
 
     def flush(self) -> None:
         """Hand on what waits, unless another thread is about to."""
         if self._busy.acquire(blocking=False):
+            more = True
             try:
-                self._hand_on(_MOST)
+                more = self._hand_on(_MOST)
             finally:
                 self._busy.release()
+                if more and self._eager:
+                    self._participant.pump.visit(self.entity, None)
 
     def _visit(self) -> bool:
         """Hand on what waits; return whether so much comes that it should not wait so long."""
@@ -246,9 +265,10 @@ class SampleReader:
 
     def close(self) -> None:
         """Delete it; nothing more is taken."""
-        if self._closed:
-            return
-        self._closed = True
+        with self._changing:
+            if self._closed:
+                return
+            self._closed = True
         cyclone.delete(self.entity)
         self._participant.pump.forget(self.entity)
         cyclone.delete(self._topic)

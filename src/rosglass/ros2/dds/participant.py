@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import threading
 import time
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from rosglass.errors import NodeClosedError
 from rosglass.ros2.dds import cyclone
 from rosglass.ros2.dds.cyclone_qos import Qos
 from rosglass.ros2.dds.discovery_info import PARTICIPANT_USER_DATA, NodeEntities
@@ -14,13 +16,16 @@ from rosglass.ros2.dds.lingering import Lingering
 from rosglass.ros2.dds.pump import Pump
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from rosglass.comm import NodeName
     from rosglass.ros2.dds.graph import DdsGraph
     from rosglass.ros2.dds.options import DdsOptions
 
 __all__ = ["Participant"]
+
+#: Seconds that closing waits for those who are using it, which takes them milliseconds.
+_PATIENCE = 5.0
 
 
 class Participant:
@@ -51,6 +56,9 @@ class Participant:
         self._nodes: dict[NodeName, int] = {}
         self._endpoints: dict[bytes, tuple[NodeName, bool]] = {}
         self._lock = threading.Lock()
+        self._use = threading.Condition()
+        self._users = 0
+        self._leaving: dict[int, Callable[[], None]] = {}
         self._closed = False
         self._domain = Domain(options)
         try:
@@ -96,14 +104,46 @@ class Participant:
             if self._endpoints.pop(guid, None) is not None:
                 self._tell()
 
+    @contextmanager
+    def in_use(self) -> Iterator[None]:
+        """Keep the participant from being deleted meanwhile.
+
+        What belongs to it goes with it, and with that memory that somebody may be using.
+
+        Raises:
+            NodeClosedError: It is being closed.
+        """
+        with self._use:
+            if self._closed:
+                raise NodeClosedError("the node is closed; connect again")
+            self._users += 1
+        try:
+            yield
+        finally:
+            with self._use:
+                self._users -= 1
+                self._use.notify_all()
+
+    def before_leaving(self, entity: int, end: Callable[[], None] | None) -> None:
+        """Have `end` called before what belongs to the participant is deleted; None ends that."""
+        with self._use:
+            if end is None:
+                self._leaving.pop(entity, None)
+            else:
+                self._leaving[entity] = end
+
     def close(self) -> None:
         """Leave the domain with all that belongs to it; nothing is handed on afterwards."""
-        with self._lock:
+        with self._lock, self._use:
             if self._closed:
                 return
             self._closed = True
             self.on_nodes = lambda _: None
+        with self._use:
+            self._use.wait_for(lambda: not self._users, _PATIENCE)
         self.pump.close()
+        for end in list(self._leaving.values()):
+            end()
         self.lingering.close()
         cyclone.delete(self.entity)
         self._domain.close()

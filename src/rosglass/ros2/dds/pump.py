@@ -112,4 +112,4 @@ class Pump:
             if not self._closed:
                 _log.exception("%s: what arrived cannot be handed on", self._thread.name)
                 time.sleep(_BACKOFF)
-            return None
+            return True  # there may be more, which is not told again
