@@ -19,6 +19,7 @@ from rosglass.interfaces import Library
 
 pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
 
+from rosglass.ros2.dds import cyclone_origins
 from rosglass.ros2.dds.replier import DdsReplier
 from rosglass.ros2.dds.requester import DdsRequester
 
@@ -207,8 +208,7 @@ def test_what_is_taken_while_it_is_received_does_not_stay(
     start_services, node, types, wait_for, monkeypatch
 ):
     """The library keeps its samples until they are taken again, and keeps only some."""
-    origins: dict[int, Any] = {}
-    monkeypatch.setattr("rosglass.ros2.dds.cyclone_origins._origins", origins)
+    before = set(cyclone_origins._readers)
     taken: list[bool] = []
     for end in (DdsRequester, DdsReplier):
 
@@ -229,7 +229,9 @@ def test_what_is_taken_while_it_is_received_does_not_stay(
             assert [other.result(10).sum for other in others] == [each, each + 1]
     assert [call.result(10).sum for call in calls] == [n + 1 for n in range(200)]
     assert peer.event("answers") == [n + 1 for n in range(200)]
-    wait_for(lambda: len(taken) >= 600 and not origins, what=f"{origins}")
+    kept = [cyclone_origins._readers[new] for new in cyclone_origins._readers.keys() - before]
+    assert len(kept) >= 2
+    wait_for(lambda: len(taken) >= 600 and not any(each._noted for each in kept), what="the taking")
     assert taken.count(True) > 100
     peer.end()
 

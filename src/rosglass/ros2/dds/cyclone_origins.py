@@ -23,14 +23,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import TypeAlias
 
-    Take: TypeAlias = Callable[[bytes, Origin, bytes | memoryview], bool]
+    Take: TypeAlias = Callable[[Origin, bytes | memoryview], bool]
 
-__all__ = ["TAKEN", "create_topic", "hasten", "origin", "problem"]
+__all__ = ["Origins", "problem"]
 
 _log = logging.getLogger("rosglass.ros2")
-
-#: The origin of what :func:`hasten` has handed on.
-TAKEN = Origin(b"", 0, None)
 
 #: Place in ``ddsi_serdata_ops``.
 _FROM_SER = 2
@@ -40,21 +37,15 @@ _RDATA = struct.Struct("=QQIIHHH2x")
 _PACKET = 48
 _RTPS_HEADER = 20
 _INFO_SOURCE = 0x0C
-#: Origins that are kept until somebody asks for them. Those of samples that a reader drops unread
-#: make room when their memory is used again, or here.
+#: Origins that a reader's samples are kept of until somebody asks for them. Those of samples that
+#: it drops unread make room when their memory is used again, or here.
 _MAX_ORIGINS = 16384
 
 _from_ser_type = c_void_p, c_void_p, c_int, c_void_p, c_size_t
 _FromSer, _FromSerFree = PYFUNCTYPE(*_from_ser_type), CFUNCTYPE(*_from_ser_type)
 
-_origins: dict[int, Origin] = {}
-#: What to call with samples while they are received, by the address of their type.
-_hasty: dict[int, Take] = {}
-
-
-def create_topic(participant: int, name: str, type_name: str) -> int:
-    """Create a topic whose readers' samples have an :func:`origin`; see `cyclone.create_topic`."""
-    return _hook.create_topic(participant, name, type_name)
+#: By the address of their reader's type.
+_readers: dict[int, Origins] = {}
 
 
 def problem() -> str:
@@ -62,39 +53,73 @@ def problem() -> str:
     return _hook.problem
 
 
-def origin(serdata: int) -> Origin | None:
-    """Return where a received sample comes from, once.
+class Origins:
+    """Where the samples of one reader come from.
 
-    None when it came within this process; :data:`TAKEN` when it was handed on already.
-
-    Args:
-        serdata: The sample's address, while the caller still holds a reference to it.
+    Each reader has its own: a sample that is dropped unread leaves its origin behind, under an
+    address that may be another reader's sample's later.
     """
-    return _origins.pop(serdata, None)
 
+    def __init__(self) -> None:
+        self._type = 0
+        self._noted: dict[int, Origin] = {}
+        self._take: Take | None = None
 
-def hasten(reader: int, take: Take) -> Callable[[], None]:
-    """Have samples of other processes handed on while they are received.
+    def create_topic(self, participant: int, name: str, type_name: str) -> int:
+        """Create the topic of the one reader; see `cyclone.create_topic`."""
+        topic = _hook.create_topic(participant, name, type_name)
+        self.follow(cyclone.sertype(topic))
+        return topic
 
-    It saves waking a thread, a fifth of a service call's time. The library is in the middle of
-    something then, and waits: `take` must not call it but to write, nor wait for anything.
+    def follow(self, sertype: int) -> None:
+        """Note the origins of the samples of a type, by its address."""
+        self._type = sertype
+        _readers[sertype] = self
 
-    Args:
-        reader: Of a topic of :func:`create_topic`.
-        take: Takes a sample's writer (empty when unknown), origin and payload; returns whether it
-            did. What it did not take, and that alone, comes later with an origin.
+    def of(self, serdata: int) -> Origin | None:
+        """Return where a sample comes from, once; None when it came within this process.
 
-    Returns:
-        What ends it.
-    """
-    sertype = cyclone.sertype(reader)
-    if not _hook.problem:
-        _hasty[sertype] = take
+        A sample that came within this process may be given the origin of one that was dropped
+        unread: see :meth:`Origin.may_be_of`.
 
-    def end() -> None:
-        _hasty.pop(sertype, None)
+        Args:
+            serdata: The sample's address, while the caller still holds a reference to it.
+        """
+        return self._noted.pop(serdata, None)
 
-    return end
+    def hasten(self, take: Take | None) -> None:
+        """Have samples of other processes handed on while they are received.
+
+        It saves waking a thread, a fifth of a service call's time. The library is in the middle of
+        something then, and waits: `take` must not call it but to write, nor wait for anything.
+
+        Args:
+            take: Takes a sample's origin and payload; returns whether it did. What it did not take
+                comes later, with the same origin. None ends it.
+        """
+        self._take = take
+
+    def close(self) -> None:
+        """Forget all; for a reader that was deleted."""
+        self._take = None
+        if _readers.get(self._type) is self:
+            del _readers[self._type]
+        self._noted.clear()
+
+    def note(self, serdata: int, fragments: int) -> None:
+        """Note the origin of a sample that was just made from fragments, and hand it on."""
+        self._noted.pop(serdata, None)
+        found = _read(fragments)
+        if found is None:
+            return
+        while len(self._noted) >= _MAX_ORIGINS:
+            self._noted.pop(next(iter(self._noted)), None)
+        self._noted[serdata] = found
+        take = self._take
+        if take is not None:
+            keeping().ddsi_serdata_ref(serdata)
+            if take(found, payload(serdata)):
+                self._noted[serdata] = found._replace(taken=True)
 
 
 class _Reading(Hook):
@@ -102,19 +127,14 @@ class _Reading(Hook):
 
     def replace(self, originals: Any) -> dict[int, Any]:
         small, big = _FromSer(originals[_FROM_SER]), _FromSerFree(originals[_FROM_SER])
-        lib = keeping()
 
         def from_ser(sertype: int, kind: int, fragments: int, size: int) -> int | None:
             make = small if size <= COPIED else big
             serdata: int | None = make(sertype, kind, fragments, size)
             try:
-                if serdata is not None and kind == SDK_DATA:
-                    found = _note(serdata, fragments)
-                    take = _hasty.get(sertype)
-                    if take is not None and found is not None:
-                        lib.ddsi_serdata_ref(serdata)
-                        if take(_writer(fragments, found), found, payload(serdata)):
-                            _origins[serdata] = TAKEN
+                origins = _readers.get(sertype)
+                if serdata is not None and kind == SDK_DATA and origins is not None:
+                    origins.note(serdata, fragments)
             except Exception:
                 _log.exception("the origin of a DDS sample cannot be noted")
             return serdata
@@ -123,10 +143,11 @@ class _Reading(Hook):
 
     def test(self, sertype: int) -> None:
         data = b"\x00\x01\x00\x00rosglass"
-        sent = Origin(b"\x00\x00\x12\x03", (3 << 32) + 4, Identity(bytes(range(16)), (5 << 32) + 6))
+        related = Identity(bytes(range(16)), (5 << 32) + 6)
+        sent = Origin(b"\x00\x00\x12\x03", (3 << 32) + 4, related, bytes(range(12)))
         header = struct.pack("=BBHHHIIiI", 0x15, 7, 0, 0, 16, 0, 0x1203, 3, 4)
-        assert sent.related is not None
-        before = bytes(20) + header + inline_qos(sent.related)
+        guid = struct.pack("=3I", *struct.unpack(">3I", sent.prefix))
+        before = bytes(8) + guid + header + inline_qos(related)
         packet = ctypes.create_string_buffer(bytes(_PACKET) + before + data)
         place = ctypes.addressof(packet)
         rdata = ctypes.create_string_buffer(
@@ -134,34 +155,32 @@ class _Reading(Hook):
         )
         # Through the table, as the library does it.
         from_ser = _FromSer(self.function(sertype, _FROM_SER))
-        serdata = from_ser(sertype, SDK_DATA, ctypes.addressof(rdata), len(data))
-        noted = origin(serdata)
+        origins = Origins()
+        origins.follow(sertype)
+        try:
+            serdata = from_ser(sertype, SDK_DATA, ctypes.addressof(rdata), len(data))
+        finally:
+            found = dict(origins._noted)
+            origins.close()
         expect(bytes(payload(serdata)), data)
-        expect(noted, sent)
+        expect(found, {serdata: sent})
 
 
 _hook = _Reading()
 
 
-def _note(serdata: int, fragments: int) -> Origin | None:
-    """Note the origin of a sample that was made from fragments of which the first is the first."""
+def _read(fragments: int) -> Origin | None:
+    """Return the origin of a sample that was made from fragments, the first of which is given."""
     rmsg, _, first, _, submessage, end, _ = _RDATA.unpack(string_at(fragments, _RDATA.size))
-    _origins.pop(serdata, None)
     if first != 0 or not rmsg or end <= submessage:
         return None
     # The library has checked that submessage and parameters end where the payload begins.
     found = read_origin(string_at(rmsg + _PACKET + submessage, end - submessage))
-    if found is None:
-        return None
-    while len(_origins) >= _MAX_ORIGINS:
-        _origins.pop(next(iter(_origins)), None)
-    _origins[serdata] = found
-    return found
+    return None if found is None else found._replace(prefix=_prefix(rmsg, submessage))
 
 
-def _writer(fragments: int, found: Origin) -> bytes:
-    """Return the GUID of a sample's writer; empty where that takes a closer look at the packet."""
-    rmsg, *_, submessage, _, _ = _RDATA.unpack(string_at(fragments, _RDATA.size))
+def _prefix(rmsg: int, submessage: int) -> bytes:
+    """Return whose submessage it is; empty where that takes a closer look at the packet."""
     packet = string_at(rmsg + _PACKET, submessage)
     at = _RTPS_HEADER
     while at + 4 <= submessage:
@@ -169,6 +188,4 @@ def _writer(fragments: int, found: Origin) -> bytes:
         if name == _INFO_SOURCE or not flags & 1:
             return b""
         at += 4 + size
-    if at != submessage:
-        return b""
-    return struct.pack(">3I", *struct.unpack_from("=3I", packet, 8)) + found.entity
+    return struct.pack(">3I", *struct.unpack_from("=3I", packet, 8)) if at == submessage else b""

@@ -49,11 +49,24 @@ class Origin(NamedTuple):
         sequence: Its number there.
         related: The request that it answers, or what a client tells of itself in a request; None
             when it carries no such identity.
+        prefix: What its writer's GUID begins with, empty where that is not known.
+        taken: Whether it was handed on already, while it was received.
     """
 
     entity: bytes
     sequence: int
     related: Identity | None
+    prefix: bytes = b""
+    taken: bool = False
+
+    @property
+    def guid(self) -> bytes:
+        """Its writer's GUID, empty where that is not known."""
+        return self.prefix + self.entity if self.prefix else b""
+
+    def may_be_of(self, guid: bytes) -> bool:
+        """Return whether its writer may be the one with a GUID."""
+        return guid.startswith(self.prefix) and guid.endswith(self.entity)
 
 
 def inline_qos(identity: Identity) -> bytes:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import threading
+from collections import OrderedDict
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -83,8 +84,8 @@ class DdsReplier(Replier):
         #: Clients whose readers of replies are matched, as found out since the last change.
         self._hearing: set[bytes] = set()
         self._strangers = False
-        #: Requests that were left to the pump: none may overtake them.
-        self._left = 0
+        #: Origins, by their identity, of requests left to the pump: none may overtake them.
+        self._left: OrderedDict[int, Origin] = OrderedDict()
         self._leaving = threading.Lock()
         self._ends = Ends(
             participant,
@@ -100,7 +101,7 @@ class DdsReplier(Replier):
         )
         self._pump = participant.pump
         self.gid = self._ends.reader.guid
-        self._end_haste = cyclone_origins.hasten(self._ends.reader.entity, self._hasten)
+        self._ends.origins.hasten(self._hasten)
         self._ends.start()
 
     @property
@@ -133,18 +134,19 @@ class DdsReplier(Replier):
 
     def close(self) -> None:
         """Withdraw the server."""
-        self._end_haste()
+        self._ends.origins.hasten(None)
         if not self._pump.current:
             self._ends.outbox.drain(_FAREWELL)
         self._ends.close()
 
-    def _hasten(self, guid: bytes, origin: Origin, data: bytes | memoryview) -> bool:
+    def _hasten(self, origin: Origin, data: bytes | memoryview) -> bool:
         """Take a request while it is received; return False when it should come again later."""
+        guid = origin.guid
         client = self._ends.writers.by_guid.get(guid)
         odd = client is None or (scheme_of(guid) is Scheme.HEADER and unpack(data) is None)
         with self._leaving:
             if odd or client is None or self._left or not self.quick:
-                self._left += 1
+                self._left[id(origin)] = origin
                 return False
         try:
             self._take(client, data, origin)
@@ -153,18 +155,31 @@ class DdsReplier(Replier):
         return True
 
     def _on_requests(self, taken: list[Taken]) -> None:
-        for data, _, handle, origin in taken:
-            if origin is cyclone_origins.TAKEN:
+        for data, _, handle, told in taken:
+            client, origin = self._ends.sender(handle, told)
+            if origin is not None and origin.taken:
                 continue
             try:
-                client = self._ends.writers.get(handle)
-                if client is not None:  # otherwise it is gone, and waits for no reply
+                if client is not None:
                     self._take(client, data, origin)
+                else:
+                    _log.error("%s: a request is lost: who sent it is gone", self._service)
             except Exception:
                 _log.exception("%s: a request is lost", self._service)
             if origin is not None:
-                with self._leaving:
-                    self._left = max(0, self._left - 1)
+                self._has_come(origin)
+
+    def _has_come(self, origin: Origin) -> None:
+        """Wait no longer for a request that was left, nor for those before it, which are lost."""
+        with self._leaving:
+            waiting, gone = len(self._left), 0
+            if id(origin) not in self._left:
+                return
+            while self._left.popitem(last=False)[0] != id(origin):
+                gone += 1
+        if gone and waiting > self._ends.depth:
+            text = "%s: %d requests are lost, as more than %d waited"
+            _log.error(text, self._service, gone, self._ends.depth)
 
     def _take(self, client: Discovered, data: bytes | memoryview, origin: Origin | None) -> None:
         if scheme_of(client.guid) is Scheme.HEADER:
@@ -190,6 +205,9 @@ class DdsReplier(Replier):
 
     def _answer(self, answer: _Answer, data: bytes | bytearray) -> bool:
         """Send a reply; return whether nothing more is to be done for it."""
+        if not self._hears(answer):
+            # Its coming may not have been told yet.
+            self._ends.look()
         writer = self._ends.writer
         if writer is None or not self._hears(answer):
             # A reply to a reader that is not matched yet would be lost.

@@ -102,7 +102,7 @@ class DdsRequester(Requester):
         assert self._ends.writer is not None
         self._writer = self._ends.writer
         self.gid = self._writer.guid
-        self._end_haste = cyclone_origins.hasten(self._ends.reader.entity, self._hasten)
+        self._ends.origins.hasten(self._hasten)
         self._ends.start()
 
     @property
@@ -124,7 +124,7 @@ class DdsRequester(Requester):
     def ready(self) -> bool:
         """Return whether a server's reader of requests and its writer of replies are matched."""
         if time.monotonic() >= self._recheck:
-            self._link()
+            self._ends.look()
         return self._scheme is not None and not self._ends.closed
 
     def send(self, data: bytes | bytearray, timeout: float | None) -> int:
@@ -161,7 +161,7 @@ class DdsRequester(Requester):
         """Withdraw the client; replies that still come are dropped."""
         if self._ends.closed:
             return
-        self._end_haste()
+        self._ends.origins.hasten(None)
         self._ends.close()
         with self._lock:
             self._calls.clear()
@@ -203,7 +203,7 @@ class DdsRequester(Requester):
                 self._by_sequence[self._sequence] = number
         return True
 
-    def _hasten(self, _: bytes, origin: Origin, data: bytes | memoryview) -> bool:
+    def _hasten(self, origin: Origin, data: bytes | memoryview) -> bool:
         """Take a reply while it is received; return False when it should come again later."""
         quick = self.quick
         # Whoever has the lock may be sending, for longer than anybody may be held up here.
@@ -220,16 +220,16 @@ class DdsRequester(Requester):
         return True
 
     def _on_replies(self, taken: list[Taken]) -> None:
-        for data, _, handle, origin in taken:
-            server = self._ends.writers.get(handle)
-            if server is None or origin is cyclone_origins.TAKEN:
+        for data, _, handle, told in taken:
+            server, origin = self._ends.sender(handle, told)
+            if origin is not None and origin.taken:
                 continue
             try:
-                self._take(server.guid, data, origin)
+                self._take(None if server is None else server.guid, data, origin)
             except Exception:
                 _log.exception("%s: a reply is lost", self._service)
 
-    def _take(self, server: bytes, data: bytes | memoryview, origin: Origin | None) -> None:
+    def _take(self, server: bytes | None, data: bytes | memoryview, origin: Origin | None) -> None:
         related = None if origin is None else origin.related
         with self._lock:
             claim = self._match(related, data)
@@ -237,7 +237,7 @@ class DdsRequester(Requester):
                 self._drop(claim[0])
         if claim is not None:
             self._answer(*claim, data)
-        elif related is not None:
+        elif related is not None or server is None:
             pass  # somebody else's, or forgotten
         elif scheme_of(server) is Scheme.IDENTITY:
             if not cyclone_origins.problem():

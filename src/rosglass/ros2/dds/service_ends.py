@@ -21,7 +21,9 @@ from rosglass.comm import EndpointKind
 from rosglass.errors import Error, NodeClosedError
 from rosglass.ros2.dds import cyclone, cyclone_builtin, cyclone_inline_qos, cyclone_origins
 from rosglass.ros2.dds.cyclone import keeping
+from rosglass.ros2.dds.cyclone_builtin import Discovered
 from rosglass.ros2.dds.cyclone_events import Event, publication_matched
+from rosglass.ros2.dds.cyclone_origins import Origins
 from rosglass.ros2.dds.cyclone_qos import qos_of
 from rosglass.ros2.dds.discovery_info import format_user_data
 from rosglass.ros2.dds.endpoints import SampleReader, SampleWriter, Taken
@@ -32,7 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from rosglass.comm import EndpointInfo, NodeName, QoS
-    from rosglass.ros2.dds.cyclone_builtin import Discovered
+    from rosglass.ros2.dds.identity import Origin
     from rosglass.ros2.dds.participant import Participant
     from rosglass.ros2.graph import Graph
 
@@ -52,6 +54,8 @@ _log = logging.getLogger("rosglass.ros2")
 
 #: First two bytes of a GUID (RTPS 2.5, section 9.3.1.5).
 _CYCLONE = b"\x01\x10"
+#: Stands for who used Cyclone DDS and is gone.
+_NOBODY = _CYCLONE.ljust(16, b"\0")
 _VENDORS = {
     b"\x01\x01": "RTI Connext",
     b"\x01\x03": "OpenDDS",
@@ -80,6 +84,8 @@ _ANSWERED, _HEARTBEAT, _QUIET, _PATIENT = 0.1, 1.2, 0.3, 4.0
 _START = 5.0
 #: Peers whose rubbish is logged, once each.
 _MAX_NAMED = 100
+#: Peers that left which are remembered, as what they sent may be handed on after that.
+_MAX_DEPARTED = 256
 
 _numbers = itertools.count(1)
 #: What the GUIDs of this process's participants with services begin with, and how often.
@@ -128,12 +134,14 @@ class Matched:
         look_up: Callable[[int, int], Discovered | None],
     ) -> None:
         self._entity, self._handles, self._look_up = entity, handles, look_up
+        #: With some who left.
         self._known: dict[int, Discovered] = {}
+        self._looking = threading.Lock()
         self.all: tuple[Discovered, ...] = ()
         self.by_guid: dict[bytes, Discovered] = {}
 
     def get(self, handle: int) -> Discovered | None:
-        """Return the one with a handle; None when it is gone, and was not seen before."""
+        """Return the one with a handle; None when it is gone, and was not seen lately."""
         known = self._known.get(handle)
         if known is None:
             known = self._look_up(self._entity, handle)
@@ -143,14 +151,16 @@ class Matched:
 
     def refresh(self) -> None:
         """Look who is there now; to be called when that changes."""
-        try:
-            handles = self._handles(self._entity)
-        except Error:  # deleted meanwhile
-            handles = []
-        here = {handle: found for handle in handles if (found := self.get(handle)) is not None}
-        self._known = here
-        self.all = tuple(here.values())
-        self.by_guid = {found.guid: found for found in self.all}
+        with self._looking:  # who looked first must not have the last word
+            try:
+                handles = self._handles(self._entity)
+            except Error:  # deleted meanwhile
+                handles = []
+            here = {handle: found for handle in handles if (found := self.get(handle)) is not None}
+            if len(self._known) > len(here) + _MAX_DEPARTED:
+                self._known = dict(here)
+            self.all = tuple(here.values())
+            self.by_guid = {found.guid: found for found in self.all}
 
 
 class Ends:
@@ -177,6 +187,8 @@ class Ends:
         writers: Whom the reader is matched with.
         readers: Whom the writer is matched with.
         outbox: What waits to be sent.
+        origins: Where received samples come from.
+        depth: How many of them wait at most, unless the profile keeps all.
     """
 
     def __init__(
@@ -200,7 +212,7 @@ class Ends:
         self._started = threading.Event()
         self._named: set[bytes] = set()
         self._since: dict[bytes, float] = {}
-        self._probing = threading.Lock()
+        self._looking, self._probing = threading.Lock(), threading.Lock()
         self._probe: list[int] = []
         self.closed = False
         requests = f"rq{service}Request", mangle_type(f"{type_name}_Request")
@@ -208,10 +220,12 @@ class Ends:
         self._received, self._sent = (requests, replies) if server else (replies, requests)
         what = "serviceid" if server else "clientid"
         self._user_data = format_user_data({what: _new_id(participant.guid), "typehash": type_hash})
-        self._qos = replace(qos, depth=max(qos.depth, _DEPTH))
+        self.depth = max(qos.depth, _DEPTH)
+        self._qos = replace(qos, depth=self.depth)
         self.outbox = Outbox(self._wake, in_order=not server)
         self.writer: SampleWriter | None = None
         self.readers: Matched | None = None
+        self.origins = Origins()
         self.reader = SampleReader(
             participant,
             *self._received,
@@ -219,9 +233,9 @@ class Ends:
             self._user_data,
             self._place,
             self._hand_on,
-            cyclone_origins.create_topic,
-            cyclone_origins.origin,
-            self._matched,
+            self.origins.create_topic,
+            self.origins.of,
+            self.look,
         )
         self.writers = Matched(
             self.reader.entity, cyclone.matched_publications, cyclone_builtin.matched_publication
@@ -239,7 +253,7 @@ class Ends:
     def start(self) -> None:
         """Let what is received be handed on, and matches be told."""
         self._started.set()
-        self._matched()
+        self.look()
         if self.writer is None:
             self._wake(False)
 
@@ -257,7 +271,30 @@ class Ends:
         # Nothing of ours is called while the lock is held that this waits for.
         count = keeping().dds_get_matched_subscriptions(writer.entity, None, 0)
         if count >= 0 and count != len(readers.all):
-            self._matched()
+            self.look()
+
+    def sender(self, handle: int, origin: Origin | None) -> tuple[Discovered | None, Origin | None]:
+        """Return who sent a sample that was taken, and the sample's origin.
+
+        Who sends and leaves at once may be gone before it is noticed at all, but what was sent is
+        nothing to lose: of such a peer only the GUID may be known, or that it is Cyclone DDS's.
+
+        Args:
+            handle: The writer's handle.
+            origin: What the sample is said to come from.
+
+        Returns:
+            The writer, None when nothing is known of it; and the origin without mistakes.
+        """
+        found = self.writers.get(handle)
+        if found is not None:
+            stale = origin is not None and not origin.may_be_of(found.guid)
+            return found, None if stale else origin
+        if origin is None:
+            # What comes from this process has no origin, and is Cyclone DDS's.
+            known = not cyclone_origins.problem()
+            return (Discovered(False, _NOBODY, handle) if known else None), None
+        return (Discovered(False, origin.guid, handle) if origin.guid else None), origin
 
     def strangers(self) -> list[EndpointInfo]:
         """Return the peers in the graph that do not use Cyclone DDS."""
@@ -290,6 +327,7 @@ class Ends:
         _here[self._participant.guid[:PREFIX]] -= 1
         self._participant.remove_endpoint(self.reader.guid)
         self.reader.close()
+        self.origins.close()
         self.outbox.close()
         with self._probing:
             self._end_probe()
@@ -301,28 +339,31 @@ class Ends:
 
     def _open(self) -> None:
         """Create the writer."""
-        writer = SampleWriter(
-            self._participant,
-            *self._sent,
-            self._qos,
-            self._user_data,
-            self._place,
-            # Requests need no identity beyond that which every sample has.
-            cyclone_inline_qos.create_topic if self._server else cyclone.create_topic,
-            _PATIENCE,
-        )
-        with self._probing:
-            if self.closed:
-                writer.close()
-                return
-            if self._server:
-                cyclone_inline_qos.prepare(writer.entity)
-            self.readers = Matched(
-                writer.entity, cyclone.matched_subscriptions, cyclone_builtin.matched_subscription
+        with self._participant.in_use():
+            writer = SampleWriter(
+                self._participant,
+                *self._sent,
+                self._qos,
+                self._user_data,
+                self._place,
+                # Requests need no identity beyond that which every sample has.
+                cyclone_inline_qos.create_topic if self._server else cyclone.create_topic,
+                _PATIENCE,
             )
-            self.writer = writer
-        self._participant.pump.watch(writer.entity, Event.PUBLICATION_MATCHED, self._on_event)
-        self._participant.add_endpoint(self._node, writer.guid, writer=True)
+            with self._probing:
+                if self.closed:
+                    writer.close()
+                    return
+                if self._server:
+                    cyclone_inline_qos.prepare(writer.entity)
+                self.readers = Matched(
+                    writer.entity,
+                    cyclone.matched_subscriptions,
+                    cyclone_builtin.matched_subscription,
+                )
+                self.writer = writer
+            self._participant.pump.watch(writer.entity, Event.PUBLICATION_MATCHED, self._on_event)
+            self._participant.add_endpoint(self._node, writer.guid, writer=True)
 
     def _synced(self) -> bool:
         """Return whether clients that find this server now will be known here by then, too."""
@@ -337,11 +378,18 @@ class Ends:
         # The first may come while their receiver is being made.
         if self._started.wait(_START):
             self._on_taken(taken)
+        elif not self.closed:
+            text = "%s: %d messages are lost: their receiver was not made within %.0f s"
+            _log.error(text, self._service, len(taken), _START)
 
-    def _matched(self) -> None:
+    def look(self) -> None:
         """Look who came or went, and tell."""
         if not self._started.is_set() or self.closed:
             return
+        with self._looking:  # who looked first must not have the last word
+            self._look_around()
+
+    def _look_around(self) -> None:
         self.writers.refresh()
         if self.readers is not None:
             self.readers.refresh()
@@ -370,11 +418,14 @@ class Ends:
         """
         self._end_probe()
         try:
-            participant = self._participant.entity
-            self._probe.append(cyclone.create_topic(participant, *self._received))
-            policies = qos_of(replace(self._qos, depth=1), writer=False)
-            reader = cyclone.create_reader(participant, self._probe[0], policies, self._place)
-            self._probe.insert(0, reader)
+            with self._participant.in_use():
+                participant = self._participant.entity
+                self._probe.append(cyclone.create_topic(participant, *self._received))
+                policies = qos_of(replace(self._qos, depth=1), writer=False)
+                reader = cyclone.create_reader(participant, self._probe[0], policies, self._place)
+                self._probe.insert(0, reader)
+        except NodeClosedError:
+            pass
         except Error as error:
             _log.warning("%s: the first sample of another may be lost: %s", self._service, error)
 
@@ -390,7 +441,7 @@ class Ends:
         if at_once and self.writer is not None:
             self._participant.pump.visit(self.writer.entity, None)
         else:
-            self._participant.pump.visit(self.reader.entity, self._look)
+            self._participant.pump.visit(self.reader.entity, self._do_due)
 
     def _on_event(self) -> None:
         if self.closed or self.writer is None:
@@ -398,22 +449,25 @@ class Ends:
         with suppress(NodeClosedError):
             matched = publication_matched(self.writer.entity)
             if matched.change or matched.current_change:
-                self._matched()
+                self.look()
         if self.outbox.retry():
             self._wake(False)
 
-    def _look(self) -> None:
+    def _do_due(self) -> None:
         """Do what is due; on the pump's thread, until nothing is left to be done."""
         if self.closed:
+            self._participant.pump.forget(self.reader.entity)
             return
         unsettled = not all(self.settled(guid) for guid in self._since)
         if not unsettled and self._probe:
             with self._probing:
                 self._end_probe()
-            self._matched()
+            self.look()
         if self.writer is None and self._synced():
             try:
                 self._open()
+            except NodeClosedError:
+                return
             except Error as error:
                 _log.error("%s cannot be offered: %s", self._service, error)
                 self._participant.pump.visit(self.reader.entity, None)
