@@ -69,8 +69,6 @@ class Ros1ServiceClient(ServiceClient, Member):
             instead of a connection for each.
     """
 
-    listed = False
-
     def __init__(
         self,
         core: Core,
@@ -247,8 +245,9 @@ class Ros1ServiceClient(ServiceClient, Member):
     def _release(self, entry: Request) -> None:
         link = entry.link
         if link is not None and link.request is entry:
-            # Given up: a response that still comes must not be taken for another one's.
-            link.request = None
+            # Given up: a response that still comes must not be taken for another one's, and the
+            # next call shall not go to the same place without asking.
+            link.request, self._place_time = None, 0.0
             link.end("")
         elif entry.began is None:
             with self._lock:
@@ -296,9 +295,10 @@ class Ros1ServiceClient(ServiceClient, Member):
         for link in list(self._links):
             if link.peer is None or link.request is not None:
                 continue
-            if link.kind is self.type and self._place in (None, link.place):
+            if link.kind is not self.type or self._place not in (None, link.place):
+                link.end("")
+            elif link.lives():
                 return link
-            link.end("")
         return None
 
     def _encoded(self, entry: Request, kind: ServiceType) -> bool:
@@ -341,7 +341,8 @@ class Ros1ServiceClient(ServiceClient, Member):
                 told = text or "its server reports a failure and does not say why"
                 entry.call.fail(ServiceError(f"the call of {self.name} failed: {told}"))
         if link.persistent:
-            self._advance()
+            # Not at once: its end may come right behind the response.
+            self._core.loop.call(self._advance)
 
     def link_ended(self, link: ServiceLink, reason: str) -> None:
         """End the call that can get no answer any more, or try again if it was not sent."""
@@ -352,7 +353,7 @@ class Ros1ServiceClient(ServiceClient, Member):
             if entry.sent is not None:
                 entry.call.fail(self._loss(entry, reason))
             elif link.refusal and (entry.refused or self._place_time >= entry.made):
-                entry.call.fail(self._refusal(link))
+                self._explain(entry, link)
             elif not entry.call.done():
                 # Refused where the server was before the call: it may be elsewhere by now.
                 entry.refused = bool(link.refusal)
@@ -395,12 +396,21 @@ class Ros1ServiceClient(ServiceClient, Member):
             "it out or not; look what happened, and call again"
         )
 
-    def _refusal(self, link: ServiceLink) -> ServiceError:
-        known = self._mismatch()
-        told = known or (
-            f"it was called as {link.kind.name} with md5 {link.kind.md5}: {link.refusal}"
-        )
-        return ServiceError(f"{link.place.uri} refuses the call of {self.name}: {told}")
+    def _explain(self, entry: Request, link: ServiceLink) -> None:
+        """End a call that was refused: most likely the server has another definition."""
+
+        def fail(peer: Peer | None, _: str = "") -> None:
+            if peer is not None and not self._closed:
+                self._meet(peer)
+            called = f"it was called as {link.kind.name} with md5 {link.kind.md5}"
+            told = self._mismatch() or f"{called}: {link.refusal}"
+            refused = f"{link.place.uri} refuses the call of {self.name}: {told}"
+            entry.call.fail(ServiceError(refused))
+
+        try:
+            probe(self._core, self.name, link.place, fail)
+        except OSError:  # no more sockets
+            fail(None)
 
     # -- finding the server, in the loop's thread ------------------------------------------------
 
@@ -530,7 +540,7 @@ class Ros1ServiceClient(ServiceClient, Member):
         nodes = self._core.graph.services().get(self.name, [])
         who = f"{' and '.join(nodes)} offers" if nodes else "somebody offers"
         return (
-            f"{who} it at {place.uri}, says the master, but cannot be reached there: {why}; if "
+            f"{who} it at {place.uri}, says the master, but calling it there fails: {why}; if "
             "it was killed, start it again, or let 'rosnode cleanup' remove it"
         )
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from rosglass.errors import ConnectionLostError, ConversionError
 from rosglass.interfaces import ros1_name
 from rosglass.ros1.connection import MAX_FRAME, Connection
+from rosglass.ros1.io_loop import READ
 from rosglass.ros1.service_probe import Peer
 
 if TYPE_CHECKING:
@@ -133,6 +134,11 @@ class ServiceLink:
     def send(self, data: bytes) -> None:
         """Send a request; the server has accepted the connection."""
         self._connection.send([_length.pack(len(data)), data])
+
+    def lives(self) -> bool:
+        """Return whether the server has not closed it; takes in what has come until now."""
+        self._connection.ready(READ)
+        return not self._connection.closed
 
     def end(self, reason: str = "") -> None:
         """End it, and say why."""

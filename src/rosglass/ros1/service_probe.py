@@ -131,6 +131,6 @@ def probe(core: Core, name: str, place: Place, done: Callable[[Peer | None, str]
         header,
         on_header,
         lambda _data, _lead: None,  # it was not called
-        lambda reason: finish(None, f"{place.uri} does not serve {name}: {reason}"),
+        lambda reason: finish(None, reason),
         lead=1,
     )

@@ -111,9 +111,9 @@ class Ros1ServiceServer(ServiceServer, Member):
         with self._lock:
             if self._closed:
                 return f"{self.name} is not offered here any more"
-            self._refused.pop(client, None)
             is_probe = header.get("probe", "").lower() in _TRUE
             if not is_probe:
+                self._refused.pop(client, None)
                 persistent = header.get("persistent", "").lower() in _TRUE
                 session = Session(self._core.loop, link, persistent, self._on_request)
                 self._sessions[link] = session

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from rosglass.messages import Message, ServiceType
     from rosglass.ros1.connection import Connection
     from rosglass.ros1.core import Core
-    from rosglass.ros1.master import Master
 
 __all__ = ["Services"]
 
@@ -41,8 +40,6 @@ class Services:
         self._core = core
         self._lock = threading.Lock()
         self._servers: dict[str, Ros1ServiceServer] = {}
-        #: A server that goes and one that comes must reach the master in this order.
-        self._registering = threading.Lock()
         self.errands = Errands(f"{core.name.name} lookups")
         self.types = ServiceTypes(core, self.errands)
 
@@ -106,30 +103,11 @@ class Services:
         if server is not None:
             server.drop(link)
 
-    # -- the master ------------------------------------------------------------------------------
-
-    def register(self, name: str, master: Master) -> None:
-        """Tell the master of a server, unless it is closed by now."""
-        with self._registering:
-            if name in self._servers:
-                master.call("registerService", name, self._uri, self._core.uri)
-
-    def unregister(self, name: str, master: Master) -> None:
-        """Tell the master that a server is gone, unless there is another one by now."""
-        with self._registering:
-            if name not in self._servers:
-                master.call("unregisterService", name, self._uri)
-
     def end(self, server: Ros1ServiceServer) -> None:
         """Forget a server."""
         with self._lock:
             if self._servers.get(server.name) is server:
                 del self._servers[server.name]
-
-    @property
-    def _uri(self) -> str:
-        host, port = self._core.address
-        return f"rosrpc://[{host}]:{port}" if ":" in host else f"rosrpc://{host}:{port}"
 
     # -- what there is ---------------------------------------------------------------------------
 

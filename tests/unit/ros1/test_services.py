@@ -1,0 +1,1032 @@
+"""ROS 1 services between our own nodes, and against servers and clients that misbehave."""
+
+from __future__ import annotations
+
+import asyncio
+import concurrent.futures
+import socket
+import struct
+import threading
+import time
+from contextlib import suppress
+
+import pytest
+
+import rosglass
+from rosglass.comm import IMMEDIATE, Dispatcher
+from rosglass.interfaces import Library
+from rosglass.ros1.header import encode_header, parse_header
+
+ADD, TRIGGER, BOOL = "rospy_tutorials/AddTwoInts", "std_srvs/Trigger", "std_srvs/SetBool"
+MD5 = "6a2e34150c00229791cc89ff309fff21"
+TELLS = {"callerid": "/robot", "md5sum": MD5, "type": ADD}
+
+
+def add(request):
+    return {"sum": request.a + request.b}
+
+
+def receive(sock, count):
+    data = b""
+    while len(data) < count:
+        more = sock.recv(count - len(data))
+        if not more:
+            raise ConnectionResetError
+        data += more
+    return data
+
+
+def receive_header(sock):
+    return parse_header(receive(sock, struct.unpack("<I", receive(sock, 4))[0]))
+
+
+def receive_request(sock):
+    return receive(sock, struct.unpack("<I", receive(sock, 4))[0])
+
+
+def response(total=3):
+    data = rosglass.load(ADD, ros=1).response.encode({"sum": total})
+    return b"\1" + struct.pack("<I", len(data)) + data
+
+
+class Robot:
+    """Serves /add on a socket: `serve(sock, header)` does what the test wants after the headers.
+
+    Attributes:
+        headers: What clients sent, probes left out.
+        tells: Its own connection header.
+    """
+
+    def __init__(self, serve, tells=TELLS):
+        self.serve, self.tells, self.headers = serve, tells, []
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.port = self._listener.getsockname()[1]
+        self._open = [self._listener]
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def _accept(self):
+        while True:
+            try:
+                sock, _ = self._listener.accept()
+            except OSError:
+                return
+            self._open.append(sock)
+            threading.Thread(target=self._run, args=(sock,), daemon=True).start()
+
+    def _run(self, sock):
+        try:
+            header = receive_header(sock)
+            is_probe = header.get("probe") == "1"
+            if not is_probe:
+                self.headers.append(header)
+            sock.sendall(encode_header(self.tells))
+            if not is_probe:
+                self.serve(sock, header)
+        except OSError:
+            pass
+        finally:
+            sock.close()
+
+    def close(self):
+        for sock in self._open:
+            with suppress(OSError):
+                sock.shutdown(socket.SHUT_RDWR)
+            sock.close()
+
+
+@pytest.fixture
+def start_robot(master):
+    robots = []
+
+    def start_robot(serve=None, tells=TELLS):
+        def answer(sock, _):
+            receive_request(sock)
+            sock.sendall(response())
+
+        robots.append(Robot(serve or answer, tells))
+        master.offer("/add", robots[-1].port)
+        return robots[-1]
+
+    yield start_robot
+    for robot in robots:
+        robot.close()
+
+
+@pytest.fixture
+def node(connect):
+    return connect("console")
+
+
+@pytest.fixture(params=[False, True], ids=["each call", "persistent"])
+def persistent(request):
+    return request.param
+
+
+@pytest.fixture
+def client(node, persistent):
+    return node.create_service_client("/add", ADD, persistent=persistent)
+
+
+def dial(node, **header):
+    """Return a socket on which `node` was sent a connection header, and what it answered."""
+    sock = socket.create_connection(("127.0.0.1", node._core.address[1]), 5)
+    sock.sendall(encode_header(header))
+    return sock, receive_header(sock)
+
+
+# -- calling -------------------------------------------------------------------------------------
+
+
+def test_a_service_is_called_and_answered(connect, client):
+    server = connect("robot").create_service_server("/add", ADD, add)
+    assert client.call({"a": 1, "b": 2}).sum == 3
+    assert client.call(rosglass.load(ADD, ros=1).request.create(a=2, b=3)).sum == 5
+    assert client.call().sum == 0
+    assert (client.problem, server.problem) == ("", "")
+    assert client.ready
+    assert client.pending == 0
+    full = "rospy_tutorials/srv/AddTwoInts"
+    assert repr(client) == f"<Ros1ServiceClient /add [{full}]>"
+    assert repr(server) == f"<Ros1ServiceServer /add [{full}]>"
+    assert client.qos == server.qos == rosglass.QoS()
+
+
+def test_services_of_the_own_node_are_called_too(node):
+    node.create_service_server("/add", ADD, add)
+    assert node.create_service_client("/add", ADD).call({"a": 1, "b": 2}).sum == 3
+
+
+def test_names_are_resolved(connect, master, eventually):
+    arm = connect("arm", "/left")
+    assert arm.create_service_client("add", ADD).name == "/left/add"
+    assert arm.create_service_server("~add", ADD, add).name == "/left/arm/add"
+    eventually(lambda: "/left/arm/add" in master.services)
+
+
+@pytest.mark.parametrize("create", ["create_service_client", "create_service_server"])
+@pytest.mark.parametrize(
+    ("name", "type_", "error", "told"),
+    [
+        ("a b", ADD, rosglass.InvalidNameError, "' ' at position 1"),
+        ("/x", "nowhere_msgs/Nothing", rosglass.TypeNotFoundError, "nowhere_msgs"),
+        ("/x", "std_msgs/String", rosglass.TypeNotFoundError, "is not a service type"),
+        ("/x", 7, rosglass.TypeNotFoundError, "7 is not a service type"),
+        ("/x", rosglass.load(TRIGGER), rosglass.UnsupportedError, "ROS 2's"),
+    ],
+    ids=["name", "unknown", "message", "number", "ROS 2"],
+)
+def test_what_cannot_be_used_is_refused_at_creation(node, create, name, type_, error, told):
+    arguments = (name, type_) if create == "create_service_client" else (name, type_, add)
+    with pytest.raises(error, match=told):
+        getattr(node, create)(*arguments)
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [({"qos": 10}, "/x: qos: expected"), ({"persistent": "no"}, "/x: persistent: expected")],
+)
+def test_options_of_another_kind_are_refused(node, options, told):
+    with pytest.raises(rosglass.ConversionError, match=told):
+        node.create_service_client("/x", ADD, **options)
+
+
+@pytest.mark.parametrize("call", ["call", "call_async"])
+@pytest.mark.parametrize(
+    ("request_", "timeout", "told"),
+    [
+        ({"a": "x"}, 1, "a: expected an integer"),
+        ({"c": 1}, 1, "c"),
+        ("text", 1, "expected"),
+        ({}, -1, "timeout: expected seconds from 0 on, or None for ever, got -1"),
+        ({}, True, "timeout: expected seconds"),
+    ],
+)
+def test_what_does_not_fit_is_refused_and_not_sent(
+    client, start_robot, call, request_, timeout, told
+):
+    robot = start_robot()
+    with pytest.raises(rosglass.ConversionError, match=told):
+        getattr(client, call)(request_, timeout=timeout)
+    assert client.pending == 0
+    assert robot.headers == []
+
+
+def test_a_request_waits_for_the_server_as_it_was_when_it_was_made(connect, client):
+    request = {"a": 1, "b": 2}
+    calls = [client.call_async(request) for _ in range(3)]
+    request["a"] = 100
+    assert client.pending == 3
+    connect("robot").create_service_server("/add", ADD, add)
+    assert [call.result(5).sum for call in calls] == [3, 3, 3]
+
+
+def test_requests_through_one_connection_arrive_in_the_order_of_the_calls(connect, node):
+    seen = []
+    client = node.create_service_client("/add", ADD, persistent=True)
+    for value in range(20):
+        client.call_async({"a": value})
+    connect("robot").create_service_server("/add", ADD, lambda r: seen.append(r.a))
+    for value in range(20, 40):
+        client.call_async({"a": value})
+    client.call({"a": 40})
+    assert seen == list(range(41))
+
+
+def test_fifty_calls_are_answered_in_parallel(connect, node):
+    client = node.create_service_client("/add", ADD)
+    together, promises = threading.Event(), []
+
+    def later(request):
+        promise = concurrent.futures.Future()
+        promises.append((promise, request.a))
+        if len(promises) == 50:
+            together.set()
+        return promise
+
+    connect("robot").create_service_server("/add", ADD, later)
+    calls = [client.call_async({"a": value}) for value in range(50)]
+    assert together.wait(10)
+    assert client.pending == 50
+    for promise, value in reversed(promises):
+        promise.set_result({"sum": value})
+    assert [call.result(5).sum for call in calls] == list(range(50))
+
+
+def test_more_calls_than_connections_wait_for_their_turn(connect, node):
+    client = node.create_service_client("/add", ADD)
+    connect("robot").create_service_server("/add", ADD, add)
+    calls = [client.call_async({"a": value}) for value in range(300)]
+    assert [call.result(20).sum for call in calls] == list(range(300))
+
+
+def test_a_call_can_be_awaited_and_calls_back(connect, client):
+    connect("robot").create_service_server("/add", ADD, add)
+
+    async def main():
+        return (await client.call_async({"a": 1, "b": 1})).sum
+
+    assert asyncio.run(main()) == 2
+    done = threading.Event()
+    client.call_async().on_done(lambda _: done.set())
+    assert done.wait(5)
+
+
+def test_a_persistent_client_uses_one_connection_and_others_one_for_each_call(
+    client, persistent, start_robot
+):
+    def answer(sock, _):
+        while True:
+            receive_request(sock)
+            sock.sendall(response())
+
+    robot = start_robot(answer)
+    assert [client.call().sum for _ in range(5)] == [3] * 5
+    assert len(robot.headers) == (1 if persistent else 5)
+    expected = {"callerid": "/console", "md5sum": MD5, "service": "/add", "type": ADD}
+    assert robot.headers[0] == expected | ({"persistent": "1"} if persistent else {})
+
+
+def test_a_server_that_keeps_no_connections_serves_persistent_clients_too(
+    client, start_robot, eventually
+):
+    start_robot()
+    for _ in range(3):
+        assert client.call().sum == 3
+        eventually(lambda: not client._links)
+
+
+def test_a_connection_that_is_lost_is_made_again(connect, node, eventually):
+    client = node.create_service_client("/add", ADD, persistent=True)
+    robot = connect("robot")
+    server = robot.create_service_server("/add", ADD, add)
+    assert client.call({"a": 1}).sum == 1
+    server.close()
+    eventually(lambda: "no server offers /add" in client.problem)
+    assert not client.ready
+    robot.create_service_server("/add", ADD, lambda _: {"sum": 9})
+    assert client.call({"a": 1}).sum == 9
+
+
+@pytest.mark.parametrize("name", ["/add", None], ids=["given", "none"])
+def test_a_call_without_time_is_over_at_once(node, start_robot, name):
+    client = node.create_service_client("/add", ADD)
+    with pytest.raises(rosglass.ServiceUnavailableError, match="nothing was sent"):
+        client.call(timeout=0)
+    assert client.pending == 0
+
+
+# -- types ---------------------------------------------------------------------------------------
+
+
+def test_a_client_without_type_takes_the_servers(connect, node, persistent):
+    client = node.create_service_client("/add", persistent=persistent)
+    assert client.type is None
+    assert "type not known yet" in repr(client)
+    early = client.call_async({"a": 4, "b": 5})
+    wrong = client.call_async({"c": 1})
+    with pytest.raises(rosglass.ConversionError, match="a message or a dict"):
+        client.call_async(7)
+    connect("robot").create_service_server("/add", ADD, add)
+    assert early.result(5).sum == 9
+    assert client.type == rosglass.load(ADD, ros=1)
+    with pytest.raises(rosglass.ConversionError, match="c"):
+        wrong.result(5)
+
+
+def test_a_type_that_nobody_knows_here_is_named_with_what_to_do(node, start_robot, eventually):
+    start_robot(tells=TELLS | {"type": "acme_srvs/Dance"})
+    client = node.create_service_client("/add")
+    eventually(lambda: "acme_srvs" in client.problem)
+    assert "/robot offers it as acme_srvs/srv/Dance" in client.problem
+    assert "Library.add_path()" in client.problem
+    assert not client.ready
+    with pytest.raises(rosglass.ServiceUnavailableError, match="acme_srvs/srv/Dance"):
+        client.call(timeout=0.1)
+
+
+def test_a_definition_that_is_added_later_is_taken(master, connect, start_robot, tmp_path):
+    definition = tmp_path / "acme_srvs" / "srv" / "Dance.srv"
+    definition.parent.mkdir(parents=True)
+    (tmp_path / "acme_srvs" / "package.xml").write_text("<package><name>acme_srvs</name></package>")
+    library = Library()
+    definition.write_text("int64 a\nint64 b\n---\nint64 sum\n")
+    start_robot(tells=TELLS | {"type": "acme_srvs/Dance"})
+    client = connect("late", library=library).create_service_client("/add")
+    call = client.call_async({"a": 1})
+    assert not client.wait_for_server(0.3)
+    library.add_path(tmp_path)
+    assert call.result(10).sum == 3
+    assert client.type.name == "acme_srvs/srv/Dance"
+
+
+def test_the_version_that_the_server_has_is_taken_where_it_is_known(
+    master, connect, start_robot, tmp_path
+):
+    library = Library()
+    folder = tmp_path / "rospy_tutorials" / "srv"
+    folder.mkdir(parents=True)
+    (folder.parent / "package.xml").write_text("<package><name>rospy_tutorials</name></package>")
+    (folder / "AddTwoInts.srv").write_text("string a\n---\nint64 sum\n")
+    library.add_path(tmp_path)
+    start_robot()
+    client = connect("two", library=library).create_service_client("/add")
+    assert client.call({"a": 1}).sum == 3
+    assert client.type.md5 == MD5
+
+
+def test_another_md5_is_refused_naming_both(connect, node, persistent, eventually):
+    robot = connect("robot")
+    server = robot.create_service_server("/add", TRIGGER, lambda _: {"success": True})
+    client = node.create_service_client("/add", ADD, persistent=persistent)
+    trigger = rosglass.load(TRIGGER, ros=1)
+    with pytest.raises(rosglass.ServiceError) as caught:
+        client.call(timeout=5)
+    for told in (ADD.replace("/", "/srv/"), MD5, "std_srvs/srv/Trigger", trigger.md5, "int64 a"):
+        assert told in str(caught.value)
+    assert not isinstance(caught.value, rosglass.ServiceUnavailableError)
+    assert not client.ready
+    assert trigger.md5 in client.problem
+    assert MD5 in client.problem
+    assert "/console calls it as rospy_tutorials/AddTwoInts" in server.problem
+    # It is called again once it is what was wanted.
+    server.close()
+    robot.create_service_server("/add", ADD, add)
+    eventually(lambda: client.ready)
+    assert client.problem == ""
+
+
+def test_a_server_of_any_type_is_called(node, start_robot):
+    start_robot(tells=TELLS | {"md5sum": "*", "type": "*"})
+    assert node.create_service_client("/add", ADD).call().sum == 3
+    unknown = node.create_service_client("/add")
+    assert not unknown.wait_for_server(0.5)
+    assert "does not tell its type" in unknown.problem
+
+
+def test_types_of_services_are_told_once_their_servers_have(node, start_robot, connect, eventually):
+    start_robot()
+    connect("other").create_service_server("/go", TRIGGER, dict)
+    eventually(lambda: set(node.services()) == {"/add", "/go"})
+    full = {"/add": ["rospy_tutorials/srv/AddTwoInts"], "/go": ["std_srvs/srv/Trigger"]}
+    eventually(lambda: node.services() == full)
+    (info,) = node.service_servers("/add")
+    assert (info.type, info.type_hash, info.node.full) == (full["/add"][0], MD5, "/robot")
+    assert [e.type for e in node.endpoints("/other")] == full["/go"]
+    assert node.service_clients("/add") == []
+
+
+def test_the_graph_changes_when_types_become_known(node, start_robot, eventually):
+    start_robot()
+    eventually(lambda: "/add" in node._core.graph.services())
+    told = []
+    node.on_graph_change(lambda: told.append(node.services()["/add"]))
+    node.services()
+    eventually(lambda: ["rospy_tutorials/srv/AddTwoInts"] in told)
+
+
+def test_nobody_is_asked_for_types_that_nobody_wants(node, master, start_robot, eventually):
+    start_robot()
+    eventually(lambda: "/add" in node._core.graph.services())
+    assert "lookupService" not in master.calls
+
+
+# -- who is there --------------------------------------------------------------------------------
+
+
+def test_a_server_is_waited_for_and_changes_are_told(connect, client, eventually):
+    told = []
+    client.on_ready_change(told.append)
+    assert not client.wait_for_server(0.05)
+    robot = connect("robot")
+    threading.Timer(0.1, lambda: robot.create_service_server("/add", ADD, add)).start()
+    assert client.wait_for_server(10)
+    eventually(lambda: told == [True])
+    robot.close()
+    eventually(lambda: told == [True, False])
+
+
+def test_a_missing_service_is_explained_with_similar_names(connect, node, eventually):
+    connect("robot").create_service_server("/arm/add", ADD, add)
+    client = node.create_service_client("/add", ADD)
+    eventually(lambda: "did you mean /arm/add?" in client.problem)
+    assert "no server offers /add [rospy_tutorials/srv/AddTwoInts] on ros1://" in client.problem
+    assert "CONNECTED" in client.problem
+    with pytest.raises(rosglass.ServiceUnavailableError, match="did you mean /arm/add"):
+        client.call(timeout=0.1)
+
+
+def test_a_master_that_is_not_there_is_named(connect, free_port):
+    node = connect("alone", url=f"ros1://127.0.0.1:{free_port}?ip=127.0.0.1")
+    client = node.create_service_client("/add", ADD)
+    with pytest.raises(rosglass.ServiceUnavailableError, match=f"127.0.0.1:{free_port}"):
+        client.call(timeout=0.5)
+
+
+def test_a_host_that_is_not_known_is_named(node, master):
+    master.offer("/add", 1234, host="robot.invalid")
+    client = node.create_service_client("/add", ADD)
+    with pytest.raises(rosglass.ServiceUnavailableError, match="ROS_HOSTNAME") as caught:
+        client.call(timeout=3)
+    assert "rosrpc://robot.invalid:1234" in str(caught.value)
+
+
+@pytest.mark.parametrize("uri", ["rosrpc://127.0.0.1", "nonsense", "rosrpc://127.0.0.1:99999"])
+def test_a_place_that_makes_no_sense_is_named(node, master, uri):
+    master.services["/add"] = ("/robot", uri, "http://127.0.0.1:1")
+    client = node.create_service_client("/add", ADD)
+    with pytest.raises(rosglass.ServiceUnavailableError, match="the master's answer for /add"):
+        client.call(timeout=1)
+
+
+def test_a_server_that_was_killed_is_explained(client, master, free_port):
+    master.offer("/add", free_port)
+    with pytest.raises(rosglass.ServiceUnavailableError) as caught:
+        client.call(timeout=0.6)
+    assert f"/robot offers it at rosrpc://127.0.0.1:{free_port}" in str(caught.value)
+    assert "Connection refused" in str(caught.value)
+    assert "rosnode cleanup" in str(caught.value)
+    assert not client.ready
+    lookups = master.calls.count("lookupService")
+    assert 0 < lookups < 20, "the master is asked again, but not without pause"
+
+
+def test_a_server_that_comes_back_on_another_port_is_called_there(client, start_robot):
+    first = start_robot(lambda sock, _: (receive_request(sock), sock.sendall(response(1))))
+    assert client.call().sum == 1
+    first.close()
+    start_robot(lambda sock, _: (receive_request(sock), sock.sendall(response(2))))
+    assert client.call().sum == 2
+
+
+def test_calls_go_on_while_the_master_is_away(client, master, start_robot):
+    start_robot()
+    assert client.call().sum == 3
+    master.stop()
+    time.sleep(1.2)  # what it said last is not taken for its present word any more
+    assert client.call(timeout=5).sum == 3
+    master.start()
+
+
+def test_a_service_that_moved_to_another_node_is_called_there(connect, client, eventually):
+    old, new = connect("old"), connect("new")
+    first = old.create_service_server("/add", ADD, lambda _: {"sum": 1})
+    assert client.call().sum == 1
+    second = new.create_service_server("/add", ADD, lambda _: {"sum": 2})
+    eventually(lambda: client.call().sum == 2)
+    eventually(lambda: "/new offers /add now" in first.problem)
+    assert second.problem == ""
+    new.close()
+    eventually(lambda: first.problem == "")
+    eventually(lambda: client.call().sum == 1)
+
+
+# -- servers that misbehave ----------------------------------------------------------------------
+
+
+def silent(sock, _):
+    receive_request(sock)
+    sock.recv(1)
+
+
+def gone(sock, _):
+    receive_request(sock)
+
+
+def garbage(data):
+    def serve(sock, _):
+        receive_request(sock)
+        sock.sendall(data)
+        sock.recv(1)
+
+    return serve
+
+
+def test_a_server_that_never_answers_is_told_apart_from_none(client, start_robot):
+    start_robot(silent)
+    with pytest.raises(rosglass.TimeoutError, match="may still carry it out") as caught:
+        client.call(timeout=0.5)
+    assert "/robot was sent the request" in str(caught.value)
+    call = client.call_async(timeout=0.3)
+    with pytest.raises(rosglass.TimeoutError):
+        call.result(5)
+    assert client.pending == 0
+    # Given up, not in the way of the next one.
+    start_robot()
+    assert client.call(timeout=5).sum == 3
+
+
+def test_a_server_that_goes_in_mid_call_ends_it_at_once(client, start_robot):
+    start_robot(gone)
+    with pytest.raises(rosglass.ConnectionLostError, match="may have carried it out or not"):
+        client.call(timeout=30)
+
+
+@pytest.mark.parametrize(
+    ("data", "error", "told"),
+    [
+        (b"\1\xff\xff\xff\xff", rosglass.ConnectionLostError, "4294967295"),
+        (b"\1\3\0\0\0abc", rosglass.ServiceError, "no rospy_tutorials"),
+        (b"\1\x09\0\0\0" + b"123456789", rosglass.ServiceError, "1 bytes left over"),
+        (b"\0\4\0\0\0oops", rosglass.ServiceError, "the call of /add failed: oops"),
+        (b"\0\0\0\0\0", rosglass.ServiceError, "does not say why"),
+        (b"\0\2\0\0\0\xff\xfe", rosglass.ServiceError, "failed: "),
+    ],
+    ids=["endless", "short", "long", "failure", "silent failure", "no UTF-8"],
+)
+def test_responses_that_make_no_sense_or_tell_failures(client, start_robot, data, error, told):
+    start_robot(garbage(data))
+    with pytest.raises(error, match=told) as caught:
+        client.call(timeout=10)
+    assert type(caught.value) is error
+    assert client.pending == 0
+
+
+def test_a_response_that_nobody_asked_for_ends_a_kept_connection(node, start_robot):
+    def twice(sock, _):
+        while True:
+            receive_request(sock)
+            sock.sendall(response(1) + response(2))
+
+    client = node.create_service_client("/add", ADD, persistent=True)
+    start_robot(twice)
+    assert [client.call().sum for _ in range(3)] == [1, 1, 1]
+
+
+@pytest.mark.parametrize(
+    "tells", [{"callerid": "/robot"}, {"type": ADD}], ids=["no md5sum", "type only"]
+)
+def test_a_header_without_what_is_needed_is_named(client, start_robot, tells):
+    start_robot(tells=tells)
+    with pytest.raises(rosglass.ServiceUnavailableError, match="no md5sum"):
+        client.call(timeout=0.6)
+
+
+def test_a_server_that_refuses_is_quoted(client, start_robot):
+    start_robot(tells={"error": "not today"})
+    with pytest.raises(rosglass.ServiceError, match=r"refuses the call of /add.*not today") as told:
+        client.call(timeout=10)
+    assert not isinstance(told.value, rosglass.ServiceUnavailableError)
+
+
+def test_a_server_that_closes_before_its_header_was_sent_nothing(client, master):
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        master.offer("/add", listener.getsockname()[1])
+
+        def shut():
+            with suppress(OSError):
+                while True:
+                    listener.accept()[0].close()
+
+        threading.Thread(target=shut, daemon=True).start()
+        with pytest.raises(rosglass.ServiceUnavailableError, match="nothing was sent"):
+            client.call(timeout=0.6)
+        listener.shutdown(socket.SHUT_RDWR)
+
+
+# -- giving up and closing -----------------------------------------------------------------------
+
+
+def test_a_cancelled_call_waits_no_more(client, start_robot):
+    waiting = client.call_async()
+    assert waiting.cancel()
+    assert client.pending == 0
+    taken = threading.Event()
+
+    def never(sock, _):
+        receive_request(sock)
+        taken.set()
+        sock.recv(1)
+
+    start_robot(never)
+    sent = client.call_async()
+    assert taken.wait(10)
+    assert sent.cancel()
+    start_robot()
+    assert client.call(timeout=5).sum == 3
+
+
+@pytest.mark.parametrize("what", ["client", "node"])
+def test_closing_ends_the_calls(node, client, start_robot, what, eventually):
+    robot = start_robot(silent)
+    calls = [client.call_async(), client.call_async()]
+    eventually(lambda: robot.headers)
+    (client if what == "client" else node).close()
+    for call in calls:
+        with pytest.raises(rosglass.NodeClosedError):
+            call.result(5)
+    client.close()
+    for use in (client.call, client.call_async, lambda: client.on_ready_change(print)):
+        with pytest.raises(rosglass.NodeClosedError):
+            use()
+    with pytest.raises(rosglass.NodeClosedError):
+        client.wait_for_server(1)
+    assert not client.ready
+    assert client.problem == "the client is closed"
+
+
+def test_closing_while_connecting_leaves_nothing(master, connect, eventually):
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        master.offer("/add", listener.getsockname()[1])
+        node = connect("hasty")
+        client = node.create_service_client("/add", ADD)
+        call = client.call_async()
+        sock, _ = listener.accept()
+        client.close()
+        with pytest.raises(rosglass.NodeClosedError):
+            call.result(1)
+        sock.settimeout(5)
+        while sock.recv(4096):
+            pass  # until it is closed
+
+
+def test_nothing_is_created_from_a_closed_node(node):
+    node.close()
+    with pytest.raises(rosglass.NodeClosedError):
+        node.create_service_client("/add", ADD)
+    with pytest.raises(rosglass.NodeClosedError):
+        node.create_service_server("/add", ADD, add)
+
+
+def test_hundreds_of_clients_and_servers_leave_no_files_and_threads(connect, eventually):
+    robot, node = connect("robot"), connect("console")
+    open_files = lambda: len(__import__("os").listdir("/proc/self/fd"))  # noqa: E731
+    before = None
+    for turn in range(300):
+        server = robot.create_service_server("/add", ADD, lambda _, t=turn: {"sum": t})
+        client = node.create_service_client("/add", ADD, persistent=turn % 2 == 0)
+        if turn % 30 == 0:
+            assert client.call(timeout=20).sum == turn
+        client.close()
+        server.close()
+        if turn == 60:
+            before = open_files(), threading.active_count()
+    eventually(lambda: "/add" not in robot._core.graph.services())
+    eventually(lambda: open_files() <= before[0] + 5)
+    eventually(lambda: threading.active_count() <= before[1] + 5)
+
+
+# -- serving -------------------------------------------------------------------------------------
+
+
+def test_a_probe_is_told_type_and_parts(connect):
+    robot = connect("robot")
+    robot.create_service_server("/add", ADD, add)
+    sock, header = dial(robot, callerid="/me", service="/add", md5sum="*", probe="1")
+    assert header == {
+        "callerid": "/robot",
+        "md5sum": MD5,
+        "request_type": f"{ADD}Request",
+        "response_type": f"{ADD}Response",
+        "service": "/add",
+        "type": ADD,
+    }
+    assert sock.recv(1) == b"", "a probe is no call: the connection is closed"
+
+
+@pytest.mark.parametrize(
+    ("header", "told"),
+    [
+        ({"service": "/add", "callerid": "/me"}, "md5sum is missing"),
+        ({"service": "/sub", "callerid": "/me", "md5sum": MD5}, "/robot does not offer /sub"),
+        ({"callerid": "/me", "md5sum": MD5}, "neither topic nor service"),
+        (
+            {"service": "/add", "callerid": "/me", "md5sum": "0" * 32, "type": "x/Y"},
+            f"/add is {ADD} with md5 {MD5} on /robot, but /me calls it as x/Y with md5 {'0' * 32}",
+        ),
+    ],
+    ids=["md5", "name", "service", "another md5"],
+)
+def test_connections_that_cannot_be_served_are_told_why(connect, header, told):
+    robot = connect("robot")
+    robot.create_service_server("/add", ADD, add)
+    sock, answer = dial(robot, **header)
+    assert set(answer) == {"error"}
+    assert told in answer["error"]
+    assert sock.recv(1) == b""
+
+
+@pytest.mark.parametrize("md5", ["*", MD5])
+def test_clients_of_the_wire_are_served_in_order(connect, md5):
+    robot = connect("robot")
+    robot.create_service_server("/add", ADD, add)
+    sock, _ = dial(robot, callerid="/me", service="/add", md5sum=md5, persistent="1")
+    kind = rosglass.load(ADD, ros=1)
+    requests = [kind.request.encode({"a": value, "b": 1}) for value in range(200)]
+    sock.sendall(b"".join(struct.pack("<I", len(data)) + data for data in requests))
+    for value in range(200):
+        assert receive(sock, 5) == b"\1\x08\0\0\0"
+        assert kind.response.decode(receive(sock, 8)).sum == value + 1
+    sock.close()
+    once, _ = dial(robot, callerid="/me", service="/add", md5sum=md5)
+    once.sendall(struct.pack("<I", 16) + requests[7])
+    assert receive(once, 13) == response(8)
+    assert once.recv(1) == b"", "without persistent=1, one call is all"
+
+
+def test_requests_that_are_not_read_yet_wait_outside(connect, eventually):
+    """A client that sends without end must not fill the server's memory."""
+    robot = connect("robot")
+    promise = concurrent.futures.Future()
+    seen = []
+
+    def slow(request):
+        seen.append(request.a)
+        return promise
+
+    robot.create_service_server("/add", ADD, slow)
+    sock, _ = dial(robot, callerid="/me", service="/add", md5sum=MD5, persistent="1")
+    sock.setblocking(False)
+    data = (struct.pack("<I", 16) + bytes(16)) * 1000
+    sent, full_since = 0, None
+    deadline = time.monotonic() + 20
+    while full_since is None or time.monotonic() - full_since < 0.5:
+        assert time.monotonic() < deadline
+        try:
+            sent += sock.send(data)
+            full_since = None
+        except BlockingIOError:
+            full_since = full_since or time.monotonic()
+            time.sleep(0.01)
+    assert seen == [0]
+    assert sent < 64e6
+    sock.close()
+    promise.set_result(None)
+
+
+def test_who_does_not_read_responses_gets_no_more_of_them(connect):
+    robot = connect("robot")
+    seen = []
+
+    def answer(request):
+        seen.append(request.data)
+        return {"success": True, "message": "x" * 10_000_000}
+
+    robot.create_service_server("/big", BOOL, answer)
+    sock, _ = dial(
+        robot,
+        callerid="/me",
+        service="/big",
+        md5sum=rosglass.load(BOOL, ros=1).md5,
+        persistent="1",
+    )
+    sock.sendall((struct.pack("<I", 1) + b"\1") * 20)
+    time.sleep(0.5)
+    assert len(seen) == 1
+    for _ in range(20):
+        ok, size = struct.unpack("<BI", receive(sock, 5))
+        assert ok
+        receive(sock, size)
+    assert len(seen) == 20
+    sock.close()
+
+
+@pytest.mark.parametrize(
+    ("fails", "told"),
+    [
+        (ValueError("no arm"), "error processing request: no arm"),
+        (KeyError(), "error processing request: KeyError"),
+        (rosglass.ServiceError("not homed"), "service cannot process request: not homed"),
+    ],
+)
+def test_an_exception_is_told_to_the_caller(connect, client, fails, told, caplog):
+    def callback(_):
+        raise fails
+
+    connect("robot").create_service_server("/add", ADD, callback)
+    with pytest.raises(rosglass.ServiceError, match=f"the call of /add failed: {told}$"):
+        client.call()
+    logged = [record for record in caplog.records if record.levelname == "ERROR"]
+    assert bool(logged) != isinstance(fails, rosglass.ServiceError)
+
+
+@pytest.mark.parametrize(
+    ("answer", "told"),
+    [
+        ({"sum": "x"}, "no valid response.*sum"),
+        ({"total": 1}, "no valid response.*total"),
+        (7, "no valid response"),
+    ],
+)
+def test_a_response_that_does_not_fit_is_told_to_the_caller(connect, client, answer, told):
+    connect("robot").create_service_server("/add", ADD, lambda _: answer)
+    with pytest.raises(rosglass.ServiceError, match=told):
+        client.call()
+
+
+def test_a_request_that_makes_no_sense_is_refused(connect):
+    robot = connect("robot")
+    seen = []
+    robot.create_service_server("/add", ADD, seen.append)
+    sock, _ = dial(robot, callerid="/me", service="/add", md5sum=MD5)
+    sock.sendall(struct.pack("<I", 3) + b"abc")
+    ok, size = struct.unpack("<BI", receive(sock, 5))
+    assert not ok
+    assert b"the request is no rospy_tutorials" in receive(sock, size)
+    assert seen == []
+
+
+@pytest.mark.parametrize("ends", ["result", "exception", "cancel"])
+def test_a_promise_answers_later(connect, client, ends):
+    promise = concurrent.futures.Future()
+    connect("robot").create_service_server("/add", ADD, lambda _: promise)
+    call = client.call_async()
+    with pytest.raises(rosglass.TimeoutError):
+        call.result(0.1)
+    if ends == "result":
+        promise.set_result({"sum": 4})
+        assert call.result(5).sum == 4
+        return
+    promise.set_exception(ValueError("late")) if ends == "exception" else promise.cancel()
+    with pytest.raises(rosglass.ServiceError, match="late" if ends == "exception" else "cancel"):
+        call.result(5)
+
+
+def test_coroutines_answer_in_their_event_loop(connect, node):
+    async def slowly(request):
+        await asyncio.sleep(0.01)
+        return {"sum": request.a}
+
+    async def main():
+        robot = connect("robot")
+        with robot.create_service_server("/add", ADD, slowly):
+            client = node.create_service_client("/add", ADD)
+            calls = [client.call_async({"a": value}) for value in range(10)]
+            return [(await call).sum for call in calls]
+
+    assert asyncio.run(main()) == list(range(10))
+    with pytest.raises(rosglass.ConversionError, match="event loop"):
+        node.create_service_server("/late", ADD, slowly)
+
+
+def test_a_slow_callback_holds_up_neither_other_services_nor_the_graph(connect, node):
+    robot = connect("robot")
+    begun, go = threading.Event(), threading.Event()
+
+    def slow(_):
+        begun.set()
+        go.wait(20)
+
+    robot.create_service_server("/slow", TRIGGER, slow)
+    robot.create_service_server("/add", ADD, add, executor=IMMEDIATE)
+    held = node.create_service_client("/slow", TRIGGER).call_async()
+    assert begun.wait(10)
+    assert node.create_service_client("/add", ADD).call({"a": 1, "b": 2}).sum == 3
+    go.set()
+    held.result(5)
+
+
+def test_a_callback_that_would_wait_for_itself_is_told(node, connect, caplog):
+    client = node.create_service_client("/add", ADD)
+    node.create_service_server("/add", ADD, add)
+    node.create_service_server("/twice", ADD, lambda r: client.call({"a": r.a}))
+    outer = connect("other").create_service_client("/twice", ADD)
+    with pytest.raises(rosglass.ServiceError, match="would wait for itself"):
+        outer.call({"a": 1}, timeout=10)
+
+
+def test_a_callback_may_call_what_runs_elsewhere(node, connect):
+    own = Dispatcher("own")
+    client = node.create_service_client("/add", ADD)
+    node.create_service_server("/add", ADD, add, executor=own)
+    node.create_service_server("/twice", ADD, lambda r: client.call({"a": r.a, "b": r.a}))
+    outer = connect("other").create_service_client("/twice", ADD)
+    assert outer.call({"a": 4}, timeout=10).sum == 8
+    own.close()
+
+
+def test_a_callback_in_the_receiving_thread_may_not_wait(node, connect):
+    client = node.create_service_client("/add", ADD)
+    connect("robot").create_service_server("/add", ADD, add)
+    failed = concurrent.futures.Future()
+
+    def callback(_):
+        try:
+            client.call()
+        except rosglass.UnsupportedError as error:
+            failed.set_result(str(error))
+
+    client.call_async().add_done_callback(callback)
+    assert "runs in a thread that receives" in failed.result(10)
+
+
+def test_a_service_has_one_server_in_a_node(node):
+    first = node.create_service_server("/add", ADD, add)
+    with pytest.raises(rosglass.ServiceError, match="/console offers /add already"):
+        node.create_service_server("/add", ADD, add)
+    first.close()
+    node.create_service_server("/add", ADD, add).close()
+
+
+def test_a_server_that_is_made_again_at_once_stays_registered(node, master, eventually):
+    """The farewell of the old one, sent meanwhile, must not remove the new one."""
+    for _ in range(20):
+        server = node.create_service_server("/add", ADD, add)
+        eventually(lambda: "/add" in master.services)
+        server.close()
+    node.create_service_server("/add", ADD, add)
+    eventually(lambda: "/add" in master.services)
+    time.sleep(0.3)
+    assert "/add" in master.services
+
+
+def test_closing_withdraws_the_service(connect, master, eventually):
+    robot = connect("robot")
+    servers = [robot.create_service_server(name, ADD, add) for name in ("/one", "/two")]
+    eventually(lambda: set(master.services) == {"/one", "/two"})
+    servers[0].close()
+    servers[0].close()
+    assert servers[0].problem == "the server is closed"
+    eventually(lambda: set(master.services) == {"/two"})
+    robot.close()
+    assert master.services == {}
+
+
+def test_closing_a_server_ends_the_calls_of_its_clients(connect, client):
+    begun = threading.Event()
+
+    def never(_):
+        begun.set()
+        return concurrent.futures.Future()
+
+    server = connect("robot").create_service_server("/add", ADD, never)
+    call = client.call_async(timeout=30)
+    assert begun.wait(10)
+    server.close()
+    with pytest.raises(rosglass.ConnectionLostError):
+        call.result(5)
+
+
+def test_a_service_is_registered_again_after_the_master_was_restarted(
+    connect, master, client, eventually
+):
+    connect("robot").create_service_server("/add", ADD, add)
+    assert client.call({"a": 1}).sum == 1
+    master.stop()
+    master.start()
+    eventually(lambda: "/add" in master.services)
+    assert client.call({"a": 2}).sum == 2
+
+
+def test_what_a_client_that_has_gone_asked_for_is_not_begun(connect, eventually):
+    robot = connect("robot")
+    seen, begun, go = [], threading.Event(), threading.Event()
+
+    def callback(request):
+        seen.append(request.a)
+        begun.set()
+        go.wait(20)
+
+    robot.create_service_server("/add", ADD, callback)
+    kind = rosglass.load(ADD, ros=1).request
+    socks = [dial(robot, callerid="/me", service="/add", md5sum=MD5)[0] for _ in range(2)]
+    server = robot._services._servers["/add"]
+    for number, sock in enumerate(socks):
+        sock.sendall(struct.pack("<I", 16) + kind.encode({"a": number}))
+        eventually(lambda n=number: len(seen) + server._waiting > n)
+    assert begun.wait(10)
+    socks[1].close()
+    eventually(lambda: len(server._sessions) == 1)
+    go.set()
+    socks[0].settimeout(10)
+    assert receive(socks[0], 13) == response(0)
+    assert seen == [0]
