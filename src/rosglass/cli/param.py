@@ -8,6 +8,8 @@ from rosglass.cli.completion import complete
 from rosglass.cli.connecting import add_connection_options, connect, settle
 from rosglass.cli.output import Style, add_output_options, note, print_json, to_yaml
 from rosglass.cli.subcommands import Subcommands
+from rosglass.cli.worlds import names_ros1
+from rosglass.errors import Error
 
 if TYPE_CHECKING:
     import argparse
@@ -17,64 +19,86 @@ if TYPE_CHECKING:
 
 __all__ = ["configure", "run"]
 
+#: What ROS 2 needs to be told.
+_NEEDED = {
+    "list": (),
+    "get": ("node", "parameter"),
+    "describe": ("node", "parameter"),
+    "set": ("node", "parameter", "value"),
+    "delete": ("node", "parameter"),
+    "dump": ("node",),
+    "load": ("node", "file"),
+}
+
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Declare what can be done with parameters."""
+    parser.epilog = (
+        "In ROS 1, one server has all parameters: a name such as /robot/speed stands for NODE "
+        "and PARAMETER, and any namespace for NODE."
+    )
     add = Subcommands(parser).add
     sub = add("list", "list the parameters of a node, or of all nodes", _list)
-    complete(sub.add_argument("node", nargs="?", help="default: all nodes"), "nodes")
-    _finish(sub)
-    sub = add("get", "print the value of a parameter", _get)
-    complete(sub.add_argument("node"), "nodes")
-    sub.add_argument("parameter")
-    _finish(sub)
-    sub = add("describe", "show what is known about a parameter", _describe)
-    complete(sub.add_argument("node"), "nodes")
-    sub.add_argument("parameter")
-    _finish(sub)
-    sub = add("set", "set a parameter", _set)
-    complete(sub.add_argument("node"), "nodes")
-    sub.add_argument("parameter")
-    sub.add_argument("value", help="as in YAML: 1.5, true, hello, [1, 2]")
-    _finish(sub)
-    sub = add("delete", "take back a parameter that was set without being declared", _delete)
-    complete(sub.add_argument("node"), "nodes")
-    sub.add_argument("parameter")
-    _finish(sub)
+    _node(sub, nargs="?", help="default: all nodes")
+    _finish(sub, "list")
+    for name, summary, handler in (
+        ("get", "print the value of a parameter", _get),
+        ("describe", "show what is known about a parameter", _describe),
+        ("set", "set a parameter", _set),
+        ("delete", "take back a parameter that was set without being declared", _delete),
+    ):
+        sub = add(name, summary, handler)
+        _node(sub)
+        sub.add_argument("parameter", nargs="?", help="ROS 1: may be a part of the name before")
+        if name == "set":
+            sub.add_argument("value", nargs="?", help="as in YAML: 1.5, true, hello, [1, 2]")
+        _finish(sub, name)
     sub = add("dump", "print all parameters of a node as a file for load", _dump)
-    complete(sub.add_argument("node"), "nodes")
+    _node(sub, nargs="?", help="ROS 1: default is everything")
     sub.add_argument("-o", "--output", metavar="FILE", help="write into a file instead")
-    _finish(sub)
+    _finish(sub, "dump")
     sub = add("load", "set the parameters of a node from a file", _load)
-    complete(sub.add_argument("node"), "nodes")
-    sub.add_argument("file", metavar="FILE.yaml")
-    _finish(sub)
+    _node(sub, help="ROS 1: may be left out, or follow the file")
+    sub.add_argument("file", metavar="FILE.yaml", nargs="?")
+    _finish(sub, "load")
 
 
 def run(args: argparse.Namespace) -> int:
     """Do it."""
-    return int(args.handler(args))
+    if names_ros1(args):
+        from rosglass.cli import param_ros1
+
+        with connect(args) as node:
+            return param_ros1.run(args.what, node, args)
+    for name in _NEEDED[args.what]:
+        if getattr(args, name) is None:
+            usage = " ".join(needed.upper() for needed in _NEEDED[args.what])
+            raise Error(f"{name.upper()} is missing: rosglass param {args.what} {usage}")
+    with connect(args) as node:
+        return int(args.handler(node, args))
 
 
-def _finish(parser: argparse.ArgumentParser) -> None:
+def _node(parser: argparse.ArgumentParser, **options: Any) -> None:
+    complete(parser.add_argument("node", **options), "nodes")
+
+
+def _finish(parser: argparse.ArgumentParser, what: str) -> None:
+    parser.set_defaults(what=what)
     add_output_options(parser)
     add_connection_options(parser)
 
 
-def _list(args: argparse.Namespace) -> int:
-    from rosglass.errors import Error
-
+def _list(node: Node, args: argparse.Namespace) -> int:
     style = Style(args)
     found: dict[str, list[str]] = {}
     failed = False
-    with connect(args) as node:
-        for name in [args.node] if args.node else _nodes(node):
-            try:
-                with node.create_parameter_client(name) as client:
-                    found[client.node] = client.names(timeout=args.timeout)
-            except Error as error:  # noqa: PERF203 - one silent node must not hide the others
-                failed = True
-                note(str(error))
+    for name in [args.node] if args.node else _nodes(node):
+        try:
+            with node.create_parameter_client(name) as client:
+                found[client.node] = client.names(timeout=args.timeout)
+        except Error as error:  # noqa: PERF203 - one silent node must not hide the others
+            failed = True
+            note(str(error))
     if args.json:
         print_json(found)
     else:
@@ -93,8 +117,8 @@ def _nodes(node: Node) -> Iterator[str]:
             yield name.full
 
 
-def _get(args: argparse.Namespace) -> int:
-    with connect(args) as node, node.create_parameter_client(args.node) as client:
+def _get(node: Node, args: argparse.Namespace) -> int:
+    with node.create_parameter_client(args.node) as client:
         found = client.get([args.parameter], timeout=args.timeout)
         if found.get(args.parameter) is None:
             return _unknown(client, args)
@@ -106,10 +130,10 @@ def _get(args: argparse.Namespace) -> int:
     return 0
 
 
-def _describe(args: argparse.Namespace) -> int:
+def _describe(node: Node, args: argparse.Namespace) -> int:
     from dataclasses import asdict
 
-    with connect(args) as node, node.create_parameter_client(args.node) as client:
+    with node.create_parameter_client(args.node) as client:
         found = client.describe([args.parameter], timeout=args.timeout).get(args.parameter)
         if found is None or not found.type:
             return _unknown(client, args)
@@ -123,20 +147,20 @@ def _describe(args: argparse.Namespace) -> int:
     return 0
 
 
-def _set(args: argparse.Namespace) -> int:
+def _set(node: Node, args: argparse.Namespace) -> int:
     from rosglass.ros2.parameter_files import parse_value
 
     # Nothing between quotes is an empty text, as for ros2.
     value = parse_value(args.value, f"the value {args.value!r}") if args.value else ""
-    return _change(args, value, "set")
+    return _change(node, args, value, "set")
 
 
-def _delete(args: argparse.Namespace) -> int:
-    return _change(args, None, "delete")
+def _delete(node: Node, args: argparse.Namespace) -> int:
+    return _change(node, args, None, "delete")
 
 
-def _change(args: argparse.Namespace, value: ParameterValue, what: str) -> int:
-    with connect(args) as node, node.create_parameter_client(args.node) as client:
+def _change(node: Node, args: argparse.Namespace, value: ParameterValue, what: str) -> int:
+    with node.create_parameter_client(args.node) as client:
         result = client.set({args.parameter: value}, timeout=args.timeout)[args.parameter]
         name = client.node
     if args.json:
@@ -149,10 +173,10 @@ def _change(args: argparse.Namespace, value: ParameterValue, what: str) -> int:
     return 0 if result.successful else 1
 
 
-def _dump(args: argparse.Namespace) -> int:
+def _dump(node: Node, args: argparse.Namespace) -> int:
     from rosglass.ros2.parameter_files import dump, write
 
-    with connect(args) as node, node.create_parameter_client(args.node) as client:
+    with node.create_parameter_client(args.node) as client:
         values = {client.node: client.get(timeout=args.timeout)}
     if args.output:
         write(args.output, values)
@@ -163,8 +187,8 @@ def _dump(args: argparse.Namespace) -> int:
     return 0
 
 
-def _load(args: argparse.Namespace) -> int:
-    with connect(args) as node, node.create_parameter_client(args.node) as client:
+def _load(node: Node, args: argparse.Namespace) -> int:
+    with node.create_parameter_client(args.node) as client:
         names = client.load(args.file, timeout=args.timeout)
     if args.json:
         print_json(names)

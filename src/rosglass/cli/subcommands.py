@@ -47,7 +47,7 @@ class Subcommands:
         self,
         name: str,
         summary: str,
-        handler: Callable[[argparse.Namespace], int],
+        handler: Callable[..., int],
         aliases: tuple[str, ...] = (),
     ) -> argparse.ArgumentParser:
         """Add something that can be done, and return the parser of its options."""

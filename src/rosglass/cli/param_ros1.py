@@ -1,0 +1,133 @@
+"""``rosglass param`` in ROS 1, where one server has the parameters of all nodes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rosglass.cli.output import print_json, to_yaml
+from rosglass.errors import Error, UnsupportedError
+
+if TYPE_CHECKING:
+    import argparse
+
+    from rosglass.comm import Node
+    from rosglass.ros1.node import Ros1Node
+    from rosglass.ros1.parameter_server import ParameterServer
+
+__all__ = ["run"]
+
+
+def run(what: str, node: Node, args: argparse.Namespace) -> int:
+    """Do what was asked for: ``list``, ``get``, ``set``, ``delete``, ``dump`` or ``load``.
+
+    Raises:
+        UnsupportedError: ROS 1 has no such thing.
+        ParameterError: A parameter is not there, or a value can be no parameter's.
+    """
+    if what not in _DOES:
+        raise UnsupportedError(
+            f"ROS 1 knows nothing of a parameter but its value: rosglass param get {args.node}"
+        )
+    _DOES[what](_server(node), args)
+    return 0
+
+
+def _server(node: Node) -> ParameterServer:
+    ros1: Any = node
+    made: Ros1Node = ros1
+    return made.parameter_server
+
+
+def _name(args: argparse.Namespace, parameter: str | None) -> str:
+    """Return an absolute name: given whole, or as node and parameter, as in ROS 2."""
+    whole = args.node if parameter is None else f"{args.node}/{parameter}"
+    return "/" + whole.strip("/")
+
+
+def _list(server: ParameterServer, args: argparse.Namespace) -> None:
+    names = server.names(f"/{args.node or ''}", timeout=args.timeout)
+    if args.json:
+        print_json(names)
+    else:
+        print("".join(f"{name}\n" for name in names), end="")
+
+
+def _get(server: ParameterServer, args: argparse.Namespace) -> None:
+    name = _name(args, args.parameter)
+    value = server.get(name, timeout=args.timeout)
+    if args.json:
+        print_json({name: value})
+    else:
+        print(to_yaml(list(value) if isinstance(value, bytes) else value).rstrip("\n"))
+
+
+def _set(server: ParameterServer, args: argparse.Namespace) -> None:
+    from rosglass.ros1.parameter_files import parse_value
+
+    parameter, text = args.parameter, args.value
+    if text is None:
+        parameter, text = None, parameter
+    if text is None:
+        raise Error(f"say to what value {args.node} shall be set: rosglass param set NAME VALUE")
+    name = _name(args, parameter)
+    # Nothing between quotes is an empty text.
+    value = parse_value(text, f"the value {text!r}") if text else ""
+    server.set(name, value, timeout=args.timeout)
+    _tell(args, name, "set")
+
+
+def _delete(server: ParameterServer, args: argparse.Namespace) -> None:
+    name = _name(args, args.parameter)
+    server.delete(name, timeout=args.timeout)
+    _tell(args, name, "deleted")
+
+
+def _dump(server: ParameterServer, args: argparse.Namespace) -> None:
+    from rosglass.ros1.parameter_files import dump
+
+    place = "/" + (args.node or "").strip("/")
+    if args.output:
+        server.save(args.output, place, timeout=args.timeout)
+        return
+    value = server.get(place, timeout=args.timeout)
+    if args.json:
+        print_json(value)
+    else:
+        print(dump(value), end="")
+
+
+def _load(server: ParameterServer, args: argparse.Namespace) -> None:
+    file, place = _file(args)
+    names = server.load(file, place, timeout=args.timeout)
+    if args.json:
+        print_json(names)
+    else:
+        print(f"{len(names)} parameters set: {', '.join(names)}")
+
+
+def _file(args: argparse.Namespace) -> tuple[str, str]:
+    """Tell a file and a namespace apart: ``FILE``, ``FILE NAMESPACE`` or ``NODE FILE``."""
+    first, second = args.node, args.file
+    if second is None:
+        return first, "/"
+    if Path(first).is_file() and not Path(second).is_file():
+        first, second = second, first
+    return second, "/" + first.strip("/")
+
+
+def _tell(args: argparse.Namespace, name: str, done: str) -> None:
+    if args.json:
+        print_json({"successful": True, "reason": ""})
+    else:
+        print(f"{name} is {done}")
+
+
+_DOES = {
+    "list": _list,
+    "get": _get,
+    "set": _set,
+    "delete": _delete,
+    "dump": _dump,
+    "load": _load,
+}
