@@ -35,13 +35,13 @@ class FakeParameters:
 
     Attributes:
         tree: All parameters, as nested dicts.
-        followers: Node APIs by the name that they follow.
+        followers: The API's URI of each node that follows a name, by name and node.
         tells: Whether followers are told of changes.
     """
 
     def __init__(self) -> None:
         self.tree: dict[str, Any] = {}
-        self.followers: dict[str, set[str]] = {}
+        self.followers: dict[str, dict[str, str]] = {}
         self.tells = True
 
     def _getParam(self, _: str, name: str) -> Any:  # noqa: N802 - the API's name
@@ -86,23 +86,22 @@ class FakeParameters:
                 return [-1, f"Cannot find parameter [{name}]", ""]
             space = space.rpartition("/")[0]
 
-    def _subscribeParam(self, _: str, api: str, name: str) -> Any:  # noqa: N802
-        self.followers.setdefault(name, set()).add(api)
+    def _subscribeParam(self, node: str, api: str, name: str) -> Any:  # noqa: N802
+        self.followers.setdefault(name, {})[node] = api
         code, _, value = self._getParam("", name)
         return [1, "", value if code == 1 else {}]
 
-    def _unsubscribeParam(self, _: str, api: str, name: str) -> Any:  # noqa: N802
-        self.followers.get(name, set()).discard(api)
+    def _unsubscribeParam(self, node: str, _: str, name: str) -> Any:  # noqa: N802
+        self.followers.get(name, {}).pop(node, None)
         return [1, "", 1]
 
     def _tell_followers(self, name: str, value: Any, node: str) -> None:
         # Like rosmaster, by the name that has changed, with a slash at its end.
         for followed, apis in self.followers.items():
             if self.tells and f"{name}/".startswith(f"{followed}/"):
-                for api in apis:
+                for api in [apis[other] for other in apis if other != node]:
                     arguments = (api, f"{name}/", value)
                     threading.Thread(target=_tell_parameter, args=arguments, daemon=True).start()
-        del node
 
     def _at(self, name: str) -> Any:
         found: Any = self.tree
@@ -126,7 +125,6 @@ class FakeMaster(FakeParameters):
     Attributes:
         port: Where it listens, also after it was stopped and started again.
         publishers: Node, its API's URI and the type of each publisher, by topic and node.
-        nodes: API's URI of each node that has registered anything.
         services: Node, service URI and the node's API's URI, by service.
         calls: Names of all methods that were called.
         answers: Functions that answer methods instead, by name; they return the whole answer.
@@ -146,7 +144,6 @@ class FakeMaster(FakeParameters):
         self.subscribers: dict[str, dict[str, str]] = {}
         self.types: dict[str, str] = {}
         self.services: dict[str, tuple[str, str, str]] = {}
-        self.nodes: dict[str, str] = {}
         self.pid = next(_pids)
         self._server = _Server(("127.0.0.1", self.port), logRequests=False, allow_none=True)
         self.port = self._server.server_address[1]
@@ -175,19 +172,10 @@ class FakeMaster(FakeParameters):
         if method in self.answers:
             return self.answers[method](*arguments)
         with self._lock:
-            if method.startswith("register"):
-                self.nodes[arguments[0]] = arguments[-1]
-            elif method == "subscribeParam":
-                self.nodes[arguments[0]] = arguments[1]
             return getattr(self, f"_{method}")(*arguments)
 
     def _getPid(self, _: str) -> Any:  # noqa: N802 - the API's name
         return [1, "", self.pid]
-
-    def _lookupNode(self, _: str, name: str) -> Any:  # noqa: N802
-        if name not in self.nodes:
-            return [-1, f"unknown node [{name}]", ""]
-        return [1, "", self.nodes[name]]
 
     def _getSystemState(self, _: str) -> Any:  # noqa: N802
         return [
@@ -204,7 +192,11 @@ class FakeMaster(FakeParameters):
         return [1, "", [[topic, kind] for topic, kind in self.types.items()]]
 
     def _lookupNode(self, _: str, node: str) -> Any:  # noqa: N802
-        topics = [*self.publishers.values(), *self.subscribers.values()]
+        topics = [
+            *self.publishers.values(),
+            *self.subscribers.values(),
+            *self.followers.values(),
+        ]
         found = [nodes[node] for nodes in topics if node in nodes]
         found += [api for name, _, api in self.services.values() if name == node]
         return [1, "", found[0]] if found else [-1, f"unknown node [{node}]", ""]
