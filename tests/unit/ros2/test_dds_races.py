@@ -1,0 +1,243 @@
+"""What happens at the same time over DDS, in the order that loses most; nobody else is there."""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+import rosglass
+from rosglass.comm import QoS
+from rosglass.errors import NodeClosedError
+
+pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
+
+from rosglass.ros2.dds import cyclone
+from rosglass.ros2.dds.cyclone_events import Event
+from rosglass.ros2.dds.cyclone_origins import Origins
+from rosglass.ros2.dds.cyclone_qos import qos_of
+from rosglass.ros2.dds.identity import Identity, Origin
+from rosglass.ros2.dds.replier import DdsReplier
+from rosglass.ros2.dds.service_ends import Matched
+
+ADD = "example_interfaces/srv/AddTwoInts"
+SERVICE = "/add"
+#: Of a writer that nobody here is.
+ELSEWHERE = Origin(b"\x00\x00\x12\x03", 1, None, bytes(12), taken=True)
+
+
+@pytest.fixture
+def node():
+    made = rosglass.connect("dds://?domain=58&range=off", "here", own_services=False)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def participant(node):
+    return node._core.middleware._participant
+
+
+@pytest.fixture
+def server(node, eventually):
+    """A server with its writer, whose requests are in ``got``."""
+    made = node.create_service_server(SERVICE, ADD, lambda r: made.got.append(r.a) or {"sum": r.b})
+    made.got = []
+    eventually(lambda: made._replier._ends.writer is not None)
+    return made
+
+
+@pytest.fixture
+def held(participant):
+    """The participant's pump does nothing as long as this is entered."""
+
+    class Held:
+        def __enter__(self) -> None:
+            self.free, stands = threading.Event(), threading.Event()
+            self.entity = -1
+            participant.pump.visit(self.entity, lambda: stands.set() or self.free.wait(10))
+            assert stands.wait(5)
+
+        def __exit__(self, *_: object) -> None:
+            participant.pump.forget(self.entity)
+            self.free.set()
+
+    return Held()
+
+
+def ready(client):
+    assert client.wait_for_server(5), client.problem
+    return client
+
+
+def test_a_reply_is_ready_before_its_client_was_noticed(node, participant, server):
+    ends = server._replier._ends
+    ends.reader._on_matched = None
+    participant.pump._acts[ends.writer.entity] = lambda: None
+    client = ready(node.create_service_client(SERVICE, ADD))
+    assert client.call({"a": 1, "b": 2}, timeout=5).sum == 2
+
+
+@pytest.mark.parametrize("noticed", [True, False])
+def test_a_request_is_carried_out_although_its_client_left_at_once(
+    node, server, held, eventually, noticed
+):
+    if noticed:
+        client = ready(node.create_service_client(SERVICE, ADD))
+    with held:
+        if not noticed:
+            client = ready(node.create_service_client(SERVICE, ADD))
+        client.call_async({"a": 7})
+        client.close()
+    eventually(lambda: server.got == [7])
+
+
+def test_a_request_in_the_memory_of_another_is_not_taken_for_that(node, server):
+    class Haunted(dict[int, Origin]):
+        def pop(self, *_: Any) -> Origin:
+            return ELSEWHERE
+
+    server._replier._ends.origins._noted = Haunted()
+    client = ready(node.create_service_client(SERVICE, ADD))
+    assert client.call({"a": 1, "b": 2}, timeout=5).sum == 2
+
+
+def test_a_reply_in_the_memory_of_another_is_not_taken_for_that(node, server):
+    class Haunted(dict[int, Origin]):
+        def pop(self, *_: Any) -> Origin:
+            return ELSEWHERE
+
+    client = ready(node.create_service_client(SERVICE, ADD))
+    client._link.requester._ends.origins._noted = Haunted()
+    assert client.call({"a": 1, "b": 2}, timeout=5).sum == 2
+
+
+def test_what_is_known_of_a_readers_samples_goes_with_it():
+    one, two = Origins(), Origins()
+    one.follow(0x1000)
+    one._noted[0x2000] = ELSEWHERE
+    # Another reader's type, where the first one's was.
+    two.follow(0x1000)
+    one.close()
+    assert one.of(0x2000) is None
+    assert two.of(0x2000) is None
+    two.follow(0x1000)
+    two.close()
+
+
+def test_a_senders_guid_decides_whose_sample_it_is():
+    whole = Origin(b"\x00\x00\x12\x03", 1, Identity(bytes(16), 1), b"p" * 12)
+    part = Origin(b"\x00\x00\x12\x03", 1, None)
+    guid = b"p" * 12 + b"\x00\x00\x12\x03"
+    assert (whole.guid, part.guid) == (guid, b"")
+    assert whole.may_be_of(guid)
+    assert part.may_be_of(guid)
+    assert not whole.may_be_of(b"q" + guid[1:])
+    assert not part.may_be_of(guid[:-1] + b"\x04")
+
+
+@pytest.mark.parametrize(("depth", "told"), [(2, 1), (100, 0)])
+def test_requests_are_waited_for_no_longer_than_they_can_come(caplog, depth, told):
+    """The oldest are lost when too many wait; without that, several threads may receive some."""
+    origins = [Origin(b"", number, None) for number in range(4)]
+    replier: Any = object.__new__(DdsReplier)
+    replier._service, replier._leaving = SERVICE, threading.Lock()
+    replier._ends = SimpleNamespace(depth=depth)
+    replier._left = OrderedDict((id(origin), origin) for origin in origins)
+    replier._has_come(Origin(b"", 2, None))
+    assert len(replier._left) == 4
+    replier._has_come(origins[2])
+    assert list(replier._left.values()) == origins[3:]
+    assert caplog.text.count("/add: 2 requests are lost, as more than 2 waited") == told
+    replier._has_come(origins[3])
+    assert not replier._left
+
+
+def test_who_looked_first_for_counterparts_has_not_the_last_word():
+    looked, go_on = threading.Event(), threading.Event()
+    answers = [[1], [1, 2]]
+
+    def handles(_: int) -> list[int]:
+        found = answers.pop(0)
+        if found == [1]:
+            looked.set()
+            assert go_on.wait(5)
+        return found
+
+    matched = Matched(1, handles, lambda _, handle: SimpleNamespace(guid=bytes([handle])))
+    first = threading.Thread(target=matched.refresh)
+    first.start()
+    assert looked.wait(5)
+    second = threading.Thread(target=matched.refresh)
+    second.start()
+    second.join(0.1)
+    go_on.set()
+    first.join(5)
+    second.join(5)
+    assert set(matched.by_guid) == {b"\1", b"\2"}
+
+
+def test_some_who_left_are_remembered(monkeypatch):
+    monkeypatch.setattr("rosglass.ros2.dds.service_ends._MAX_DEPARTED", 2)
+    here = [1]
+    matched = Matched(
+        1, lambda _: here, lambda _, h: SimpleNamespace(guid=h) if h in here else None
+    )
+    for handle in (2, 3):
+        matched.refresh()
+        here[0] = handle
+    matched.refresh()
+    assert [matched.get(handle) is not None for handle in (1, 2, 3)] == [True, True, True]
+    assert [found.guid for found in matched.all] == [3]
+    here[0] = 4
+    matched.refresh()
+    assert [matched.get(handle) is not None for handle in (1, 2, 3, 4)] == [False] * 3 + [True]
+
+
+def test_writing_after_the_end_is_told(node):
+    """The memory that this takes went with the node."""
+    middleware, name = node._core.middleware, node._core.name
+    writer = middleware.create_writer(name, "/t", "std_msgs/msg/String", "", QoS())
+    payload = b"\0\1\0\0\1\0\0\0\0"
+    writer.write(payload)
+    node.close()
+    with pytest.raises(NodeClosedError, match="/t: the publisher is closed"):
+        writer.write(payload)
+    writer.close()
+
+
+def test_nobody_is_left_without_ground(node, participant):
+    """Who makes something of a node is waited for; then nothing more is made."""
+    node_closed = threading.Thread(target=node.close)
+    with participant.in_use():
+        node_closed.start()
+        node_closed.join(0.3)
+        assert node_closed.is_alive()
+        assert cyclone.guid(participant.entity) == participant.guid
+        with pytest.raises(NodeClosedError), participant.in_use():
+            pass
+    node_closed.join(5)
+    assert not node_closed.is_alive()
+    with pytest.raises(NodeClosedError):
+        cyclone.guid(participant.entity)
+
+
+def test_what_cannot_be_handed_on_holds_up_nothing_else(participant, caplog, eventually):
+    topic = cyclone.create_topic(participant.entity, "rt/t", "T")
+    policies = qos_of(QoS(), writer=False)
+    reader = cyclone.create_reader(participant.entity, topic, policies, "topic /t")
+    results: list[bool] = []
+
+    def act() -> bool:
+        results.append(not results)
+        if results == [True]:
+            raise ValueError("rubbish")
+        return len(results) < 3
+
+    participant.pump.watch(reader, Event.DATA_AVAILABLE, act)
+    participant.pump.visit(reader, None)
+    eventually(lambda: results == [True, False, False])
+    assert "what arrived cannot be handed on" in caplog.text
