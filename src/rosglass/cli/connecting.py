@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, TypeVar
 from rosglass.comm import ConnectionState
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from rosglass.comm import Node, Status
 
@@ -23,8 +23,10 @@ __all__ = [
     "End",
     "add_connection_options",
     "add_definitions_option",
+    "await_types",
     "connect",
     "find",
+    "join",
     "natural",
     "seconds",
     "settle",
@@ -34,7 +36,7 @@ __all__ = [
 _T = TypeVar("_T")
 #: Seconds to wait for the robot, unless told otherwise.
 TIMEOUT = 10.0
-#: Seconds that something which is there takes to show up in the graph.
+#: Seconds that something which is there takes to show up in the graph, or to tell its type.
 _DISCOVERY = 3.0
 #: Seconds after which a command says what it is waiting for.
 _PATIENCE = 2.0
@@ -113,6 +115,23 @@ def connect(args: argparse.Namespace, *, own_services: bool = False) -> Node:
     return node
 
 
+def join(url: str, name: str, timeout: float) -> Node:
+    """Join the graph at `url`, and wait until somebody answers; for commands that know it.
+
+    Raises:
+        Error: As for :func:`connect`.
+    """
+    import rosglass
+
+    node = rosglass.connect(url, name=name, own_services=False)
+    try:
+        _wait_for_connection(node, timeout)
+    except BaseException:
+        node.close()
+        raise
+    return node
+
+
 def settle(node: Node, least: float = 0.0) -> None:
     """Wait until the graph is known: no news for a moment.
 
@@ -157,6 +176,12 @@ def find(node: Node, look: Callable[[], _T], timeout: float) -> _T:
     wait(node, look, min(timeout, _DISCOVERY if _QUIET[node.url.partition(":")[0]] else 0.0))
     settle(node)
     return look()
+
+
+def await_types(node: Node, look: Callable[[], Iterable[object]], timeout: float) -> None:
+    """Wait until all types that `look` returns are known, which ROS 1's servers are asked for."""
+    if node.wire == "ros1":
+        wait(node, lambda: all(look()), min(timeout, _DISCOVERY))
 
 
 class End(threading.Event):

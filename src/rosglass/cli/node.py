@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rosglass.cli.completion import complete
-from rosglass.cli.connecting import add_connection_options, connect, find, settle
+from rosglass.cli.connecting import add_connection_options, await_types, connect, find, settle
 from rosglass.cli.endpoints import describe
 from rosglass.cli.output import Style, add_output_options, note, print_json
 from rosglass.cli.subcommands import Subcommands
@@ -70,6 +70,7 @@ def _info(args: argparse.Namespace) -> int:
         name = "/" + args.node.lstrip("/")
         if not find(node, lambda: name in _others(node), args.timeout):
             return _unknown(node, name)
+        await_types(node, lambda: [end.type for end in node.endpoints(name)], args.timeout)
         ends = [end for end in node.endpoints(name) if args.hidden or not is_hidden(node, end.name)]
     if args.json:
         print_json({"node": name, "endpoints": [describe(node, end) for end in ends]})

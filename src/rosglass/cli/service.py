@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from typing import TYPE_CHECKING
 
 from rosglass.cli.completion import complete
-from rosglass.cli.connecting import add_connection_options, connect, find, settle, wait
+from rosglass.cli.connecting import (
+    add_connection_options,
+    await_types,
+    connect,
+    find,
+    settle,
+    wait,
+)
 from rosglass.cli.endpoints import describe, short
 from rosglass.cli.output import (
     Style,
@@ -20,10 +28,12 @@ from rosglass.cli.output import (
 )
 from rosglass.cli.subcommands import Subcommands
 from rosglass.cli.values import parse_fields, split_type
-from rosglass.cli.worlds import is_hidden, spelled
+from rosglass.cli.worlds import is_hidden, is_ros1, spelled
 
 if TYPE_CHECKING:
     import argparse
+
+    from rosglass.comm import EndpointInfo
 
 __all__ = ["configure", "run"]
 
@@ -66,6 +76,8 @@ def _list(args: argparse.Namespace) -> int:
     style = Style(args)
     with connect(args) as node:
         settle(node)
+        if args.types or args.json:
+            await_types(node, lambda: node.services().values(), args.timeout)
         found = {s: k for s, k in node.services().items() if args.hidden or not is_hidden(node, s)}
     if args.json:
         print_json([{"service": name, "types": types} for name, types in found.items()])
@@ -88,9 +100,13 @@ def _info(args: argparse.Namespace) -> int:
     style = Style(args)
     with connect(args) as node:
         name = node.resolve(args.service)
-        ends = find(
-            node, lambda: [*node.service_servers(name), *node.service_clients(name)], args.timeout
-        )
+
+        def look() -> list[EndpointInfo]:
+            return [*node.service_servers(name), *node.service_clients(name)]
+
+        find(node, look, args.timeout)
+        await_types(node, lambda: [end.type for end in look()], args.timeout)
+        ends = look()
     if not ends:
         note(f"nobody offers or calls {name}; rosglass service list shows what there is")
         return 1
@@ -101,7 +117,9 @@ def _info(args: argparse.Namespace) -> int:
     for end in ends:
         print(f"  {end.kind.value} {style(end.node, 'cyan')}")
         for key, value in describe(node, end).items():
-            if key in ("type", "md5", "type_hash", "response_hash", "gid") and value:
+            # In ROS 1, the type is above.
+            shown = ("md5",) if is_ros1(node) else ("type", "type_hash", "response_hash", "gid")
+            if key in shown and value:
                 print(f"    {key}: {short(value)}")
     return 0
 
@@ -112,6 +130,9 @@ def _call(args: argparse.Namespace) -> int:
     type_name, text = split_type(args.rest)
     style = Style(args)
     deadline = time.monotonic() + args.timeout
+    if not args.verbose:
+        # What keeps it from being called is told here, once.
+        logging.getLogger("rosglass.ros1").setLevel(logging.ERROR)
     with connect(args) as node:
         name = node.resolve(args.service)
         with node.create_service_client(name, type_name) as client:
