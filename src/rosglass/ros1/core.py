@@ -137,6 +137,7 @@ class Core:
         self._process = os.getpid()
         self.address, self.uri = ("", 0), ""
         self._doors: list[Door] = []
+        self._api: Slave | None = None
         self._members: dict[Member, None] = {}
         self._moved = False
         self._telling = threading.Lock()
@@ -164,9 +165,10 @@ class Core:
             api: What the master and others can ask.
             accept: Called in the loop's thread with each connection and its address.
         """
+        self._api = Slave(api)
         self._doors = [
             Door(self.loop, self._tcpros, accept),
-            Door(self.loop, self._slave, Slave(api).accept),
+            Door(self.loop, self._slave, self._api.accept),
         ]
         for door in self._doors:
             self.loop.call(door.open)
@@ -322,6 +324,8 @@ class Core:
         for door in self._doors:
             self.loop.call(door.end)
         self.loop.close()
+        if self._api is not None:
+            self._api.close()
         self.graph.clear()
         self.tell(Status(ConnectionState.CLOSED, reason))
         self.graph_listeners.clear()

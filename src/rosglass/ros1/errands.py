@@ -13,8 +13,9 @@ if TYPE_CHECKING:
 __all__ = ["Errands"]
 
 _log = logging.getLogger("rosglass.ros1")
-#: Jobs under way at once: some robots' nodes answer only after a time-out.
-_MOST = 8
+#: Jobs under way at once: nodes that are gone, but registered still, answer only by a time-out,
+#: and others must not wait for that.
+_MOST = 32
 #: Seconds after which a thread without job ends.
 _IDLE = 5.0
 
@@ -46,7 +47,13 @@ class Errands:
                 return
             self._threads += 1
             number = self._threads
-        threading.Thread(target=self._work, name=f"{self._name} {number}", daemon=True).start()
+        thread = threading.Thread(target=self._work, name=f"{self._name} {number}", daemon=True)
+        try:
+            thread.start()
+        except RuntimeError as error:  # no more threads, or the interpreter is at its end
+            with self._changed:
+                self._threads -= 1
+            _log.warning("%s: a job has to wait: %s", self._name, error)
 
     def close(self) -> None:
         """Forget the jobs that wait; those under way end by their own time-outs."""

@@ -43,6 +43,7 @@ class Registrations:
     def __init__(self, core: Core) -> None:
         self._core = core
         self._wanted = threading.Event()
+        self._lock = threading.Lock()
         self._closing = False
         #: Members that the master knows, and those that it may know.
         self._registered: set[Member] = set()
@@ -77,12 +78,14 @@ class Registrations:
         self._wanted.set()
 
     def close(self) -> None:
-        """Unregister all, and end the thread; takes two seconds if the master does not answer."""
-        self._closing = True
+        """Unregister all, and end the thread; takes up to two seconds if the master is silent."""
+        with self._lock:
+            self._closing = True
+            known = bool(self._tried)
         self._wanted.set()
         if self.is_current:
             self._leave()
-        elif self._thread.is_alive():
+        elif known:
             self._thread.join(_FAREWELL)
         self._core.master.close()
         if not self.is_current and self._thread.is_alive():
@@ -129,7 +132,7 @@ class Registrations:
         except ConnectionLostError as error:
             self._lose(str(error))
         except MasterError as error:
-            core.tell(Status(ConnectionState.LOST, f"{error}; trying again every second"))
+            self._lose(str(error))
         except (TypeError, ValueError) as error:
             self._lose(f"{core.master.uri} answers, but not as a ROS 1 master does: {error}")
         else:
@@ -177,10 +180,13 @@ class Registrations:
         """Tell the master of members it does not know; return what it has against some."""
         refused = []
         for member in self._core.members():
-            if member in self._registered or self._closing:
+            if member in self._registered:
                 continue
-            # It may know the member although its answer got lost.
-            self._tried.add(member)
+            with self._lock:
+                if self._closing:
+                    break
+                # It may know the member although its answer gets lost.
+                self._tried.add(member)
             try:
                 member.register(self._core.master)
                 self._registered.add(member)
@@ -226,6 +232,8 @@ class Registrations:
 
     def _lose(self, reason: str) -> None:
         core = self._core
+        if self._closing:
+            return
         state = ConnectionState.LOST if self._answered else ConnectionState.CONNECTING
         if core.status().state is ConnectionState.CONNECTED:
             _log.warning("%s: %s", core.url, reason)

@@ -100,7 +100,7 @@ class Slave(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCDispatcher):
         super().__init__(allow_none=True)
         self._api = api
         self._lock = threading.Lock()
-        self._connections = 0
+        self._connections: set[socket.socket] = set()
         for name, method in (
             ("getBusStats", lambda _: api.bus_stats()),
             ("getBusInfo", lambda _: api.bus_info()),
@@ -118,8 +118,9 @@ class Slave(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCDispatcher):
     def accept(self, sock: socket.socket, address: str) -> None:
         """Serve a connection, unless there are far too many; in the loop's thread."""
         with self._lock:
-            crowded = self._connections >= _MOST_CONNECTIONS
-            self._connections += not crowded
+            crowded = len(self._connections) >= _MOST_CONNECTIONS
+            if not crowded:
+                self._connections.add(sock)
         if crowded:
             _log.warning("%s: refused, %d connections are served", address, _MOST_CONNECTIONS)
             sock.close()
@@ -129,6 +130,14 @@ class Slave(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCDispatcher):
         except RuntimeError:  # no more threads
             _log.warning("%s: refused, there are too many threads", address)
             self.shutdown_request(sock)
+
+    def close(self) -> None:
+        """End the connections; safe to call twice."""
+        with self._lock:
+            for sock in self._connections:
+                with suppress(OSError):
+                    # What is being answered may go out; its thread ends at the next call.
+                    sock.shutdown(socket.SHUT_RD)
 
     def _marshaled_dispatch(self, data: Any, *arguments: Any, **named: Any) -> Any:
         if b"<!DOCTYPE" in data:
@@ -146,10 +155,10 @@ class Slave(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCDispatcher):
     def shutdown_request(self, request: Any) -> None:
         """Close a connection."""
         with self._lock:
-            self._connections -= 1
-        with suppress(OSError):
-            request.shutdown(socket.SHUT_WR)
-        request.close()
+            self._connections.discard(request)
+            with suppress(OSError):
+                request.shutdown(socket.SHUT_WR)
+            request.close()
 
     def handle_error(self, *_: Any) -> None:
         """Log, instead of writing to standard error: somebody went away, or sent garbage."""
