@@ -90,6 +90,7 @@ _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 #: Reached as attributes, too: `rosglass.comm.IMMEDIATE`.
 _PACKAGES = (
     "bags",
+    "bridge",
     "comm",
     "connection",
     "errors",

@@ -21,6 +21,7 @@ RANK = {
     "ros2": 4,
     "connection": 5,
     "bags": 5,
+    "bridge": 5,
     "tf": 5,
     "images": 5,
     "qt": 5,

@@ -1,0 +1,291 @@
+"""``rosglass bridge``: relay topics and services between two worlds."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import math
+import secrets
+import shutil
+import sys
+import time
+from typing import TYPE_CHECKING
+
+from rosglass.cli.connecting import TIMEOUT, End, add_definitions_option, join, seconds, settle
+from rosglass.cli.output import Style, add_output_options, note, print_json, table
+from rosglass.errors import Error
+
+if TYPE_CHECKING:
+    from rosglass.bridge import Bridge, BridgeStatus, Rule
+    from rosglass.comm import Node
+
+__all__ = ["configure", "run"]
+
+#: Seconds that a problem may pass by itself.
+_PATIENCE = 3.0
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's options."""
+    parser.add_argument("first", metavar="URL", help="the first world, e.g. ros1://robot:11311")
+    parser.add_argument("second", metavar="URL", help="the second, e.g. zenoh://127.0.0.1:7447")
+    parser.add_argument(
+        "-t",
+        "--topic",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="relay a topic, both ways; NAME:=OTHER gives it another name in the second world, "
+        "'NAME->' relays it only from the first to the second, 'NAME<-' only back; * stands for "
+        "any characters; may be repeated",
+    )
+    parser.add_argument(
+        "-s",
+        "--service",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="the same for a service; 'NAME->' is one that the first world offers",
+    )
+    parser.add_argument(
+        "-a",
+        "--all",
+        action="store_true",
+        help="relay all topics and services, hidden ones and those of every node excepted",
+    )
+    parser.add_argument(
+        "-x",
+        "--exclude",
+        "--exclude-regex",
+        default="",
+        metavar="REGEX",
+        help="never relay what matches",
+    )
+    parser.add_argument(
+        "--one-way",
+        action="store_true",
+        help="relay only from the first world to the second, unless an arrow says otherwise",
+    )
+    parser.add_argument(
+        "--type",
+        action="append",
+        default=[],
+        type=_type,
+        metavar="NAME:=TYPE",
+        help="the type of a topic that nobody publishes yet: it is relayed from its first message",
+    )
+    parser.add_argument(
+        "--qos",
+        default="",
+        metavar="PRESET",
+        help="quality of service at both ends, e.g. sensor_data; default: what fits",
+    )
+    parser.add_argument(
+        "--keep",
+        action="store_true",
+        help="take messages even while nobody in the other world subscribes to them",
+    )
+    parser.add_argument(
+        "--service-timeout",
+        type=seconds,
+        default=10.0,
+        metavar="SECONDS",
+        help="how long servers have to answer (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--list",
+        "--dry-run",
+        action="store_true",
+        help="show what would be relayed, and as what, and end",
+    )
+    parser.add_argument(
+        "--statistics",
+        type=seconds,
+        default=10.0,
+        metavar="SECONDS",
+        help="time between two lines of statistics, 0 for none (default: %(default)g)",
+    )
+    parser.add_argument(
+        "-d", "--duration", type=seconds, metavar="SECONDS", help="end by itself after so long"
+    )
+    parser.add_argument(
+        "--node-name", default="", metavar="NAME", help="default: one that nobody else has"
+    )
+    parser.add_argument(
+        "--timeout",
+        type=seconds,
+        default=TIMEOUT,
+        metavar="SECONDS",
+        help="how long to wait for each world to answer (default: %(default)g)",
+    )
+    add_definitions_option(parser)
+    add_output_options(parser)
+    parser.epilog = (
+        "Ctrl-C ends it. What maps to what, and what gets lost: docs/bridge.md in the source."
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Relay until Ctrl-C, SIGTERM or the end of the duration."""
+    from rosglass.bridge import Bridge
+    from rosglass.bridge.side import BRIDGE_NAME
+    from rosglass.comm import QoS
+
+    topics, services = _rules(args)
+    qos = QoS.preset(args.qos) if args.qos else None
+    name = args.node_name or f"{BRIDGE_NAME}_{secrets.token_hex(4)}"
+    if not args.verbose:
+        # What is wrong is told here, once.
+        logging.getLogger("rosglass").setLevel(logging.ERROR)
+    with (
+        join(args.first, name, args.timeout) as first,
+        join(args.second, name, args.timeout) as second,
+    ):
+        if args.list:
+            return _list(args, first, second, topics, services)
+        with Bridge(
+            first,
+            second,
+            topics,
+            services,
+            exclude=args.exclude,
+            types=dict(args.type),
+            qos=qos,
+            keep=args.keep,
+            timeout=args.service_timeout,
+        ) as bridge:
+            end = End()
+            note(f"relaying between {first.url} and {second.url}; Ctrl-C ends it")
+            return _watch(args, bridge, end)
+
+
+def _rules(args: argparse.Namespace) -> tuple[list[Rule], list[Rule]]:
+    from rosglass.bridge import Direction, Rule
+
+    if args.all and (args.topic or args.service):
+        raise Error("--all and names exclude each other; write --topic '*' or --service '*'")
+    if not (args.all or args.topic or args.service):
+        if not args.list:
+            raise Error("nothing is to be relayed: name it by --topic or --service, or use --all")
+        args.all = True
+    found = []
+    for given in (["*"], ["*"]) if args.all else (args.topic, args.service):
+        rules = [Rule.parse(text) for text in given]
+        if args.one_way:
+            rules = [
+                Rule(r.name, r.other, Direction.THERE) if r.direction is Direction.BOTH else r
+                for r in rules
+            ]
+        found.append(rules)
+    return found[0], found[1]
+
+
+def _list(
+    args: argparse.Namespace, first: Node, second: Node, topics: list[Rule], services: list[Rule]
+) -> int:
+    from rosglass.bridge import survey
+
+    settle(first)
+    settle(second)
+    found = survey(first, second, topics, services, exclude=args.exclude)
+    if args.json:
+        print_json(
+            [
+                {
+                    "kind": one.kind,
+                    "name": one.name,
+                    "other_name": one.other,
+                    "direction": one.direction,
+                    "type": one.type,
+                    "other_type": one.other_type,
+                    "notes": list(one.notes),
+                    "problem": one.problem,
+                }
+                for one in found
+            ]
+        )
+        return 0
+    style = Style(args)
+    rows = []
+    for one in found:
+        names = (one.name, one.other) if one.direction == "->" else (one.other, one.name)
+        types = (one.type, one.other_type or "-")
+        left, right = types if one.direction == "->" else types[::-1]
+        rows.append((one.kind, names[0], left or "?", one.direction, names[1], right or "?"))
+    for line, one in zip(table(rows) if rows else (), found, strict=True):
+        print(style(line, "red") if one.problem else line)
+        for told in (*one.notes, *((f"not relayed: {one.problem}",) if one.problem else ())):
+            print(style(f"    {told}", "dim"))
+    if not found:
+        note("nothing is there that could be relayed; rosglass doctor looks why")
+    return 0
+
+
+def _watch(args: argparse.Namespace, bridge: Bridge, end: End) -> int:
+    until = math.inf if args.duration is None else time.monotonic() + args.duration
+    period = args.statistics or math.inf
+    due = time.monotonic() + period
+    news = _News()
+    shown = sys.stderr.isatty()
+    try:
+        while not end.wait(max(0.0, min(0.5, until - time.monotonic()))):
+            now = time.monotonic()
+            status = bridge.status()
+            news.tell(status)
+            if shown:
+                width = shutil.get_terminal_size().columns - 1
+                print(f"\r\033[K{status.line()[:width]}", end="", file=sys.stderr, flush=True)
+            elif now >= due:
+                due = now + period
+                print(status.line(), flush=True)
+            if now >= until:
+                break
+    finally:
+        status = bridge.status()
+        if shown:
+            print(file=sys.stderr)
+        print(status.line(), flush=True)
+        for one in status.relays:
+            sign = f"{one.name} {one.direction}" + (f" {one.other}" * (one.other != one.name))
+            print(f"  {one.count:8} {sign} [{one.type or '?'}]")
+    return end.code
+
+
+class _News:
+    """Tells what is wrong, or gets lost, when it begins; and when it is over."""
+
+    def __init__(self) -> None:
+        self._since: dict[str, tuple[str, float]] = {}
+        self._told: dict[str, str] = {}
+        self._noted: set[tuple[str, str]] = set()
+
+    def tell(self, status: BridgeStatus) -> None:
+        now = time.monotonic()
+        problems = {
+            f"{one.name} {one.direction}": one.problem for one in status.relays if one.problem
+        }
+        for number, problem in enumerate(status.worlds):
+            if problem:
+                problems[f"the {('first', 'second')[number]} world"] = problem
+        for one in status.relays:
+            told = "; ".join(one.notes)
+            if told and (one.type, told) not in self._noted:
+                self._noted.add((one.type, told))
+                note(f"{one.name} {one.direction} [{one.type}]: {told}")
+        for name, problem in problems.items():
+            since = self._since.get(name, ("", now))
+            self._since[name] = (problem, since[1] if since[0] == problem else now)
+            if self._told.get(name) != problem and now - self._since[name][1] >= _PATIENCE:
+                self._told[name] = problem
+                note(f"{name}: {problem}")
+        for name in self._since.keys() - problems.keys():
+            del self._since[name]
+            if self._told.pop(name, None) is not None:
+                note(f"{name}: well again")
+
+
+def _type(text: str) -> tuple[str, str]:
+    name, separator, kind = text.partition(":=")
+    if not (separator and name and kind):
+        raise argparse.ArgumentTypeError(f"{text!r} is not of the form /topic:=package/Type")
+    return name, kind
