@@ -97,8 +97,7 @@ class ParameterServer(Handle):
         if default is not _REQUIRED:
             return default
         raise ParameterError(
-            f"parameter {full} is not set on {self._core.master.uri}"
-            f"{similar(full, self._known(timeout))}"
+            f"parameter {full} is not set on {self._core.master.uri}{self._similar(full, timeout)}"
         )
 
     def has(self, name: str, *, timeout: float = _TIMEOUT) -> bool:
@@ -160,7 +159,7 @@ class ParameterServer(Handle):
         except ParameterError:
             if self._call("hasParam", full, timeout=timeout):
                 raise
-            hint = similar(full, self._known(timeout))
+            hint = self._similar(full, timeout)
             raise ParameterError(f"parameter {full} is not set{hint}") from None
 
     # -- following -------------------------------------------------------------------------------
@@ -352,6 +351,13 @@ class ParameterServer(Handle):
     def _known(self, timeout: float) -> list[str]:
         return sorted(str(name) for name in self._call("getParamNames", timeout=timeout))
 
+    def _similar(self, full: str, timeout: float) -> str:
+        """Return a hint at a parameter or namespace that may be meant."""
+        names = self._known(timeout)
+        parts = [name.split("/") for name in names]
+        spaces = {"/".join(p[:end]) for p in parts for end in range(2, len(p))}
+        return similar(full, [*names, *sorted(spaces)])
+
     def _change(self, method: str, full: str, *arguments: Any, timeout: float) -> None:
         try:
             self._call(method, full, *arguments, timeout=timeout)
@@ -384,8 +390,6 @@ class StartParameters(Member):
     Args:
         server: The node's view of the parameter server.
     """
-
-    listed = False
 
     def __init__(self, server: ParameterServer) -> None:
         self._server = server

@@ -1,0 +1,134 @@
+"""The log, log levels and simulated time: ours against ROS 1's commands and nodes."""
+
+from __future__ import annotations
+
+import logging
+
+import pytest
+
+
+@pytest.fixture
+def node(connect, wait_for):
+    node = connect("cockpit", "/ops")
+    wait_for(lambda: "/ops/cockpit/set_logger_level" in node.services(), 20)
+    return node
+
+
+def test_rostopic_echo_shows_what_we_log(node, start_tool, wait_for):
+    echo = start_tool("rostopic", "echo", "/rosout")
+    wait_for(lambda: node._furniture._rosout._handler._publisher.subscription_count() >= 1, 20)
+    node.logger.warning("battery at %d %%: Grüße", 5)
+    wait_for(lambda: echo.output.count("---\n") >= 1, 20, lambda: "".join(echo.output))
+    told = "".join(echo.output)
+    assert "level: 4\n" in told
+    assert 'name: "/ops/cockpit"\n' in told
+    assert "battery at 5 %: Gr" in told
+    assert f'file: "{__file__}"\n' in told
+    assert 'function: "test_rostopic_echo_shows_what_we_log"\n' in told
+    assert "topics: \n  - /rosout\n" in told
+
+
+def test_the_first_message_is_not_lost(connect, start_rospy, master):
+    listener = start_rospy("listener")
+    listener.call("subscribe", topic="/rosout", type="rosgraph_msgs/Log")
+    node = connect("early", wait=False)
+    node.logger.info("one")
+    node.logger.info("two")
+    heard: list[str] = []
+    while heard[-1:] != ["two"]:
+        value = listener.event("received")["value"]
+        if value["name"] == "/early":
+            heard.append(value["msg"])
+    assert heard == ["one", "two"]
+
+
+def test_rosservice_and_rosconsole_see_and_set_our_levels(node, tool):
+    node.logger.getChild("gripper")
+    told = tool("rosservice", "call", "/ops/cockpit/get_loggers")
+    assert 'name: "ros.ops.cockpit"\n    level: "info"' in told
+    assert "ros.ops.cockpit.gripper" in tool("rosconsole", "list", "/ops/cockpit")
+    tool("rosconsole", "set", "/ops/cockpit", "ros.ops.cockpit.gripper", "debug")
+    assert node.logger.getChild("gripper").isEnabledFor(logging.DEBUG)
+    assert not node.logger.isEnabledFor(logging.DEBUG)
+    assert "debug" in tool("rosconsole", "get", "/ops/cockpit", "ros.ops.cockpit.gripper")
+    refused = tool(
+        "rosservice", "call", "/ops/cockpit/set_logger_level", "nobody", "info", status=None
+    )
+    assert "no logger 'nobody'; one of ros.ops.cockpit" in refused
+
+
+@pytest.mark.parametrize(
+    ("kind", "logger", "plan"), [("rospy", "rosout", {"level": "info"}), ("roscpp", "ros", {})]
+)
+def test_we_hear_the_log_and_see_the_levels_of_others(node, request, wait_for, kind, logger, plan):
+    peer = request.getfixturevalue(f"{kind}_peer")
+    heard: list = []
+    node.create_subscription("/rosout", None, heard.append, 100)
+
+    def hears(text: str) -> bool:
+        peer.call("log", text=text, **plan)
+        return any(m.msg == text and m.name == f"/{kind}_peer" for m in heard)
+
+    wait_for(lambda: hears("hello"), 20)
+    first = next(m for m in heard if m.msg == "hello")
+    assert first.level == 2
+    assert first.file.endswith((".py", ".cpp"))
+    assert first.line > 0
+    ask = node.create_service_client(f"/{kind}_peer/get_loggers")
+    loggers = {entry.name: entry.level.lower() for entry in ask.call(timeout=20).loggers}
+    assert loggers[logger] == "info"
+
+
+def test_we_set_the_levels_of_others(node, rospy_peer):
+    # Not of a roscpp node: Debian 12's dies of it (SIGSEGV), whoever calls.
+    change = node.create_service_client("/rospy_peer/set_logger_level", "roscpp/SetLoggerLevel")
+    change.call({"logger": "rosout", "level": "DEBUG"}, timeout=20)
+    assert rospy_peer.call("log_level") == "DEBUG"
+    change.call({"logger": "rosout", "level": "INFO"}, timeout=20)
+    assert rospy_peer.call("log_level") == "INFO"
+
+
+@pytest.mark.parametrize("start", ["start_rospy", "start_roscpp"])
+def test_our_clock_follows_and_theirs_follows_ours(start_master, connect, request, wait_for, start):
+    master = start_master()
+    start_peer = request.getfixturevalue(start)
+    node = connect("cockpit", url=master.url)
+    before = node.clock.is_simulated
+    master.call("setParam", "/use_sim_time", True)
+    wait_for(lambda: node.clock.is_simulated, 20)
+    assert not before
+    clock = node.create_publisher("/clock", "rosgraph_msgs/Clock")
+    peer = start_peer(f"follower_{start}", master=master)
+    wait_for(lambda: clock.subscription_count() == 2, 20)
+    clock.publish(clock={"secs": 100, "nsecs": 500_000_000})
+    wait_for(lambda: node.now().seconds == 100.5)
+    stamp = 100.5 if start == "start_roscpp" else {"secs": 100, "nsecs": 500_000_000}
+    wait_for(lambda: peer.call("now") == stamp, 20)
+
+
+def test_a_rospy_publisher_of_clock_drives_our_timers(start_master, connect, start_rospy, wait_for):
+    master = start_master()
+    master.call("setParam", "/use_sim_time", True)
+    node = connect("cockpit", url=master.url)
+    wait_for(lambda: node.clock.is_simulated, 20)
+    jumps: list = []
+    node.clock.on_jump(jumps.append)
+    fired: list[float] = []
+    gazebo = start_rospy("gazebo", master=master)
+    gazebo.call("publish", topic="/clock", type="rosgraph_msgs/Clock")
+
+    def tick(secs: float) -> None:
+        value = {"clock": {"secs": int(secs), "nsecs": int(secs % 1 * 1e9)}}
+        gazebo.call("publish", topic="/clock", type="rosgraph_msgs/Clock", value=value)
+        wait_for(lambda: node.now().seconds == secs, 20)
+
+    wait_for(lambda: gazebo.call("connections", topic="/clock") == 2, 20)
+    tick(10)
+    node.create_timer(1.0, lambda: fired.append(node.now().seconds))
+    tick(10.5)
+    tick(11)
+    wait_for(lambda: fired == [11.0], 20)
+    tick(5)
+    wait_for(lambda: any(jump.delta.seconds < 0 for jump in jumps), 20)
+    gazebo.end()  # the simulation is killed: time stands still
+    assert node.now().seconds == 5.0
