@@ -7,13 +7,14 @@ import platform
 import shlex
 import sys
 from collections import Counter
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rosglass.cli.connecting import add_connection_options, settle, wait
 from rosglass.cli.endpoints import problems
+from rosglass.cli.finding import Finding
 from rosglass.cli.network import ask, interfaces, is_loopback
 from rosglass.cli.output import Style, add_output_options, print_json
 from rosglass.errors import Error
@@ -48,29 +49,16 @@ _VARIABLES = (
     "CYCLONEDDS_URI",
     "ZENOH_SESSION_CONFIG_URI",
     "AMENT_PREFIX_PATH",
+    "ROS_MASTER_URI",
+    "ROS_IP",
+    "ROS_HOSTNAME",
+    "ROS_PACKAGE_PATH",
 )
 #: Receive buffer in bytes that a camera picture needs.
 _BUFFER = 4 * 2**20
 _NO_NETWORK = "connect a network, or for this machine alone: sudo ip link set lo up multicast on"
 #: Seconds to look around in a graph.
 _LOOK = 3.0
-
-
-@dataclass(frozen=True)
-class Finding:
-    """Something that was looked at.
-
-    Attributes:
-        level: ``ok``, ``note``, ``warning`` or ``error``.
-        area: What was looked at.
-        text: What was found.
-        fix: What to do about it.
-    """
-
-    level: str
-    area: str
-    text: str
-    fix: str = ""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -105,12 +93,14 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _look(args: argparse.Namespace) -> Iterator[Finding]:
+    urls, told = _urls(args)
+    ros2 = any(not url.lower().startswith("ros1:") for url in urls)
     yield from _programs()
     yield from _environment()
     yield from _definitions()
-    yield from _kernel()
-    yield from _interfaces()
-    urls, told = _urls(args)
+    if ros2:
+        yield from _kernel()
+    yield from _interfaces(ros2)
     answering = []
     for url in urls:
         findings = list(_robot(url, args.timeout))
@@ -144,7 +134,7 @@ def _programs() -> Iterator[Finding]:
 
 def _environment() -> Iterator[Finding]:
     told = [f"{name}={os.environ[name]}" for name in _VARIABLES if os.environ.get(name)]
-    yield Finding("ok", "environment", "; ".join(told) or "no variables of ROS 2 or rosglass")
+    yield Finding("ok", "environment", "; ".join(told) or "no variables of ROS or rosglass")
     for folder in filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)):
         if not Path(folder).is_dir():
             fix = "source the workspace anew, or unset AMENT_PREFIX_PATH"
@@ -154,8 +144,9 @@ def _environment() -> Iterator[Finding]:
 def _definitions() -> Iterator[Finding]:
     from rosglass.messages import default_library
 
-    names = default_library().names(2)
-    yield Finding("ok", "definitions", f"{len(names)} types of ROS 2 are known on this machine")
+    counts = [len(default_library().names(ros)) for ros in (1, 2)]
+    text = f"{counts[1]} types of ROS 2 and {counts[0]} of ROS 1 are known on this machine"
+    yield Finding("ok", "definitions", text)
 
 
 def _kernel() -> Iterator[Finding]:
@@ -174,14 +165,14 @@ def _kernel() -> Iterator[Finding]:
         yield Finding("ok", "network", f"receive buffers up to {size / 2**20:.0f} MiB")
 
 
-def _interfaces() -> Iterator[Finding]:
+def _interfaces(ros2: bool) -> Iterator[Finding]:
     found = interfaces()
     if found is None:
         return
     names = ", ".join(interface.name for interface in found)
     if not found:
         yield Finding("error", "network", "no network interface is up", _NO_NETWORK)
-    elif not any(interface.has_multicast for interface in found):
+    elif ros2 and not any(interface.has_multicast for interface in found):
         yield Finding(
             "warning",
             "network",
@@ -200,7 +191,10 @@ def _address(answering: list[str]) -> Finding:
     """Say what to set where nothing is set."""
     if not answering:
         text = "nothing says where the robot is, and nobody answers on this machine"
-        fix = "export ROSGLASS_URL=zenoh://<robot's address> (or dds://), and see the notes above"
+        fix = (
+            "export ROSGLASS_URL=zenoh://<robot's address> (or dds://, ros1://<its address>), "
+            "and see the notes above"
+        )
         return Finding("error", "address", text, fix)
     text = f"nothing says where the robot is; found: {', '.join(answering)}"
     return Finding("warning", "address", text, f"export ROSGLASS_URL={shlex.quote(answering[0])}")
@@ -215,13 +209,18 @@ def _urls(args: argparse.Namespace) -> tuple[list[str], bool]:
     try:
         return [default_url(os.environ)], True
     except Error:
-        return ["zenoh://127.0.0.1:7447", "dds://"], False
+        return ["zenoh://127.0.0.1:7447", "dds://", "ros1://127.0.0.1:11311"], False
 
 
 def _robot(url: str, timeout: float) -> Iterator[Finding]:
     import rosglass
     from rosglass.comm import ConnectionState
 
+    if url.lower().startswith("ros1:"):
+        from rosglass.cli import doctor_ros1
+
+        yield from doctor_ros1.look(url, timeout)
+        return
     try:
         node = rosglass.connect(url, name=f"rosglass_doctor_{os.getpid()}", own_services=False)
     except ModuleNotFoundError as error:
