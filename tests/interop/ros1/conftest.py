@@ -103,10 +103,10 @@ class RosMaster:
         self.kill()
         self.start()
 
-    def call(self, method: str, *arguments: Any) -> Any:
-        """Call its XML-RPC API as ``/test``; return the value, fail the test without success."""
+    def call(self, method: str, *arguments: Any, caller: str = "/test") -> Any:
+        """Call its XML-RPC API as a node; return the value, fail the test without success."""
         with xmlrpc.client.ServerProxy(self.uri) as server:
-            code, told, value = getattr(server, method)("/test", *arguments)
+            code, told, value = getattr(server, method)(caller, *arguments)
         assert code == 1, f"{method}{arguments}: {told}"
         return value
 

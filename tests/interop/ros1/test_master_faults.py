@@ -1,0 +1,229 @@
+"""A master that is killed, comes late, hangs or forgets; and nodes that take each other's name."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+
+import pytest
+
+import rosglass
+from rosglass.comm import ConnectionState
+
+
+@pytest.fixture
+def own_master(start_master):
+    """A master that a test may kill."""
+    return start_master()
+
+
+def registered(master, topic):
+    """Return who publishes and who subscribes to a topic, as the master has it."""
+    publishers, subscribers, _ = master.call("getSystemState")
+    return dict(publishers).get(topic, []), dict(subscribers).get(topic, [])
+
+
+def test_a_restarted_master_learns_of_us_and_messages_go_on_meanwhile(
+    own_master, connect, start_rospy, wait_for
+):
+    peer = start_rospy("peer", master=own_master)
+    node = connect("panel", url=own_master.url)
+    commands = node.create_publisher("/commands", "std_msgs/Int32")
+    words = node.create_subscription("/words")
+    node.create_service_server("/reset", "std_srvs/Empty", lambda _: None)
+    peer.call("subscribe", topic="/commands", type="std_msgs/Int32", tell=False)
+    peer.call("publish", topic="/words", type="std_msgs/String", value={"data": "w"}, rate=50,
+              count=0)  # fmt: skip
+    wait_for(commands.subscription_count)
+    words.wait(10)
+    joined = []
+    words.on_matched(joined.append)
+
+    def go_on(count):
+        """See that messages arrive both ways."""
+        before = peer.call("count", topic="/commands")
+        for number in range(count):
+            commands.publish(data=number)
+        wait_for(lambda: peer.call("count", topic="/commands") == before + count)
+        while words.take() is not None:
+            pass
+        words.wait(10)
+
+    go_on(3)
+    own_master.kill()
+    wait_for(lambda: node.status().state is ConnectionState.LOST)
+    assert "does not answer" in node.status().detail
+    go_on(3)
+    own_master.start()
+    began = time.monotonic()
+    wait_for(lambda: registered(own_master, "/commands")[0] == ["/panel"])
+    wait_for(lambda: registered(own_master, "/words")[1] == ["/panel"])
+    wait_for(lambda: dict(own_master.call("getSystemState")[2]).get("/reset") == ["/panel"])
+    assert time.monotonic() - began < 3
+    wait_for(lambda: node.status().state is ConnectionState.CONNECTED)
+    go_on(3)
+    # rospy does not register again: its connections are the ones from before.
+    assert registered(own_master, "/words")[0] == []
+    assert commands.subscription_count() == words.publisher_count() == 1
+    assert [event.change for event in joined] == [1]
+    assert words.problem == ""
+
+    # Whoever comes now is found by both sides.
+    late = connect("late", url=own_master.url)
+    late.create_publisher("/words", "std_msgs/String")
+    receiver = late.create_subscription("/commands")
+    wait_for(lambda: words.publisher_count() == 2)
+    wait_for(lambda: commands.subscription_count() == 2)
+    commands.publish(data=7)
+    assert receiver.wait(10).message().data == 7
+
+
+def test_a_master_that_starts_late_is_found(own_master, connect, tool, wait_for):
+    own_master.kill()
+    node = connect("early", url=own_master.url, wait=False)
+    told = []
+    node.on_status_change(told.append)
+    publisher = node.create_publisher("/early", "std_msgs/Empty")
+    subscription = node.create_subscription("/early")
+    wait_for(lambda: "Connection refused" in node.status().detail)
+    assert node.status().state is ConnectionState.CONNECTING
+    own_master.start()
+    wait_for(lambda: told and told[-1].state is ConnectionState.CONNECTED)
+    wait_for(publisher.subscription_count)
+    publisher.publish()
+    subscription.wait(10)
+
+
+def test_a_master_that_hangs_holds_up_neither_topics_nor_closing(own_master, connect, wait_for):
+    one, two = connect("one", url=own_master.url), connect("two", url=own_master.url)
+    publisher = one.create_publisher("/count", "std_msgs/Int32")
+    subscription = two.create_subscription("/count")
+    wait_for(publisher.subscription_count)
+    pid = own_master._process.pid
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        publisher.publish(data=1)
+        assert subscription.wait(10).message().data == 1
+        left = []
+        publisher.on_matched(left.append)
+        subscription.close()  # its connection ends at once, whatever the master does
+        wait_for(lambda: [event.change for event in left] == [1, -1], 3)
+        wait_for(lambda: one.status().state is ConnectionState.LOST)
+        assert "no answer in time" in one.status().detail
+        new = connect("three", url=own_master.url, wait=False)
+        for node in (new, two, one):
+            began = time.monotonic()
+            node.close()
+            assert time.monotonic() - began < 4
+            assert node.status().state is ConnectionState.CLOSED
+    finally:
+        os.kill(pid, signal.SIGCONT)
+
+
+def test_closing_while_connecting_leaves_nothing_behind(own_master, connect, wait_for):
+    for delay in [0.0, 0.001, 0.002, 0.003, 0.005, 0.01, 0.02, 0.03] * 4:
+        node = connect("hasty", url=own_master.url, wait=False)
+        node.create_publisher("/hasty", "std_msgs/Empty")
+        node.create_subscription("/hasty")
+        node.create_service_server("/hasty/reset", "std_srvs/Empty", lambda _: None)
+        threading.Event().wait(delay)
+        node.close()
+    assert [part for part in own_master.call("getSystemState") if part] == []
+
+
+def test_many_nodes_come_and_go_without_a_trace(own_master, connect, wait_for):
+    def cycle():
+        node = rosglass.connect(f"{own_master.url}?ip=127.0.0.1", "brief")
+        publisher = node.create_publisher("/brief", "std_msgs/Empty")
+        subscription = node.create_subscription("/brief")
+        if publisher.subscription_count() == 0:
+            subscription.close()
+        node.close()
+
+    def traces():
+        return threading.active_count(), len(os.listdir("/proc/self/fd"))
+
+    for _ in range(5):
+        cycle()
+    before = traces()
+    for _ in range(300):
+        cycle()
+    wait_for(lambda: traces() <= before, what=lambda: f"{before} became {traces()}")
+    assert [part for part in own_master.call("getSystemState") if part] == []
+
+
+def test_the_master_is_told_again_of_what_it_forgot_alone(own_master, connect, wait_for):
+    node = connect("panel", url=own_master.url)
+    node.create_publisher("/one", "std_msgs/Empty")
+    node.create_publisher("/two", "std_msgs/Empty")
+    node.create_subscription("/three", "std_msgs/Empty")
+    wait_for(lambda: registered(own_master, "/three")[1])
+    # As `rosnode cleanup` does when a node seems to be gone for a moment.
+    api = own_master.call("lookupNode", "/panel")
+    own_master.call("unregisterPublisher", "/one", api, caller="/panel")
+    own_master.call("unregisterSubscriber", "/three", api, caller="/panel")
+    wait_for(lambda: registered(own_master, "/one")[0] == ["/panel"], 5)
+    wait_for(lambda: registered(own_master, "/three")[1] == ["/panel"], 5)
+    assert registered(own_master, "/two")[0] == ["/panel"]
+
+
+def test_publishers_are_found_though_the_master_cannot_call_us(own_master, connect, wait_for):
+    node = connect("behind_a_firewall", url=own_master.url)
+    subscription = node.create_subscription("/talk")
+    wait_for(lambda: registered(own_master, "/talk")[1])
+    # Its API is not served any more: calls of the master's get lost.
+    core = node._core
+    door = core._doors[1]
+    core.loop.call(door.end)
+    core._api.close()
+    wait_for(lambda: door._listener.fileno() < 0)
+    talker = connect("talker", url=own_master.url)
+    publisher = talker.create_publisher("/talk", "std_msgs/Int32")
+    wait_for(publisher.subscription_count)
+    publisher.publish(data=3)
+    assert subscription.wait(10).message().data == 3
+
+
+@pytest.mark.parametrize("peer", ["rosglass", "rospy", "roscpp"])
+def test_the_older_of_two_nodes_of_a_name_ends(own_master, connect, request, wait_for, peer):
+    older = connect("twin", url=own_master.url)
+    told, done = [], threading.Event()
+    older.on_status_change(lambda status: (told.append(status), done.set()))
+    older.create_publisher("/old", "std_msgs/Empty")
+    wait_for(lambda: registered(own_master, "/old")[0])
+    if peer == "rosglass":
+        newer = connect("twin", url=own_master.url)
+        newer.create_publisher("/new", "std_msgs/Empty")
+    else:
+        start = request.getfixturevalue(f"start_{peer}")
+        newer = start("twin", master=own_master)
+    wait_for(lambda: older.status().state is ConnectionState.CLOSED)
+    done.wait(10)
+    assert told[-1] == older.status()
+    assert "same name" in told[-1].detail or "has the name /twin now" in told[-1].detail
+    with pytest.raises(rosglass.NodeClosedError, match="/twin is closed"):
+        older.create_publisher("/late", "std_msgs/Empty")
+    if peer == "rosglass":
+        wait_for(lambda: registered(own_master, "/new")[0] == ["/twin"])
+        assert newer.status().state is ConnectionState.CONNECTED
+    wait_for(lambda: registered(own_master, "/old")[0] == [])
+
+
+def test_a_node_ends_although_the_master_cannot_tell_it_that_its_name_is_taken(
+    own_master, connect, wait_for
+):
+    older = connect("twin", url=own_master.url)
+    older.create_publisher("/old", "std_msgs/Empty")
+    wait_for(lambda: registered(own_master, "/old")[0])
+    core = older._core
+    door = core._doors[1]
+    core.loop.call(door.end)
+    core._api.close()
+    wait_for(lambda: door._listener.fileno() < 0)
+    newer = connect("twin", url=own_master.url)
+    newer.create_publisher("/new", "std_msgs/Empty")
+    wait_for(lambda: older.status().state is ConnectionState.CLOSED)
+    assert f"{newer._core.uri} has the name /twin now" in older.status().detail
+    assert newer.status().state is ConnectionState.CONNECTED
