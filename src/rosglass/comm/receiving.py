@@ -38,6 +38,6 @@ def check_may_wait(name: str) -> None:
     if first.startswith(_BEGINNINGS):
         raise UnsupportedError(
             f"{name}: this callback runs in a thread that receives (executor=IMMEDIATE, or "
-            "add_done_callback()), where what it waits for could never arrive; take call_async() "
-            "here, or let it run elsewhere: on_done(), or another executor"
+            "add_done_callback()), where what it waits for could never arrive; take call_async(), "
+            "get_async() or the like here, or let it run elsewhere: on_done(), or another executor"
         )

@@ -191,11 +191,13 @@ class _Parser:
 
     def _parameter(self, text: str, name: str, value: str) -> None:
         from rosglass.ros1.parameter_files import parse_value  # noqa: PLC0415 - yaml
+        from rosglass.ros1.parameter_values import to_wire  # noqa: PLC0415 - xmlrpc
 
         try:
             expand("~" + name, "n", "/")
             if not name:
                 raise InvalidNameError("a parameter's name is missing")
             self._parameters[name] = parse_value(value, f"{name}{_SIGN}")
+            to_wire(f"~{name}", self._parameters[name])
         except (InvalidNameError, ParameterError) as error:
             raise self._error(f"{text!r}: {error}") from None

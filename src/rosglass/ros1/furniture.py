@@ -72,7 +72,8 @@ class Furniture(Member):
         self._core.add(self)
         if self._has_start:
             self._core.add(StartParameters(self.server))
-        self._made.append(SimTime(self._node, self._core.clock, self.server))
+        core = self._core
+        self._made.append(SimTime(self._node, core.clock, self.server, core.timers))
         if offered:
             self._core.timers.after(_DELAY, self._offer)
 

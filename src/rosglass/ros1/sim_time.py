@@ -14,13 +14,15 @@ from rosglass.comm import IMMEDIATE, Handle, QoS, Time
 from rosglass.errors import Error
 
 if TYPE_CHECKING:
-    from rosglass.comm import Clock, Node, Sample, Subscription
+    from rosglass.comm import Clock, Node, Sample, Subscription, Timers
     from rosglass.ros1.parameter_server import ParameterServer
 
 __all__ = ["USE_SIM_TIME", "SimTime"]
 
 _log = logging.getLogger("rosglass.ros1")
 USE_SIM_TIME = "/use_sim_time"
+#: Seconds that a simulation may take to tell its time before people are told that it does not.
+_PATIENCE = 5.0
 
 
 class SimTime(Handle):
@@ -33,10 +35,11 @@ class SimTime(Handle):
         node: The node.
         clock: Its clock.
         server: The parameter server.
+        timers: Run a look whether there is a simulation at all.
     """
 
-    def __init__(self, node: Node, clock: Clock, server: ParameterServer) -> None:
-        self._node, self._clock = node, clock
+    def __init__(self, node: Node, clock: Clock, server: ParameterServer, timers: Timers) -> None:
+        self._node, self._clock, self._timers = node, clock, timers
         self._lock = threading.Lock()
         self._subscription: Subscription | None = None
         self._closed = False
@@ -53,7 +56,7 @@ class SimTime(Handle):
 
     def _follow(self, value: Any) -> None:
         """Do as the parameter says."""
-        # As rospy and roscpp have it: 1 counts, too.
+        # As rospy has it: 1 counts, too.
         wanted = bool(value)
         made = None
         with self._lock:
@@ -76,6 +79,18 @@ class SimTime(Handle):
             old.close()
         # As it is now: another thread may have changed it since.
         self._clock.simulate(self._subscription is not None)
+        if made is not None:
+            self._timers.after(_PATIENCE, self._look)
+
+    def _look(self) -> None:
+        """Tell people why nothing moves, if nothing does."""
+        if self._subscription is not None and not self._clock.now().nanoseconds:
+            _log.warning(
+                "%s: %s is set, but nothing came on /clock: time stands still at zero until a "
+                "simulation publishes it, or the parameter is deleted",
+                self._node,
+                USE_SIM_TIME,
+            )
 
     def _tick(self, sample: Sample) -> None:
         stamp = sample.message().clock

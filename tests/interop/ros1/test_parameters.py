@@ -117,6 +117,12 @@ def test_roscpp_reads_and_sets_with_us(server, roscpp_peer, wait_for):
     wait_for(lambda: subscription.value == [3, 4])
 
 
+def test_parameters_on_our_command_line_are_there_for_others(connect, rospy_peer):
+    node = connect("arm", "/left", arguments=["prog", "_speed:=1.5", "_joints:=[a, b]", "x"])
+    assert node.parameters.get("speed") == 1.5
+    assert rospy_peer.call("get_param", name="/left/arm/joints") == [["a", "b"], "list"]
+
+
 def test_another_nodes_parameters_are_seen_through_a_client(node, rospy_peer, wait_for):
     rospy_peer.call("set_param", name="~speed", value=1.5)
     rospy_peer.call("set_param", name="~arm", value={"joints": ["a", "b"]})

@@ -172,3 +172,12 @@ def test_the_clock_is_the_systems_again_once_a_new_master_says_so(connect, maste
     assert node.clock.is_simulated
     master.start()
     eventually(lambda: not node.clock.is_simulated)
+
+
+def test_people_are_told_when_there_is_no_simulation(
+    connect, master, eventually, monkeypatch, caplog
+):
+    monkeypatch.setattr("rosglass.ros1.sim_time._PATIENCE", 0.1)
+    master.tree["use_sim_time"] = True
+    connect("arm", own_services=False)
+    eventually(lambda: "time stands still at zero" in caplog.text)

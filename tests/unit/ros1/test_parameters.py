@@ -17,6 +17,7 @@ from rosglass.errors import (
     MasterError,
     NodeClosedError,
     ParameterError,
+    RosArgumentError,
     UnsupportedError,
 )
 
@@ -407,6 +408,12 @@ def test_parameters_of_the_start_win_once(master, eventually):
         eventually(lambda: master.tree["arm"] == {"speed": 4.0, "gain": {"p": 1}})
     finally:
         node.close()
+
+
+def test_what_can_be_no_parameter_is_refused_on_the_command_line(connect):
+    for argument in ("_speed:=99999999999", "_day:=2026-01-02", "_none:=null"):
+        with pytest.raises(RosArgumentError, match=f"argument 1: '{argument}'"):
+            connect("arm", arguments=[argument])
 
 
 # -- other nodes' --------------------------------------------------------------------------------
