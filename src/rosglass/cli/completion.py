@@ -69,8 +69,14 @@ class _Completer:
     def _names(self, args: argparse.Namespace) -> Iterable[str]:
         kinds = {"messages": "msg", "service_types": "srv", "action_types": "action"}
         if self._what in kinds or self._what == "interfaces":
+            from rosglass.cli.worlds import names_ros1
+            from rosglass.interfaces import ros1_name
             from rosglass.messages import default_library
 
+            if names_ros1(args):
+                return [
+                    ros1_name(name) for name in default_library().names(1, kinds.get(self._what))
+                ]
             return default_library().names(2, kinds.get(self._what))
         return self._ask(args)
 

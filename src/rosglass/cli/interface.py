@@ -8,6 +8,7 @@ from rosglass.cli.completion import complete
 from rosglass.cli.connecting import add_connection_options, add_definitions_option, connect
 from rosglass.cli.output import Style, add_output_options, note, print_json, template
 from rosglass.cli.subcommands import Subcommands
+from rosglass.cli.worlds import names_ros1
 
 if TYPE_CHECKING:
     import argparse
@@ -33,23 +34,32 @@ def configure(parser: argparse.ArgumentParser) -> None:
     sub.add_argument("--ros1", action="store_true", help="ROS 1's types")
     add_definitions_option(sub)
     add_output_options(sub)
+    sub.set_defaults(url="")
 
 
 def run(args: argparse.Namespace) -> int:
     """Do it."""
+    args.ros1 = args.ros1 or names_ros1(args)
     return int(args.handler(args))
 
 
 def _finish(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--ros1", action="store_true", help="the type as in ROS 1")
+    parser.add_argument(
+        "--ros1",
+        action="store_true",
+        help="the type as in ROS 1; it need not be said with --url ros1://...",
+    )
     add_output_options(parser)
     add_connection_options(parser, timeout=5.0)
 
 
 def _list(args: argparse.Namespace) -> int:
+    from rosglass.interfaces import ros1_name
     from rosglass.messages import default_library
 
     names = default_library().names(1 if args.ros1 else 2, args.kind)
+    if args.ros1 and not args.json:
+        names = [ros1_name(name) for name in names]
     found = [name for name in names if args.text.lower() in name.lower()]
     if args.json:
         print_json(found)
@@ -62,6 +72,8 @@ def _list(args: argparse.Namespace) -> int:
 
 
 def _show(args: argparse.Namespace) -> int:
+    from rosglass.interfaces import ros1_name
+
     found = _find(args)
     definition = found.definition
     source = definition.source
@@ -81,7 +93,8 @@ def _show(args: argparse.Namespace) -> int:
         )  # fmt: skip
         return 0
     style = Style(args)
-    print(style(f"# {found.name}, from {source.provider}", "dim"))
+    shown = f"{ros1_name(found.name)}, md5 {found.md5}" if found.ros == 1 else found.name
+    print(style(f"# {shown}, from {source.provider}", "dim"))
     for line in definition.text.rstrip("\n").split("\n"):
         code, mark, comment = line.partition("#")
         if args.no_comments:
@@ -103,20 +116,23 @@ def _find(args: argparse.Namespace) -> MessageType | ServiceType | ActionType:
     import os
 
     from rosglass.errors import TypeNotFoundError, UnsupportedError
+    from rosglass.interfaces import ros1_name
     from rosglass.messages import default_library, load
 
     hint = ""
     if "/" not in args.type:
         names = default_library().names(1 if args.ros1 else 2)
         close = [name for name in names if name.rpartition("/")[2].lower() == args.type.lower()]
-        told = f"Did you mean {' or '.join(close)}?" if close else "Write e.g. std_msgs/msg/Bool"
+        close = [ros1_name(name) for name in close] if args.ros1 else close
+        example = "std_msgs/Bool" if args.ros1 else "std_msgs/msg/Bool"
+        told = f"Did you mean {' or '.join(close)}?" if close else f"Write e.g. {example}"
         raise TypeNotFoundError(f"{args.type!r} names no package. {told}")
     try:
         return load(args.type, 1 if args.ros1 else 2)
     except TypeNotFoundError as error:
         _, mark, close_ones = str(error).partition("Did you mean ")
         hint = f"{mark}{close_ones.partition('?')[0]}?" if mark else ""
-        if args.ros1 or not (args.url or os.environ.get("ROSGLASS_URL")):
+        if not (args.url or names_ros1(args) or os.environ.get("ROSGLASS_URL")):
             where = "or say where the robot is: --url zenoh://robot:7447"
             raise TypeNotFoundError(f"{error}; {where}") from error
     try:

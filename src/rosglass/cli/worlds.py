@@ -25,7 +25,7 @@ def names_ros1(args: argparse.Namespace) -> bool:
     from rosglass.connection import default_url
     from rosglass.errors import Error
 
-    url = args.url
+    url = getattr(args, "url", "")
     with suppress(Error):
         url = url or default_url(os.environ)
     return str(url).lower().startswith("ros1:")
