@@ -12,7 +12,7 @@ import threading
 import time
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import ActionClient, CancelAnswer, EndpointKind, Executor, Promise, Time
+from rosglass.comm import ActionClient, EndpointKind, Executor, Promise, Time
 from rosglass.comm.inorder import InOrder
 from rosglass.comm.promise import check_timeout
 from rosglass.comm.readiness import Readiness
@@ -22,8 +22,6 @@ from rosglass.errors import (
     DecodeError,
     Error,
     NodeClosedError,
-    ServiceUnavailableError,
-    TimeoutError,  # noqa: A004 - the field's own word
 )
 from rosglass.ros1.action_discovery import ActionDiscovery
 from rosglass.ros1.action_ends import ActionEnds
@@ -37,7 +35,7 @@ from rosglass.ros1.action_types import (
     state_of,
     time_of,
 )
-from rosglass.ros1.cancelling import Entry, Sweep
+from rosglass.ros1.cancelling import Entry, Sweeps
 from rosglass.ros1.client_goal import Ros1ClientGoal
 from rosglass.ros1.core import Member
 from rosglass.ros1.master import call_node
@@ -45,7 +43,7 @@ from rosglass.ros1.master import call_node
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from rosglass.comm import ClientGoal, GoalStatus, Handle, Sample
+    from rosglass.comm import CancelAnswer, ClientGoal, GoalStatus, Handle, Sample
     from rosglass.messages import ActionType, Message
     from rosglass.ros1.action_state import CommState
     from rosglass.ros1.core import Core
@@ -92,8 +90,7 @@ class Ros1ActionClient(ActionClient, Member):
         self._lists: dict[str, dict[str, Entry]] = {}
         self._heard: dict[str, float] = {}
         self._asked: set[str] = set()
-        self._sweeps: list[Sweep] = []
-        self._waiting: list[tuple[Time | None, Promise[CancelAnswer]]] = []
+        self._sweeps = Sweeps(name)
         self._closed = False
         self._warned = self._garbage = ""
         self._readiness = Readiness(name, lambda: self.ready, self._check_open, core.dispatcher)
@@ -231,18 +228,8 @@ class Ros1ActionClient(ActionClient, Member):
         )
 
         def give_up() -> None:
-            if any(waiting is answer for _, waiting in self._waiting):
-                why = self.problem or "its server appeared too late"
-                told = f"{self.name} could not be asked to cancel within {timeout or 0.0:g} s: "
-                answer.fail(ServiceUnavailableError(told + why))
-            answer.fail(
-                TimeoutError(
-                    f"{self.name} did not tell within {timeout or 0.0:g} s that all goals are "
-                    "cancelled. It may cancel them all the same: watch their status"
-                )
-            )
-            self._waiting = [entry for entry in self._waiting if entry[1] is not answer]
-            self._sweeps = [sweep for sweep in self._sweeps if sweep.answer is not answer]
+            why = self.problem or "its server appeared too late"
+            self._sweeps.give_up(answer, timeout or 0.0, why)
 
         if timeout is not None:
             self.core.timers.after(timeout, lambda: self.jobs.add(give_up))
@@ -288,12 +275,14 @@ class Ros1ActionClient(ActionClient, Member):
         for goal in self._live():
             if not goal.sent and (until is None or goal.stamp <= until):
                 goal.cancel()
-        if not self._server or self._ends is None:
-            self._waiting.append((until, answer))
-            return
-        before = dict(self._lists.get(self._server, {}))
-        self._sweeps.append(Sweep(until, answer, before))
-        self._ends.send_cancel("", until or Time())
+        self._sweeps.add(until, answer)
+        self._ask_sweeps()
+
+    def _ask_sweeps(self) -> None:
+        ends = self._ends
+        if self._server and ends is not None:
+            before = dict(self._lists.get(self._server, {}))
+            self._sweeps.ask(before, lambda until: ends.send_cancel("", until or Time()))
 
     def _take_status(self, server: str, message: Message) -> None:
         entries = {
@@ -309,7 +298,7 @@ class Ros1ActionClient(ActionClient, Member):
             else:
                 goal.hear(server, entry.state, entry.text)
         if server == self._server:
-            self._sweeps = [sweep for sweep in self._sweeps if not sweep.hear(entries)]
+            self._sweeps.hear(entries)
 
     def _take_result(self, message: Message) -> None:
         goal = self._goals.get(message.status.goal_id.id)
@@ -342,9 +331,7 @@ class Ros1ActionClient(ActionClient, Member):
         for goal in self._live():
             if not goal.sent and not goal.over:
                 goal.send(self._server, self._epoch)
-        waiting, self._waiting = self._waiting, []
-        for until, answer in waiting:
-            self._begin_sweep(until, answer)
+        self._ask_sweeps()
         self._readiness.update()
 
     def _watch(self) -> None:
@@ -497,11 +484,8 @@ class Ros1ActionClient(ActionClient, Member):
     def _end(self) -> None:
         for goal in self._live():
             goal.lose(self.ended())
-        error = NodeClosedError(f"the client of {self.name} was closed before the server told it")
-        answers = [sweep.answer for sweep in self._sweeps] + [each[1] for each in self._waiting]
-        self._sweeps, self._waiting = [], []
-        for answer in answers:
-            answer.fail(error)
+        told = f"the client of {self.name} was closed before the server told that it cancels goals"
+        self._sweeps.fail(NodeClosedError(told))
 
     def _check_open(self) -> None:
         self.core.check_open()

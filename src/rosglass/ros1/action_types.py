@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from rosglass.comm import QoS, Time
+from rosglass.comm import History, QoS, Time
 from rosglass.errors import DecodeError
 from rosglass.interfaces.definition import ActionDefinition, Definition
 from rosglass.interfaces.derived import derive
@@ -39,8 +39,8 @@ __all__ = [
 ]
 
 GOAL, CANCEL, STATUS, RESULT, FEEDBACK = "goal", "cancel", "status", "result", "feedback"
-#: How many messages may wait for a slow peer, of topics of which none may be lost.
-QUEUE = QoS(depth=1000)
+#: For topics of which no message may be lost, however slow the other end.
+QUEUE = QoS(history=History.KEEP_ALL)
 
 _STATUS_TYPE, _CANCEL_TYPE = "actionlib_msgs/msg/GoalStatusArray", "actionlib_msgs/msg/GoalID"
 _SUFFIXES = {GOAL: "ActionGoal", RESULT: "ActionResult", FEEDBACK: "ActionFeedback"}

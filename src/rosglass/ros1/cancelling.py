@@ -6,12 +6,19 @@ import time
 from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.comm import CancelAnswer, Time
+from rosglass.errors import (
+    ServiceUnavailableError,
+    TimeoutError,  # noqa: A004 - the field's own word
+)
 from rosglass.ros1.action_state import ServerState
 
 if TYPE_CHECKING:
-    from rosglass.comm import Promise
+    from collections.abc import Callable
 
-__all__ = ["Entry", "Sweep"]
+    from rosglass.comm import Promise
+    from rosglass.errors import Error
+
+__all__ = ["Entry", "Sweep", "Sweeps"]
 
 #: Seconds after which a server without goals to cancel has heard of the request.
 _HEARD = 0.5
@@ -70,3 +77,63 @@ class Sweep:
             CancelAnswer(accepted, "" if accepted else "there was no goal to cancel")
         )
         return True
+
+
+class Sweeps:
+    """A client's requests to cancel many goals: those that wait for a server, and for its sign.
+
+    Args:
+        name: Of the action.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._waiting: list[tuple[Time | None, Promise[CancelAnswer]]] = []
+        self._asked: list[Sweep] = []
+
+    def add(self, until: Time | None, answer: Promise[CancelAnswer]) -> None:
+        """Take a request in; it waits for :meth:`ask`."""
+        self._waiting.append((until, answer))
+
+    def ask(self, before: dict[str, Entry], send: Callable[[Time | None], None]) -> None:
+        """Ask a server for all that waits.
+
+        Args:
+            before: What the server said last of its goals.
+            send: Sends one request.
+        """
+        waiting, self._waiting = self._waiting, []
+        for until, answer in waiting:
+            self._asked.append(Sweep(until, answer, before))
+            send(until)
+
+    def hear(self, entries: dict[str, Entry]) -> None:
+        """Take a status message of the server that was asked."""
+        self._asked = [sweep for sweep in self._asked if not sweep.hear(entries)]
+
+    def give_up(self, answer: Promise[CancelAnswer], timeout: float, why: str) -> None:
+        """Wait no longer.
+
+        Args:
+            answer: For whom.
+            timeout: Seconds that were waited.
+            why: What kept the server from being asked.
+        """
+        if any(each is answer for _, each in self._waiting):
+            told = f"{self._name} could not be asked to cancel within {timeout:g} s: {why}"
+            answer.fail(ServiceUnavailableError(told))
+        answer.fail(
+            TimeoutError(
+                f"{self._name} did not tell within {timeout:g} s that all goals are cancelled. It "
+                "may cancel them all the same: watch their status"
+            )
+        )
+        self._waiting = [entry for entry in self._waiting if entry[1] is not answer]
+        self._asked = [sweep for sweep in self._asked if sweep.answer is not answer]
+
+    def fail(self, error: Error) -> None:
+        """Answer all with an error."""
+        answers = [sweep.answer for sweep in self._asked] + [each for _, each in self._waiting]
+        self._asked, self._waiting = [], []
+        for answer in answers:
+            answer.fail(error)

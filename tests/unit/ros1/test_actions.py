@@ -1,0 +1,739 @@
+"""Actions against servers and clients led by hand: late, silent, and contradictory ones."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import logging
+import threading
+
+import pytest
+
+import rosglass
+from rosglass.comm import IMMEDIATE, Dispatcher, GoalStatus, QoS, Time
+from rosglass.errors import (
+    ConnectionLostError,
+    ConversionError,
+    GoalRejectedError,
+    NodeClosedError,
+    ServiceUnavailableError,
+    TimeoutError,  # noqa: A004
+    TypeNotFoundError,
+)
+from rosglass.interfaces import Library
+from rosglass.ros1.action_state import CommState, ServerState, TerminalState
+
+TYPE = "actionlib/TestAction"
+NAME = "/work"
+OWN = "int32 order\n---\nint32 total\n---\nfloat32 part"
+
+
+class Puppet:
+    """The topics of a server, led by a test.
+
+    Attributes:
+        goals: Received goals.
+        cancels: Received requests to cancel, as id and nanoseconds.
+    """
+
+    def __init__(self, node, *, leave_out=""):
+        self.node, self.goals, self.cancels = node, [], []
+        self.status = node.create_publisher(
+            f"{NAME}/status", "actionlib_msgs/GoalStatusArray", QoS.latched()
+        )
+        self.result = node.create_publisher(f"{NAME}/result", "actionlib/TestActionResult")
+        self.feedback = node.create_publisher(f"{NAME}/feedback", "actionlib/TestActionFeedback")
+        node.create_subscription(
+            f"{NAME}/goal", "actionlib/TestActionGoal", self.goals.append, executor=IMMEDIATE
+        )
+        if leave_out != "cancel":
+            node.create_subscription(
+                f"{NAME}/cancel", "actionlib_msgs/GoalID", self._cancel, executor=IMMEDIATE
+            )
+        self.say()
+
+    def _cancel(self, message):
+        stamp = message.stamp.secs * 10**9 + message.stamp.nsecs
+        self.cancels.append((message.id, stamp))
+
+    def say(self, **states):
+        """Publish the state of goals, by their places in `goals`: g0="ACTIVE"."""
+        entries = []
+        for word, state in states.items():
+            code = state if isinstance(state, int) else ServerState[state]
+            entries.append({"goal_id": self.goals[int(word[1:])].goal_id.to_dict(), "status": code})
+        self.status.publish(status_list=entries)
+
+    def end(self, state, number=0, text=""):
+        """Publish the result of a goal."""
+        goal_id = self.goals[number].goal_id.to_dict()
+        status = {"goal_id": goal_id, "status": ServerState[state], "text": text}
+        self.result.publish(status=status, result={"result": 7})
+
+
+@pytest.fixture
+def puppet(connect):
+    return Puppet(connect("robot"))
+
+
+@pytest.fixture
+def client(puppet, connect):
+    made = connect("us").create_action_client(NAME, TYPE)
+    assert made.wait_for_server(10), made.problem
+    return made
+
+
+@pytest.fixture
+def sent(client, puppet, eventually):
+    """A goal that the server has, and tells to execute."""
+    goal = client.send_goal({"goal": 5})
+    eventually(lambda: puppet.goals)
+    puppet.say(g0="ACTIVE")
+    eventually(lambda: goal.status is GoalStatus.EXECUTING)
+    return goal
+
+
+# -- the client ------------------------------------------------------------------------------------
+
+
+def test_what_goes_over_the_wire(sent, puppet):
+    message = puppet.goals[0]
+    assert message.goal.goal == 5
+    assert message.goal_id.id == sent.id_text == sent.id.decode()
+    name, number, stamp = message.goal_id.id.rsplit("-", 2)
+    assert (name, number.isdigit()) == ("/us", True)
+    assert stamp == f"{message.goal_id.stamp.secs}.{message.goal_id.stamp.nsecs:09d}"
+    assert Time.from_parts(message.goal_id.stamp.secs, message.goal_id.stamp.nsecs) == sent.stamp
+    assert message.header.stamp.to_dict() == message.goal_id.stamp.to_dict()
+
+
+def test_ids_are_unique_among_a_nodes_clients(connect):
+    node = connect("us")
+    clients = [node.create_action_client(NAME, TYPE) for _ in range(2)]
+    goals = [client.send_goal() for client in clients for _ in range(3)]
+    assert len({goal.id for goal in goals}) == 6
+
+
+def test_a_server_is_there_once_all_five_topics_are_connected(connect, eventually):
+    Puppet(connect("robot"), leave_out="cancel")
+    client = connect("us").create_action_client(NAME, TYPE)
+    eventually(
+        lambda: client.problem == f"the server /robot is not connected on {NAME}/cancel (yet)"
+    )
+    assert client.wait_for_server(0.3) is False
+    goal = client.send_goal(timeout=0.2)
+    with pytest.raises(ServiceUnavailableError, match=f"not connected on {NAME}/cancel"):
+        goal.result(5)
+    assert goal.terminal_state is TerminalState.LOST
+
+
+def test_a_server_that_no_longer_names_a_goal_has_lost_it(sent, puppet, client):
+    puppet.say()
+    with pytest.raises(ConnectionLostError, match=r"does not know goal .* any more"):
+        sent.result(5)
+    assert (sent.status, sent.comm_state) == (GoalStatus.LOST, CommState.DONE)
+    assert client.goals == ()
+
+
+def test_another_servers_list_does_not_lose_a_goal(sent, connect, puppet, eventually):
+    Puppet(connect("second"))
+    puppet.say(g0="PREEMPTING")
+    eventually(lambda: sent.status is GoalStatus.CANCELING)
+    puppet.end("SUCCEEDED")
+    assert sent.result(5).result.result == 7
+
+
+def test_a_goal_whose_result_never_comes_is_lost(sent, puppet, eventually, monkeypatch):
+    monkeypatch.setattr("rosglass.ros1.client_goal._OVERDUE", 0.2)
+    puppet.say(g0="SUCCEEDED")
+    eventually(lambda: sent.comm_state is CommState.WAITING_FOR_RESULT)
+    assert sent.status is GoalStatus.SUCCEEDED
+
+    def lost():
+        puppet.say()
+        return sent.done.done()
+
+    eventually(lost)
+    with pytest.raises(ConnectionLostError, match="has ended as succeeded, but its result never"):
+        sent.result(0)
+
+
+def test_a_silent_server_that_lives_keeps_its_goals(sent, puppet, monkeypatch, eventually):
+    asked = []
+    monkeypatch.setattr("rosglass.ros1.action_client._SILENCE", 0.1)
+    monkeypatch.setattr(
+        "rosglass.ros1.action_client.call_node", lambda *given, **_: asked.append(given[1])
+    )
+    eventually(lambda: len(asked) > 1)
+    assert set(asked) == {"getPid"}
+    assert sent.status is GoalStatus.EXECUTING
+    puppet.end("SUCCEEDED")
+    assert sent.result(5).status is GoalStatus.SUCCEEDED
+
+
+def test_a_silent_server_that_does_not_answer_loses_its_goals(sent, client, monkeypatch):
+    def fail(*_given, **_more):
+        raise ConnectionLostError("http://robot:1 does not answer: no answer in time")
+
+    monkeypatch.setattr("rosglass.ros1.action_client._SILENCE", 0.1)
+    monkeypatch.setattr("rosglass.ros1.action_client.call_node", fail)
+    with pytest.raises(ConnectionLostError, match=r"fell silent .*no answer in time.* before goal"):
+        sent.result(10)
+    assert not client.ready
+    assert "does not tell the status of its goals" in client.problem
+
+
+def test_a_request_to_cancel_is_repeated_until_the_server_shows_a_sign(
+    sent, puppet, eventually, monkeypatch
+):
+    monkeypatch.setattr("rosglass.ros1.client_goal._INSIST", 0.05)
+    answer = sent.cancel()
+    eventually(lambda: sent.comm_state is CommState.WAITING_FOR_CANCEL_ACK)
+    assert sent.status is GoalStatus.EXECUTING
+
+    def insisted():
+        puppet.say(g0="ACTIVE")
+        return len(puppet.cancels) >= 4
+
+    eventually(insisted)
+    for _ in range(20):
+        puppet.say(g0="ACTIVE")
+    puppet.say(g0="PREEMPTING")
+    assert answer.result(5) == ((sent.id,), "")
+    assert puppet.cancels == [(sent.id_text, 0)] * 4
+    puppet.end("PREEMPTED", text="stopped")
+    assert sent.result(5).status is GoalStatus.CANCELED
+    assert sent.text == "stopped"
+
+
+def test_a_request_to_cancel_that_nobody_heeds_times_out(sent):
+    with pytest.raises(TimeoutError, match=r"did not tell within 0.2 s that it cancels goal"):
+        sent.cancel(timeout=0.2).result(5)
+    assert sent.status is GoalStatus.EXECUTING
+
+
+def test_a_goal_that_ended_cannot_be_cancelled(sent, puppet):
+    late = sent.cancel()
+    puppet.end("SUCCEEDED")
+    assert late.result(5) == ((), "the goal has ended already: succeeded")
+    assert sent.cancel().result(5) == ((), "the goal has ended already: succeeded")
+
+
+def test_cancelling_many_is_answered_when_all_show_it(client, puppet, eventually):
+    goals = [client.send_goal({"goal": n}) for n in range(3)]
+    eventually(lambda: len(puppet.goals) == 3)
+    puppet.say(g0="ACTIVE", g1="PENDING", g2="ACTIVE")
+    eventually(lambda: all(goal.comm_state is not CommState.WAITING_FOR_GOAL_ACK for goal in goals))
+    answer = client.cancel_before(goals[1].stamp)
+    eventually(lambda: puppet.cancels)
+    assert puppet.cancels == [("", goals[1].stamp.nanoseconds)]
+    puppet.say(g0="PREEMPTING", g1="PENDING", g2="ACTIVE")
+    eventually(lambda: goals[0].status is GoalStatus.CANCELING)
+    assert not answer.done()
+    puppet.say(g0="PREEMPTED", g1="RECALLING", g2="ACTIVE")
+    assert answer.result(5) == ((goals[0].id, goals[1].id), "")
+    with pytest.raises(TimeoutError, match="that all goals are cancelled"):
+        client.cancel_all(timeout=0.2).result(5)
+
+
+def test_cancelling_all_waits_for_a_server_and_keeps_goals_back(connect):
+    client = connect("us").create_action_client(NAME, TYPE)
+    goal = client.send_goal()
+    with pytest.raises(ServiceUnavailableError, match=r"could not be asked to cancel within 0.2 s"):
+        client.cancel_all(timeout=0.2).result(5)
+    assert goal.result(5).status is GoalStatus.CANCELED
+    assert goal.terminal_state is TerminalState.RECALLED
+    answer = client.cancel_all()
+    puppet = Puppet(connect("robot"))
+    assert client.wait_for_server(10)
+    stop = threading.Event()
+    teller = threading.Thread(
+        target=lambda: [puppet.say() for _ in iter(lambda: stop.wait(0.1), 1)]
+    )
+    teller.start()
+    try:
+        assert answer.result(10) == ((), "there was no goal to cancel")
+    finally:
+        stop.set()
+        teller.join()
+    assert puppet.cancels == [("", 0)]
+    assert puppet.goals == []
+
+
+def test_a_server_that_does_not_know_a_goal_in_time(client, puppet, eventually):
+    goal = client.send_goal({"goal": 1}, timeout=0.3)
+    with pytest.raises(TimeoutError, match=r"did not tell that it knows goal .* within 0.3 s"):
+        goal.result(5)
+    eventually(lambda: puppet.cancels == [(goal.id_text, 0)])
+    with pytest.raises(TimeoutError):
+        goal.acceptance.result(0)
+
+
+def test_a_goal_may_be_pending_for_longer_than_the_timeout(client, puppet, eventually):
+    goal = client.send_goal({"goal": 1}, timeout=0.3)
+    eventually(lambda: puppet.goals)
+    puppet.say(g0="PENDING")
+    eventually(lambda: goal.comm_state is CommState.PENDING)
+    with pytest.raises(TimeoutError, match="has not ended, and goes on"):
+        goal.result(0.6)
+    puppet.end("SUCCEEDED")
+    assert goal.result(5).status is GoalStatus.SUCCEEDED
+    assert goal.acceptance.result(0) is True
+
+
+def test_a_server_that_contradicts_itself_is_told_of_once(sent, puppet, caplog, eventually):
+    for _ in range(5):
+        puppet.say(g0="PENDING")
+    puppet.say(g0="PREEMPTING")
+    eventually(lambda: sent.status is GoalStatus.CANCELING)
+    told = [
+        record.getMessage() for record in caplog.records if "contradicts" in record.getMessage()
+    ]
+    assert len(told) == 1
+    assert "PENDING does not follow ACTIVE" in told[0]
+
+
+def test_a_status_that_does_not_exist_is_told_of_once(sent, puppet, caplog, eventually):
+    for _ in range(5):
+        puppet.say(g0=77)
+    puppet.say(g0="PREEMPTING")
+    eventually(lambda: sent.status is GoalStatus.CANCELING)
+    assert len([text for text in caplog.messages if "status 77" in text]) == 1
+
+
+@pytest.mark.parametrize(
+    ("state", "error", "text"),
+    [
+        ("LOST", ConnectionLostError, "says that goal .* is lost: why"),
+        ("REJECTED", GoalRejectedError, "does not accept goal .*: why"),
+    ],
+)
+def test_ends_without_result(state, error, text, sent, puppet):
+    puppet.end(state, text="why")
+    with pytest.raises(error, match=text):
+        sent.result(5)
+    assert sent.terminal_state.name == state
+
+
+def test_a_result_may_come_before_any_status(client, puppet, eventually):
+    goal = client.send_goal({"goal": 1})
+    eventually(lambda: puppet.goals)
+    states = []
+    goal.on_comm_state_change(states.append)
+    puppet.end("RECALLED")
+    assert goal.result(5).status is GoalStatus.CANCELED
+    eventually(lambda: len(states) == 3)
+    assert states == [CommState.PENDING, CommState.WAITING_FOR_RESULT, CommState.DONE]
+
+
+def test_goals_of_others_are_none_of_ours(sent, puppet, connect, eventually):
+    other = connect("other").create_action_client(NAME, TYPE)
+    assert other.wait_for_server(10)
+    theirs = other.send_goal({"goal": 6})
+    eventually(lambda: len(puppet.goals) == 2)
+    puppet.end("SUCCEEDED", 1)
+    assert theirs.result(5).status is GoalStatus.SUCCEEDED
+    assert sent.status is GoalStatus.EXECUTING
+
+
+def test_a_server_of_another_type_is_named(puppet, connect, eventually):
+    client = connect("us").create_action_client(NAME, "actionlib/TwoIntsAction")
+    eventually(lambda: "actionlib/TestActionResult" in client.problem)
+    assert not client.ready
+
+
+def test_what_cannot_be_sent(client, connect):
+    for given in (5, "five", {"goal": "five"}, {"unknown": 1}):
+        with pytest.raises(ConversionError):
+            client.send_goal(given)
+    with pytest.raises(ConversionError):
+        client.send_goal({"goal": 1}, on_done=5)
+    with pytest.raises(ConversionError):
+        client.send_goal({"goal": 1}, executor="here")
+    with pytest.raises(ConversionError):
+        client.send_goal({"goal": 1}, timeout="soon")
+    for wrong in (Time(), 5, None, Time(2**63)):
+        with pytest.raises(ConversionError):
+            client.cancel_before(wrong)
+    with pytest.raises(TypeNotFoundError, match="TestGoal"):
+        connect("other").create_action_client("/a", "actionlib/TestGoal")
+    assert client.goals == ()
+
+
+def test_a_closed_client_says_so(sent, client, puppet):
+    answer = client.cancel_all()
+    client.close()
+    client.close()
+    for promise in (sent.done, answer):
+        with pytest.raises(NodeClosedError):
+            promise.result(5)
+    for call in (client.send_goal, client.cancel_all, client.wait_for_server, sent.resend):
+        with pytest.raises(NodeClosedError):
+            call()
+    assert client.problem == "the client is closed"
+    assert not client.ready
+
+
+# -- types -----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def own_server(connect):
+    """Return a server of a type that only its own library has."""
+    library = Library()
+    library.add_text("own_msgs/action/Count", OWN, ros=1)
+    node = connect("robot", library=library)
+    return node.create_action_server(
+        NAME, "own_msgs/CountAction", lambda goal: {"total": goal.goal.order + 1}
+    )
+
+
+@pytest.mark.usefixtures("own_server")
+def test_a_type_that_is_not_known_here_is_put_together_of_what_the_topics_tell(connect, eventually):
+    client = connect("us", library=Library()).create_action_client(NAME)
+    goal = client.send_goal({"order": 4})
+    eventually(lambda: "no definition of own_msgs/CountGoal is known" in client.problem)
+    library = Library()
+    library.add_text("own_msgs/action/Count", OWN, ros=1)
+    other = connect("other", library=library).create_action_client(NAME, "own_msgs/Count")
+    assert goal.result(10).result.total == 5
+    assert client.type.name == "own_msgs/action/Count"
+    assert other.send_goal({"order": 1}).result(10).result.total == 2
+
+
+@pytest.mark.usefixtures("own_server")
+def test_actions_are_listed_with_their_types(connect, eventually):
+    node = connect("us")
+    eventually(lambda: node.actions() == {NAME: ["own_msgs/action/Count"]})
+
+
+# -- the server ------------------------------------------------------------------------------------
+
+
+class Hand:
+    """The topics of a client, led by a test.
+
+    Attributes:
+        results: Received results, by goal: state, text and result.
+        listed: The states of the last status message, by goal.
+    """
+
+    def __init__(self, node, eventually):
+        self.results, self.listed, self.order = {}, {}, itertools.count(1)
+        self.goal = node.create_publisher(f"{NAME}/goal", "actionlib/TestActionGoal")
+        self.cancel = node.create_publisher(f"{NAME}/cancel", "actionlib_msgs/GoalID")
+        result = node.create_subscription(f"{NAME}/result", "actionlib/TestActionResult", self._end)
+        status = node.create_subscription(
+            f"{NAME}/status", "actionlib_msgs/GoalStatusArray", self._list, QoS.latched()
+        )
+        eventually(lambda: self.goal.subscription_count() and self.cancel.subscription_count())
+        eventually(lambda: result.publisher_count() and status.publisher_count())
+
+    def _end(self, message):
+        status = message.status
+        end = (ServerState(status.status).name, status.text, message.result.result)
+        self.results.setdefault(status.goal_id.id, []).append(end)
+
+    def _list(self, message):
+        self.listed = {
+            status.goal_id.id: ServerState(status.status).name for status in message.status_list
+        }
+
+    def send(self, name, goal=1, stamp=None):
+        goal_id = {"id": name, "stamp": {"secs": next(self.order) if stamp is None else stamp}}
+        self.goal.publish(goal_id=goal_id, goal={"goal": goal})
+
+    def stop(self, name="", stamp=0):
+        self.cancel.publish(id=name, stamp={"secs": stamp})
+
+
+@pytest.fixture
+def offer(connect, eventually):
+    """Offer the action; returns the server and somebody to lead its client."""
+
+    def offer(execute, **more):
+        server = connect("robot").create_action_server(NAME, TYPE, execute, **more)
+        return server, Hand(connect("hand"), eventually)
+
+    return offer
+
+
+def until_stopped(goal):
+    """Execute a goal until it is stopped."""
+    goal.wait_for_cancel(20)
+    return {"result": 3}
+
+
+def test_a_request_to_cancel_before_the_goal(offer, eventually):
+    executed = []
+    _, hand = offer(executed.append)
+    hand.stop("a")
+    eventually(lambda: hand.listed == {"a": "RECALLING"})
+    hand.send("a")
+    eventually(lambda: hand.results)
+    assert hand.results == {"a": [("RECALLED", "It was cancelled before it came", 0)]}
+    assert executed == []
+
+
+def test_goals_not_newer_than_the_last_request_are_recalled(offer, eventually):
+    _, hand = offer(lambda goal: {"result": goal.goal.goal})
+    hand.stop(stamp=100)
+    hand.stop("marker")
+    eventually(lambda: "marker" in hand.listed)
+    hand.send("old", stamp=100)
+    hand.send("new", stamp=101)
+    hand.send("none", stamp=0)  # gets the time of its arrival
+    eventually(lambda: len(hand.results) == 3)
+    assert [hand.results[name][0][0] for name in ("old", "new", "none")] == [
+        "RECALLED",
+        "SUCCEEDED",
+        "SUCCEEDED",
+    ]
+
+
+def test_a_goal_that_is_sent_twice_is_executed_once(offer, eventually):
+    executed = []
+    _, hand = offer(lambda goal: executed.append(goal.id_text))
+    hand.send("a", stamp=1)
+    eventually(lambda: hand.listed == {"a": "SUCCEEDED"})
+    hand.send("a", stamp=1)
+    hand.send("b", stamp=2)
+    eventually(lambda: "b" in hand.results)
+    assert executed == ["a", "b"]
+    assert len(hand.results["a"]) == 1
+
+
+def test_a_goal_without_id_gets_one(offer, eventually):
+    server, hand = offer(until_stopped)
+    hand.send("", stamp=0)
+    (goal,) = eventually(lambda: server.goals)
+    assert goal.id_text.startswith("/robot-")
+    assert goal.accepted.nanoseconds > 10**18
+    goal.succeed({"result": 1}, "early")
+    eventually(lambda: hand.results)
+    assert hand.results == {goal.id_text: [("SUCCEEDED", "early", 1)]}
+
+
+@pytest.mark.parametrize("answer", [False, None, 1, RuntimeError("broken")])
+def test_what_is_not_accepted_is_rejected(answer, offer, eventually, caplog):
+    def accept(_):
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    _, hand = offer(until_stopped, accept=accept)
+    hand.send("a")
+    eventually(lambda: hand.results)
+    assert hand.results == {"a": [("REJECTED", "It is not accepted", 0)]}
+    errors = [each for each in caplog.records if each.levelno >= logging.ERROR]
+    assert bool(errors) is (answer is not False)
+
+
+def test_a_goal_cancelled_while_it_is_decided_on_is_recalled(offer, eventually):
+    decide, executed = threading.Event(), []
+    _, hand = offer(executed.append, accept=lambda _: decide.wait(10))
+    hand.send("a")
+    eventually(lambda: hand.listed == {"a": "PENDING"})
+    hand.stop("a")
+    eventually(lambda: hand.listed == {"a": "RECALLING"})
+    decide.set()
+    eventually(lambda: hand.results)
+    assert hand.results["a"][0][0] == "RECALLED"
+    assert executed == []
+
+
+@pytest.mark.parametrize(
+    ("answer", "allowed"), [(True, True), (False, False), (None, True), (RuntimeError(), True)]
+)
+def test_who_decides_on_cancelling(answer, allowed, offer, eventually):
+    asked = []
+
+    def cancel(goal):
+        asked.append(goal)
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    server, hand = offer(until_stopped, cancel=cancel)
+    hand.send("a")
+    (goal,) = eventually(lambda: server.goals)
+    hand.stop("a")
+    eventually(lambda: asked == [goal])
+    if allowed:
+        eventually(lambda: hand.results)
+        assert hand.results["a"] == [("PREEMPTED", "", 3)]
+        return
+    hand.stop("marker")
+    eventually(lambda: "marker" in hand.listed)
+    assert hand.listed["a"] == "ACTIVE"
+    assert not goal.is_cancel_requested
+
+
+@pytest.mark.parametrize(
+    ("execute", "text"),
+    [
+        (lambda _: 5, "ConversionError"),
+        (lambda _: {"result": "five"}, "ConversionError"),
+        (lambda _: 1 / 0, "ZeroDivisionError: division by zero"),
+    ],
+)
+def test_what_fails_is_aborted_with_its_reason(execute, text, offer, eventually):
+    _, hand = offer(execute)
+    hand.send("a")
+    eventually(lambda: hand.results)
+    state, told, result = hand.results["a"][0]
+    assert (state, result) == ("ABORTED", 0)
+    assert told.startswith(text)
+
+
+def test_ends_that_are_none(offer, eventually):
+    server, hand = offer(until_stopped)
+    hand.send("a")
+    (goal,) = eventually(lambda: server.goals)
+    with pytest.raises(rosglass.Error, match="nobody asked to cancel goal a"):
+        goal.canceled()
+    for wrong in ({"result": "five"}, {"other": 5}):
+        with pytest.raises(ConversionError):
+            goal.succeed(wrong)
+    with pytest.raises(ConversionError, match="text"):
+        goal.abort(None, 5)
+    with pytest.raises(ConversionError, match="not both"):
+        goal.publish_feedback({"feedback": 1}, feedback=2)
+    goal.abort(text="enough")
+    for call in (goal.succeed, goal.abort, goal.canceled, goal.publish_feedback):
+        with pytest.raises(rosglass.Error, match="has ended as aborted already"):
+            call()
+    goal.close()
+    eventually(lambda: hand.results)
+    assert hand.results == {"a": [("ABORTED", "enough", 0)]}
+
+
+def test_an_executor_takes_goals_one_by_one(offer, eventually):
+    executor, begun = Dispatcher("goals"), []
+
+    def execute(goal):
+        begun.append(goal.id_text)
+        return until_stopped(goal)
+
+    server, hand = offer(execute, executor=executor)
+    hand.send("a")
+    eventually(lambda: begun)
+    hand.send("b")
+    eventually(lambda: len(server.goals) == 2)
+    assert [goal.status for goal in server.goals] == [GoalStatus.EXECUTING, GoalStatus.ACCEPTED]
+    hand.stop("b")
+    eventually(lambda: hand.listed.get("b") == "PREEMPTING")
+    hand.stop("a")
+    eventually(lambda: len(hand.results) == 2)
+    assert begun == ["a"]
+    assert [end[0][0] for end in hand.results.values()] == ["PREEMPTED", "PREEMPTED"]
+    executor.close()
+
+
+def test_coroutines_execute_goals(master):
+    async def main():
+        async def execute(goal):
+            await asyncio.sleep(0)
+            return {"result": goal.goal.goal + 1}
+
+        with (
+            rosglass.connect(master.url, "robot") as robot,
+            rosglass.connect(master.url, "us") as us,
+        ):
+            robot.create_action_server(NAME, TYPE, execute)
+            goal = us.create_action_client(NAME, TYPE).send_goal({"goal": 4})
+            return await asyncio.wait_for(goal.done, 10)
+
+    assert asyncio.run(main()).result.result == 5
+
+
+def test_a_newer_goal_takes_the_place_of_those_before(offer, eventually):
+    begun, go = [], threading.Event()
+
+    def execute(goal):
+        begun.append(goal.id_text)
+        goal.wait_for_cancel(20)
+        assert go.wait(20)
+        return {"result": 3}
+
+    server, hand = offer(execute, simple=True)
+    hand.send("a", stamp=10)
+    eventually(lambda: begun == ["a"])
+    hand.send("b", stamp=11)
+    eventually(lambda: hand.listed.get("b") == "PENDING")
+    assert server.goals[0].is_cancel_requested
+    assert server.goals[0].status is GoalStatus.EXECUTING
+    hand.send("c", stamp=12)
+    eventually(lambda: "b" in hand.results)
+    assert hand.results["b"][0][0] == "RECALLED"
+    hand.send("late", stamp=11)
+    eventually(lambda: "late" in hand.results)
+    assert hand.results["late"][0][0] == "RECALLED"
+    go.set()
+    eventually(lambda: begun == ["a", "c"])
+    assert hand.results["a"] == [("PREEMPTED", "", 3)]
+    hand.stop("c")
+    eventually(lambda: "c" in hand.results)
+    assert hand.results["c"] == [("PREEMPTED", "", 3)]
+    assert begun == ["a", "c"]
+
+
+def test_a_goal_that_waits_for_its_turn_is_recalled(offer, eventually):
+    go = threading.Event()
+    server, hand = offer(lambda _: go.wait(20) and None, simple=True)
+    hand.send("a")
+    eventually(lambda: server.goals)
+    hand.send("b")
+    eventually(lambda: hand.listed.get("b") == "PENDING")
+    hand.stop("b")
+    eventually(lambda: "b" in hand.results)
+    assert hand.results["b"][0][0] == "RECALLED"
+    go.set()
+    eventually(lambda: "a" in hand.results)
+    hand.send("c")
+    eventually(lambda: "c" in hand.results)
+    assert hand.results["c"][0][0] == "SUCCEEDED"
+
+
+def test_closing_ends_all_goals(offer, eventually):
+    closed = threading.Event()
+
+    def execute(_):
+        closed.wait(20)
+
+    server, hand = offer(execute, simple=True)
+    hand.send("a")
+    eventually(lambda: server.goals)
+    hand.send("b")
+    eventually(lambda: hand.listed.get("b") == "PENDING")
+    running, waiting = server.goals
+    threading.Timer(0.2, closed.set).start()
+    server.close()
+    server.close()
+    eventually(lambda: len(hand.results) == 2)
+    assert hand.results["a"][0][0] == "ABORTED"
+    assert hand.results["b"][0][0] == "REJECTED"
+    for goal in (running, waiting):
+        with pytest.raises(NodeClosedError):
+            goal.succeed()
+    assert server.problem == "the server is closed"
+
+
+def test_the_status_is_latched(offer, connect, eventually):
+    _, hand = offer(lambda _: None)
+    hand.send("a")
+    eventually(lambda: hand.listed == {"a": "SUCCEEDED"})
+    message = connect("late").wait_for_message(f"{NAME}/status", timeout=5)
+    assert [status.goal_id.id for status in message.status_list] == ["a"]
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"accept": 5}, {"cancel": 5}, {"simple": "yes"}, {"executor": 5}]
+)
+def test_servers_that_cannot_be(wrong, connect):
+    node = connect("robot")
+    with pytest.raises(ConversionError):
+        node.create_action_server(NAME, TYPE, until_stopped, **wrong)
+    with pytest.raises(ConversionError):
+        node.create_action_server(NAME, TYPE, "execute")
+    node.create_action_server(NAME, TYPE, until_stopped)
