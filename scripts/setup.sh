@@ -21,7 +21,7 @@ apt_demo=(xvfb libegl1 libgl1 libopengl0 libxkbcommon-x11-0 libdbus-1-3 libfontc
 # Debian's own Python for the RViz environment, ROS 1's message generator to compare with, a private
 # network for DDS, Fast DDS to talk to, and ROS 1 itself: master, tools, rospy, roscpp, actionlib.
 apt_test=(python3 python3-venv python3-genpy python3-genmsg xdotool x11-apps
-          iproute2 util-linux g++ libfastrtps-dev
+          iproute2 util-linux g++ pkg-config libfastrtps-dev
           python3-rosmaster python3-roslaunch rosout python3-rospy python3-actionlib
           python3-rostopic python3-rosservice python3-rosparam python3-rosnode python3-rosbag
           python3-rosmsg python3-std-msgs python3-std-srvs python3-geometry-msgs
