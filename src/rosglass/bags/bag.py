@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.comm import Handle, QoS, Reliability
-from rosglass.errors import BagError, Error
+from rosglass.errors import BagError, DefinitionError, Error
 from rosglass.messages import MessageType, OpaqueType, load
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ class Channel:
         wire: Format of the messages, ``cdr`` or ``ros1``.
         text: The definition with all that it needs, as the recording has it; may be empty.
         encoding: Language of `text`: ``msg`` or ``idl``.
-        type_hash: RIHS01 hash of the type, empty when the recording has none.
+        type_hash: RIHS01 hash of the type, in ROS 1 its md5 sum; empty when the recording has none.
         offered: Quality of service of the publishers that were recorded.
         count: Messages, -1 when that is not known before reading them.
     """
@@ -55,16 +55,31 @@ class Channel:
         """
         ros = 1 if self.wire == "ros1" else 2
         if self.text and self.encoding == "msg":
-            return MessageType.from_text(self.type_name, self.text, ros=ros)
+            return self._by_text(ros)
         try:
-            found = load(self.type_name, ros=ros, library=library)
+            wanted = self.type_hash if ros == 1 else ""
+            known = load(self.type_name, ros=ros, library=library, hash=wanted)
         except Error as error:
-            if ros == 1:
+            if ros == 1 and not self.type_hash:
                 raise
             reason = f"the recording has no definition of it, and {error}"
-            return OpaqueType(self.type_name, self.type_hash, reason)
-        assert isinstance(found, MessageType)
-        return found
+            return OpaqueType(self.type_name, self.type_hash, reason, ros=ros)
+        assert isinstance(known, MessageType)
+        return known
+
+    def _by_text(self, ros: int) -> MessageType:
+        try:
+            found = MessageType.from_text(self.type_name, self.text, ros=ros)
+        except DefinitionError as error:
+            if ros == 2 or not self.type_hash:
+                raise
+            reason = str(error)
+        else:
+            if ros == 2 or self.type_hash in ("", "*", found.md5):
+                return found
+            reason = f"the recording says md5 {self.type_hash}, its definition has {found.md5}"
+        # In ROS 1, a message can be passed on with whatever its publisher sent for a definition.
+        return OpaqueType(self.type_name, self.type_hash, reason, text=self.text, ros=1)
 
     def profile(self) -> QoS:
         """Return a profile that serves whoever subscribed to the recorded publishers."""

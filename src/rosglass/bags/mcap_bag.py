@@ -154,7 +154,7 @@ class McapBag(Bag):
             wire,
             schema.data.decode("utf-8", "replace"),
             language or "msg",
-            told.get("topic_type_hash", ""),
+            told.get("md5sum" if wire == "ros1" else "topic_type_hash", ""),
             offered,
             count,
         )

@@ -54,11 +54,8 @@ class McapFile(RecordingFile):
         """Announce messages of a topic; see :meth:`RecordingFile.channel`."""
         ros1 = self._wire == "ros1"
         name, language = (ros1_name(kind.name), "ros1msg") if ros1 else (kind.name, "ros2msg")
-        if isinstance(kind, OpaqueType):
-            schema = self._writer.register_schema(name, "", b"")
-        else:
-            text = full_text(kind.definition).encode()
-            schema = self._writer.register_schema(name, language, text)
+        text = kind.text if isinstance(kind, OpaqueType) else full_text(kind.definition)
+        schema = self._writer.register_schema(name, language if text else "", text.encode())
         metadata: dict[str, Any] = {}
         if ros1:
             latched = any(qos.durability is Durability.TRANSIENT_LOCAL for qos in offered)

@@ -48,7 +48,7 @@ class Ros1BagFile(RecordingFile):
     ) -> int:
         """Announce messages of a topic from a node; see :meth:`RecordingFile.channel`."""
         latched = any(qos.durability is Durability.TRANSIENT_LOCAL for qos in offered)
-        text = "" if isinstance(kind, OpaqueType) else full_text(kind.definition)
+        text = kind.text if isinstance(kind, OpaqueType) else full_text(kind.definition)
         self._connections.append(
             self._writer.add_connection(
                 topic,

@@ -99,7 +99,7 @@ def _channel(connection: Any, wire: str) -> Channel:
         wire,
         connection.msgdef.data,
         "idl" if connection.msgdef.format.name == "IDL" else "msg",
-        connection.digest if connection.digest.startswith("RIHS") else "",
+        connection.digest if wire == "ros1" or connection.digest.startswith("RIHS") else "",
         offered,
     )
 

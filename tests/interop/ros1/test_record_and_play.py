@@ -185,20 +185,34 @@ def test_the_clock_of_a_recording_drives_rospy(connect, start_master, start_rosp
     peer.end()
 
 
-def test_a_publisher_without_definition_is_recorded_as_bytes(connect, tmp_path, wait_for):
+@pytest.mark.parametrize("name", ["sealed.bag", "sealed.mcap"])
+@pytest.mark.parametrize("text", ["", "what is this?\n", "uint8 other\n"])
+def test_what_comes_without_its_definition_is_kept_and_played_as_bytes(
+    name, text, connect, tmp_path, wait_for
+):
+    kind = OpaqueType("sealed_msgs/msg/Box", "a" * 32, text=text, ros=1)
     robot, ears = connect("robot"), connect("ears")
-    secret = robot.create_publisher("/sealed", OpaqueType("sealed_msgs/msg/Box", "a" * 32, ros=1))
-    with Recorder(ears, tmp_path / "sealed.bag", ["/sealed"]) as recorder:
+    secret = robot.create_publisher("/sealed", kind, rosglass.QoS.latched())
+    path = tmp_path / name
+    with Recorder(ears, path, ["/sealed"]) as recorder:
         wait_for(secret.subscription_count)
         secret.publish_serialized(b"\x01\x02")
         wait_for(lambda: recorder.status().messages, what=lambda: str(recorder.status()))
-    with Reader(tmp_path / "sealed.bag") as reader:
-        ((connection, _, data),) = reader.messages()
-    assert (connection.msgtype, connection.digest, bytes(data)) == (
-        "sealed_msgs/msg/Box", "a" * 32, b"\x01\x02",
-    )  # fmt: skip
-    with open_bag(tmp_path / "sealed.bag") as bag:
+    secret.close()
+    if path.suffix == ".bag":
+        with Reader(path) as reader:
+            ((connection, _, data),) = reader.messages()
+        assert (connection.msgtype, connection.digest) == ("sealed_msgs/msg/Box", "a" * 32)
+        assert (connection.msgdef.data, bytes(data)) == (text, b"\x01\x02")
+    with open_bag(path) as bag:
         assert [message.data for message in bag.messages()] == [b"\x01\x02"]
+        (channel,) = bag.channels
+        assert channel.type() == kind
+        with Player(robot, bag, delay=0) as player:
+            assert player.wait(10)
+            assert not player.problems
+            sample = ears.create_subscription("/sealed", kind).wait(10)
+    assert (sample.data, sample.type.md5) == (b"\x01\x02", "a" * 32)
 
 
 def test_all_topics_are_recorded_whatever_their_names(connect, start_master, tmp_path, wait_for):
