@@ -4,5 +4,7 @@ Nothing of ROS is needed on this machine. Import what you need from the modules.
 """
 
 from rosglass.ros1.node import Ros1Node
+from rosglass.ros1.parameter_server import ParameterServer
+from rosglass.ros1.parameter_watch import ParameterSubscription
 
-__all__ = ["Ros1Node"]
+__all__ = ["ParameterServer", "ParameterSubscription", "Ros1Node"]

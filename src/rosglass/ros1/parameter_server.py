@@ -10,24 +10,25 @@ import re
 import threading
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from rosglass.comm import Executor, Handle, Promise
+from rosglass.comm import Handle
 from rosglass.comm.promise import check_timeout
 from rosglass.comm.receiving import check_may_wait
 from rosglass.comm.similar import similar
 from rosglass.errors import (
     InvalidNameError,
     MasterError,
-    NodeClosedError,
     ParameterError,
 )
 from rosglass.ros1.core import Member
 from rosglass.ros1.parameter_values import from_wire, to_wire
 from rosglass.ros1.parameter_watch import ParameterSubscription, ParameterWatches
+from rosglass.ros1.questions import Questions
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
     from os import PathLike
 
+    from rosglass.comm import Executor, Promise
     from rosglass.ros1.core import Core
     from rosglass.ros1.master import Master
 
@@ -57,7 +58,7 @@ class ParameterServer(Handle):
     Every method that asks the master takes `timeout`, seconds to wait for each of its answers, and
     raises ConnectionLostError when there is none, NodeClosedError, and InvalidNameError. Those
     whose names end in ``_async`` return a :class:`rosglass.comm.Promise` at once, for user
-    interfaces, and for callbacks in threads that must not wait.
+    interfaces, and for callbacks in threads that must not wait; the master gets them in order.
 
     Args:
         core: The node.
@@ -66,11 +67,10 @@ class ParameterServer(Handle):
 
     def __init__(self, core: Core, start: Mapping[str, Any]) -> None:
         self._core, self._start = core, start
-        self._lock, self._beginning = threading.Lock(), threading.Lock()
+        self._beginning = threading.Lock()
         self._begun = not start
-        self._pending: set[Promise[Any]] = set()
+        self._questions = Questions(core)
         self._watches = ParameterWatches(core)
-        self._closed = False
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self._core.master.uri}>"
@@ -265,29 +265,9 @@ class ParameterServer(Handle):
         return self.later(f"parameters in {namespace}", lambda: self.names(namespace))
 
     def later(self, what: str, job: Callable[[], _T]) -> Promise[_T]:
-        """Run `job`, which waits for the master, in a thread that may; return its promise."""
+        """Run `job`, which waits for the master, after what was asked before; return at once."""
         self._check_open()
-        made: Promise[_T] = Promise(
-            f"{self._core.master.uri} has not answered ({what})",
-            self._core.dispatcher,
-            cancellable=True,
-        )
-        with self._lock:
-            self._pending.add(made)
-        made.add_done_callback(self._forget)
-
-        def run() -> None:
-            if made.done():
-                return
-            try:
-                made.fulfil(job())
-            except Exception as error:
-                made.fail(error)
-
-        self._core.errands.run(run)
-        if self._closed:
-            self.close()
-        return made
+        return self._questions.ask(what, job)
 
     # -- the node's ------------------------------------------------------------------------------
 
@@ -327,11 +307,7 @@ class ParameterServer(Handle):
 
     def close(self) -> None:
         """Give up what was asked without waiting; safe to call twice."""
-        self._closed = True
-        with self._lock:
-            pending = list(self._pending)
-        for promise in pending:
-            promise.fail(NodeClosedError(f"node {self._core.name} was closed meanwhile"))
+        self._questions.close()
 
     def _leaves(self, place: str, value: Any) -> Iterator[tuple[str, Any]]:
         """Yield name and wire value of each single parameter that a file has for `place`."""
@@ -378,10 +354,6 @@ class ParameterServer(Handle):
 
     def _check_open(self) -> None:
         self._core.check_open()
-
-    def _forget(self, promise: Any) -> None:
-        with self._lock:
-            self._pending.discard(promise)
 
 
 class StartParameters(Member):

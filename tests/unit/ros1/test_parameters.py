@@ -179,6 +179,26 @@ def test_promises_do_not_wait(server, node, master):
     hold.set()
 
 
+def test_promises_keep_their_order_and_fail_together(server, master):
+    waiting = [server.set_async("/a", number) for number in range(50)]
+    assert server.get_async("/a").result(10) == 49
+    assert all(promise.done() for promise in waiting)
+    release = threading.Event()
+    master.answers["setParam"] = lambda *_: [1, "", int(release.wait(20))]
+    first = server.set_async("/a", 1)
+    given_up, rest = server.set_async("/a", 2), [server.get_async("/a") for _ in range(20)]
+    assert given_up.cancel()
+    began = time.monotonic()
+    with pytest.raises(ConnectionLostError):
+        first.result(20)
+    for promise in rest:
+        with pytest.raises(ConnectionLostError):
+            promise.result(1)
+    assert time.monotonic() - began < 10
+    release.set()
+    assert server.get_async("/a").result(10) == 49
+
+
 def test_a_closed_node_has_no_parameters(node, server):
     client = node.create_parameter_client("/robot")
     own = node.parameters
