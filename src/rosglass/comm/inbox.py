@@ -11,6 +11,7 @@ import threading
 import time
 from collections import deque
 from contextlib import suppress
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from rosglass.comm.executor import IMMEDIATE
@@ -36,6 +37,7 @@ INBOX_LIMIT = 256 * 1024 * 1024
 _SAMPLE_SIZE = 500
 #: Seconds between two log lines about a consumer that is too slow, or one that fails.
 _LOG_EVERY = 10.0
+_data = itemgetter(0)
 
 
 class Inbox:
@@ -95,7 +97,46 @@ class Inbox:
             if len(samples) == self._depth:
                 self._dropped += 1
             samples.append(sample)
-            slow = 0 if self._limit is None else self._keep_within(self._limit, now)
+            slow = 0
+            if self._limit is not None:
+                self._held += len(sample[0]) + _SAMPLE_SIZE
+                slow = self._keep_within(self._limit, now)
+            if self._waiters:
+                waiters, self._waiters = self._waiters, []
+            post = self._call is not None and not self._calling
+            if post:
+                self._calling = True
+        if post:
+            self._executor.post(self._call_soon)
+        if waiters is not None:
+            for wake in waiters:
+                wake()
+        if slow:
+            self._log_slow(slow)
+
+    def put_many(self, given: list[Sample]) -> None:
+        """Take samples in that came together, as :meth:`put` does one by one."""
+        waiters: list[Callable[[], object]] | None = None
+        now = time.monotonic()
+        size = sum(map(len, map(_data, given)))
+        with self._lock:
+            if self._closed:
+                return
+            if now >= self._next_mark:
+                self._next_mark = now + MARK_PERIOD
+                self._meter.mark(self._last, self._received, self._bytes, given[0])
+            self._last = now
+            self._received += len(given)
+            self._bytes += size
+            samples = self._samples
+            slow = 0
+            if self._limit is None:
+                self._dropped += max(0, len(samples) + len(given) - self._depth)
+                samples.extend(given)
+            else:
+                samples.extend(given)
+                self._held += size + len(given) * _SAMPLE_SIZE
+                slow = self._keep_within(self._limit, now)
             if self._waiters:
                 waiters, self._waiters = self._waiters, []
             post = self._call is not None and not self._calling
@@ -180,8 +221,7 @@ class Inbox:
         return sample
 
     def _keep_within(self, limit: int, now: float) -> int:
-        """Make room for the sample that came last; returns how many drops to complain about."""
-        self._held += len(self._samples[-1][0]) + _SAMPLE_SIZE
+        """Make room for what came last; returns how many drops to complain about."""
         if not self._shrink(limit) or now < self._next_log:
             return 0
         self._next_log = now + _LOG_EVERY
@@ -254,6 +294,12 @@ class ImmediateInbox(Inbox):
                 turn.release()
         else:
             self._store(sample)
+        if self._samples:
+            self._go_on()
+
+    def _go_on(self) -> None:
+        """Call back for what was stored, unless another thread does so already."""
+        turn = self._turn
         # Whoever let go of the turn looks again: what was stored meanwhile is nobody else's.
         while self._samples and turn.acquire(False):
             try:
@@ -262,6 +308,41 @@ class ImmediateInbox(Inbox):
                     self._handle(stored)
             finally:
                 turn.release()
+
+    def put_many(self, given: list[Sample]) -> None:
+        """Take samples in that came together and call back for each."""
+        turn = self._turn
+        left = given
+        if not self._samples and turn.acquire(False):
+            try:
+                left = self._handle_many(given)
+            finally:
+                turn.release()
+        for sample in left:
+            self.put(sample)
+        if self._samples:
+            self._go_on()
+
+    def _handle_many(self, given: list[Sample]) -> list[Sample]:
+        """Call back for each; returns those that have to wait for what came in between."""
+        now = time.monotonic()
+        if now >= self._next_mark:
+            self._next_mark = now + MARK_PERIOD
+            self._meter.mark(self._last, self._received, self._bytes, given[0])
+        self._last = now
+        call, waiting = self._call_back, self._samples
+        done = given
+        for number, sample in enumerate(given):
+            if waiting or self._closed:
+                done = given[:number]
+                break
+            try:
+                call(sample)
+            except Exception:
+                self._log_failure()
+        self._received += len(done)
+        self._bytes += sum(map(len, map(_data, done)))
+        return given[len(done) :]
 
     def _handle(self, sample: Sample) -> None:
         if self._closed:
@@ -287,7 +368,10 @@ class ImmediateInbox(Inbox):
                 self._dropped += 1
             self._samples.append(sample)
             now = time.monotonic()
-            slow = 0 if self._limit is None else self._keep_within(self._limit, now)
+            slow = 0
+            if self._limit is not None:
+                self._held += len(sample[0]) + _SAMPLE_SIZE
+                slow = self._keep_within(self._limit, now)
             # Samples count when they are handled; these will not be.
             self._received += self._dropped - dropped
         if slow:

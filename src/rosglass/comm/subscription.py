@@ -57,6 +57,7 @@ class Subscription(Handle):
     Attributes:
         topic: Absolute topic name.
         deliver: Called with each received sample, from any thread; for worlds.
+        deliver_many: The same with samples that came together, at least one; for worlds.
         source: What fills it; for worlds.
         on_close: Called once when it is closed; for worlds.
         events: Who is told about what; for worlds.
@@ -98,7 +99,7 @@ class Subscription(Handle):
             self._inbox: Inbox = ImmediateInbox(topic, qos, call)
         else:
             self._inbox = Inbox(topic, qos, executor, call)
-        self.deliver = self._inbox.put
+        self.deliver, self.deliver_many = self._inbox.put, self._inbox.put_many
 
     # -- what it is ------------------------------------------------------------------------------
 

@@ -38,6 +38,8 @@ _HEADER_LIMIT = 10.0
 _KEEPALIVE = (("TCP_KEEPIDLE", 5), ("TCP_KEEPINTVL", 3), ("TCP_KEEPCNT", 3))
 #: Seconds to wait, in :meth:`Connection.drain`, for another thread that reads just now.
 _TURN = 0.1
+#: Bytes read at once as long as little comes.
+_LITTLE = 4096
 #: Bytes at one look after which a connection is not left to itself any more: the other end must not
 #: be held up by a full socket.
 _MUCH = 64 * 1024
@@ -78,14 +80,16 @@ class Connection:
         self._loop, self._sock = loop, sock
         self._on_header, self._on_frame, self._on_closed = on_header, on_frame, on_closed
         self._incoming = Incoming(peer, lead, self._take)
-        #: Held while the socket is read from, never while anybody is called.
+        #: Held while another thread than the loop's reads from the socket, which the loop closes.
         self._io = threading.Lock()
-        #: Held while frames are handed on, in order; by the thread with this number.
+        #: Held while frames are handed on, in order; outside of the loop by this thread.
         self._turn = threading.Lock()
         self._turn_of = 0
         self._lock = threading.Lock()
         self._outgoing = Outgoing()
         self._connected = False
+        #: Bytes to read at once: memory that stays empty has to be had all the same.
+        self._ask = _LITTLE
         self._reading = self._hurried = True
         self._closed = False
         self._limit: Later | None = None
@@ -148,6 +152,16 @@ class Connection:
     def lost(self) -> int:
         """How many frames made room for newer ones before they were sent."""
         return self._outgoing.lost
+
+    @property
+    def info(self) -> str:
+        """The connection as ``rosnode info`` shows it; empty when it is not made, or ended."""
+        try:
+            port, number = self._sock.getsockname()[1], self._sock.fileno()
+            host, theirs = self._sock.getpeername()[:2]
+        except OSError:
+            return ""
+        return f"TCPROS connection on port {port} to [{host}:{theirs} on socket {number}]"
 
     @property
     def received(self) -> int:
@@ -226,7 +240,11 @@ class Connection:
 
     def _go_on(self) -> None:
         if self._reading and not self._closed and self._turn.acquire(blocking=False):
-            self._receive(go_on=True)
+            self._receive(self._sock.recv, self._sock.recv_into, go_on=True)
+
+    def take_together(self, take: Callable[[list[Received], int], None]) -> None:
+        """Have frames handed on as they come, several at once; `take` must not raise anything."""
+        self._incoming.take = take
 
     def hurry(self, hurried: bool) -> None:
         """Say whether to read as soon as something comes, or about ten times a second."""
@@ -253,7 +271,7 @@ class Connection:
             self._send_waiting()
         if events & READ and self._turn.acquire(blocking=False):
             before = self._incoming.total
-            self._receive()
+            self._receive(self._sock.recv, self._sock.recv_into)
             if not self._hurried and self._incoming.total - before > _MUCH:
                 self.hurry(True)
 
@@ -264,58 +282,73 @@ class Connection:
             return
         # Whoever reads just now hands on the same messages.
         if self._turn.acquire(timeout=_TURN):
-            self._receive()
+            self._turn_of = me
+            self._receive(self._recv, self._recv_into)
 
-    def _receive(self, go_on: bool = False) -> None:
+    def _recv(self, size: int) -> bytes:
+        """Read in a thread other than the loop's, which may close the socket at any time."""
+        with self._io:
+            if self._closed:
+                raise BlockingIOError
+            return self._sock.recv(size)
+
+    def _recv_into(self, room: memoryview) -> int:
+        with self._io:
+            if self._closed:
+                raise BlockingIOError
+            return self._sock.recv_into(room)
+
+    def _receive(
+        self,
+        recv: Callable[[int], bytes],
+        recv_into: Callable[[memoryview], int],
+        go_on: bool = False,
+    ) -> None:
         """Take in what has come; with the turn, which ends here."""
-        self._turn_of = threading.get_ident()
+        incoming = self._incoming
         try:
             if go_on:
-                self._incoming.feed(b"")
+                incoming.feed(b"")
             for _ in range(_ROUNDS):
-                if not self._receive_some():
+                if self._closed or not self._reading:
                     return
+                room = incoming.room
+                if room is None:
+                    most = self._ask
+                    data = recv(most)
+                    count = len(data)
+                    self._ask = CHUNK if count == most else _LITTLE
+                    if count:
+                        incoming.feed(data)
+                else:
+                    most = len(room)
+                    count = recv_into(room)
+                    if count:
+                        incoming.filled(count)
+                if not count:
+                    self._lose("the other end closed the connection")
+                if count < most:
+                    return
+        except (BlockingIOError, InterruptedError):
+            return
         except DecodeError as error:
             self._lose(str(error))
+        except OSError as error:
+            self._lose(error.strerror or str(error))
         finally:
             self._turn_of = 0
             self._turn.release()
 
-    def _receive_some(self) -> bool:
-        """Read once; return whether there may be more."""
-        incoming = self._incoming
-        room, data = incoming.room, b""
-        try:
-            with self._io:
-                if self._closed or not self._reading:
-                    return False
-                if room is None:
-                    data = self._sock.recv(CHUNK)
-                    count, most = len(data), CHUNK
-                else:
-                    count, most = self._sock.recv_into(room), len(room)
-        except (BlockingIOError, InterruptedError):
-            return False
-        except OSError as error:
-            self._lose(error.strerror or str(error))
-            return False
-        if not count:
-            self._lose("the other end closed the connection")
-            return False
-        if room is None:
-            incoming.feed(data)
-        else:
-            incoming.filled(count)
-        return count == most
-
-    def _take(self, data: Received, first: int) -> None:
+    def _take(self, frames: list[Received], first: int) -> None:
         if not self.header:
-            self._take_header(bytes(data))
+            self._take_header(bytes(frames[0]))
             return
         try:
-            self._on_frame(data, first)
-        except Exception:
+            for frame in frames:
+                self._on_frame(frame, first)
+        except Exception as error:
             _log.exception("%s: a message could not be taken", self.peer)
+            self._lose(f"an error of ours, {error!r}")
 
     def _take_header(self, data: bytes) -> None:
         fields = parse_header(data)

@@ -71,9 +71,9 @@ class Intake(Member):
         """Give a subscription that came late what it would have got on a connection of its own."""
         if link.uri == self.core.uri:
             for data in self._topics.latched(self.topic):
-                reading.take(link, data, time.time_ns())
+                reading.take(link, [data], time.time_ns())
         elif link.latched is not None:
-            reading.take(link, link.latched, time.time_ns())
+            reading.take(link, [link.latched], time.time_ns())
 
     def leave(self, reading: Reading) -> bool:
         """Feed a subscription no more; return whether it was the last one."""
@@ -109,6 +109,7 @@ class Intake(Member):
             left -= 1
             if not left:
                 link.resume()
+                link.attend(self.eager)
                 self.core.wake()
 
         for reading in readings:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import socket
 import time
 from typing import TYPE_CHECKING, Any
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PublisherLink"]
 
+_log = logging.getLogger("rosglass.ros1")
 #: Seconds between attempts to reach a publisher, the first and the longest.
 _RETRY, _LONGEST_RETRY = 0.5, 5.0
 #: Bytes per second up to which what nobody waits for may lie in the socket for a tenth of a second.
@@ -58,13 +60,25 @@ class PublisherLink:
         self._addresses: list[tuple[str, int]] = []
         self._latches = False
         self._delay = _RETRY
-        self._measured_at, self._measured, self._rate = time.monotonic(), 0, float("inf")
+        self._measured_at, self._measured, self._rate = time.monotonic(), 0, 0.0
         self._begin()
 
     @property
     def connected(self) -> bool:
         """Whether messages can come."""
         return bool(self.header)
+
+    @property
+    def info(self) -> str:
+        """The connection as ``rosnode info`` shows it; empty when there is none."""
+        connection = self._connection
+        return "" if connection is None else connection.info
+
+    @property
+    def received(self) -> int:
+        """How many bytes have come on this connection."""
+        connection = self._connection
+        return 0 if connection is None else connection.received
 
     def end(self) -> None:
         """Forget the publisher."""
@@ -130,7 +144,7 @@ class PublisherLink:
         }
         try:
             self._connection = Connection.dial(
-                self._core.loop, addresses[0], header, self._on_header, self._on_frame, self._fail
+                self._core.loop, addresses[0], header, self._on_header, _ignore, self._fail
             )
         except OSError as error:
             self._fail(reason_of(error))
@@ -138,19 +152,23 @@ class PublisherLink:
     def _on_header(self, header: dict[str, str]) -> None:
         connection = self._connection
         assert connection is not None
+        connection.take_together(self._on_frames)
         connection.pause(reading=False)  # until it is decided who understands it
         self.header, self.problem, self._delay, self._addresses = header, "", _RETRY, []
         self.name = header.get("callerid", "") or self.uri
         self._latches = header.get("latching") == "1"
-        self._measured_at, self._measured, self._rate = time.monotonic(), 0, float("inf")
+        self._measured_at, self._measured, self._rate = time.monotonic(), 0, 0.0
         self.intake.greet(self)
 
-    def _on_frame(self, data: Received, _: int) -> None:
+    def _on_frames(self, frames: list[Received], _: int) -> None:
         received = time.time_ns()
         if self._latches:
-            self.latched = data
-        for reading in self.intake.readings:
-            reading.take(self, data, received)
+            self.latched = frames[-1]
+        try:
+            for reading in self.intake.readings:
+                reading.take(self, frames, received)
+        except Exception:  # an executor of somebody's
+            _log.exception("%s: messages could not be handed on", self.intake.topic)
 
     def _fail(self, reason: str) -> None:
         """Try again later: the master names it still."""
@@ -171,6 +189,10 @@ class PublisherLink:
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.name}>"
+
+
+def _ignore(_data: Received, _first: int) -> None:
+    """Take a message by itself: nobody is asked to, they are taken together."""
 
 
 def _addresses(answer: Any, place: str) -> list[tuple[str, int]]:

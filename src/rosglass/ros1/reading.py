@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from itertools import repeat
 from typing import TYPE_CHECKING
 
 from rosglass.comm import (
@@ -24,7 +25,7 @@ from rosglass.ros1.names import split
 from rosglass.ros1.types import ANY
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from rosglass.comm import Subscription
     from rosglass.messages import MessageType
@@ -179,14 +180,30 @@ class Reading(Source):
         for known in (self._accepted, self._refused, self._remarks):
             known.pop(link, None)
 
-    def take(self, link: PublisherLink, data: bytes | memoryview, received: int) -> None:
-        """Hand on a message; from the loop's thread, or one that asks for messages."""
+    def take(
+        self, link: PublisherLink, frames: Sequence[bytes | memoryview], received: int
+    ) -> None:
+        """Hand on messages; from the loop's thread, or one that asks for messages."""
         known = self._accepted.get(link)
         if known is not None:
-            # As Sample(...) does, in half the time.
-            self.subscription.deliver(
-                tuple.__new__(Sample, (data, "ros1", known[0], received, None, known[1], -1))
+            kind, who = known
+            # As Sample(...) does, in a third of the time.
+            make = tuple.__new__
+            if len(frames) == 1:
+                sample = make(Sample, (frames[0], "ros1", kind, received, None, who, -1))
+                self.subscription.deliver(sample)
+                return
+            given = zip(
+                frames,
+                repeat("ros1"),
+                repeat(kind),
+                repeat(received),
+                repeat(None),
+                repeat(who),
+                repeat(-1),
+                strict=False,
             )
+            self.subscription.deliver_many(list(map(make, repeat(Sample), given)))
 
     # -- what the subscription asks --------------------------------------------------------------
 
