@@ -1,7 +1,9 @@
-"""The example remote_control.qml on real middleware: a Zenoh router and a robot's node."""
+"""The example remote_control.qml on a robot's node: over Zenoh with a router, and on ROS 1."""
 
 from __future__ import annotations
 
+import socket
+import subprocess
 import threading
 import time
 from pathlib import Path
@@ -46,7 +48,7 @@ class Robot:
         data = np.full((480, 640, 3), (200, 40, 20), np.uint8).reshape(-1)
         while not self._ended.wait(1 / 30):
             self._camera.publish(
-                header={"stamp": Time.now().to_dict()},
+                header={"stamp": Time.now()},
                 width=640,
                 height=480,
                 encoding="rgb8",
@@ -60,25 +62,41 @@ class Robot:
         self.node.close()
 
 
-@pytest.fixture
-def router() -> Iterator[Router]:
-    with Router("tcp/127.0.0.1:0") as running:
-        yield running
+@pytest.fixture(params=["zenoh", "ros1"])
+def url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
+    """Where a robot and its operator meet: a router, or a master."""
+    if request.param == "zenoh":
+        with Router("tcp/127.0.0.1:0") as router:
+            yield router.url
+        return
+    if not Path("/usr/bin/rosmaster").exists():
+        pytest.skip("ROS 1 is not installed: sudo apt-get install python3-rosmaster")
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    env = {"PATH": "/usr/bin:/bin", "HOME": str(tmp_path), "ROS_HOME": str(tmp_path)}
+    command = ["/usr/bin/rosmaster", "--core", "-p", str(port)]
+    output = (tmp_path / "rosmaster").open("wb")
+    master = subprocess.Popen(command, env=env, stdout=output, stderr=output)
+    yield f"ros1://127.0.0.1:{port}?ip=127.0.0.1"
+    master.kill()
+    master.wait()
+    output.close()
 
 
 @pytest.fixture
-def robot(router: Router) -> Iterator[Robot]:
-    made = Robot(router.url)
+def robot(url: str) -> Iterator[Robot]:
+    made = Robot(url)
     yield made
     made.close()
 
 
 @pytest.fixture
-def view(app: Any, router: Router, wait: Any) -> Iterator[Any]:
+def view(app: Any, url: str, wait: Any) -> Iterator[Any]:
     from PySide6.QtCore import QUrl
     from PySide6.QtQuick import QQuickView
 
-    session = Session(router.url)
+    session = Session(url)
     made = QQuickView()
     made.setResizeMode(QQuickView.ResizeMode.SizeRootObjectToView)
     install(made.engine(), session)
@@ -86,7 +104,7 @@ def view(app: Any, router: Router, wait: Any) -> Iterator[Any]:
     assert made.status() is QQuickView.Status.Ready, [e.toString() for e in made.errors()]
     made.resize(400, 300)
     made.show()
-    wait(lambda: session.state == "connected")
+    wait(lambda: session.state == "connected", 20)
     yield made
     made.close()
     made.deleteLater()
@@ -130,13 +148,13 @@ def test_the_button_switches_the_lamp(robot: Robot, view: Any, wait: Any) -> Non
 
 @pytest.mark.xvfb
 def test_the_camera_is_on_the_screen(
-    robot: Robot, router: Router, start: Any, screen: str, tmp_path: Path
+    robot: Robot, url: str, start: Any, screen: str, tmp_path: Path
 ) -> None:
     import cv2
 
     shot = tmp_path / "shot.png"
     program = start(
-        "run", EXAMPLE, "--url", router.url, "--screenshot", shot, "--after", 2.5, display=screen
+        "run", EXAMPLE, "--url", url, "--screenshot", shot, "--after", 2.5, display=screen
     )
     assert program.end(30) == 0, program.text
     picture = cv2.imread(str(shot))
@@ -145,11 +163,11 @@ def test_the_camera_is_on_the_screen(
 
 
 def test_a_robot_that_dies_shows_within_a_second_and_comes_back(
-    router: Router, view: Any, wait: Any
+    url: str, view: Any, wait: Any
 ) -> None:
     from PySide6.QtCore import QObject
 
-    robot = Robot(router.url)
+    robot = Robot(url)
     camera = view.rootObject().findChild(QObject, "camera") or next(
         child
         for child in view.rootObject().children()
@@ -163,7 +181,7 @@ def test_a_robot_that_dies_shows_within_a_second_and_comes_back(
     started = time.monotonic()
     wait(lambda: camera.property("stale"))
     assert time.monotonic() - started < 1.0
-    robot = Robot(router.url)
+    robot = Robot(url)
     try:
         wait(lambda: not camera.property("stale"))
     finally:
