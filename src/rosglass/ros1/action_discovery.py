@@ -1,7 +1,7 @@
 """Learning the type of an action from its topics: names from the master, the rest from the server.
 
 A server tells the definitions of its results and feedback when it is subscribed to. That of goals
-nobody tells but other clients; it comes from the library, or from them.
+comes from the library, from other clients, or from servers that tell it (those in Python).
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from rosglass.ros1.action_types import (
     assemble,
     part,
 )
+from rosglass.ros1.goal_probe import GoalProbe
 
 if TYPE_CHECKING:
     from rosglass.messages import MessageType
@@ -47,6 +48,8 @@ class ActionDiscovery:
     def __init__(self, core: Core, topics: Topics, name: str) -> None:
         self._core, self._name = core, name
         self.problem = ""
+        self._topics = topics
+        self._goal_probe: GoalProbe | None = None
         self._probes: dict[str, Subscription] = {}
         for word in _LABELS:
             topic = core.resolve(part(name, word))
@@ -68,7 +71,7 @@ class ActionDiscovery:
             known = ActionTypes.of(self._core.types.action(kind), self._core.types)
             if (known.result.md5, known.feedback.md5) == (result.md5, feedback.md5):
                 return known
-        goal = told[GOAL] or self._goal(kind)
+        goal = told[GOAL] or self._goal(kind.replace("/action/", "/msg/") + "ActionGoal")
         if goal is None:
             short = ros1_name(kind.replace("/action/", "/msg/"))
             self.problem = (
@@ -85,6 +88,8 @@ class ActionDiscovery:
         """Listen no more; safe to call twice."""
         for probe in self._probes.values():
             probe.close()
+        if self._goal_probe is not None:
+            self._goal_probe.close()
 
     def _told(self, word: str, kind: str) -> MessageType | None:
         """Return what the topic's publisher says its type is, if it is one of this action."""
@@ -92,7 +97,11 @@ class ActionDiscovery:
         name = kind.replace("/action/", "/msg/") + _LABELS[word]
         return found if found is not None and found.name == name else None
 
-    def _goal(self, kind: str) -> MessageType | None:
+    def _goal(self, name: str) -> MessageType | None:
+        """Return the type of goals: from the library, or as the server tells it."""
         with suppress(Error):
-            return self._core.types.message(kind.replace("/action/", "/msg/") + "ActionGoal")
-        return None
+            return self._core.types.message(name)
+        if self._goal_probe is None:
+            topic = self._core.resolve(part(self._name, GOAL))
+            self._goal_probe = GoalProbe(self._core, self._topics, topic, name)
+        return self._goal_probe.look()

@@ -82,8 +82,6 @@ class Ros1ActionServer(ActionServer, Member):
             actionlib's SimpleActionServer.
     """
 
-    listed = False
-
     def __init__(
         self,
         core: Core,

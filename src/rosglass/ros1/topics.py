@@ -16,6 +16,8 @@ from rosglass.ros1.reading import Reading
 from rosglass.ros1.types import ANY
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rosglass.comm import EndpointInfo, Subscription
     from rosglass.messages import MessageType
     from rosglass.ros1.connection import Connection
@@ -40,6 +42,8 @@ class Topics:
         self._lock = threading.Lock()
         self.registering = threading.Lock()
         self._publications: dict[str, Publication] = {}
+        #: Who takes connections of topics that are about to be published.
+        self._stand_ins: dict[str, Callable[[Connection, dict[str, str]], str]] = {}
         self._intakes: dict[str, Intake] = {}
 
     def publish(self, topic: str, type: MessageType, qos: QoS) -> Ros1Publisher:
@@ -95,10 +99,32 @@ class Topics:
 
     def accept(self, link: Connection, header: dict[str, str]) -> str:
         """Take a subscriber's connection; return why not, empty when it is taken."""
-        publication = self._publications.get(header.get("topic", ""))
-        if publication is None:
-            return f"{self._core.name} does not publish {header.get('topic')}"
-        return publication.accept(link, header)
+        topic = header.get("topic", "")
+        publication, stand_in = self._publications.get(topic), self._stand_ins.get(topic)
+        if publication is not None:
+            return publication.accept(link, header)
+        if stand_in is not None:
+            return stand_in(link, header)
+        return f"{self._core.name} does not publish {header.get('topic')}"
+
+    def stand_in(
+        self, topic: str, accept: Callable[[Connection, dict[str, str]], str] | None
+    ) -> None:
+        """Let somebody take the connections of a topic as long as it is not published.
+
+        Args:
+            topic: Absolute topic name.
+            accept: Told a connection and its header; returns why not, empty when it is taken. None
+                for nobody any more.
+        """
+        if accept is None:
+            self._stand_ins.pop(topic, None)
+        else:
+            self._stand_ins[topic] = accept
+
+    def serves(self, topic: str) -> bool:
+        """Return whether somebody takes the connections of a topic."""
+        return topic in self._publications or topic in self._stand_ins
 
     def drop(self, link: Connection) -> None:
         """Forget a subscriber's connection that has ended."""

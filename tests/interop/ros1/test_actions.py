@@ -9,6 +9,7 @@ import pytest
 import rosglass
 from rosglass.comm import GoalStatus, Time
 from rosglass.errors import ConnectionLostError, GoalRejectedError, NodeClosedError
+from rosglass.interfaces import Distributions, Library
 from rosglass.ros1.action_state import CommState, TerminalState
 
 TYPE = "actionlib/TestAction"
@@ -182,6 +183,34 @@ def test_the_type_is_learned_from_the_server(peer, name, connect):
     assert goal.result(10).result.result == 2
     assert client.type.name == "actionlib/action/Test"
     assert goal.goal.goal == 2
+
+
+class WithoutActionlib(Distributions):
+    """The standard definitions of a machine that does not have the package actionlib."""
+
+    def find(self, name, ros):
+        return () if name.startswith("actionlib/") else super().find(name, ros)
+
+
+def test_a_type_that_is_not_known_here_is_learned_from_a_server_in_python(
+    rospy_peer, name, connect
+):
+    client = connect("us", library=Library(WithoutActionlib())).create_action_client(name)
+    rospy_peer.call("action_server", name=name)
+    goal = client.send_goal({"goal": 3})
+    assert goal.result(10).result.result == 3, client.problem
+    assert client.type.name == "actionlib/action/Test"
+
+
+def test_a_type_that_is_not_known_here_is_learned_from_other_clients(
+    roscpp_peer, name, connect, wait_for
+):
+    client = connect("us", library=Library(WithoutActionlib())).create_action_client(name)
+    roscpp_peer.call("action_server", name=name)
+    goal = client.send_goal({"goal": 3})
+    wait_for(lambda: "no definition of actionlib/TestGoal is known" in client.problem)
+    assert roscpp_peer.call("wait_for_server", name=name) is True
+    assert goal.result(10).result.result == 3, client.problem
 
 
 @BOTH
