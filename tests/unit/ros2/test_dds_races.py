@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from asyncio import CancelledError
 from collections import OrderedDict
 from types import SimpleNamespace
 from typing import Any
@@ -20,6 +21,7 @@ from rosglass.ros2.dds.cyclone_events import Event
 from rosglass.ros2.dds.cyclone_origins import Origins
 from rosglass.ros2.dds.cyclone_qos import qos_of
 from rosglass.ros2.dds.identity import Identity, Origin
+from rosglass.ros2.dds.outbox import Outbox
 from rosglass.ros2.dds.replier import DdsReplier
 from rosglass.ros2.dds.service_ends import Matched
 
@@ -225,7 +227,21 @@ def test_nobody_is_left_without_ground(node, participant):
         cyclone.guid(participant.entity)
 
 
-def test_what_cannot_be_handed_on_holds_up_nothing_else(participant, caplog, eventually):
+def test_what_cannot_be_sent_is_not_waited_for(caplog):
+    outbox, ended = Outbox(lambda _: None, in_order=True), []
+
+    def fail() -> bool:
+        raise ValueError("no such thing")
+
+    outbox.put(fail, 100.0, lambda: ended.append(1), now=False)
+    outbox.put(lambda: True, 100.0, lambda: ended.append(2), now=False)
+    assert not outbox.retry()
+    assert ended == [1]
+    assert "what was to be sent is lost: no such thing" in caplog.text
+
+
+@pytest.mark.parametrize("raised", [ValueError, SystemExit, CancelledError])
+def test_what_cannot_be_handed_on_holds_up_nothing_else(participant, caplog, eventually, raised):
     topic = cyclone.create_topic(participant.entity, "rt/t", "T")
     policies = qos_of(QoS(), writer=False)
     reader = cyclone.create_reader(participant.entity, topic, policies, "topic /t")
@@ -234,7 +250,7 @@ def test_what_cannot_be_handed_on_holds_up_nothing_else(participant, caplog, eve
     def act() -> bool:
         results.append(not results)
         if results == [True]:
-            raise ValueError("rubbish")
+            raise raised("rubbish")
         return len(results) < 3
 
     participant.pump.watch(reader, Event.DATA_AVAILABLE, act)

@@ -52,7 +52,7 @@ class Outbox:
         Args:
             attempt: Sends it; returns False to be called again a little later.
             patience: Seconds after which it is given up.
-            expired: Called then.
+            expired: Called then, and when it cannot be sent at all.
             now: Whether to try it in the calling thread; what it raises comes out of here then.
         """
         if now and not (self._in_order and self._items) and attempt():
@@ -93,8 +93,11 @@ class Outbox:
                 return True
         except NodeClosedError:
             return True
-        except Error as error:
-            _log.warning("what was to be sent is lost: %s", error)
+        except Exception as error:
+            _log.warning(
+                "what was to be sent is lost: %s", error, exc_info=not isinstance(error, Error)
+            )
+            item.expired()  # nobody is to wait for it
             return True
         if time.monotonic() < item.deadline:
             return False

@@ -108,7 +108,7 @@ class Pump:
             return None
         try:
             return act()
-        except Exception:
+        except BaseException:  # whatever a callback raises, the others' messages must go on
             if not self._closed:
                 _log.exception("%s: what arrived cannot be handed on", self._thread.name)
                 time.sleep(_BACKOFF)
