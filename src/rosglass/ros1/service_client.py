@@ -560,7 +560,9 @@ class Ros1ServiceClient(ServiceClient, Member):
             if not nodes and not self._queue:
                 self._place = self._peer = None
                 self._fault = ""
-        if (nodes and time.monotonic() >= self._due) or self._queue:
+        # The graph may lag behind: who has come and gone between two looks is in none of them.
+        known = bool(nodes) or self._peer is not None
+        if (known and time.monotonic() >= self._due) or self._queue:
             self._look()
         self._update()
 
