@@ -223,7 +223,7 @@ class Bridge(Handle):
         """Return whether another bridge between the two worlds relays a topic already."""
         beside = side.other.beside(side.other.node.publishers(other))
         if relay is None:
-            return bool(beside)
+            return bool(beside) or not side.other.known
         return any(end.node < side.other.name for end in beside)
 
     def _follow_services(self, side: Side) -> None:
@@ -241,11 +241,12 @@ class Bridge(Handle):
             wanted = bool(servers) or (relay is not None and not side.connected)
             wanted = self._settled("service", key, wanted, relay is not None)
             there = side.other.node.service_servers(other)
-            if wanted and relay is None and side.other.beside(there):
+            if relay is None and (side.other.beside(there) or not side.other.known):
+                # In ROS 1 whoever offers a service last is called: nobody must be pushed aside.
                 wanted = False
             rivals = side.other.sources(there)
             refusal = "service", *key
-            if wanted and rivals and relay is None:
+            if wanted and rivals:
                 told = f"{rivals[0].node} offers it there already"
                 sign = "->" if side.number == 0 else "<-"
                 refused = RelayStatus("service", name, other, sign, problem=told)

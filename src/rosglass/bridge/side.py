@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,8 @@ __all__ = ["BRIDGE_NAME", "Side"]
 BRIDGE_NAME = "rosglass_bridge"
 #: Seconds within which both nodes of a bridge that starts are seen.
 _GRACE = 3.0
+#: Seconds in which the graph becomes known.
+_DISCOVERY = 1.5
 
 
 class Side:
@@ -43,16 +46,23 @@ class Side:
         self.name = NodeName(node.namespace, node.name)
         self._nodes: set[NodeName] = set()
         self._seen: dict[NodeName, float] = {}
+        self._since = math.inf
 
     @property
     def connected(self) -> bool:
         """Whether what the graph says is what there is."""
         return self.node.status().state is ConnectionState.CONNECTED
 
+    @property
+    def known(self) -> bool:
+        """Whether the graph was there long enough to tell who is not."""
+        return time.monotonic() - self._since > _DISCOVERY
+
     def look(self) -> None:
         """Look who is there."""
         self._nodes = set(self.node.nodes())
         now = time.monotonic()
+        self._since = min(self._since, now) if self.connected else math.inf
         bridges = {node for node in self._nodes if node.name.startswith(BRIDGE_NAME)}
         self._seen = {node: self._seen.get(node, now) for node in bridges}
 

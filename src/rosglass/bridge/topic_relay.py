@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from contextlib import suppress
@@ -33,6 +34,9 @@ __all__ = ["TopicRelay", "notes"]
 _log = logging.getLogger("rosglass.bridge")
 #: Seconds for which messages are still taken that nobody in the other world subscribes to.
 _IDLE = 5.0
+#: Seconds that the first message waits for subscribers in the other world to be linked, and that
+#: links take to carry something once they are told of.
+_LINKING, _LINKED = 1.5, 0.15
 #: Seconds that a publisher's first message waits for what the graph says of the publisher.
 _INTRODUCTION = 1.5
 
@@ -87,6 +91,9 @@ class TopicRelay:
         #: A publisher for each of the source's that latches; those that do not share one.
         self._latched: dict[bytes, Publisher] = {}
         self._volatile: set[bytes] = set()
+        #: When publishers were made that have not sent anything.
+        self._new: dict[Publisher, float] = {}
+        self._own = 0
         self._outbox = Outbox(f"bridge {topic}", self._send, memory)
         self._wanted_at = time.monotonic()
         self._problem = ""
@@ -116,7 +123,7 @@ class TopicRelay:
         Args:
             own: How many subscriptions this bridge itself has on the topic in the other world.
         """
-        now = time.monotonic()
+        now, self._own = time.monotonic(), own
         ends = self._source.sources(self._source.node.publishers(self.topic))
         wanted = self._wanted(own)
         if wanted or self._keep or self._latched or self._type is None:
@@ -234,6 +241,8 @@ class TopicRelay:
                 raise ConversionError("", sample.type.name, told, self.topic)
             else:
                 data = self._translation.encode(sample.data)
+            if publisher in self._new:
+                self._await_links(publisher)
             publisher.publish_serialized(data)
         except NodeClosedError:
             return
@@ -275,6 +284,19 @@ class TopicRelay:
             time.sleep(0.02)
         return False
 
+    def _await_links(self, publisher: Publisher) -> None:
+        """Wait until those who subscribe in the other world can get a publisher's first message.
+
+        Who publishes a single command, having waited for us to subscribe, must not lose it.
+        """
+        made = self._new.get(publisher, -math.inf)
+        while not self._closed and time.monotonic() < made + _LINKING:
+            if publisher.subscription_count() > self._own:
+                time.sleep(max(0.0, min(_LINKED, made + _LINKING - time.monotonic())))
+                break
+            time.sleep(0.01)
+        self._new.pop(publisher, None)
+
     def _publisher(self, gid: bytes | None) -> Publisher | None:
         """Return a new publisher in the other world, for all or for one that latches."""
         kind = self._translation.type if self._translation is not None else self._type
@@ -292,6 +314,8 @@ class TopicRelay:
             else:
                 kept = self._shared if gid is None else self._latched[gid]  # type: ignore[assignment]
             closed = self._closed
+            if kept is made:
+                self._new[made] = time.monotonic()
         if kept is not made or closed:
             made.close()
         if closed:
@@ -345,6 +369,7 @@ class TopicRelay:
             self._closed = True
             publishers = [p for p in (self._shared, *self._latched.values()) if p is not None]
             self._latched.clear()
+            self._new.clear()
         if self._subscription is not None:
             self._subscription.close()
         self._outbox.close()

@@ -1,0 +1,330 @@
+"""A bridge between a rosmaster with rospy nodes and a Zenoh router with ROS 2 nodes."""
+
+from __future__ import annotations
+
+import time
+from concurrent.futures import Future
+
+import pytest
+
+from rosglass import ServiceError
+from rosglass.bridge import survey
+from rosglass.comm import Durability, QoS
+from rosglass.ros2.zenoh.router import Router
+
+STRING, IMAGE = "std_msgs/msg/String", "sensor_msgs/msg/Image"
+
+
+def relays(bridge):
+    return {(one.name, one.direction): one for one in bridge.status().relays}
+
+
+def test_from_ros1(bridge, connect, rospy_peer, wait_for):
+    bridge(["/talk_one"])
+    listener = connect("ros2", "listener").create_subscription(
+        "/talk_one", STRING, qos=QoS(depth=100)
+    )
+    rospy_peer.call("publish", topic="/talk_one", type="std_msgs/String")
+    wait_for(lambda: rospy_peer.call("connections", topic="/talk_one"), what="the bridge is away")
+    for number in range(20):
+        rospy_peer.call(
+            "publish", topic="/talk_one", type="std_msgs/String", value={"data": f"ü{number}"}
+        )
+    found = [listener.wait(10).message().data for _ in range(20)]
+    assert found == [f"ü{number}" for number in range(20)]
+
+
+def test_to_ros1(bridge, connect, rospy_peer, wait_for):
+    made = bridge(["/talk_two"])
+    talker = connect("ros2", "talker").create_publisher("/talk_two", "geometry_msgs/PoseStamped")
+    rospy_peer.call("subscribe", topic="/talk_two", type="geometry_msgs/PoseStamped")
+    wait_for(talker.subscription_count, what="the bridge is away")
+    stamp = {"sec": 12, "nanosec": 34}
+    talker.publish(header={"stamp": stamp, "frame_id": "map"}, pose={"position": {"x": 1.5}})
+    value = rospy_peer.event("received")["value"]
+    assert value["header"] == {"seq": 0, "stamp": {"secs": 12, "nsecs": 34}, "frame_id": "map"}
+    assert value["pose"]["position"]["x"] == 1.5
+    assert relays(made)["/talk_two", "<-"].count == 1
+
+
+@pytest.mark.parametrize("way", ["->", "<-"])
+def test_pictures(bridge, connect, rospy_peer, wait_for, way):
+    name = "/picture_there" if way == "->" else "/picture_back"
+    bridge(["/picture_*"])
+    node = connect("ros2", "viewer")
+    shape = {"width": 1920, "height": 1080, "step": 5760, "encoding": "rgb8"}
+    if way == "->":
+        viewer = node.create_subscription(name, IMAGE)
+        data = {"data": {"repeat": 7, "length": 6_220_800}}
+        rospy_peer.call("publish", topic=name, type="sensor_msgs/Image", latch=True,
+                        value=shape | data)  # fmt: skip
+        found = viewer.wait(20).message()
+        assert (found.width, found.data[-1], len(found.data)) == (1920, 7, 6_220_800)
+    else:
+        camera = node.create_publisher(name, IMAGE)
+        rospy_peer.call("subscribe", topic=name, type="sensor_msgs/Image")
+        wait_for(camera.subscription_count)
+        camera.publish(shape | {"data": bytes([7]) * 6_220_800})
+        value = rospy_peer.event("received")["value"]
+        assert (value["width"], value["data"][0]) == (1920, 6_220_800)
+
+
+def test_latched_both_ways(bridge, connect, rospy_peer, wait_for):
+    made = bridge(["/map_*"])
+    rospy_peer.call(
+        "publish", topic="/map_one", type="std_msgs/String", value={"data": "one"}, latch=True
+    )
+    node = connect("ros2", "walls")
+    keeper = node.create_publisher("/map_two", STRING, QoS.latched())
+    keeper.publish(data="two")
+    wait_for(lambda: {("/map_one", "->"), ("/map_two", "<-")} <= relays(made).keys())
+    wait_for(lambda: node.publishers("/map_one"))
+    wait_for(lambda: all(one.count for one in made.status().relays))
+    (end,) = node.publishers("/map_one")
+    assert end.qos.durability is Durability.TRANSIENT_LOCAL
+    late = node.create_subscription("/map_one", STRING, qos=QoS.latched())
+    assert late.wait(10).message().data == "one"
+    rospy_peer.call("subscribe", topic="/map_two", type="std_msgs/String")
+    assert rospy_peer.event("received")["value"] == {"data": "two"}
+    # What is latched goes with whoever published it.
+    keeper.close()
+    wait_for(lambda: ("/map_two", "<-") not in relays(made))
+    ours = connect("ros1", "latecomer").create_subscription("/map_two", STRING)
+    assert ours.wait(0.5) is None
+
+
+def test_several_latched_publishers_stay_apart(bridge, connect, wait_for):
+    made = bridge(["/tf_static"])
+    texts = [f"frame {number}" for number in range(3)]
+    for number, text in enumerate(texts):
+        node = connect("ros2", f"broadcaster{number}")
+        keeper = node.create_publisher("/tf_static", "tf2_msgs/TFMessage", QoS.latched())
+        keeper.publish(transforms=[{"child_frame_id": text}])
+    wait_for(lambda: made.status().count == 3, what=lambda: str(made.status()))
+    late = connect("ros1", "late").create_subscription("/tf_static")
+    found = {late.wait(10).message().transforms[0].child_frame_id for _ in range(3)}
+    assert found == set(texts)
+
+
+def test_nothing_comes_back(bridge, connect, wait_for):
+    """Two bridges beside each other: each message arrives once, nowhere twice."""
+    first, second = bridge(["*"]), bridge(["*"])
+    one, two = connect("ros1", "echo_one"), connect("ros2", "echo_two")
+    # Both worlds publish the topic, and listen to it.
+    ends = [node.create_publisher("/echo", STRING, QoS(depth=100)) for node in (one, two)]
+    ears = [node.create_subscription("/echo", STRING, qos=QoS(depth=1000)) for node in (one, two)]
+
+    def relaying():
+        return [
+            sum(("/echo", way) in relays(bridge) for bridge in (first, second))
+            for way in ("->", "<-")
+        ]
+
+    wait_for(lambda: relaying() == [1, 1], 20, what=lambda: str(relaying()))
+    wait_for(lambda: all(end.subscription_count() >= 2 for end in ends))
+    time.sleep(1)  # what must not happen needs time to happen
+    for number in range(10):
+        ends[0].publish(data=f"one {number}")
+        ends[1].publish(data=f"two {number}")
+    expected = sorted(f"{word} {number}" for word in ("one", "two") for number in range(10))
+    for ear in ears:
+        found = [ear.wait(10).message().data for _ in range(20)]
+        assert sorted(found) == expected
+        assert ear.wait(0.7) is None
+
+
+def test_another_bridge_takes_over(bridge, connect, wait_for):
+    first = bridge(["/shared"])
+    one, two = connect("ros1", "share_one"), connect("ros2", "share_two")
+    talker = one.create_publisher("/shared", STRING)
+    listener = two.create_subscription("/shared", STRING)
+    wait_for(lambda: relays(first))
+    wait_for(lambda: two.publishers("/shared"))
+    second = bridge(["/shared"])
+    time.sleep(2.5)  # by then it would have begun
+    assert not relays(second)
+    first.close()
+    wait_for(lambda: relays(second), 15)
+
+    def heard():
+        talker.publish(data="again")
+        return listener.wait(0.1)
+
+    wait_for(heard, 15)
+
+
+def test_directions_and_names(bridge, connect, wait_for):
+    made = bridge(["/left->/right", "/stop<-"])
+    one, two = connect("ros1", "named_one"), connect("ros2", "named_two")
+    talkers = [
+        node.create_publisher(topic, STRING)
+        for node, topic in ((one, "/left"), (two, "/right"), (one, "/stop"), (two, "/stop"))
+    ]
+    listener = two.create_subscription("/right", STRING)
+    wait_for(lambda: set(relays(made)) == {("/left", "->"), ("/stop", "<-")})
+    assert relays(made)["/left", "->"].other == "/right"
+
+    def heard():
+        talkers[0].publish(data="over")
+        return listener.wait(0.1)
+
+    assert wait_for(heard).message().data == "over"
+
+
+def test_a_type_given_beforehand(bridge, connect, wait_for):
+    """Not even the first message is missed."""
+    bridge(["/cmd->"], types={"/cmd": "geometry_msgs/Twist"})
+    listener = connect("ros2", "wheels").create_subscription("/cmd", "geometry_msgs/msg/Twist")
+    wait_for(listener.publisher_count)
+    one = connect("ros1", "stick")
+    wait_for(lambda: one.subscriptions("/cmd"))
+    talker = one.create_publisher("/cmd", "geometry_msgs/Twist")
+    wait_for(talker.subscription_count)
+    talker.publish(linear={"x": 0.5})
+    assert listener.wait(10).message().linear.x == 0.5
+
+
+def test_services_of_ros1(bridge, connect, rospy_peer):
+    made = bridge(services=["/arm/*"])
+    for service, fails in (("/arm/set", ""), ("/arm/broken", "refusal")):
+        rospy_peer.call(
+            "serve",
+            service=service,
+            type="std_srvs/SetBool",
+            returns={"success": True, "message": "set"},
+            fails=fails,
+        )
+    node = connect("ros2", "caller")
+    client = node.create_service_client("/arm/set", "std_srvs/srv/SetBool")
+    answer = client.call({"data": True}, timeout=20)
+    assert (answer.success, answer.message) == (True, "set")
+    assert rospy_peer.event("served")["request"] == {"data": True}
+    broken = node.create_service_client("/arm/broken", "std_srvs/srv/SetBool")
+    with pytest.raises(ServiceError, match="not homed"):
+        broken.call({"data": True}, timeout=20)
+    assert relays(made)["/arm/broken", "->"].refused == 1
+    rospy_peer.call("unserve", service="/arm/set")
+    rospy_peer.call("unserve", service="/arm/broken")
+
+
+def test_services_of_ros2(bridge, connect, rospy_peer):
+    bridge(services=["/sum", "/never"], timeout=1.0)
+    node = connect("ros2", "server")
+    node.create_service_server(
+        "/sum", "example_interfaces/srv/AddTwoInts", lambda asked: {"sum": asked.a + asked.b}
+    )
+    node.create_service_server("/never", "std_srvs/srv/Trigger", lambda _: Future())
+    adder = connect("ros1", "adder").create_service_client("/sum")
+    found = adder.call({"a": 2, "b": -5}, timeout=20)
+    assert found.sum == -3
+    (told,) = rospy_peer.call("call", service="/never", type="std_srvs/Trigger")
+    assert "within 1 s" in told
+
+
+def test_a_service_that_both_offer_is_left_alone(bridge, connect, wait_for):
+    one, two = connect("ros1", "offer_one"), connect("ros2", "offer_two")
+    for node in (one, two):
+        node.create_service_server("/both", "std_srvs/Trigger", lambda _: {"success": True})
+    wait_for(lambda: one.service_servers("/both") and two.service_servers("/both"))
+    made = bridge(services=["/both"])
+    wait_for(lambda: len(made.status().relays) == 2)
+    for relay in made.status().relays:
+        assert "offers it there already" in relay.problem
+    assert one.create_service_client("/both").call().success
+
+
+def test_what_does_not_fit_is_refused_and_told(bridge, connect, wait_for, caplog):
+    made = bridge(["/late"])
+    talker = connect("ros2", "past").create_publisher("/late", "std_msgs/msg/Header")
+    listener = connect("ros1", "present").create_subscription("/late")
+    wait_for(talker.subscription_count)
+    for _ in range(3):
+        talker.publish(stamp={"sec": -1})
+    wait_for(lambda: relays(made)["/late", "<-"].refused == 3)
+    assert "stamp.sec" in relays(made)["/late", "<-"].problem
+    assert caplog.text.count("a message is not relayed") == 1
+    talker.publish(frame_id="fine")
+    assert listener.wait(10).message().frame_id == "fine"
+
+
+def test_survey(connect, rospy_peer, wait_for):
+    one, two = connect("ros1", "survey_one"), connect("ros2", "survey_two")
+    rospy_peer.call("publish", topic="/seen/one", type="std_msgs/Time")
+    connect("ros2", "seen").create_publisher("/seen/two", "visualization_msgs/msg/Marker")
+    wait_for(lambda: one.publishers("/seen/one") and two.publishers("/seen/two"))
+    found = {entry.name: entry for entry in survey(one, two, ["/seen/*"], ["/seen/*"])}
+    assert found["/seen/one"].other_type == "builtin_interfaces/msg/Time"
+    assert found["/seen/one"].direction == "->"
+    assert "mesh_file" in found["/seen/two"].notes[0]
+
+
+def test_an_unused_topic_costs_nothing(bridge, connect, wait_for):
+    made = bridge(["/heavy"])
+    one, two = connect("ros1", "heavy_one"), connect("ros2", "heavy_two")
+    talker = one.create_publisher("/heavy", STRING)
+    wait_for(lambda: two.publishers("/heavy"))
+    wait_for(lambda: talker.subscription_count() == 0, 20)
+    listener = two.create_subscription("/heavy", STRING)
+    wait_for(talker.subscription_count)
+    talker.publish(data="wanted")
+    assert listener.wait(10).message().data == "wanted"
+    assert relays(made)["/heavy", "->"].count == 1
+
+
+def test_the_master_restarts(bridge, connect, start_master, start_rospy, wait_for):
+    master = start_master()
+    url = f"{master.url}?ip=127.0.0.1"
+    bridge(["/steady"], urls=(url, ""))
+    two = connect("ros2", "steady_two")
+    peer = start_rospy("steady_peer", master=master)
+    peer.call(
+        "publish", topic="/steady", type="std_msgs/String", value={"data": "."}, rate=20, count=0
+    )
+    listener = two.create_subscription("/steady", STRING)
+    assert listener.wait(20)
+    master.kill()
+    while listener.take():
+        pass
+    assert listener.wait(10), "connections outlive the master"
+    master.start()
+    again = start_rospy("steady_again", master=master)
+    again.call(
+        "publish", topic="/steady", type="std_msgs/String", value={"data": "new"}, rate=20, count=0
+    )
+    wait_for(lambda: listener.wait(1).message().data == "new", 20)
+
+
+def test_the_router_restarts(bridge, connect, rospy_peer, free_port, wait_for):
+    where = f"tcp/127.0.0.1:{free_port}"
+    with Router(where) as router:
+        bridge(["/lasting"], urls=("", router.url))
+        listener = connect("ros2", "lasting", router.url).create_subscription("/lasting", STRING)
+        rospy_peer.call(
+            "publish",
+            topic="/lasting",
+            type="std_msgs/String",
+            value={"data": "."},
+            rate=20,
+            count=0,
+        )
+        assert listener.wait(20)
+    with Router(where):
+        again = connect("ros2", "lasting_again", router.url)
+        late = again.create_subscription("/lasting", STRING)
+        assert late.wait(30)
+    rospy_peer.call("unpublish", topic="/lasting")
+
+
+def test_a_ros2_client_that_is_not_ours(bridge, start_peer, router, rospy_peer, peer_values):
+    bridge(["/chatter", "/told"])
+    rospy_peer.call("subscribe", topic="/chatter", type="std_msgs/String")
+    peer = start_peer("sdk", router, publish={"/chatter": STRING}, subscribe={"/told": STRING})
+    value = rospy_peer.event("received", 30)["value"]
+    assert value == {"data": peer_values.VALUES[STRING]["data"]}
+    rospy_peer.call("unsubscribe", topic="/chatter")
+    rospy_peer.call(
+        "publish", topic="/told", type="std_msgs/String", value={"data": "from rospy"},
+        rate=10, count=0,
+    )  # fmt: skip
+    assert peer.event("received", 30) == "/told"
+    rospy_peer.call("unpublish", topic="/told")
