@@ -67,7 +67,7 @@ class Graph:
         known = self._seen
         types = known.types
         offers = (publishers, subscribers, services)
-        missing = any(name not in types for name in (*publishers, *subscribers))
+        missing = any(types.get(name, "") in _UNKNOWN for name in (*publishers, *subscribers))
         if offers != known[:3] or (missing and time.monotonic() - self._asked > _LATE):
             self._asked = time.monotonic()
             types = {str(name): str(kind) for name, kind in master.call("getTopicTypes")}

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm import EndpointKind, History, Node, NodeName, QoS, Subscription
 from rosglass.comm.flags import check_flag
 from rosglass.comm.loop import check_plain
-from rosglass.interfaces import ros1_name
+from rosglass.errors import InvalidNameError
 from rosglass.ros1.action_types import actions
+from rosglass.ros1.answers import Answers
 from rosglass.ros1.connection import Connection
 from rosglass.ros1.core import Core
 from rosglass.ros1.furniture import Furniture
@@ -87,7 +88,9 @@ class Ros1Node(Node):
         self._topics = Topics(self._core)
         self._services = Services(self._core)
         self._furniture = Furniture(self, self._core, self._topic_names, parameters or {})
-        self._core.start(self, self._accept)
+        self._core.start(
+            Answers(self._core, self._topics, self._furniture.server.changed), self._accept
+        )
         self._furniture.open(own_services)
 
     # -- topics ----------------------------------------------------------------------------------
@@ -266,9 +269,17 @@ class Ros1Node(Node):
         """Return the time of the node's clock."""
         return self._core.clock.now()
 
+    @property
+    def address(self) -> str:
+        """Host or address under which others reach this node."""
+        return self._core.address[0]
+
     def resolve(self, name: str) -> str:
         """Return the absolute name of a topic or service; raises InvalidNameError."""
-        return self._core.resolve(name)
+        full = self._core.resolve(name)
+        if full == "/":
+            raise InvalidNameError(f"{name!r} is a namespace; write a topic's or service's name")
+        return full
 
     # -- the graph -------------------------------------------------------------------------------
 
@@ -373,69 +384,11 @@ class Ros1Node(Node):
         self._topics.drop(link)
         self._services.drop(link)
 
-    # -- the slave API ---------------------------------------------------------------------------
-
-    def bus_info(self) -> list[list[Any]]:
-        """Return the connections, as ``rosnode info`` shows them."""
-        found: list[list[Any]] = []
-        for topic, publication in self._topics.published().items():
-            for link in publication.links():
-                peer = link.header.get("callerid", link.peer)
-                found.append(_bus(len(found) + 1, peer, "o", topic, True, link.peer))
-        for topic, intake in self._topics.subscribed().items():
-            for source in intake.links():
-                peer = source.name if source.connected else source.uri
-                found.append(_bus(len(found) + 1, peer, "i", topic, source.connected, source.uri))
-        return found
-
-    def bus_stats(self) -> list[Any]:
-        """Return statistics; nobody reads them, and roscpp leaves them empty, too."""
-        return [[], [], []]
-
-    def master_uri(self) -> str:
-        """Return the master's URI."""
-        return self._core.master.uri
-
-    def published(self) -> list[list[str]]:
-        """Return topic and type of all that is published."""
-        return [[t, ros1_name(p.type.name)] for t, p in sorted(self._topics.published().items())]
-
-    def subscribed(self) -> list[list[str]]:
-        """Return topic and type of all that is subscribed."""
-        return [[t, i.type_name] for t, i in sorted(self._topics.subscribed().items())]
-
-    def shut_down(self, caller: str, reason: str) -> None:
-        """End the node, because somebody else says so: another one has its name now."""
-        self._core.shut_down(caller, reason)
-
-    def parameter_changed(self, name: str, value: Any) -> None:  # noqa: ARG002 - it may be old
-        """Look at a parameter that was subscribed to."""
-        self._furniture.server.changed(name)
-
     def _topic_names(self) -> list[str]:
         return sorted({*self._topics.published(), *self._topics.subscribed()})
-
-    def publishers_changed(self, topic: str, uris: list[str]) -> None:
-        """Take the publishers that a topic has now."""
-        intake = self._topics.subscribed().get(topic)
-        if intake is not None:
-            intake.publishers_changed(uris)
-
-    def request_topic(self, topic: str, protocols: list[Any]) -> list[Any]:
-        """Return how to connect to a published topic; raises KeyError when it is not."""
-        if topic not in self._topics.published():
-            raise KeyError(f"{self._core.name} does not publish {topic}")
-        if not any(isinstance(p, list) and p and p[0] == "TCPROS" for p in protocols):
-            names = ", ".join(str(p[0] if isinstance(p, list) and p else p) for p in protocols)
-            raise ValueError(f"{self._core.name} speaks TCPROS only, not {names}")
-        return ["TCPROS", *self._core.address]
 
 
 def _profile(qos: QoS | int) -> QoS:
     if type(qos) is int and qos == 0:
         return QoS(history=History.KEEP_ALL)  # as roscpp and rospy have it
     return qos if isinstance(qos, QoS) else QoS(depth=qos)
-
-
-def _bus(number: int, peer: str, way: str, topic: str, up: bool, place: str) -> list[Any]:
-    return [number, peer, way, "TCPROS", topic, up, f"TCPROS connection to [{place}]"]

@@ -6,6 +6,7 @@ import os
 import signal
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
@@ -143,7 +144,7 @@ def test_many_nodes_come_and_go_without_a_trace(own_master, connect, wait_for):
         node.close()
 
     def traces():
-        return threading.active_count(), len(os.listdir("/proc/self/fd"))
+        return threading.active_count(), len(list(Path("/proc/self/fd").iterdir()))
 
     for _ in range(5):
         cycle()

@@ -1,0 +1,243 @@
+"""What the master is told of a node, also by masters and after faults that are hard to have."""
+
+from __future__ import annotations
+
+import logging
+import socket
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+import rosglass
+from rosglass.comm import ConnectionState, EndpointKind, NodeName
+from rosglass.ros1 import address
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from tests.unit.ros1.conftest import FakeMaster
+
+    from rosglass.ros1 import Ros1Node
+
+
+def wait_for(condition: Callable[[], Any], what: Callable[[], object] = str) -> None:
+    deadline = time.monotonic() + 10
+    while not condition():
+        assert time.monotonic() < deadline, what()
+        time.sleep(0.005)
+
+
+@pytest.fixture
+def node(master: FakeMaster) -> Iterator[Any]:
+    """A connected node."""
+    made = connected(master)
+    yield made
+    made.close()
+
+
+def connected(master: FakeMaster, name: str = "panel") -> Any:
+    made = rosglass.connect(master.url, name, own_services=False)
+    wait_for(lambda: made.status().state is ConnectionState.CONNECTED, made.status)
+    return made
+
+
+def test_a_master_that_restarts_with_the_same_process_number(
+    master: FakeMaster, node: Ros1Node
+) -> None:
+    node.create_publisher("/a", "std_msgs/Empty")
+    wait_for(lambda: "/panel" in master.publishers.get("/a", {}))
+    pid = master.pid
+    master.stop()
+    master.start()
+    master.pid = pid
+    wait_for(lambda: "/panel" in master.publishers.get("/a", {}))
+
+
+def test_closing_and_creating_again_keeps_a_topic_registered(
+    master: FakeMaster, node: Ros1Node
+) -> None:
+    for _ in range(100):
+        publisher = node.create_publisher("/a", "std_msgs/Empty")
+        subscription = node.create_subscription("/a", "std_msgs/Empty")
+        publisher.close()
+        subscription.close()
+    node.create_publisher("/a", "std_msgs/Empty")
+    node.create_subscription("/a", "std_msgs/Empty")
+    # Whatever waits for the master is done before these.
+    node.create_publisher("/last", "std_msgs/Empty")
+    wait_for(lambda: "/panel" in master.publishers.get("/last", {}))
+    assert "/panel" in master.publishers["/a"]
+    assert "/panel" in master.subscribers["/a"]
+
+
+@pytest.mark.parametrize("create", ["create_publisher", "create_subscription"])
+def test_closing_from_other_threads_at_the_same_time(
+    master: FakeMaster, node: Ros1Node, create: str
+) -> None:
+    def churn() -> None:
+        for _ in range(50):
+            getattr(node, create)("/a", "std_msgs/Empty").close()
+
+    threads = [threading.Thread(target=churn) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    kept = getattr(node, create)("/a", "std_msgs/Empty")
+    offers = master.publishers if create == "create_publisher" else master.subscribers
+    wait_for(lambda: "/panel" in offers.get("/a", {}))
+    kept.close()
+    wait_for(lambda: "/panel" not in offers["/a"])
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        5,
+        [1],
+        [1, "", 5],
+        [1, "", []],
+        [1, "", [[], []]],
+        [1, "", [[["/a"]], [], []]],
+        [1, "", [[[1, 2]], [], []]],
+        ["1", "", [[], [], []]],
+        [True, "", [[], [], []]],
+        {"code": 1},
+        [0, "out of order", 0],
+        [-1, "no such luck", 0],
+    ],
+)
+def test_masters_that_talk_nonsense_are_told_apart(master: FakeMaster, answer: Any) -> None:
+    master.answers["getSystemState"] = lambda _: answer
+    with rosglass.connect(master.url, "panel", own_services=False) as node:
+        wait_for(lambda: "trying again" in node.status().detail, node.status)
+        assert node.status().state is ConnectionState.CONNECTING
+        told = node.status().detail
+        assert "not as " in told or "refuses getSystemState" in told
+        del master.answers["getSystemState"]
+        wait_for(lambda: node.status().state is ConnectionState.CONNECTED)
+
+
+def test_something_else_at_the_masters_address_is_named() -> None:
+    def serve() -> None:
+        while True:
+            try:
+                sock, _ = server.accept()
+            except OSError:
+                return
+            sock.recv(4096)
+            sock.sendall(b"HTTP/1.0 404 Not Found\r\n\r\n<html></html>")
+            sock.close()
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        threading.Thread(target=serve, daemon=True).start()
+        url = f"ros1://127.0.0.1:{server.getsockname()[1]}"
+        with rosglass.connect(url, "panel") as node:
+            wait_for(lambda: "HTTP status 404; trying again" in node.status().detail)
+        server.shutdown(socket.SHUT_RDWR)
+
+
+def test_a_refusal_is_shown_logged_once_and_tried_again(
+    master: FakeMaster, node: Ros1Node, caplog: pytest.LogCaptureFixture
+) -> None:
+    master.answers["registerPublisher"] = lambda *_: [0, "not on Sundays", 0]
+    with caplog.at_level(logging.WARNING):
+        node.create_publisher("/a", "std_msgs/Empty")
+        wait_for(lambda: "not on Sundays" in node.status().detail)
+        assert node.status().state is ConnectionState.CONNECTED
+        wait_for(lambda: master.calls.count("registerPublisher") > 2)
+    assert len([r for r in caplog.records if "not on Sundays" in r.getMessage()]) == 1
+    del master.answers["registerPublisher"]
+    wait_for(lambda: node.status().detail == "")
+    assert "/panel" in master.publishers["/a"]
+
+
+def test_a_wrong_own_address_is_shown(master: FakeMaster, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_IP", "192.0.2.7")
+    url = master.url.partition("?")[0]
+    with rosglass.connect(url, "panel", own_services=False) as node:
+        wait_for(lambda: node.status().state is ConnectionState.CONNECTED)
+        told = node.status().detail
+        assert told.startswith("ROS_IP=192.0.2.7 is no address of this machine")
+        node.create_publisher("/a", "std_msgs/Empty")
+        wait_for(lambda: "/panel" in master.publishers.get("/a", {}))
+        assert master.publishers["/a"]["/panel"].startswith("http://192.0.2.7:")
+
+
+def test_a_new_network_address_is_announced_and_the_node_lives_on(
+    master: FakeMaster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(address, "_route_elsewhere", lambda: "127.0.0.1")
+    url = master.url.partition("?")[0]
+    with rosglass.connect(url, "panel", own_services=False) as node:
+        node.create_publisher("/a", "std_msgs/Empty")
+        wait_for(lambda: "127.0.0.1" in master.publishers.get("/a", {}).get("/panel", ""))
+        monkeypatch.setattr(address, "_route_elsewhere", lambda: "127.0.0.2")
+        wait_for(lambda: "127.0.0.2" in master.publishers["/a"]["/panel"])
+        # The master takes it for another node, and tells the old one to end.
+        core: Any = node._core
+        core.shut_down("/master", "[/panel] Reason: new node registered with same name")
+        wait_for(lambda: "shutdown" not in [t.name for t in threading.enumerate()])
+        assert node.status().state is ConnectionState.CONNECTED
+        core.shut_down("/rosnode", "user request")
+        wait_for(lambda: node.status().state is ConnectionState.CLOSED)
+
+
+def test_the_graph_is_told_and_changes_are(master: FakeMaster, node: Ros1Node) -> None:
+    changes: list[float] = []
+    node.on_graph_change(lambda: changes.append(time.monotonic()))
+    master.publishers["/scan"] = {"/robot/laser": "http://127.0.0.1:1/"}
+    master.types["/scan"] = "sensor_msgs/LaserScan"
+    master.subscribers["/cmd"] = {"/robot/base": "http://127.0.0.1:1/"}
+    master.types["/cmd"] = "*"
+    wait_for(lambda: "/scan" in node.topics())
+    assert node.topics() == {"/cmd": [], "/scan": ["sensor_msgs/msg/LaserScan"]}
+    laser, base = NodeName("/robot", "laser"), NodeName("/robot", "base")
+    assert node.nodes() == sorted([laser, base, NodeName("/", "panel")])
+    (end,) = node.publishers("/scan")
+    assert (end.kind, end.node, end.type) == (
+        EndpointKind.PUBLISHER,
+        laser,
+        "sensor_msgs/msg/LaserScan",
+    )
+    assert [one.name for one in node.endpoints("/robot/base")] == ["/cmd"]
+    assert node.endpoints("/nobody") == []
+    wait_for(lambda: changes)
+    # A type that becomes known later counts as a change.
+    count = len(changes)
+    master.types["/cmd"] = "geometry_msgs/Twist"
+    wait_for(lambda: node.topics()["/cmd"] == ["geometry_msgs/msg/Twist"])
+    wait_for(lambda: len(changes) > count)
+    del master.publishers["/scan"]
+    wait_for(lambda: "/scan" not in node.topics())
+
+
+def test_misspelled_topics_are_pointed_out(master: FakeMaster, node: Ros1Node) -> None:
+    master.publishers["/robot/scan"] = {"/laser": "http://127.0.0.1:1/"}
+    subscription = node.create_subscription("/scan")
+    wait_for(lambda: "/robot/scan" in node.topics())
+    assert subscription.hint == "nobody publishes /scan; did you mean /robot/scan?"
+
+
+def test_a_publisher_that_is_registered_but_gone_is_named(
+    master: FakeMaster, node: Ros1Node
+) -> None:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    master.publishers["/scan"] = {"/laser": f"http://127.0.0.1:{port}/"}
+    subscription = node.create_subscription("/scan")
+    wait_for(lambda: "Connection refused" in subscription.problem)
+    assert f"http://127.0.0.1:{port}/" in subscription.problem
+
+
+def test_a_node_asks_little_of_its_master(master: FakeMaster, node: Ros1Node) -> None:
+    node.create_publisher("/a", "std_msgs/Empty")
+    wait_for(lambda: "/panel" in master.publishers.get("/a", {}))
+    looks = master.calls.count("getSystemState")
+    wait_for(lambda: master.calls.count("getSystemState") >= looks + 1)
+    master.calls.clear()
+    wait_for(lambda: master.calls.count("getSystemState") >= 2)
+    assert set(master.calls) == {"lookupNode", "getSystemState"}
