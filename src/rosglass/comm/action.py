@@ -81,7 +81,7 @@ class ClientGoal(Handle):
     Closing it ends its callbacks and the waiting; the goal itself goes on at the server.
 
     Attributes:
-        id: 16 bytes (a UUID) in ROS 2.
+        id: 16 bytes (a UUID) in ROS 2; a text in UTF-8 in ROS 1.
         goal: What was asked for; None while the action's type is not discovered yet.
     """
 
@@ -93,7 +93,10 @@ class ClientGoal(Handle):
 
     @property
     def id_text(self) -> str:
-        """The id as ``ros2 action`` prints it: 32 hexadecimal digits (some logs put dashes in)."""
+        """The id as ROS's tools print it.
+
+        In ROS 2, 32 hexadecimal digits (some logs put dashes in); in ROS 1, the text that it is.
+        """
         return self.id.hex()
 
     @property
@@ -253,7 +256,8 @@ class ActionClient(Handle):
         """Ask the server to cancel all goals that it accepted at or before `time`.
 
         Args:
-            time: By the server's clock, e.g. :attr:`ClientGoal.accepted`.
+            time: By the server's clock, e.g. :attr:`ClientGoal.accepted`; in ROS 1, by the clocks
+                of those who sent the goals.
             timeout: As for :meth:`cancel_all`.
 
         Raises:
@@ -273,7 +277,7 @@ class ServerGoal(Handle):
     Closing it aborts it, unless it has ended: ``with goal:`` leaves no goal behind.
 
     Attributes:
-        id: 16 bytes (a UUID) in ROS 2.
+        id: 16 bytes (a UUID) in ROS 2; a text in UTF-8 in ROS 1.
         goal: What is asked for.
         accepted: When it was accepted.
     """
@@ -287,7 +291,10 @@ class ServerGoal(Handle):
 
     @property
     def id_text(self) -> str:
-        """The id as ``ros2 action`` prints it: 32 hexadecimal digits (some logs put dashes in)."""
+        """The id as ROS's tools print it.
+
+        In ROS 2, 32 hexadecimal digits (some logs put dashes in); in ROS 1, the text that it is.
+        """
         return self.id.hex()
 
     @property

@@ -20,6 +20,7 @@ from rosglass.comm.similar import similar
 from rosglass.errors import (
     ConversionError,
     DecodeError,
+    DefinitionConflictError,
     Error,
     NodeClosedError,
 )
@@ -410,16 +411,24 @@ class Ros1ActionClient(ActionClient, Member):
         if self._closed:
             return
         if self._discovery is not None:
-            types = self._discovery.look()
-            if types is not None:
-                self._speak(types)
-                self._discovery.close()
-                self._discovery = None
+            self._discover(self._discovery)
         problem = "; ".join(self._conflicts())
         if problem and problem != self._warned:
             _log.warning("%s: %s", self.name, problem)
         self._warned = problem
         self.jobs.add(self._watch)
+
+    def _discover(self, discovery: ActionDiscovery) -> None:
+        types = discovery.look()
+        if types is None:
+            return
+        try:
+            self._speak(types)
+        except DefinitionConflictError as error:
+            discovery.problem = str(error)
+            return
+        discovery.close()
+        self._discovery = None
 
     def _speak(self, types: ActionTypes) -> None:
         """Open the topics."""

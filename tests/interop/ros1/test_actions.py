@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import os
+import signal
 
 import pytest
 
@@ -398,6 +400,26 @@ def test_a_server_killed_in_mid_goal_loses_it(which, request, connect, name, wai
     assert (goal.status, goal.terminal_state) == (GoalStatus.LOST, TerminalState.LOST)
     assert not client.ready
     assert not client.goals
+
+
+@BOTH
+def test_a_server_that_hangs_loses_its_goals(which, request, connect, name, wait_for, monkeypatch):
+    monkeypatch.setattr("rosglass.ros1.action_client._SILENCE", 1.0)
+    monkeypatch.setattr("rosglass.ros1.action_client._ANSWER", 1.0)
+    peer = request.getfixturevalue(f"start_{which}")(f"{which}_frozen_{next(numbers)}")
+    peer.call("action_server", name=name)
+    client = connect("us").create_action_client(name, TYPE)
+    goal = client.send_goal({"goal": 100000})
+    wait_for(lambda: goal.feedback is not None)
+    os.kill(peer.pid, signal.SIGSTOP)
+    try:
+        with pytest.raises(ConnectionLostError, match=r"fell silent .* before goal"):
+            goal.result(15)
+        assert not client.ready
+    finally:
+        os.kill(peer.pid, signal.SIGCONT)
+    assert client.wait_for_server(10)
+    assert client.cancel_all().result(10).accepted == (goal.id,)
 
 
 def test_a_server_that_is_restarted_does_not_know_its_goals(start_rospy, connect, name, wait_for):
