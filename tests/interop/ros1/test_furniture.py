@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import logging
+from pathlib import Path
 
 import pytest
+
+#: The node that roscore starts beside the master.
+ROSOUT = "/usr/lib/rosout/rosout"
 
 
 @pytest.fixture
@@ -132,3 +136,26 @@ def test_a_rospy_publisher_of_clock_drives_our_timers(start_master, connect, sta
     wait_for(lambda: any(jump.delta.seconds < 0 for jump in jumps), 20)
     gazebo.end()  # the simulation is killed: time stands still
     assert node.now().seconds == 5.0
+
+
+def links(node):
+    return [link[:3] + link[4:] for link in node.bus_info()]
+
+
+def test_roscores_own_node_collects_our_log(start_master, start_program, connect, wait_for):
+    master = start_master()
+    if not Path(ROSOUT).exists():
+        pytest.skip("the node rosout is not installed: sudo apt-get install rosout")
+    start_program(ROSOUT, "__name:=rosout", env=master.env())
+    wait_for(lambda: ["/rosout", ["/rosout"]] in master.call("getSystemState")[1], 20)
+    node = connect("cockpit", url=master.url)
+    listener = node.create_subscription("/rosout_agg", None)
+    wait_for(lambda: any(link[3:5] == ["/rosout_agg", True] for link in links(node)), 20)
+    node.logger.error("motor stalled")
+    node.logger.info("second")
+    heard = [listener.wait(20).message(), listener.wait(20).message()]
+    assert [(m.name, m.msg, m.level) for m in heard] == [
+        ("/cockpit", "motor stalled", 8),
+        ("/cockpit", "second", 2),
+    ]
+    assert heard[0].file == __file__
