@@ -20,12 +20,12 @@ from rosglass.cli.output import (
 )
 from rosglass.cli.subcommands import Subcommands
 from rosglass.cli.values import parse_fields, split_type
-from rosglass.cli.worlds import spelled
+from rosglass.cli.worlds import is_ros1, spelled
 
 if TYPE_CHECKING:
     import argparse
 
-    from rosglass.comm import ClientGoal
+    from rosglass.comm import ClientGoal, EndpointInfo, Node
     from rosglass.messages import Message
 
 __all__ = ["configure", "run"]
@@ -92,9 +92,8 @@ def _info(args: argparse.Namespace) -> int:
     style = Style(args)
     with connect(args) as node:
         name = node.resolve(args.action)
-        service = f"{name}/_action/send_goal"
-        find(node, lambda: node.service_servers(service), args.timeout)
-        servers, clients = node.service_servers(service), node.service_clients(service)
+        find(node, lambda: any(_ends(node, name)), args.timeout)
+        servers, clients = _ends(node, name)
         types = node.actions().get(name, [])
     if not servers and not clients:
         note(f"nobody offers or uses {name}; rosglass action list shows what there is")
@@ -113,6 +112,14 @@ def _info(args: argparse.Namespace) -> int:
         for end in ends:
             print(f"  action {what} {style(end.node, 'cyan')}")
     return 0
+
+
+def _ends(node: Node, name: str) -> tuple[list[EndpointInfo], list[EndpointInfo]]:
+    """Return an action's servers and clients."""
+    if is_ros1(node):
+        return node.publishers(f"{name}/result"), node.publishers(f"{name}/goal")
+    service = f"{name}/_action/send_goal"
+    return node.service_servers(service), node.service_clients(service)
 
 
 def _send(args: argparse.Namespace) -> int:

@@ -231,11 +231,14 @@ def _table(bag: Bag) -> dict[str, Any]:
 
 
 def _listing(bag: Bag) -> str:
+    from rosglass.interfaces import ros1_name
+
     began = datetime.fromtimestamp(bag.start / 1e9).astimezone()
     lines = [f"{bag.path}: {bag.duration:.1f} s from {began:%Y-%m-%d %H:%M:%S %Z}"]
     if bag.problem:
         lines.append(f"  {bag.problem}")
-    lines += [
-        f"  {'?' if c.count < 0 else c.count:>8} {c.topic} [{c.type_name}]" for c in bag.channels
-    ]
+    for channel in bag.channels:
+        count = "?" if channel.count < 0 else channel.count
+        kind = ros1_name(channel.type_name) if channel.wire == "ros1" else channel.type_name
+        lines.append(f"  {count:>8} {channel.topic} [{kind}]")
     return "\n".join(lines)

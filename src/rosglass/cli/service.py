@@ -136,7 +136,13 @@ def _call(args: argparse.Namespace) -> int:
     with connect(args) as node:
         name = node.resolve(args.service)
         with node.create_service_client(name, type_name) as client:
-            wait(node, lambda: client.type is not None, args.timeout)
+
+            def settled() -> bool:
+                # ROS 1's master knows at once that there is no such service.
+                gone = is_ros1(node) and not node.service_servers(name)
+                return client.type is not None or gone
+
+            wait(node, settled, args.timeout)
             if client.type is None:
                 raise ServiceUnavailableError(client.problem or f"nobody offers {name}")
             request = client.type.request

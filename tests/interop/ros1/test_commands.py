@@ -1,0 +1,316 @@
+"""The `rosglass` commands in a ROS 1 graph whose robot is a rospy node."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+TWIST = "geometry_msgs/Twist"
+
+
+@pytest.fixture(scope="module")
+def robot(start_rospy, master) -> Any:
+    """A rospy node with one of everything."""
+    peer = start_rospy("robot")
+    peer.call("publish", topic="/pose", type="geometry_msgs/PoseStamped")
+    pose = {"header": {"frame_id": "map"}, "pose": {"position": {"x": 1.5}}}
+    peer.call("publish", topic="/pose", type="geometry_msgs/PoseStamped", value=pose, rate=50,
+              count=0)  # fmt: skip
+    cells = {"info": {"width": 500, "height": 2}, "data": [7] * 1000}
+    peer.call("publish", topic="/map", type="nav_msgs/OccupancyGrid", value=cells, latch=True)
+    peer.call("subscribe", topic="/cmd_vel", type=TWIST)
+    peer.call("serve", service="/robot/stop", type="std_srvs/Trigger",
+              returns={"success": True, "message": "stöpped"})  # fmt: skip
+    peer.call("action_server", name="/count")
+    master.call("setParam", "/robot/speed", 1.5)
+    return peer
+
+
+@pytest.fixture
+def run(
+    robot: Any, master: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Iterator[Any]:
+    """Run a command in this process, which is quicker: its code, what it printed, and where."""
+    from rosglass.cli import main
+
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    for name in ("ROSGLASS_URL", "ROS_DISTRO", "ROS_DOMAIN_ID", "RMW_IMPLEMENTATION"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("ROS_IP", "127.0.0.1")
+    monkeypatch.setenv("ROS_MASTER_URI", master.uri)
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        capsys.readouterr()
+        try:
+            code = main(arguments)
+        except SystemExit as error:
+            code = int(error.code or 0)
+        return code, *capsys.readouterr()
+
+    yield run
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+
+
+@pytest.fixture
+def start_command(master: Any) -> Iterator[Any]:
+    """Start a command as a process of its own, as somebody does who presses Ctrl-C."""
+    started = []
+
+    def start_command(*arguments: str) -> subprocess.Popen[str]:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "rosglass", *arguments],
+            env=os.environ | {"ROSGLASS_URL": f"{master.url}?ip=127.0.0.1"},
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        started.append(process)
+        return process
+
+    yield start_command
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+def test_topic_list_and_info(run, master, monkeypatch):
+    code, out, err = run("topic", "list", "-t")
+    assert (code, err) == (0, "")
+    assert "/pose [geometry_msgs/PoseStamped]" in out.splitlines()
+    assert "/cmd_vel [geometry_msgs/Twist]" in out.splitlines()
+    code, out, _ = run("topic", "info", "/pose")
+    assert out == "/pose [geometry_msgs/PoseStamped]\n  publisher /robot\n"
+    code, out, _ = run("topic", "info", "/cmd_vel", "--json")
+    assert json.loads(out)["endpoints"] == [
+        {"kind": "subscription", "name": "/cmd_vel", "node": "/robot",
+         "type": "geometry_msgs/msg/Twist"}
+    ]  # fmt: skip
+    code, _, err = run("topic", "info", "/posse")
+    assert code == 1
+    assert "nobody publishes or subscribes to /posse. Did you mean /pose?" in err
+    monkeypatch.delenv("ROS_MASTER_URI")
+    code, out, _ = run("topic", "list", "--url", master.url)
+    assert code == 0
+    assert "/pose" in out.splitlines()
+
+
+def test_topic_echo(run):
+    code, out, _ = run("topic", "echo", "/map", "-1")
+    assert code == 0
+    assert "  width: 500\n" in out
+    assert "1000 in all" in out
+    code, out, _ = run("topic", "echo", "pose", "-1", "-f", "pose.position.x")
+    assert out == "1.5\n"
+    code, out, _ = run("topic", "echo", "/pose", "geometry_msgs/PoseStamped", "-1", "--json")
+    assert json.loads(out)["header"]["stamp"] == {"secs": 0, "nsecs": 0}
+    code, _, err = run("topic", "echo", "/pose", "std_msgs/String", "-1", "--timeout", "3")
+    assert code == 1
+    assert "publishes /pose as geometry_msgs/PoseStamped with md5" in err
+    assert err.count("\n") == 1
+    code, _, err = run("topic", "echo", "/nothing", "--timeout", "0.5")
+    assert "nobody publishes it" in err
+
+
+def test_topic_hz_bw_delay(run, robot):
+    code, out, _ = run("topic", "hz", "/pose", "-d", "2.5", "--json")
+    assert code == 0
+    assert 30 < json.loads(out.splitlines()[-1])["rate"] < 70
+    code, out, _ = run("topic", "bw", "/pose", "-d", "1.5")
+    assert "B/s  message mean 75 B" in out
+    code, out, _ = run("topic", "delay", "/pose", "-d", "1.5", "--json")
+    delay = json.loads(out.splitlines()[-1])["mean"]
+    assert abs(delay - time.time()) < 10  # the robot stamps with zero
+    assert run("topic", "delay", "/cmd_vel", "-d", "1.2")[0] == 1
+
+
+@pytest.mark.parametrize("given", [[TWIST], ["geometry_msgs/msg/Twist"], []])
+def test_topic_pub(run, robot, given):
+    code, _, err = run("topic", "pub", "-1", "cmd_vel", *given, "{linear: {x: 0.5}}")
+    assert (code, err) == (0, "")
+    received = robot.event("received")
+    assert received["value"]["linear"]["x"] == 0.5
+    assert received["topic"] == "/cmd_vel"
+
+
+def test_a_latched_topic_pub_stays_until_ctrl_c(start_command, tool, wait_for):
+    process = start_command("topic", "pub", "/plan", "std_msgs/String", "{data: left}", "-r",
+                            "0.01", "--qos", "latched")  # fmt: skip
+    assert process.stdout.readline().startswith("1: ")
+    assert tool("rostopic", "echo", "-n1", "/plan") == 'data: "left"\n---\n'
+    process.send_signal(signal.SIGINT)
+    assert process.wait(10) == 130
+
+
+def test_topic_pub_tells_what_is_missing(run):
+    code, _, err = run("topic", "pub", "-1", "/nobody", "{}", "--timeout", "0.5")
+    assert (code, err) == (
+        1, "rosglass: nobody uses /nobody yet: say its type, e.g. std_msgs/String\n",
+    )  # fmt: skip
+
+
+def test_service_commands(run):
+    code, out, _ = run("service", "list", "-t")
+    assert "/robot/stop [std_srvs/Trigger]" in out.splitlines()
+    assert "/robot/get_loggers [roscpp/GetLoggers]" in out.splitlines()
+    code, out, _ = run("service", "info", "/robot/stop")
+    assert out.splitlines() == [
+        "/robot/stop [std_srvs/Trigger]",
+        "  service server /robot",
+        "    md5: 937c9679a518e3a18d831e57125ea522",
+    ]
+    for given in ([], ["std_srvs/Trigger"], ["std_srvs/srv/Trigger", "{}"]):
+        code, out, err = run("service", "call", "/robot/stop", *given, "--json")
+        assert (code, err) == (0, "")
+        assert json.loads(out) == {"success": True, "message": "stöpped"}
+    code, _, err = run("service", "call", "/robot/stopp")
+    assert code == 1
+    assert "did you mean /robot/stop?" in err
+    code, _, err = run("service", "call", "/robot/stop", "std_srvs/SetBool", "{data: true}")
+    assert code == 1
+    assert err.count("not as std_srvs/srv/SetBool") == 1
+
+
+def test_action_commands(run, start_command):
+    code, out, _ = run("action", "list", "-t")
+    assert out == "/count [actionlib/Test]\n"
+    code, out, _ = run("action", "info", "/count")
+    assert out.splitlines() == ["/count [actionlib/Test]", "  action server /robot"]
+    code, out, _ = run("action", "send", "/count", "{goal: 5}", "--feedback", "--json")
+    assert code == 0
+    *feedback, end = map(json.loads, out.splitlines())
+    assert [each["feedback"] for each in feedback] == [{"feedback": n} for n in range(5)]
+    assert (end["status"], end["result"]) == ("succeeded", {"result": 5})
+    code, out, _ = run("action", "send", "/count", "actionlib/Test", "{goal: -1}")
+    assert code == 1
+    assert "aborted" in out
+    process = start_command("action", "send", "/count", "{goal: 10000}", "--feedback")
+    while process.stdout.readline() != "feedback:\n":
+        assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=10)
+    assert "cancelling the goal" in err
+    assert "canceled" in out
+
+
+def test_node_commands(run):
+    code, out, _ = run("node", "list")
+    assert "/robot" in out.splitlines()
+    assert not any("rosglass" in line for line in out.splitlines())
+    code, out, _ = run("node", "info", "/robot")
+    assert "    /pose [geometry_msgs/PoseStamped]" in out.splitlines()
+    assert "    /cmd_vel [geometry_msgs/Twist]" in out.splitlines()
+    assert "    /robot/stop [std_srvs/Trigger]" in out.splitlines()
+    code, _, err = run("node", "info", "/robott")
+    assert (code, "Did you mean /robot?" in err) == (1, True)
+
+
+def test_param_commands(run, master, tool, tmp_path):
+    assert "/robot/speed" in run("param", "list")[1].splitlines()
+    assert run("param", "list", "/robot") == (0, "/robot/speed\n", "")
+    for given in (["/robot/speed"], ["/robot", "speed"], ["robot/speed"]):
+        assert run("param", "get", *given) == (0, "1.5\n", "")
+    assert run("param", "set", "/arm/limits", "{low: -1, high: [2.5, 3.0], name: grün}")[0] == 0
+    assert run("param", "set", "/arm", "on", "true")[0] == 0
+    assert master.call("getParam", "/arm/limits/high") == [2.5, 3.0]
+    assert tool("rosparam", "get", "/arm/limits/low") == "-1\n"
+    assert master.call("getParam", "/arm/on") is True
+    file = tmp_path / "arm.yaml"
+    assert run("param", "dump", "/arm", "-o", str(file)) == (0, "", "")
+    assert run("param", "delete", "/arm") == (0, "/arm is deleted\n", "")
+    assert run("param", "delete", "/arm")[0] == 1
+    tool("rosparam", "load", str(file), "/left")
+    assert run("param", "load", str(file), "/right")[0] == 0
+    assert master.call("getParam", "/left") == master.call("getParam", "/right")
+    code, _, err = run("param", "get", "/robot/sped")
+    assert (code, "did you mean /robot/speed?" in err) == (1, True)
+    code, _, err = run("param", "describe", "/robot/speed")
+    assert (code, "nothing of a parameter but its value" in err) == (1, True)
+
+
+def test_interface_commands(run):
+    code, out, _ = run("interface", "show", "std_msgs/Header")
+    assert code == 0
+    assert out.startswith("# std_msgs/Header, md5 2176decaecbce78abc3b96ef049fabed, from ")
+    assert "uint32 seq" in out
+    assert "geometry_msgs/Twist" in run("interface", "list", "twist")[1].splitlines()
+
+
+def test_doctor_finds_nothing_wrong(run, master):
+    code, out, _ = run("doctor")
+    assert code == 0
+    assert f"a master answers at {master.uri}" in out
+    assert "the master reaches this machine under it" in out
+    assert "nodes: all can be reached" in out
+    assert master.call("getParamNames") == [
+        name for name in master.call("getParamNames") if "was_here" not in name
+    ]
+
+
+def test_doctor_finds_what_is_wrong(run, master, monkeypatch):
+    far = "http://turtlebot.invalid:4567/"
+    master.call("registerPublisher", "/far", "std_msgs/String", far)
+    master.call("setParam", "/use_sim_time", True)
+    try:
+        code, out, _ = run("doctor")
+        assert code == 1
+        assert "/test can be reached under the name turtlebot.invalid only" in out
+        assert "/use_sim_time is true, but nobody publishes /clock" in out
+    finally:
+        master.call("deleteParam", "/use_sim_time")
+        master.call("unregisterPublisher", "/far", far)
+    gone = "http://127.0.0.1:9/"
+    master.call("registerPublisher", "/gone", "std_msgs/String", gone)
+    try:
+        code, out, _ = run("doctor")
+        assert code == 0
+        assert "/test no longer run" in out
+        assert "rosnode cleanup" in out
+    finally:
+        master.call("unregisterPublisher", "/gone", gone)
+    # An address that exists nowhere near.
+    monkeypatch.setenv("ROS_IP", "192.0.2.77")
+    code, out, _ = run("doctor")
+    assert code == 1
+    assert "ROS_IP=192.0.2.77 is no address of this machine" in out
+    assert "the master cannot reach this machine at 192.0.2.77" in out
+
+
+@pytest.mark.parametrize(
+    ("uri", "told"),
+    [
+        ("http://127.0.0.1:1", "no master runs: 127.0.0.1 is there"),
+        ("http://nobody.invalid:11311", "no computer is called nobody.invalid"),
+        ("http://127.0.0.1", "ROS_MASTER_URI"),
+    ],
+)
+def test_doctor_says_why_there_is_no_master(run, monkeypatch, uri, told):
+    monkeypatch.setenv("ROS_MASTER_URI", uri)
+    code, out, _ = run("doctor", "--timeout", "1")
+    assert code == 1
+    assert told in out
+
+
+def test_record_and_play_commands(run, robot, start_command, tmp_path, tool, master):
+    bag = tmp_path / "drive.bag"
+    process = start_command("record", "/map", "/pose", "-o", str(bag), "-d", "2")
+    out, err = process.communicate(timeout=20)
+    assert process.returncode == 0, err
+    assert "1 /map" in out
+    assert "/pose" in tool("rosbag", "info", str(bag))
+    assert "1 /map [nav_msgs/OccupancyGrid]" in run("play", "--list", str(bag))[1]
+    process = start_command("play", str(bag), "-m", "/map:=/replayed", "-t", "/map", "-d", "3",
+                            "--clock")  # fmt: skip
+    told = tool("rostopic", "echo", "-n1", "/replayed/info/width")
+    assert told.endswith("500\n---\n")
+    out, err = process.communicate(timeout=20)
+    assert process.returncode == 0, err
+    assert "1 messages sent" in out
