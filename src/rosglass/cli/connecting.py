@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import signal
 import sys
 import threading
@@ -11,7 +10,7 @@ import time
 from math import isfinite
 from typing import TYPE_CHECKING, TypeVar
 
-from rosglass.comm import ConnectionState
+from rosglass.comm import ConnectionState, anonymous_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -103,7 +102,7 @@ def connect(args: argparse.Namespace, *, own_services: bool = False) -> Node:
 
     node = rosglass.connect(
         args.url or None,
-        name=args.node_name or f"rosglass_{args.command}_{os.getpid()}",
+        name=args.node_name or anonymous_name(f"rosglass_{args.command}"),
         arguments=args.ros_arguments,
         own_services=own_services,
     )

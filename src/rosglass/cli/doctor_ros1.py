@@ -6,7 +6,6 @@ connect to it (ROS wiki, "ROS/NetworkSetup").
 
 from __future__ import annotations
 
-import os
 import socket
 import threading
 from concurrent.futures import ThreadPoolExecutor
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.cli.connecting import wait
 from rosglass.cli.finding import Finding
-from rosglass.comm import ConnectionState
+from rosglass.comm import ConnectionState, anonymous_name
 from rosglass.errors import ConnectionLostError, ConversionError, Error, MasterError
 
 if TYPE_CHECKING:
@@ -80,7 +79,9 @@ def _join(url: str, timeout: float) -> Ros1Node | Finding:
     import rosglass
 
     try:
-        made: Any = rosglass.connect(url, name=f"rosglass_doctor_{os.getpid()}", own_services=False)
+        made: Any = rosglass.connect(
+            url, name=anonymous_name("rosglass_doctor"), own_services=False
+        )
     except Error as error:
         return Finding("error", url, str(error))
     wait(made, lambda: made.status().state is ConnectionState.CONNECTED, timeout)

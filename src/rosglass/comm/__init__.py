@@ -9,6 +9,7 @@ from rosglass.comm.action import (
     GoalStatus,
     ServerGoal,
 )
+from rosglass.comm.anonymous import anonymous_name
 from rosglass.comm.clock import Clock, ClockChange, Jump, Timer
 from rosglass.comm.events import (
     DeadlineMissed,
@@ -114,5 +115,6 @@ __all__ = [
     "Transition",
     "TransitionEvent",
     "Worker",
+    "anonymous_name",
     "executor_for",
 ]

@@ -5,19 +5,14 @@ Rules: ROS wiki, "Names"; where it and the clients differ, roscpp's ``names.cpp`
 
 from __future__ import annotations
 
-import itertools
-import os
 import re
-import socket
-import time
 
 from rosglass.errors import InvalidNameError
 
-__all__ = ["absolute_namespace", "anonymous", "expand", "split", "validate_node_name"]
+__all__ = ["absolute_namespace", "expand", "split", "validate_node_name"]
 
 _FORBIDDEN = re.compile(r"[^A-Za-z0-9_/]")
 _NODE_FORBIDDEN = re.compile(r"[^A-Za-z0-9_]")
-_numbers = itertools.count(1)
 
 
 def validate_node_name(name: str) -> None:
@@ -86,15 +81,6 @@ def split(full: str) -> tuple[str, str]:
     """Return namespace and base name of an absolute name."""
     namespace, _, name = full.rpartition("/")
     return namespace or "/", name
-
-
-def anonymous(name: str) -> str:
-    """Return a node name that begins with `name` and that nobody else has.
-
-    Made as rospy and roscpp do: host, process and time in milliseconds are appended.
-    """
-    host = re.sub(r"[^A-Za-z0-9_]", "_", socket.gethostname())
-    return f"{name}_{host}_{os.getpid()}_{int(time.time() * 1000)}_{next(_numbers)}"
 
 
 def _check(what: str, text: str, whole: str) -> None:

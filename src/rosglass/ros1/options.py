@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, unquote, urlsplit
 
+from rosglass.comm import anonymous_name
 from rosglass.errors import ConversionError
 from rosglass.ros1.address import bracketed, check_host, given_address, parse_uri
 from rosglass.ros1.arguments import NO_ARGUMENTS
-from rosglass.ros1.names import absolute_namespace, anonymous
+from rosglass.ros1.names import absolute_namespace
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -108,7 +109,7 @@ class Ros1Options:
         """
         if self.arguments.name:
             return self.arguments.name
-        return anonymous(name or "rosglass") if name is None or self.anonymous else name
+        return anonymous_name(name or "rosglass") if name is None or self.anonymous else name
 
     def namespace(self, given: str | None, env: Mapping[str, str] = os.environ) -> str:
         """Return the node's namespace.

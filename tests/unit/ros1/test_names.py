@@ -8,8 +8,9 @@ import pytest
 
 import rosglass
 from rosglass import ConversionError, InvalidNameError
+from rosglass.comm import anonymous_name
 from rosglass.ros1 import address
-from rosglass.ros1.names import absolute_namespace, anonymous, expand, validate_node_name
+from rosglass.ros1.names import absolute_namespace, expand, validate_node_name
 from rosglass.ros1.options import Ros1Options
 
 PLACE = "ros1://127.0.0.1:1"
@@ -81,7 +82,7 @@ def test_namespaces_of_programs_are_absolute() -> None:
 
 def test_anonymous_names_are_valid_and_differ(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(socket, "gethostname", lambda: "my-robot.local")
-    names = {anonymous("viewer") for _ in range(100)}
+    names = {anonymous_name("viewer") for _ in range(100)}
     assert len(names) == 100
     for name in names:
         validate_node_name(name)
