@@ -6,13 +6,12 @@ Protocol: ROS wiki, "actionlib/DetailedDescription".
 from __future__ import annotations
 
 import copy
-import itertools
 import logging
 import threading
 import time
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import ActionClient, EndpointKind, Executor, Promise, Time
+from rosglass.comm import ActionClient, Executor, Promise, Time
 from rosglass.comm.inorder import InOrder
 from rosglass.comm.promise import check_timeout
 from rosglass.comm.readiness import Readiness
@@ -31,8 +30,8 @@ from rosglass.ros1.action_types import (
     RESULT,
     STATUS,
     ActionTypes,
-    actions,
-    part,
+    new_id,
+    offered,
     state_of,
     time_of,
 )
@@ -58,8 +57,6 @@ _log = logging.getLogger("rosglass.ros1")
 _SILENCE, _ANSWER = 5.0, 5.0
 #: Seconds after which a server has told of the goals that it knew when it was connected.
 _SETTLED = 1.0
-#: Goals of this process; actionlib's clients number theirs alike.
-_numbers = itertools.count(1)
 
 
 class Ros1ActionClient(ActionClient, Member):
@@ -185,7 +182,7 @@ class Ros1ActionClient(ActionClient, Member):
         else:
             raise ConversionError("", goal, "a message or a dict of fields", self.name)
         now = self.core.clock.now()
-        id_text = f"{self.core.name.full}-{next(_numbers)}-{now.sec}.{now.nanosec:09d}"
+        id_text = new_id(self.core.name.full, now)
         made = Ros1ClientGoal(self, id_text, now, value, timeout, typed=kind is not None)
         if on_feedback is not None:
             made.on_feedback(on_feedback, executor)
@@ -459,17 +456,13 @@ class Ros1ActionClient(ActionClient, Member):
         connecting = "" if ends is None else ends.absence(self._heard)
         if connecting:
             return connecting
-        offered = [
-            name
-            for name in actions(graph)
-            if graph.endpoints(EndpointKind.PUBLISHER, self.core.resolve(part(name, STATUS)))
-        ]
+        names = offered(graph)
         kind = "" if self.type is None else f" [{self.type.name}]"
-        if self.name in offered:
+        if self.name in names:
             return f"the server of {self.name} is not connected yet"
         return (
             f"no server offers the action {self.name}{kind} on {self.core.url} "
-            f"({self.core.status()}){similar(self.name, offered)}"
+            f"({self.core.status()}){similar(self.name, names)}"
         )
 
     # -- the end ---------------------------------------------------------------------------------

@@ -6,7 +6,6 @@ Protocol: ROS wiki, "actionlib/DetailedDescription".
 from __future__ import annotations
 
 import inspect
-import itertools
 import logging
 import threading
 import time
@@ -28,6 +27,7 @@ from rosglass.ros1.action_types import (
     RESULT,
     STATUS,
     ActionTypes,
+    new_id,
     part,
     stamp,
     time_of,
@@ -57,7 +57,6 @@ _FREQUENCY, _KEEP = 5.0, 5.0
 #: Longest pause in seconds before ended goals are forgotten where no status is published.
 _TICK = 1.0
 _REPLACED = "Another goal was received, which takes its place"
-_numbers = itertools.count(1)
 
 
 class Ros1ActionServer(ActionServer, Member):
@@ -273,7 +272,7 @@ class Ros1ActionServer(ActionServer, Member):
             return
         now = self._core.clock.now()
         if not id_text:
-            id_text = f"{self._core.name.full}-{next(_numbers)}-{now.sec}.{now.nanosec:09d}"
+            id_text = new_id(self._core.name.full, now)
         with self._lock:
             known = self._closed
             stamped = sent if sent.nanoseconds else now

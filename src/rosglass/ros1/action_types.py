@@ -6,10 +6,11 @@ Layer".
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from rosglass.comm import History, QoS, Time
+from rosglass.comm import EndpointKind, History, QoS, Time
 from rosglass.errors import DecodeError
 from rosglass.interfaces.definition import ActionDefinition, Definition
 from rosglass.interfaces.derived import derive
@@ -32,6 +33,8 @@ __all__ = [
     "announced",
     "assemble",
     "goal_id",
+    "new_id",
+    "offered",
     "part",
     "stamp",
     "state_of",
@@ -43,6 +46,7 @@ GOAL, CANCEL, STATUS, RESULT, FEEDBACK = "goal", "cancel", "status", "result", "
 QUEUE = QoS(history=History.KEEP_ALL)
 
 _STATUS_TYPE, _CANCEL_TYPE = "actionlib_msgs/msg/GoalStatusArray", "actionlib_msgs/msg/GoalID"
+_numbers = itertools.count(1)
 _SUFFIXES = {GOAL: "ActionGoal", RESULT: "ActionResult", FEEDBACK: "ActionFeedback"}
 
 
@@ -123,6 +127,12 @@ def actions(graph: Graph) -> dict[str, list[str]]:
     return found
 
 
+def offered(graph: Graph) -> list[str]:
+    """Return the names of the actions that somebody serves."""
+    publisher = EndpointKind.PUBLISHER
+    return [name for name in actions(graph) if graph.endpoints(publisher, part(name, STATUS))]
+
+
 def stamp(time: Time) -> dict[str, int]:
     """Return the value of a time field."""
     return {"secs": time.sec, "nsecs": time.nanosec}
@@ -136,6 +146,11 @@ def time_of(field: Message) -> Time:
 def goal_id(id: str, time: Time) -> dict[str, object]:
     """Return an ``actionlib_msgs/GoalID``."""
     return {"stamp": stamp(time), "id": id}
+
+
+def new_id(node: str, time: Time) -> str:
+    """Return the id of a new goal, as actionlib makes them: node, number in this process, time."""
+    return f"{node}-{next(_numbers)}-{time.sec}.{time.nanosec:09d}"
 
 
 def state_of(status: Message) -> ServerState:
