@@ -138,10 +138,6 @@ def test_a_rospy_publisher_of_clock_drives_our_timers(start_master, connect, sta
     assert node.now().seconds == 5.0
 
 
-def links(node):
-    return [link[:3] + link[4:] for link in node.bus_info()]
-
-
 def test_roscores_own_node_collects_our_log(start_master, start_program, connect, wait_for):
     master = start_master()
     if not Path(ROSOUT).exists():
@@ -150,12 +146,15 @@ def test_roscores_own_node_collects_our_log(start_master, start_program, connect
     wait_for(lambda: ["/rosout", ["/rosout"]] in master.call("getSystemState")[1], 20)
     node = connect("cockpit", url=master.url)
     listener = node.create_subscription("/rosout_agg", None)
-    wait_for(lambda: any(link[3:5] == ["/rosout_agg", True] for link in links(node)), 20)
+
+    def knock() -> bool:
+        node.logger.info("knock")
+        return listener.wait(0.2) is not None
+
+    wait_for(knock, 20)
     node.logger.error("motor stalled")
-    node.logger.info("second")
-    heard = [listener.wait(20).message(), listener.wait(20).message()]
-    assert [(m.name, m.msg, m.level) for m in heard] == [
-        ("/cockpit", "motor stalled", 8),
-        ("/cockpit", "second", 2),
-    ]
-    assert heard[0].file == __file__
+    message = listener.wait(20).message()
+    while message.msg == "knock":
+        message = listener.wait(20).message()
+    assert (message.name, message.msg, message.level) == ("/cockpit", "motor stalled", 8)
+    assert message.file == __file__
