@@ -34,7 +34,7 @@ _ros1, _ros2 = _fixtures_of("ros1"), _fixtures_of("ros2")
 start_master, master = _ros1.start_master, _ros1.master
 start_rospy, rospy_peer = _ros1.start_rospy, _ros1.rospy_peer
 interfaces, peer_values, start_peer = _ros2.interfaces, _ros2.peer_values, _ros2.start_peer
-free_port = _ros2.free_port
+free_port, dds_domain = _ros2.free_port, _ros2.dds_domain
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,7 @@ def connect(master: Any, router: Router) -> Iterator[Callable[..., Node]]:
 
 @pytest.fixture
 def bridge(connect: Callable[..., Node]) -> Iterator[Callable[..., Bridge]]:
-    """Make a bridge from ROS 1 to ROS 2; closed at the end of the test."""
+    """Make a bridge from ROS 1 to ROS 2, or between two URLs; closed at the end of the test."""
     made: list[Bridge] = []
 
     def bridge(*arguments: Any, urls: tuple[str, str] = ("", ""), **more: Any) -> Bridge:

@@ -10,6 +10,7 @@ import pytest
 from rosglass import ServiceError
 from rosglass.bridge import survey
 from rosglass.comm import Durability, QoS
+from rosglass.messages import MessageType
 from rosglass.ros2.zenoh.router import Router
 
 STRING, IMAGE = "std_msgs/msg/String", "sensor_msgs/msg/Image"
@@ -328,3 +329,64 @@ def test_a_ros2_client_that_is_not_ours(bridge, start_peer, router, rospy_peer, 
     )  # fmt: skip
     assert peer.event("received", 30) == "/told"
     rospy_peer.call("unpublish", topic="/told")
+
+
+def test_a_chain_of_bridges(bridge, connect, start_master, wait_for):
+    """What one bridge brings is not its own to those who go on to a third world."""
+    far = f"{start_master().url}?ip=127.0.0.1"
+    bridge(["*"])
+    bridge(["*"], urls=(far, ""))
+    talker = connect("ros1", "near").create_publisher("/chain", STRING)
+    listener = connect("ros1", "far", far).create_subscription("/chain", STRING)
+
+    def heard():
+        talker.publish(data="far away")
+        return listener.wait(0.1)
+
+    assert wait_for(heard, 30).message().data == "far away"
+
+
+@pytest.mark.parametrize("kind", ["ros1", "dds"])
+def test_other_pairs_of_worlds(bridge, connect, router, request, wait_for, kind):
+    """Between worlds of one ROS messages pass as they are, those of unknown types, too."""
+    if kind == "ros1":
+        ours, other = "", f"{request.getfixturevalue('start_master')().url}?ip=127.0.0.1"
+        near, world = connect("ros1", "pair_near"), "ros1"
+    else:
+        pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
+        ours = router.url
+        other = f"dds://?domain={request.getfixturevalue('dds_domain')}"
+        near, world = connect("ros2", "pair_near"), "ros2"
+    far = connect(world, "pair_far", other)
+    bridge(["/pair"], ["/pair/*"], urls=(ours, other))
+    text = "int32 number\nstring[] words\n"
+    kind_of_ones_own = MessageType.from_text("own_msgs/msg/Own", text, 1 if kind == "ros1" else 2)
+    talker = near.create_publisher("/pair", kind_of_ones_own)
+    listener = far.create_subscription("/pair", kind_of_ones_own)
+    far.create_service_server("/pair/go", "std_srvs/srv/Trigger", lambda _: {"message": "gone"})
+
+    def heard():
+        talker.publish(number=7, words=["a", "b"])
+        return listener.wait(0.1)
+
+    found = wait_for(heard, 30).message()
+    assert (found.number, list(found.words)) == (7, ["a", "b"])
+    client = near.create_service_client("/pair/go", "std_srvs/srv/Trigger")
+    assert client.call(timeout=30).message == "gone"
+
+
+def test_from_ros1_to_dds(bridge, connect, rospy_peer, dds_domain, wait_for):
+    pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
+    url = f"dds://?domain={dds_domain}"
+    bridge(["/far/*"], ["/far/*"], urls=("", url))
+    node = connect("ros2", "dds_viewer", url)
+    viewer = node.create_subscription("/far/picture", IMAGE)
+    data = {"width": 640, "data": {"repeat": 9, "length": 640 * 480 * 3}}
+    rospy_peer.call(
+        "publish", topic="/far/picture", type="sensor_msgs/Image", value=data, latch=True
+    )
+    found = viewer.wait(30).message()
+    assert (found.width, found.data[-1], len(found.data)) == (640, 9, 640 * 480 * 3)
+    node.create_service_server("/far/go", "std_srvs/srv/Trigger", lambda _: {"message": "gone"})
+    (told,) = rospy_peer.call("call", service="/far/go", type="std_srvs/Trigger", timeout=30)
+    assert told == {"success": False, "message": "gone"}

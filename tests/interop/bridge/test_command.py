@@ -1,0 +1,78 @@
+"""``rosglass bridge``, as a user runs it."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+STRING = "std_msgs/msg/String"
+COMMAND = (sys.executable, "-m", "rosglass.cli", "bridge")
+
+
+def run(*arguments, status=0):
+    done = subprocess.run(
+        [*COMMAND, *arguments], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == status, done.stdout + done.stderr
+    return done
+
+
+def test_it_relays_until_it_is_ended(master, router, connect, start_program, wait_for):
+    one, two = connect("ros1", "cli_one"), connect("ros2", "cli_two")
+    talker = one.create_publisher("/cli", STRING)
+    listener = two.create_subscription("/cli", STRING)
+    command = (*COMMAND, f"{master.url}?ip=127.0.0.1", router.url, "--topic", "/cli->")
+    process = start_program(*command, "--statistics", "0.5", env=dict(os.environ))
+
+    def heard():
+        talker.publish(data="from ROS 1")
+        return listener.wait(0.1)
+
+    assert wait_for(heard, 30).message().data == "from ROS 1"
+    wait_for(lambda: any("1 topic, 0 services" in line for line in process.output), 20)
+    process.popen.send_signal(signal.SIGINT)
+    assert process.popen.wait(10) == 130
+    process.end()
+    assert any("/cli -> [std_msgs/msg/String]" in line for line in process.output)
+
+
+def test_it_lists_what_maps(master, router, connect, wait_for):
+    one, two = connect("ros1", "list_one"), connect("ros2", "list_two")
+    one.create_publisher("/list/logs", "rosgraph_msgs/Log")
+    two.create_publisher("/list/markers", "visualization_msgs/msg/Marker")
+    two.create_service_server("/list/go", "std_srvs/srv/Trigger", lambda _: {})
+    wait_for(lambda: one.topics().get("/list/logs"))
+    urls = (f"{master.url}?ip=127.0.0.1", router.url)
+    asked = ("--list", "--topic", "/list/*", "--service", "/list/*")
+    found = {one["name"]: one for one in json.loads(run(*urls, *asked, "--json").stdout)}
+    assert found["/list/logs"]["other_type"] == "rcl_interfaces/msg/Log"
+    assert found["/list/logs"]["direction"] == "->"
+    assert "mesh_file" in found["/list/markers"]["notes"][0]
+    assert found["/list/go"]["kind"] == "service"
+    text = run(*urls, *asked).stdout
+    assert "left out: header.frame_id, topics" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ((), "nothing is to be relayed"),
+        (("--all", "--topic", "/a"), "exclude each other"),
+        (("--topic", "/a b"), "no name of a topic"),
+        (("--topic", "/a", "--qos", "best"), "no QoS preset"),
+    ],
+)
+def test_nonsense(arguments, told):
+    done = run("ros1://127.0.0.1", "zenoh://127.0.0.1", *arguments, status=1)
+    assert told in done.stderr
+
+
+def test_nobody_answers(router, free_port):
+    url = f"ros1://127.0.0.1:{free_port}"
+    done = run(url, router.url, "--all", "--timeout", "1", status=1)
+    assert url in done.stderr
