@@ -81,13 +81,11 @@ class GoalRunner:
             name=f"{self._name} {goal.id_text}",
             daemon=True,
         )
-        with self._lock:
-            self._threads.add(thread)
         try:
-            thread.start()
+            with self._lock:  # who joins must find it started
+                thread.start()
+                self._threads.add(thread)
         except RuntimeError as error:
-            with self._lock:
-                self._threads.discard(thread)
             self._log.error("%s: aborting goal %s: %s", self._name, goal.id_text, error)
             goal.fail(error)
             self._ended()

@@ -241,10 +241,10 @@ class Ros1ActionClient(ActionClient, Member):
         if self._ends is not None:
             self._ends.send_goal(goal)
 
-    def ask_cancel(self, id_text: str) -> None:
-        """Publish a request to cancel one goal."""
-        if self._ends is not None and not self._closed:
-            self._ends.send_cancel(id_text, Time())
+    def ask_cancel(self, id_text: str) -> bool:
+        """Publish a request to cancel one goal; return whether somebody is there to hear it."""
+        ends = self._ends
+        return ends is not None and not self._closed and ends.send_cancel(id_text, Time())
 
     def forget(self, goal: Ros1ClientGoal) -> None:
         """Let a goal go that has ended."""
@@ -263,7 +263,8 @@ class Ros1ActionClient(ActionClient, Member):
             goal.lose(self.ended())
             return
         goal.begin()
-        if self._server and not goal.over:
+        self._look()  # it is not to be sent to nobody
+        if self._server and not goal.sent and not goal.over:
             goal.send(self._server, self._epoch)
 
     def _begin_sweep(self, until: Time | None, answer: Promise[CancelAnswer]) -> None:
@@ -273,6 +274,7 @@ class Ros1ActionClient(ActionClient, Member):
         for goal in self._live():
             if not goal.sent and (until is None or goal.stamp <= until):
                 goal.cancel()
+        self._look()  # a lost stop command is the worst that can happen
         self._sweeps.add(until, answer)
         self._ask_sweeps()
 

@@ -66,9 +66,14 @@ class ActionEnds:
         """Publish a goal; raises ConversionError."""
         self._publishers[GOAL].publish(goal)
 
-    def send_cancel(self, id: str, time: Time) -> None:
-        """Ask for goals to be cancelled: one, those until a time, or all."""
+    def send_cancel(self, id: str, time: Time) -> bool:
+        """Ask for goals to be cancelled: one, those until a time, or all.
+
+        Returns:
+            Whether somebody is connected to hear it.
+        """
         self._publishers[CANCEL].publish(goal_id(id, time))
+        return self._publishers[CANCEL].subscription_count() > 0
 
     def tellers(self) -> dict[str, str]:
         """Return the nodes that are connected to tell the status of goals, with their URIs."""

@@ -95,7 +95,7 @@ class Sweeps:
         """Take a request in; it waits for :meth:`ask`."""
         self._waiting.append((until, answer))
 
-    def ask(self, before: dict[str, Entry], send: Callable[[Time | None], None]) -> None:
+    def ask(self, before: dict[str, Entry], send: Callable[[Time | None], object]) -> None:
         """Ask a server for all that waits.
 
         Args:

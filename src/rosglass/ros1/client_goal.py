@@ -50,7 +50,7 @@ _OUTAGE = 10.0
 #: Seconds that a result may take once the server keeps the goal's end in mind no longer.
 _OVERDUE = 5.0
 #: Seconds after which a request to cancel is repeated that the server shows no sign of, and how
-#: often: a lost stop command is the worst that can happen.
+#: often while it is connected: a lost stop command is the worst that can happen.
 _INSIST, _REPEATS = 1.0, 3
 
 _CANCELED = (
@@ -276,8 +276,7 @@ class Ros1ClientGoal(ClientGoal):
         self._take(said, text)
         waits = self._machine.state is CommState.WAITING_FOR_CANCEL_ACK
         if waits and self._repeats < _REPEATS and time.monotonic() - self._asked >= _INSIST:
-            self._repeats += 1
-            self._ask_cancel()
+            self._repeats += self._ask_cancel()
 
     def miss(self, server: str) -> None:
         """Take note that a status message does not name it."""
@@ -346,7 +345,8 @@ class Ros1ClientGoal(ClientGoal):
         if self.server in tellers:
             self._alone = None
             if not self._known and settled and epoch != self._epoch:
-                self.lose(self._gone("it was restarted after the goal was sent to it, and before"))
+                self._client.ask_cancel(self._id_text)  # nothing is to run that nobody watches
+                self.lose(self._gone("was cut off after it was sent the goal, before"))
             return
         self._alone = self._alone or now
         cut_off = self._client.core.status().state is not ConnectionState.CONNECTED
@@ -429,9 +429,9 @@ class Ros1ClientGoal(ClientGoal):
             told = f"{self._label} was cancelled before any server told its type: no result"
             self._end(ServiceUnavailableError(told))
 
-    def _ask_cancel(self) -> None:
+    def _ask_cancel(self) -> bool:
         self._asked = time.monotonic()
-        self._client.ask_cancel(self._id_text)
+        return self._client.ask_cancel(self._id_text)
 
     def _take(self, said: ServerState, text: str) -> None:
         try:

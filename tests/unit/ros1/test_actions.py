@@ -47,10 +47,14 @@ class Puppet:
             f"{NAME}/goal", "actionlib/TestActionGoal", self.goals.append, executor=IMMEDIATE
         )
         if leave_out != "cancel":
-            node.create_subscription(
-                f"{NAME}/cancel", "actionlib_msgs/GoalID", self._cancel, executor=IMMEDIATE
-            )
+            self.listen()
         self.say()
+
+    def listen(self):
+        """Take requests to cancel from now on."""
+        self.listening = self.node.create_subscription(
+            f"{NAME}/cancel", "actionlib_msgs/GoalID", self._cancel, executor=IMMEDIATE
+        )
 
     def _cancel(self, message):
         stamp = message.stamp.secs * 10**9 + message.stamp.nsecs
@@ -204,6 +208,37 @@ def test_a_request_to_cancel_is_repeated_until_the_server_shows_a_sign(
     puppet.end("PREEMPTED", text="stopped")
     assert sent.result(5).status is GoalStatus.CANCELED
     assert sent.text == "stopped"
+
+
+def test_a_request_to_cancel_outlives_a_connection(sent, client, puppet, eventually, monkeypatch):
+    monkeypatch.setattr("rosglass.ros1.client_goal._INSIST", 0.02)
+    puppet.listening.close()
+    eventually(lambda: not client.ready)
+    answer, every = sent.cancel(), client.cancel_all()
+    for _ in range(20):
+        puppet.say(g0="ACTIVE")
+    assert not client.ready
+    puppet.listen()
+
+    def heard():
+        puppet.say(g0="ACTIVE")
+        return (sent.id_text, 0) in puppet.cancels and ("", 0) in puppet.cancels
+
+    eventually(heard)
+    puppet.say(g0="PREEMPTING")
+    assert answer.result(5).accepted == (sent.id,)
+    assert every.result(5).accepted == (sent.id,)
+
+
+def test_a_server_that_was_cut_off_may_have_missed_a_goal(client, puppet, eventually):
+    goal = client.send_goal({"goal": 1}, timeout=None)
+    eventually(lambda: puppet.goals)
+    puppet.listening.close()
+    eventually(lambda: not client.ready)
+    puppet.listen()
+    with pytest.raises(ConnectionLostError, match=r"was cut off after it was sent the goal"):
+        goal.result(10)
+    eventually(lambda: puppet.cancels == [(goal.id_text, 0)])
 
 
 def test_a_request_to_cancel_that_nobody_heeds_times_out(sent):
