@@ -161,18 +161,24 @@ def open_bag(path: str | os.PathLike[str]) -> Bag:
     found = Path(path).expanduser()
     if not found.exists():
         raise BagError(f"{found} does not exist; name an MCAP file, a ROS 2 bag or a ROS 1 bag")
-    if found.is_file() and (found.suffix == ".mcap" or _starts_as_mcap(found)):
+    if found.is_file() and (found.suffix == ".mcap" or _starts_with(found, _MCAP)):
         from rosglass.bags.mcap_bag import McapBag  # noqa: PLC0415 - the library is an extra
 
         return McapBag(found)
+    from rosglass.bags.ros1_cut_bag import MAGIC, Ros1CutBag  # noqa: PLC0415 - for few files
     from rosglass.bags.rosbags_bag import RosbagsBag  # noqa: PLC0415 - slow to import
 
-    return RosbagsBag(found)
+    try:
+        return RosbagsBag(found)
+    except BagError:
+        if not (found.is_file() and _starts_with(found, MAGIC)):
+            raise
+    return Ros1CutBag(found)
 
 
-def _starts_as_mcap(path: Path) -> bool:
+def _starts_with(path: Path, magic: bytes) -> bool:
     try:
         with path.open("rb") as file:
-            return file.read(len(_MCAP)) == _MCAP
+            return file.read(len(magic)) == magic
     except OSError as error:
         raise BagError(f"{path} cannot be read: {error.strerror}") from error

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import heapq
 import logging
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from mcap.reader import NonSeekingReader, SeekingReader
 
 from rosglass.bags.bag import Bag, BagMessage, Channel
+from rosglass.bags.nearly_sorted import by_time
 from rosglass.bags.qos_text import read_profiles
 from rosglass.comm import QoS
 from rosglass.errors import BagError
@@ -24,8 +24,6 @@ __all__ = ["McapBag"]
 _log = logging.getLogger("rosglass.bags")
 _WIRES = {"cdr": "cdr", "ros1": "ros1"}
 _LANGUAGES = {"ros2msg": "msg", "ros1msg": "msg", "ros2idl": "idl"}
-#: A file cut short is read from its start, and sorted by time over this many messages.
-_SORTED = 1000
 
 
 class McapBag(Bag):
@@ -71,7 +69,7 @@ class McapBag(Bag):
         if self._complete:
             found = self._seek(topics, start, end)
         else:
-            found = _by_time(self._scan())
+            found = by_time(self._scan())
         for number, time, data in found:
             late = end is not None and time >= end
             if number in wanted and not late and (start is None or time >= start):
@@ -172,19 +170,3 @@ class McapBag(Bag):
     def _note(self, problem: str) -> None:
         self.problem = f"{self.problem}; {problem}" if self.problem else problem
         _log.warning("%s: %s", self.path, problem)
-
-
-def _by_time(messages: Iterator[tuple[int, int, bytes]]) -> Iterator[tuple[int, int, bytes]]:
-    """Sort what is nearly sorted, without holding a whole file in memory."""
-    heap: list[tuple[int, int, int, bytes]] = []
-    for order, (number, time, data) in enumerate(messages):
-        heapq.heappush(heap, (time, order, number, data))
-        if len(heap) > _SORTED:
-            yield _unwrap(heapq.heappop(heap))
-    while heap:
-        yield _unwrap(heapq.heappop(heap))
-
-
-def _unwrap(entry: tuple[int, int, int, bytes]) -> tuple[int, int, bytes]:
-    time, _, number, data = entry
-    return number, time, data
