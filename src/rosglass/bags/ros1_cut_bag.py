@@ -127,25 +127,23 @@ class Ros1CutBag(Bag):
         if number < 0 or number in self._known:
             return
         try:
-            header = _fields(record.data)
+            header = {k: v.decode(errors="replace") for k, v in _fields(record.data).items()}
         except _EndError:
             return
-        told = {
-            key.decode(errors="replace"): header[key].decode(errors="replace") for key in header
-        }
+        told = {key.decode(errors="replace"): text for key, text in header.items()}
         topic = record.fields.get(b"topic", b"").decode(errors="replace")
         try:
-            name = join_name(told.get(b"type", ""))
+            name = join_name(told.get("type", ""))
         except InvalidNameError:
             return
         self._known[number] = Channel(
             topic,
             name,
             "ros1",
-            told.get(b"message_definition", ""),
+            told.get("message_definition", ""),
             "msg",
-            told.get(b"md5sum", ""),
-            (QoS.latched(),) if told.get(b"latching") == "1" else (),
+            told.get("md5sum", ""),
+            (QoS.latched(),) if told.get("latching") == "1" else (),
         )
 
 
