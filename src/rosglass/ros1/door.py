@@ -36,13 +36,15 @@ def listen(address: str, port: int, url: str) -> socket.socket:
         ConnectionLostError: The port is taken, or not allowed.
     """
     six = ":" in address
-    inner = "::1" if six else "127.0.0.1"
+    place = ""
+    if is_loopback(address):
+        place = "127.0.0.1" if address == "localhost" else address
     sock = socket.socket(socket.AF_INET6 if six else socket.AF_INET, socket.SOCK_STREAM)
     try:
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         if six:
             sock.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 0)
-        sock.bind((inner if is_loopback(address) else "", port))
+        sock.bind((place, port))
         sock.listen(_BACKLOG)
         sock.setblocking(False)
     except OSError as error:
