@@ -27,7 +27,7 @@ __all__ = ["Bridge"]
 
 _log = logging.getLogger("rosglass.bridge")
 #: Seconds between two looks when no graph changes.
-_PAUSE = 0.25
+_PAUSE = 0.5
 #: Seconds that who has gone may take to come back: a restart keeps its relay.
 _GONE = 3.0
 #: Seconds between two words about itself.
@@ -88,6 +88,8 @@ class Bridge(Handle):
                 raise ConversionError(name, node, "a node of rosglass.connect()", "Bridge")
         if node_a is node_b:
             raise ConversionError("node_b", node_b, "another node than node_a", "Bridge")
+        if node_a.url == node_b.url:
+            raise ConversionError("node_b", node_b.url, "another world than node_a's", "Bridge")
         check_timeout(timeout, "Bridge")
         if isinstance(memory, bool) or not isinstance(memory, int) or memory < 1:
             raise ConversionError("memory", memory, "a number of bytes", "Bridge")
@@ -190,7 +192,7 @@ class Bridge(Handle):
             if not wanted and relay is not None and not side.connected:
                 wanted = True  # who is there is not known: what works goes on
             wanted = self._settled("topic", key, wanted, relay is not None)
-            if wanted and self._stands_by(side, other, relay):
+            if self._stands_by(side, other, relay) or (relay is not None and relay.outdated):
                 wanted = False
             if not wanted:
                 if relay is not None:
@@ -243,6 +245,8 @@ class Bridge(Handle):
             there = side.other.node.service_servers(other)
             if relay is None and (side.other.beside(there) or not side.other.known):
                 # In ROS 1 whoever offers a service last is called: nobody must be pushed aside.
+                wanted = False
+            elif any(end.node < side.other.name for end in side.other.beside(there)):
                 wanted = False
             rivals = side.other.sources(there)
             refusal = "service", *key

@@ -63,6 +63,7 @@ class TopicRelay:
 
     Attributes:
         fixed: Whether it is there whether somebody publishes or not.
+        outdated: Whether its type is not that of those who publish now: it is to be made anew.
         ignored: Identities of publishers that other bridges have at the source.
     """
 
@@ -81,7 +82,7 @@ class TopicRelay:
     ) -> None:
         self._source, self._target, self.topic, self.other = source, target, topic, other
         self._kind, self._qos, self._keep, self._wake = kind, qos, keep, wake
-        self.fixed = bool(kind)
+        self.fixed, self.outdated = bool(kind), False
         self.ignored: frozenset[bytes] = frozenset()
         self._subscription: Subscription | None = None
         self._translation: Translation | None = None
@@ -98,9 +99,9 @@ class TopicRelay:
         self._wanted_at = time.monotonic()
         self._problem = ""
         self._failed: dict[str, int] = {}
-        self._failed_at = 0.0
+        self._failed_at = self._sent_at = -math.inf
         self._count = self._size = self._refused = 0
-        self._closed = False
+        self._closed = self._hopeless = False
 
     # -- on the bridge's thread ------------------------------------------------------------------
 
@@ -122,7 +123,23 @@ class TopicRelay:
 
         Args:
             own: How many subscriptions this bridge itself has on the topic in the other world.
+
+        Raises:
+            NodeClosedError: One of the nodes is closed.
         """
+        try:
+            self._follow(own)
+        except NodeClosedError:
+            raise
+        except Error as error:
+            self._complain(str(error))
+
+    def _follow(self, own: int) -> None:
+        if self._hopeless:
+            # Nothing can become of its messages: the robot need not send them.
+            if self._subscription is not None:
+                self._subscription.close()
+            return
         now, self._own = time.monotonic(), own
         ends = self._source.sources(self._source.node.publishers(self.topic))
         wanted = self._wanted(own)
@@ -154,12 +171,9 @@ class TopicRelay:
 
     def _subscribe(self) -> None:
         try:
-            wanted: str | MessageType | None = self._kind or None
-            if self._type is not None and self._source.node.wire == "ros1":
-                wanted = self._type
             self._subscription = self._source.node.create_subscription(
                 self.topic,
-                wanted,
+                self._kind or None,
                 qos=QoS.best_available(100) if self._qos is None else self._qos,
                 raw_callback=self._receive,
                 executor=IMMEDIATE,
@@ -172,6 +186,7 @@ class TopicRelay:
             return
         if self._kind and self._subscription.type is not None:
             self._take_type(self._subscription.type)
+        self._subscription.on_matched(lambda _: self._wake(), IMMEDIATE)
 
     def _take_type(self, kind: MessageType) -> None:
         """Find the type in the other world."""
@@ -182,8 +197,9 @@ class TopicRelay:
             self._complain(f"its type {kind.name} cannot be translated: {kind.reason}")
             return
         try:
-            self._translation = Translation(kind, self._in_use(kind.ros), None)
+            self._translation = Translation(kind, self._in_use(kind.ros))
         except Error as error:
+            self._hopeless = True
             self._complain(str(error))
             return
         self._type = kind
@@ -232,15 +248,15 @@ class TopicRelay:
             publisher = self._publisher_for(sample.publisher)
             if publisher is None:
                 return
-            if self._translation is None:
-                if sample.type != self._type:
-                    raise ConversionError("", sample.type.name, f"a {self._type.name}", self.topic)
-                data: bytes | memoryview = sample.data
-            elif sample.type != self._translation.source:
+            same = sample.type.name == self._type.name
+            if not same if self._translation is None else sample.type != self._type:
+                # A node that was updated has been restarted, unless there are two at once.
+                self.outdated = time.monotonic() - self._sent_at > _IDLE
                 told = f"{self._type.name} in the version that came first"
                 raise ConversionError("", sample.type.name, told, self.topic)
-            else:
-                data = self._translation.encode(sample.data)
+            data: bytes | memoryview = sample.data
+            if self._translation is not None:
+                data = self._translation.encode(data)
             if publisher in self._new:
                 self._await_links(publisher)
             publisher.publish_serialized(data)
@@ -254,6 +270,7 @@ class TopicRelay:
             return
         self._count += 1
         self._size += len(sample.data)
+        self._sent_at = time.monotonic()
         if self._problem and time.monotonic() - self._failed_at > _IDLE:
             self._problem = ""
 

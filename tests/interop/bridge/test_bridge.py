@@ -292,7 +292,12 @@ def test_the_master_restarts(bridge, connect, start_master, start_rospy, wait_fo
     again.call(
         "publish", topic="/steady", type="std_msgs/String", value={"data": "new"}, rate=20, count=0
     )
-    wait_for(lambda: listener.wait(1).message().data == "new", 20)
+
+    def heard():
+        sample = listener.wait(0.5)
+        return sample is not None and sample.message().data == "new"
+
+    wait_for(heard, 20)
 
 
 def test_the_router_restarts(bridge, connect, rospy_peer, free_port, wait_for):
@@ -390,3 +395,50 @@ def test_from_ros1_to_dds(bridge, connect, rospy_peer, dds_domain, wait_for):
     node.create_service_server("/far/go", "std_srvs/srv/Trigger", lambda _: {"message": "gone"})
     (told,) = rospy_peer.call("call", service="/far/go", type="std_srvs/Trigger", timeout=30)
     assert told == {"success": False, "message": "gone"}
+
+
+def test_a_publisher_comes_back_with_another_type(bridge, connect, wait_for):
+    made = bridge(["/changed"])
+    two = connect("ros2", "changed_two")
+    listeners = {
+        name: two.create_subscription("/changed", name)
+        for name in (STRING, "geometry_msgs/msg/Point")
+    }
+    for name, value in ((STRING, {"data": "x"}), ("geometry_msgs/msg/Point", {"x": 1.0})):
+        one = connect("ros1", f"changed_{len(value)}_{name[:3]}")
+        talker = one.create_publisher("/changed", name)
+
+        def heard(name=name, value=value, talker=talker):
+            talker.publish(value)
+            return listeners[name].wait(0.1)
+
+        wait_for(heard, 30, what=lambda: str(made.status()))
+        talker.close()
+
+
+def test_a_type_that_cannot_be_is_told_once(bridge, connect, wait_for, caplog):
+    made = bridge(["/case"])
+    kind = MessageType.from_text("own_msgs/msg/Case", "int8 a\nint8 A\n", ros=1)
+    talker = connect("ros1", "case").create_publisher("/case", kind)
+    wait_for(lambda: made.status().relays and made.status().relays[0].problem)
+    assert "differ only in case" in made.status().relays[0].problem
+    wait_for(lambda: talker.subscription_count() == 0)
+    time.sleep(1)
+    assert caplog.text.count("differ only in case") == 1
+
+
+def test_closing(bridge, connect, wait_for):
+    """In any order, twice, with the worlds gone."""
+    made = bridge(["*"], ["*"])
+    one, two = connect("ros1", "close_one"), connect("ros2", "close_two")
+    one.create_publisher("/closing", STRING).publish(data="x")
+    two.create_service_server("/closing/go", "std_srvs/srv/Trigger", lambda _: {})
+    wait_for(lambda: ("/closing", "->") in relays(made) and ("/closing/go", "<-") in relays(made))
+    wait_for(lambda: one.service_servers("/closing/go"))
+    made.close()
+    made.close()
+    wait_for(lambda: not one.service_servers("/closing/go"))
+    other = bridge(["*"], ["*"])
+    for side in other._sides:
+        side.node.close()
+    other.close()
