@@ -13,7 +13,6 @@ from rosglass.comm import Call, QoS, ServiceClient
 from rosglass.comm.promise import check_timeout
 from rosglass.comm.readiness import Readiness
 from rosglass.comm.receiving import check_may_wait
-from rosglass.comm.similar import similar
 from rosglass.errors import (
     ConnectionLostError,
     ConversionError,
@@ -26,8 +25,9 @@ from rosglass.errors import (
     UnsupportedError,
 )
 from rosglass.ros1.core import Member
+from rosglass.ros1.service_finder import ServiceFinder
 from rosglass.ros1.service_link import Request, ServiceLink, check_size
-from rosglass.ros1.service_probe import locate, probe
+from rosglass.ros1.service_probe import probe
 from rosglass.ros1.types import ANY
 
 if TYPE_CHECKING:
@@ -44,19 +44,12 @@ __all__ = ["Ros1ServiceClient"]
 _log = logging.getLogger("rosglass.ros1")
 #: Connections at once, each with a call; more calls wait for their turn.
 _MOST_LINKS = 64
-#: Seconds for which the master's word where a server is counts, when calls come one by one.
-_TRUST = 1.0
-#: Seconds between looks for a server while somebody waits for it.
-_RETRY = 0.2
-#: Seconds between looks whether the server lives: one that was killed stays with the master.
-_CHECK, _CHECK_ABSENT = 3.0, 1.0
 
 
 class Ros1ServiceClient(ServiceClient, Member):
     """A service client; made by :meth:`Ros1Node.create_service_client`.
 
-    Except what users call, everything runs in the loop's thread, which owns the queue, the
-    connections, and what is known of the server.
+    Except what users call, everything runs in the loop's thread, which owns the connections.
 
     Args:
         core: The node it belongs to.
@@ -79,42 +72,40 @@ class Ros1ServiceClient(ServiceClient, Member):
         persistent: bool,
     ) -> None:
         self.name, self.qos, self.persistent = name, qos, persistent
-        self.type: ServiceType | None = None if wanted is None else core.types.service(wanted)
         self._core, self._services = core, services
-        self._discovers, self._fixed = wanted is None, not isinstance(wanted, (str, type(None)))
+        self._finder = ServiceFinder(core, services, name, wanted, self)
         self._lock = threading.Lock()
         self._requests: dict[Call, Request] = {}
         self._count = 0
         self._closed = False
         self._waiters = 0
-        # What follows belongs to the loop's thread.
+        #: The connection that is kept; who claims it for a request has the lock.
+        self._kept: ServiceLink | None = None
+        #: Calls that wait; changed with the lock.
         self._queue: deque[Request] = deque()
+        # What follows belongs to the loop's thread.
         self._links: set[ServiceLink] = set()
-        self._place: Place | None = None
-        self._place_time = 0.0
-        self._peer: Peer | None = None
-        self._looking = self._probing = self._retrying = False
-        self._due = 0.0
-        #: Why the server cannot be reached, or its type is not known; empty when that is not so.
-        self._fault = self._type_fault = self._warned = ""
-        self._nodes: list[str] = []
-        self._tried: tuple[str, str] | None = None
+        self._warned = ""
         self._readiness = Readiness(name, lambda: self.ready, self._check_open, core.dispatcher)
 
     # -- who is there ----------------------------------------------------------------------------
 
     @property
+    def type(self) -> ServiceType | None:  # type: ignore[override]
+        """The service type; None while it is not discovered yet."""
+        return self._finder.type
+
+    @property
     def ready(self) -> bool:
         """Whether a server is there that understands the requests."""
-        known = self._peer is not None and self.type is not None
-        return known and not self._closed and not self._mismatch()
+        return self._finder.ready and not self._closed
 
     @property
     def problem(self) -> str:
         """Why the service cannot be called, in words; empty when all is well."""
         if self._closed:
             return "the client is closed"
-        return self._conflict() or ("" if self.ready else self._absence())
+        return self._finder.conflict() or ("" if self.ready else self._finder.absence())
 
     @property
     def pending(self) -> int:
@@ -127,7 +118,7 @@ class Ros1ServiceClient(ServiceClient, Member):
             self._waiters += 1
         try:
             if not self.ready:
-                self._core.loop.call(self._look)
+                self._core.loop.call(self._finder.look)
             return self._readiness.wait(timeout)
         finally:
             with self._lock:
@@ -155,7 +146,7 @@ class Ros1ServiceClient(ServiceClient, Member):
         timeout = check_timeout(timeout, self.name)
         entry = self._enter(request)
         try:
-            self._core.loop.call(self._advance)
+            self._begin(entry)
             if timeout is not None:
                 try:
                     return entry.call.result(timeout)
@@ -175,7 +166,7 @@ class Ros1ServiceClient(ServiceClient, Member):
         entry = self._enter(request)
         if timeout is not None:
             entry.timer = self._core.timers.after(timeout, lambda: self._expire(entry, timeout))
-        self._core.loop.call(self._advance)
+        self._begin(entry)
         return entry.call
 
     def _enter(self, value: Any) -> Request:
@@ -207,6 +198,22 @@ class Ros1ServiceClient(ServiceClient, Member):
         call.add_done_callback(lambda _: self._ended(entry))
         return entry
 
+    def _begin(self, entry: Request) -> None:
+        """Send a request at once if a kept connection is idle; else let the loop do it."""
+        link = self._kept
+        if link is not None and link.peer is not None and link.kind is entry.type:
+            with self._lock:
+                alone = len(self._queue) == 1 and self._queue[0] is entry
+                free = alone and not (link.request or link.settling or link.ended)
+                if free:
+                    self._queue.popleft()
+                    link.request, entry.link = entry, link
+                    entry.began = time.monotonic()
+            if free:
+                self._send(link, entry)
+                return
+        self._core.loop.call(self._advance)
+
     def _expire(self, entry: Request, timeout: float) -> None:
         """End a call whose time is over."""
         if entry.call.done():
@@ -219,8 +226,8 @@ class Ros1ServiceClient(ServiceClient, Member):
             )
         else:
             error = TimeoutError(
-                f"{self.name} did not answer within {timeout:g} s: {self._server} was sent the "
-                f"request {time.monotonic() - entry.sent:.1f} s ago, and may still carry it out"
+                f"{self.name} did not answer within {timeout:g} s: {self._finder.server} was sent "
+                f"the request {time.monotonic() - entry.sent:.1f} s ago, and may still carry it out"
             )
         entry.call.fail(error)
 
@@ -239,17 +246,17 @@ class Ros1ServiceClient(ServiceClient, Member):
             entry.timer.close()
         with self._lock:
             self._requests.pop(entry.call, None)
-        # Whoever waits for room, or for a connection, learns it there.
-        self._core.loop.call(lambda: self._release(entry))
+        if entry.link is not None or entry.began is None:
+            self._core.loop.call(lambda: self._release(entry))
 
     def _release(self, entry: Request) -> None:
         link = entry.link
         if link is not None and link.request is entry:
             # Given up: a response that still comes must not be taken for another one's, and the
             # next call shall not go to the same place without asking.
-            link.request, self._place_time = None, 0.0
+            link.request, self._finder.asked = None, 0.0
             link.end("")
-        elif entry.began is None:
+        else:
             with self._lock:
                 if entry in self._queue:
                     self._queue.remove(entry)
@@ -259,22 +266,30 @@ class Ros1ServiceClient(ServiceClient, Member):
     def _advance(self) -> None:
         """Send what waits, in order, if a server is there."""
         while self._queue and not self._closed:
-            kind, place = self.type, self._place
+            kind, place = self.type, None
             link = self._free_link() if self.persistent else None
             if link is None:
                 if len(self._links) >= (1 if self.persistent else _MOST_LINKS):
                     return
-                if place is None or time.monotonic() - self._place_time > _TRUST:
-                    self._look()
+                place = self._finder.current()
+                if place is None:
                     return
             if kind is None:
                 return  # the server is being asked for it
-            entry = self._queue.popleft()
-            if entry.call.done() or not self._encoded(entry, kind):
-                continue
-            entry.began = time.monotonic()
-            if link is not None:
-                link.request, entry.link = entry, link
+            with self._lock:
+                if not self._queue or (link is not None and link.request is not None):
+                    return
+                entry = self._queue.popleft()
+                entry.began = time.monotonic()
+                if link is not None:
+                    link.request, entry.link = entry, link
+            error = self._encode(entry, kind)
+            if error is not None or entry.call.done():
+                if link is not None:
+                    link.request = entry.link = None
+                if error is not None:
+                    entry.call.fail(error)
+            elif link is not None:
                 self._send(link, entry)
             elif place is not None:
                 self._dial(kind, place, entry)
@@ -283,33 +298,33 @@ class Ros1ServiceClient(ServiceClient, Member):
         try:
             link = ServiceLink(self._core, self.name, kind, place, self.persistent, self)
         except OSError as error:  # no more sockets, or an address that this machine cannot use
-            self._place, self._fault = None, self._dead(place, error.strerror or str(error))
             self._put_back(entry)
-            self._retry()
+            self._finder.fail(place, error.strerror or str(error))
         else:
             self._links.add(link)
             link.request, entry.link = entry, link
+            self._kept = link if self.persistent else None
 
     def _free_link(self) -> ServiceLink | None:
         """Return the kept connection, if it is idle and still the right one."""
         for link in list(self._links):
             if link.peer is None or link.request is not None:
                 continue
-            if link.kind is not self.type or self._place not in (None, link.place):
+            if link.kind is not self.type or self._finder.place not in (None, link.place):
                 link.end("")
             elif link.lives():
                 return link
         return None
 
-    def _encoded(self, entry: Request, kind: ServiceType) -> bool:
+    def _encode(self, entry: Request, kind: ServiceType) -> Error | None:
         try:
             entry.encode(kind)
         except Error as error:
-            entry.call.fail(error)
+            return error
         except Exception as error:
             _log.exception("%s: encoding a request failed", self.name)
-            entry.call.fail(ServiceError(f"{self.name}: the request could not be sent: {error}"))
-        return not entry.call.done()
+            return ServiceError(f"{self.name}: the request could not be sent: {error}")
+        return None
 
     def _send(self, link: ServiceLink, entry: Request) -> None:
         entry.sent = time.monotonic()
@@ -317,20 +332,25 @@ class Ros1ServiceClient(ServiceClient, Member):
 
     def link_ready(self, link: ServiceLink, peer: Peer) -> None:
         """Send the request for which the connection was made."""
-        self._meet(peer)
+        self._finder.meet(peer)
         entry = link.request
         if entry is None or entry.call.done():
             link.end("")
         elif peer.md5 not in (ANY, link.kind.md5):
-            link.refusal = self._mismatch() or f"it has md5 {peer.md5}"
+            link.refusal = self._finder.mismatch() or f"it has md5 {peer.md5}"
             link.end(link.refusal)
         else:
             self._send(link, entry)
 
     def link_answered(self, link: ServiceLink, ok: bool, data: bytes | memoryview) -> None:
         """End the call that was answered."""
-        entry, link.request = link.request, None
-        if not link.persistent:
+        with self._lock:
+            link.settling = link.persistent
+            entry, link.request = link.request, None
+        if link.persistent:
+            # Not at once: its end may come right behind the response, or what nobody asked for.
+            self._core.loop.call(lambda: self._settle(link))
+        else:
             link.end("")
         if entry is not None:
             entry.link = None
@@ -340,19 +360,22 @@ class Ros1ServiceClient(ServiceClient, Member):
                 text = bytes(data).decode("utf-8", "replace").strip()
                 told = text or "its server reports a failure and does not say why"
                 entry.call.fail(ServiceError(f"the call of {self.name} failed: {told}"))
-        if link.persistent:
-            # Not at once: its end may come right behind the response.
-            self._core.loop.call(self._advance)
+
+    def _settle(self, link: ServiceLink) -> None:
+        link.settling = False
+        self._advance()
 
     def link_ended(self, link: ServiceLink, reason: str) -> None:
         """End the call that can get no answer any more, or try again if it was not sent."""
         self._links.discard(link)
-        entry, link.request = link.request, None
+        with self._lock:
+            link.ended = True
+            entry, link.request = link.request, None
         if entry is not None:
             entry.link = None
             if entry.sent is not None:
                 entry.call.fail(self._loss(entry, reason))
-            elif link.refusal and (entry.refused or self._place_time >= entry.made):
+            elif link.refusal and (entry.refused or self._finder.asked >= entry.made):
                 self._explain(entry, link)
             elif not entry.call.done():
                 # Refused where the server was before the call: it may be elsewhere by now.
@@ -361,7 +384,7 @@ class Ros1ServiceClient(ServiceClient, Member):
         if self._closed:
             return
         if reason:
-            self._lose(link, reason)
+            self._finder.lose(link, reason)
         self._advance()
 
     def _put_back(self, entry: Request) -> None:
@@ -379,7 +402,7 @@ class Ros1ServiceClient(ServiceClient, Member):
             message = response.decode(data)
         except DecodeError as problem:
             rubbish = ServiceError(
-                f"{self._server} answered the call of {self.name} with bytes that are no "
+                f"{self._finder.server} answered the call of {self.name} with bytes that are no "
                 f"{response.name}: {problem}; it was probably built from another definition "
                 "of the type: add that to the library"
             )
@@ -391,7 +414,7 @@ class Ros1ServiceClient(ServiceClient, Member):
     def _loss(self, entry: Request, reason: str) -> ConnectionLostError:
         since = time.monotonic() - (entry.sent or 0.0)
         return ConnectionLostError(
-            f"{self._server} went away before it answered the call of {self.name} sent "
+            f"{self._finder.server} went away before it answered the call of {self.name} sent "
             f"{since:.1f} s ago ({reason or 'the connection was closed'}), and may have carried "
             "it out or not; look what happened, and call again"
         )
@@ -400,10 +423,10 @@ class Ros1ServiceClient(ServiceClient, Member):
         """End a call that was refused: most likely the server has another definition."""
 
         def fail(peer: Peer | None, _: str = "") -> None:
-            if peer is not None and not self._closed:
-                self._meet(peer)
+            if peer is not None:
+                self._finder.meet(peer)
             called = f"it was called as {link.kind.name} with md5 {link.kind.md5}"
-            told = self._mismatch() or f"{called}: {link.refusal}"
+            told = self._finder.mismatch() or f"{called}: {link.refusal}"
             refused = f"{link.place.uri} refuses the call of {self.name}: {told}"
             entry.call.fail(ServiceError(refused))
 
@@ -412,202 +435,36 @@ class Ros1ServiceClient(ServiceClient, Member):
         except OSError:  # no more sockets
             fail(None)
 
-    # -- finding the server, in the loop's thread ------------------------------------------------
+    # -- what the finder asks and tells, in the loop's thread --------------------------------------
 
-    def _look(self) -> None:
-        """Ask the master where the server is, and the server for its type if need be."""
-        if self._looking or self._retrying or self._closed:
-            return
-        self._looking = True
-        self._services.errands.run(self._locate)
+    @property
+    def waits(self) -> bool:
+        """Whether somebody waits for the server."""
+        return bool(self._queue) or (self._waiters > 0 and not self.ready)
 
-    def _locate(self) -> None:
-        """Ask the master; on a thread that may wait."""
-        place, fault = None, ""
-        try:
-            place = locate(self._core.master, self.name)
-        except ConnectionLostError as error:
-            fault = str(error)
-        self._core.loop.call(lambda: self._located(place, fault))
+    @property
+    def busy(self) -> bool:
+        """Whether there are connections with the server."""
+        return bool(self._links)
 
-    def _located(self, place: Place | None, fault: str) -> None:
-        self._looking = False
-        if self._closed:
-            return
-        self._place_time = time.monotonic()
-        if fault and self._peer is not None and self._place is not None:
-            place = self._place  # only the master is away: the server is called where it was
-        else:
-            self._fault = fault
-        if place is None:
-            self._due = self._place_time + _CHECK_ABSENT
-            self._place = self._peer = None
-            self._update()
-            self._retry()
-            return
-        moved = self._place is None or self._place.uri != place.uri
-        self._place = place
+    def server_found(self, moved: bool) -> None:
+        """Call the server where it is now."""
         if moved:
             for link in [link for link in self._links if link.request is None]:
                 link.end("")  # a kept connection to who offers it no more
         self._advance()
-        wanted = self._peer is None or moved or self._place_time >= self._due
-        if wanted and not self._probing and not self._links:
-            self._probe(place)
 
-    def _probe(self, place: Place) -> None:
-        self._probing = True
-        try:
-            probe(self._core, self.name, place, lambda peer, why: self._probed(place, peer, why))
-        except OSError as error:
-            self._probed(place, None, error.strerror or str(error))
-
-    def _probed(self, place: Place, peer: Peer | None, why: str) -> None:
-        self._probing = False
-        if self._closed:
-            return
-        if peer is not None:
-            self._meet(peer)
-            return
-        self._due = time.monotonic() + _CHECK_ABSENT
-        if place == self._place:
-            self._fault, self._peer, self._place = self._dead(place, why), None, None
-        self._update()
-        self._retry()
-
-    def _retry(self) -> None:
-        """Look again soon if somebody waits."""
-        if (self._queue or self._waiters) and not self._retrying:
-            self._retrying = True
-            self._core.loop.after(_RETRY, self._again)
-
-    def _again(self) -> None:
-        self._retrying = False
-        if self._queue:
-            self._advance()
-        elif self._waiters and not self.ready:
-            self._look()
-
-    def _meet(self, peer: Peer) -> None:
-        """Take what the server says of itself."""
-        self._due = time.monotonic() + _CHECK
-        self._peer, self._fault = peer, ""
-        self._services.types.note(self.name, peer)
-        key = (peer.type, peer.md5)
-        ours = self.type
-        fits = ours is not None and peer.md5 in (ANY, ours.md5)
-        if self._discovers and fits and ours is not None:
-            fits = peer.type in ("", ours.name)
-        if fits:
-            self._tried, self._type_fault = key, ""
-        elif not self._fixed and (key != self._tried or self._type_fault):
-            self._tried = key
-            self._services.errands.run(lambda: self._learn(peer))
-        self._update()
-
-    def _learn(self, peer: Peer) -> None:
-        """Find the definition that the server has; on a thread that may wait."""
-        kind, fault = None, ""
-        try:
-            kind = self._core.types.announced_service(peer.type, peer.md5)
-        except Error as error:
-            fault = f"{peer.node} offers it as {peer.type or 'an unknown type'}: {error}"
-        self._core.loop.call(lambda: self._learned(peer, kind, fault))
-
-    def _learned(self, peer: Peer, kind: ServiceType | None, fault: str) -> None:
-        if self._closed or self._tried != (peer.type, peer.md5):
-            return
-        same_name = self.type is None or kind is None or kind.name == self.type.name
-        if kind is not None and (self._discovers or same_name):
-            self.type = kind
-        self._type_fault = fault
-        self._update()
-        self._advance()
-
-    def _lose(self, link: ServiceLink, reason: str) -> None:
-        """Forget a server whose connection has ended, as far as it is the one that counts."""
-        if self._place is None or link.place == self._place:
-            self._place_time = self._due = 0.0
-            if link.peer is None and not link.refusal:
-                self._peer, self._fault = None, self._dead(link.place, reason)
-        self._update()
-        if self._queue or self._waiters:
-            self._retry()
-        else:
-            self._look()
-
-    def _dead(self, place: Place, why: str) -> str:
-        nodes = self._core.graph.services().get(self.name, [])
-        who = f"{' and '.join(nodes)} offers" if nodes else "somebody offers"
-        return (
-            f"{who} it at {place.uri}, says the master, but calling it there fails: {why}; if "
-            "it was killed, start it again, or let 'rosnode cleanup' remove it"
-        )
-
-    # -- following the graph ---------------------------------------------------------------------
-
-    def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - time matters as well
-        """Follow the graph: whether a server is there, and which."""
-        if not self._closed:
-            self._core.loop.call(self._follow)
-
-    def _follow(self) -> None:
-        nodes = self._core.graph.services().get(self.name, [])
-        if self._closed:
-            return
-        if nodes != self._nodes:
-            self._nodes, self._due = nodes, 0.0
-            if not nodes and not self._queue:
-                self._place = self._peer = None
-                self._fault = ""
-        # The graph may lag behind: who has come and gone between two looks is in none of them.
-        known = bool(nodes) or self._peer is not None
-        if (known and time.monotonic() >= self._due) or self._queue:
-            self._look()
-        self._update()
-
-    def _update(self) -> None:
+    def server_changed(self) -> None:
         """Tell what has changed."""
-        problem = self._conflict()
+        problem = self._finder.conflict()
         if problem and problem != self._warned:
             _log.warning("%s: %s", self.name, problem)
         self._warned = problem
         self._readiness.update()
 
-    @property
-    def _server(self) -> str:
-        return "its server" if self._peer is None else self._peer.node
-
-    def _mismatch(self) -> str:
-        """Say that the server has another definition; empty when it has ours."""
-        peer, ours = self._peer, self.type
-        if peer is None or ours is None or peer.md5 in (ANY, ours.md5):
-            return ""
-        return (
-            f"{peer.node} offers {self.name} as {peer.type or 'an unknown type'} with md5 "
-            f"{peer.md5}, not as {ours.name} with md5 {ours.md5}: it cannot be called; add the "
-            "robot's definition to the library, or leave out the type. Ours:\n"
-            f"{self._core.types.text(ours).strip()}"
-        )
-
-    def _conflict(self) -> str:
-        """Say what a person has to mend; empty when nothing."""
-        if self._peer is not None and self.type is None:
-            return self._type_fault
-        return self._mismatch()
-
-    def _absence(self) -> str:
-        """Say why no server is there although nothing is wrong."""
-        if self._fault:
-            return self._fault
-        known = self._core.graph.services()
-        if self.name in known:
-            return f"{' and '.join(known[self.name])} offers it, and is being asked for its type"
-        kind = "" if self.type is None else f" [{self.type.name}]"
-        return (
-            f"no server offers {self.name}{kind} on {self._core.url} ({self._core.status()})"
-            f"{similar(self.name, known)}"
-        )
+    def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - time matters as well
+        """Follow the graph: whether a server is there, and which."""
+        self._core.loop.call(self._finder.follow)
 
     # -- the end ---------------------------------------------------------------------------------
 
@@ -622,12 +479,14 @@ class Ros1ServiceClient(ServiceClient, Member):
             return
         for entry in entries:
             entry.call.fail(NodeClosedError(f"the client of {self.name} was closed during a call"))
+        self._finder.close()
         self._core.loop.call(self._end)
         self._readiness.close()
         self._core.remove(self)
 
     def _end(self) -> None:
-        self._queue.clear()
+        with self._lock:
+            self._queue.clear()
         for link in list(self._links):
             link.request = None
             link.end("")

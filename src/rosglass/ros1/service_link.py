@@ -84,7 +84,7 @@ class LinkOwner(Protocol):
 
 
 class ServiceLink:
-    """A connection to a server; everything in the loop's thread.
+    """A connection to a server; in the loop's thread, except :meth:`send`.
 
     Args:
         core: The node.
@@ -103,6 +103,8 @@ class ServiceLink:
         peer: What the server says of itself; None before it has.
         refusal: Why the server refuses the connection; empty when it does not.
         request: The request that is, or will be, answered through it; None when it is idle.
+        settling: Whether what came with the last response is still being looked at.
+        ended: Whether it is of no use any more.
     """
 
     def __init__(
@@ -118,6 +120,7 @@ class ServiceLink:
         self.peer: Peer | None = None
         self.refusal = ""
         self.request: Request | None = None
+        self.settling = self.ended = False
         self._owner = owner
         header = {
             "callerid": core.name.full,
