@@ -351,15 +351,14 @@ def test_closing_our_server_aborts_its_goals(server, peer, name):
 def test_rostopic_sees_and_drives_our_server(connect, tool, start_tool, name, wait_for):
     node = connect("us")
     server = node.create_action_server(name, TYPE, work)
-    for word, kind in (
-        ("goal", "actionlib/TestActionGoal"),
-        ("cancel", "actionlib_msgs/GoalID"),
-        ("status", "actionlib_msgs/GoalStatusArray"),
-        ("result", "actionlib/TestActionResult"),
-        ("feedback", "actionlib/TestActionFeedback"),
-    ):
-        wait_for(lambda w=word: f"{name}/{w}" in node.topics())
-        assert tool("rostopic", "type", f"{name}/{word}").strip() == kind
+    words = ("goal", "cancel", "status", "result", "feedback")
+    wait_for(lambda: node.topics().keys() >= {f"{name}/{word}" for word in words})
+    listed = tool("rostopic", "list", "-v")
+    assert f" * {name}/goal [actionlib/TestActionGoal] 1 subscriber" in listed
+    assert f" * {name}/cancel [actionlib_msgs/GoalID] 1 subscriber" in listed
+    assert f" * {name}/status [actionlib_msgs/GoalStatusArray] 1 publisher" in listed
+    assert f" * {name}/result [actionlib/TestActionResult] 1 publisher" in listed
+    assert f" * {name}/feedback [actionlib/TestActionFeedback] 1 publisher" in listed
     start_tool("rostopic", "pub", f"{name}/goal", "actionlib/TestActionGoal", "goal: {goal: 1000}")
     goal = wait_for(lambda: server.goals and server.goals[0])
     assert goal.id_text.startswith("/us-")  # rostopic leaves that to the server
