@@ -67,7 +67,11 @@ class Ros1BagFile(RecordingFile):
         self._forget()
 
     def flush(self) -> None:
-        """Write the chunk in progress; its index comes at the end, ``rosbag reindex`` makes one."""
+        """Write the chunk in progress.
+
+        The index comes at the end. Without, we read the file; ``rosbag reindex`` does not, because
+        it expects 8 bytes more of padding in the file's header than the rosbags package writes.
+        """
         self._writer.write_chunk(self._writer.chunks[-1])
         self._forget()
         self._writer.bio.flush()

@@ -1,7 +1,7 @@
 """ROS 1 bags that were not closed: without index, or cut short (wiki, "Bags/Format/2.0").
 
-``rosbag reindex`` mends such files where ROS 1 is installed; here they are read as they are, from
-their start and for as far as they go.
+``rosbag reindex`` mends most such files where ROS 1 is installed; here they are read as they are,
+from their start and for as far as they go.
 """
 
 from __future__ import annotations
