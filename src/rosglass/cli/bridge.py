@@ -225,8 +225,8 @@ def _watch(args: argparse.Namespace, bridge: Bridge, end: End) -> int:
     until = math.inf if args.duration is None else time.monotonic() + args.duration
     period = args.statistics or math.inf
     due = time.monotonic() + period
-    news = _News()
     shown = sys.stderr.isatty()
+    news = _News(shown)
     try:
         while not end.wait(max(0.0, min(0.5, until - time.monotonic()))):
             now = time.monotonic()
@@ -254,7 +254,8 @@ def _watch(args: argparse.Namespace, bridge: Bridge, end: End) -> int:
 class _News:
     """Tells what is wrong, or gets lost, when it begins; and when it is over."""
 
-    def __init__(self) -> None:
+    def __init__(self, on_terminal: bool) -> None:
+        self._before = "\r\033[K" if on_terminal else ""
         self._since: dict[str, tuple[str, float]] = {}
         self._told: dict[str, str] = {}
         self._noted: set[tuple[str, str]] = set()
@@ -271,17 +272,20 @@ class _News:
             told = "; ".join(one.notes)
             if told and (one.type, told) not in self._noted:
                 self._noted.add((one.type, told))
-                note(f"{one.name} {one.direction} [{one.type}]: {told}")
+                self._note(f"{one.name} {one.direction} [{one.type}]: {told}")
         for name, problem in problems.items():
             since = self._since.get(name, ("", now))
             self._since[name] = (problem, since[1] if since[0] == problem else now)
             if self._told.get(name) != problem and now - self._since[name][1] >= _PATIENCE:
                 self._told[name] = problem
-                note(f"{name}: {problem}")
+                self._note(f"{name}: {problem}")
         for name in self._since.keys() - problems.keys():
             del self._since[name]
             if self._told.pop(name, None) is not None:
-                note(f"{name}: well again")
+                self._note(f"{name}: well again")
+
+    def _note(self, text: str) -> None:
+        print(f"{self._before}rosglass: {text}", file=sys.stderr, flush=True)
 
 
 def _type(text: str) -> tuple[str, str]:

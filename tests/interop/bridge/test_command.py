@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -76,3 +78,16 @@ def test_nobody_answers(router, free_port):
     url = f"ros1://127.0.0.1:{free_port}"
     done = run(url, router.url, "--all", "--timeout", "1", status=1)
     assert url in done.stderr
+
+
+def test_the_documented_program(master, router):
+    page = (Path(__file__).parents[3] / "docs" / "bridge.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    code = code.replace("ros1://robot:11311", f"{master.url}?ip=127.0.0.1")
+    code = code.replace("zenoh://127.0.0.1:7447", router.url)
+    code += "robot.close()\noffice.close()\n"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("0 topics, 0 services")
