@@ -216,7 +216,7 @@ class TopicRelay:
                     known = load(end.type, 3 - ros, hash=version)
                     if isinstance(known, MessageType) and known not in found:
                         found.append(known)
-                    break
+                        break
         return found
 
     def _part(self, ends: list[EndpointInfo]) -> None:

@@ -33,6 +33,7 @@ def _fixtures_of(world: str) -> ModuleType:
 _ros1, _ros2 = _fixtures_of("ros1"), _fixtures_of("ros2")
 start_master, master = _ros1.start_master, _ros1.master
 start_rospy, rospy_peer = _ros1.start_rospy, _ros1.rospy_peer
+tool = _ros1.tool
 interfaces, peer_values, start_peer = _ros2.interfaces, _ros2.peer_values, _ros2.start_peer
 free_port, dds_domain = _ros2.free_port, _ros2.dds_domain
 
