@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+import rosglass
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -242,6 +244,18 @@ def test_interface_commands(run):
     assert out.startswith("# std_msgs/Header, md5 2176decaecbce78abc3b96ef049fabed, from ")
     assert "uint32 seq" in out
     assert "geometry_msgs/Twist" in run("interface", "list", "twist")[1].splitlines()
+
+
+def test_a_type_that_only_the_robot_has_is_shown(run, connect):
+    text = "uint8 LEVEL=3\nVault[] inner\n" + "=" * 80 + "\nMSG: secret_msgs/Vault\nint8 gold\n"
+    kind = rosglass.MessageType.from_text("secret_msgs/Bank", text, ros=1)
+    connect("bank").create_publisher("/bank", kind)
+    code, out, err = run("interface", "show", "secret_msgs/Bank")
+    assert (code, err) == (0, "")
+    assert f"secret_msgs/Bank, md5 {kind.md5}" in out
+    assert "Vault[] inner" in out
+    code, _, err = run("interface", "show", "secret_msgs/Nothing")
+    assert (code, "no topic of that type is published" in err) == (1, True)
 
 
 def test_doctor_finds_nothing_wrong(run, master):
