@@ -10,6 +10,7 @@ import logging
 import os
 import socket
 import threading
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rosglass.errors import DecodeError
@@ -399,6 +400,9 @@ class Connection:
         self._loop.linger(self, False)
         self._loop.watch(self._sock, 0, self)
         with self._io:
+            with suppress(OSError):
+                # A process that was forked has the socket, too, and would keep the other end.
+                self._sock.shutdown(socket.SHUT_RDWR)
             self._sock.close()
         self._on_closed(reason)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import logging
 import socket
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rosglass.errors import ConnectionLostError
@@ -99,4 +100,7 @@ class Door:
         """Accept nobody any more; safe to call twice."""
         if self._listener.fileno() >= 0:
             self._loop.watch(self._listener, 0, self)
+            with suppress(OSError):
+                # A process that was forked has the socket, too, and would go on listening.
+                self._listener.shutdown(socket.SHUT_RDWR)
             self._listener.close()

@@ -228,3 +228,56 @@ def test_a_node_ends_although_the_master_cannot_tell_it_that_its_name_is_taken(
     wait_for(lambda: older.status().state is ConnectionState.CLOSED)
     assert f"{newer._core.uri} has the name /twin now" in older.status().detail
     assert newer.status().state is ConnectionState.CONNECTED
+
+
+_FORK = """
+import os, sys, threading, rosglass
+
+def wait(condition):
+    for _ in range(1000):
+        if condition():
+            return
+        threading.Event().wait(0.01)
+    sys.exit("not in time")
+
+node = rosglass.connect(sys.argv[1], "parent")
+publisher = node.create_publisher("/forked", "std_msgs/Int32")
+subscription = node.create_subscription("/forked")
+wait(publisher.subscription_count)
+inner, outer = os.pipe()
+child = os.fork()
+if not child:
+    os.close(outer)
+    try:
+        publisher.publish(data=1)
+    except rosglass.NodeClosedError as error:
+        assert "after a fork" in str(error)
+    else:
+        sys.exit("published")
+    assert node.status().state.value == "closed"
+    node.close()
+    with rosglass.connect(sys.argv[1], "child") as own:
+        wait(lambda: own.status().state.value == "connected")
+    os.read(inner, 1)  # it lives on, with all that it has inherited
+    sys.exit(0)
+os.close(inner)
+publisher.publish(data=2)
+assert subscription.wait(10).message().data == 2
+subscription.close()
+wait(lambda: not publisher.subscription_count())
+os.write(outer, b"x")
+assert os.waitpid(child, 0)[1] == 0
+assert node.status().state.value == "connected"
+print('{"done": true}', flush=True)
+# It ends without closing anything.
+"""
+
+
+def test_a_fork_keeps_nothing_alive_and_an_end_without_closing_leaves_nothing(
+    own_master, start, wait_for
+):
+    process = start("-c", _FORK, f"{own_master.url}?ip=127.0.0.1")
+    assert process.event("done")
+    assert process.popen.wait(10) == 0
+    assert "".join(process.output) == ""
+    assert [part for part in own_master.call("getSystemState") if part] == []
