@@ -1,0 +1,277 @@
+"""Topics when peers die, are slow, send garbage, or leave while they are being connected."""
+
+from __future__ import annotations
+
+import gc
+import os
+import socket
+import struct
+import threading
+import time
+import xmlrpc.client
+from pathlib import Path
+
+import pytest
+
+import rosglass
+from rosglass.comm import IMMEDIATE
+from rosglass.messages import MessageType, OpaqueType
+from rosglass.ros1.header import encode_header, parse_header
+
+STRING = "std_msgs/String"
+
+
+def dial(node, published, **fields):
+    """Connect to a node of ours as a subscriber would; return the socket and the answer."""
+    with xmlrpc.client.ServerProxy(node._core.uri) as api:
+        _, _, (_, host, port) = api.requestTopic("/raw", published, [["TCPROS"]])
+    sock = socket.create_connection((host, port))
+    sock.settimeout(10)
+    if fields:
+        sock.sendall(encode_header({"callerid": "/raw", "topic": published} | fields))
+    return sock
+
+
+def answer_of(sock):
+    """Return the connection header that a node answers with."""
+    (size,) = struct.unpack("<I", sock.recv(4, socket.MSG_WAITALL))
+    return parse_header(sock.recv(size, socket.MSG_WAITALL))
+
+
+def test_a_publisher_that_is_killed_is_told_of_and_replaced(connect, start_rospy, wait_for):
+    node = connect("follower")
+    subscription = node.create_subscription("/killed", STRING)
+    plan = {"topic": "/killed", "type": STRING, "rate": 50, "count": 0}
+    first = start_rospy("killed")
+    first.call("publish", value={"data": "first"}, **plan)
+    assert subscription.wait(10).message().data == "first"
+    first.end()
+    wait_for(
+        lambda: (
+            "/killed was lost" in subscription.problem
+            or "cannot be received" in subscription.problem
+        )
+    )
+    assert subscription.publisher_count() == 0
+    second = start_rospy("killed")  # the same name on other ports
+    second.call("publish", value={"data": "second"}, **plan)
+    wait_for(lambda: (s := subscription.wait(1)) and s.message().data == "second")
+    wait_for(lambda: not subscription.problem, what=lambda: subscription.problem)
+
+
+def test_messages_flow_on_while_the_master_is_killed_and_restarted(
+    start_master, connect, start_rospy, wait_for
+):
+    master = start_master()
+    node = connect("steady", url=master.url)
+    peer = start_rospy("steady_peer", master=master)
+    peer.call("publish", topic="/a", type=STRING, value={"data": "x"}, rate=50, count=0)
+    subscription = node.create_subscription("/a", STRING)
+    assert subscription.wait(10)
+    master.kill()
+    wait_for(lambda: node.status().state.value == "lost")
+    for _ in range(20):
+        assert subscription.wait(5)
+    assert subscription.problem == ""
+    master.start()
+    wait_for(lambda: node.status().state.value == "connected")
+    # rospy does not register again: the new master never names it, and we keep it all the same.
+    wait_for(lambda: ["/a", ["/steady"]] in master.call("getSystemState")[1])
+    other = connect("newcomer", url=master.url)
+    publisher = other.create_publisher("/a", STRING)
+    wait_for(lambda: subscription.publisher_count() == 2)
+    publisher.publish(data="new")
+    wait_for(lambda: (s := subscription.wait(1)) and s.message().data == "new")
+    assert subscription.publisher_count() == 2
+
+
+def test_a_slow_subscriber_is_told_of_and_holds_up_nobody(connect, wait_for):
+    node, other = connect("fast"), connect("listener")
+    publisher = node.create_publisher("/fast", "std_msgs/UInt8MultiArray", 5)
+    slow = dial(node, "/fast", md5sum="*", type="*")
+    got = []
+    other.create_subscription("/fast", raw_callback=got.append, executor=IMMEDIATE)
+    wait_for(lambda: publisher.subscription_count() == 2)
+    data = publisher.type.encode({"data": bytes(1_000_000)})
+    for number in range(60):
+        publisher.publish_serialized(data)
+        wait_for(lambda wanted=number: len(got) > wanted)
+    assert publisher.dropped >= 40
+    assert all(link.waiting() <= 6 for link in publisher.publication.links())
+    wait_for(lambda: "/raw is too slow" in publisher.problem)
+    slow.close()
+    wait_for(lambda: publisher.problem == "" and publisher.subscription_count() == 1)
+
+
+@pytest.mark.parametrize("garbage", [b"\xff" * 100, b"GET / HTTP/1.1\r\n\r\n", b"\0" * 4])
+def test_garbage_is_hung_up_on_and_others_go_on(garbage, connect, wait_for):
+    node = connect("robust")
+    publisher = node.create_publisher("/robust", STRING)
+    subscription = node.create_subscription("/robust")
+    wait_for(lambda: publisher.subscription_count() == 1)
+    with dial(node, "/robust") as sock:
+        sock.sendall(garbage)
+        assert sock.recv(10) == b""
+    publisher.publish(data="on")
+    assert subscription.wait(10).message().data == "on"
+
+
+@pytest.mark.parametrize(
+    ("fields", "told"),
+    [
+        ({"type": STRING}, "no md5sum"),
+        ({"md5sum": "0" * 32, "type": STRING}, f"md5 {'0' * 32}"),
+        ({"md5sum": "*", "type": "std_msgs/Int32"}, "subscribes to std_msgs/Int32"),
+        ({"topic": "/nowhere", "md5sum": "*"}, "does not publish /nowhere"),
+    ],
+)
+def test_a_header_that_will_not_do_is_refused_by_name(fields, told, connect, wait_for):
+    node = connect("strict")
+    publisher = node.create_publisher("/strict", STRING)
+    with dial(node, "/strict", **fields) as sock:
+        assert told in answer_of(sock)["error"]
+        assert sock.recv(10) == b""
+    if "topic" not in fields:
+        wait_for(lambda: told in publisher.problem)
+
+
+def test_an_md5_mismatch_names_both_definitions(connect, wait_for):
+    node, other = connect("ours"), connect("theirs")
+    theirs = MessageType.from_text("test_msgs/msg/Other", "int32 theirs\n", ros=1)
+    ours = MessageType.from_text("test_msgs/msg/Other", "int32 ours\n", ros=1)
+    other.create_publisher("/mismatch", theirs)
+    subscription = node.create_subscription("/mismatch", ours)
+    told = wait_for(lambda: subscription.problem)
+    for part in (theirs.md5, ours.md5, "int32 theirs", "int32 ours", "/theirs"):
+        assert part in told
+    assert subscription.publisher_count() == 0
+
+
+def test_what_nobody_can_define_is_passed_on_as_it_came(connect, wait_for):
+    source, relay, sink = connect("source"), connect("relay"), connect("sink")
+    secret = OpaqueType("secret_msgs/Thing", "a" * 32, text="no definition {", ros=1)
+    sent = source.create_publisher("/secret", secret, rosglass.QoS.latched())
+    sent.publish_serialized(b"\1\2\3")
+    sample = relay.create_subscription("/secret").wait(10)
+    assert (bytes(sample.data), sample.type) == (b"\1\2\3", secret)
+    again = relay.create_publisher("/passed_on", sample.type, rosglass.QoS.latched())
+    again.publish_serialized(sample)
+    end = sink.create_subscription("/passed_on").wait(10)
+    assert (bytes(end.data), end.type.text) == (b"\1\2\3", "no definition {")
+    with pytest.raises(rosglass.TypeNotFoundError, match="md5"):
+        relay.create_publisher("/nothing", OpaqueType("secret_msgs/Thing", ros=1))
+
+
+def test_each_latched_publisher_of_a_node_is_heard_by_who_comes_late(connect, wait_for):
+    node = connect("static")
+    first = node.create_publisher("/static", STRING, rosglass.QoS.latched())
+    second = node.create_publisher("/static", STRING, rosglass.QoS.latched())
+    for text in ("old", "a"):
+        first.publish(data=text)
+    second.publish(data="b")
+    for reader in (node, node, connect("late")):
+        subscription = reader.create_subscription("/static")
+        assert {subscription.wait(10).message().data for _ in range(2)} == {"a", "b"}
+    first.close()
+    assert connect("later").create_subscription("/static").wait(10).message().data == "b"
+
+
+def test_creating_and_closing_a_thousand_times_leaves_nothing(connect, wait_for):
+    node = connect("busy")
+    publisher = node.create_publisher("/busy", STRING)
+
+    def cycle():
+        subscription = node.create_subscription("/busy")
+        again = node.create_publisher("/busy/again", STRING)
+        subscription.close()
+        again.close()
+
+    def things():
+        return threading.active_count(), len([*Path("/proc/self/fd").iterdir()])
+
+    for _ in range(20):
+        cycle()
+    wait_for(lambda: publisher.subscription_count() == 0)
+    time.sleep(6)  # threads for errands end after 5 s without any
+    before = things()
+    for number in range(1000):
+        cycle()
+        if number % 50 == 49:
+            wait_for(lambda: publisher.subscription_count() == 0, 30)
+    wait_for(
+        lambda: all(now <= then for now, then in zip(things(), before, strict=True)),
+        30,
+        what=lambda: f"{things()}, {before} before",
+    )
+    gc.collect()
+    kinds = [type(one).__name__ for one in gc.get_objects()]
+    assert kinds.count("Reading") < 20
+    assert kinds.count("Connection") < 20
+    # What was closed and made again is registered at last.
+    subscription = node.create_subscription("/busy")
+    wait_for(lambda: publisher.subscription_count() == 1)
+    publisher.publish(data="x")
+    assert subscription.wait(10)
+
+
+def test_closing_while_connecting(connect, start_master):
+    publisher = connect("there").create_publisher("/closing", STRING)
+    for number in range(10):
+        node = connect(f"closing{number}", wait=number % 2 == 0)
+        subscription = node.create_subscription("/closing")
+        time.sleep(number * 0.003)
+        began = time.monotonic()
+        node.close()
+        assert time.monotonic() - began < 5
+        assert subscription.closed
+        assert subscription.wait() is None
+    publisher.close()
+
+
+def test_an_immediate_callback_may_publish_and_close(connect, wait_for):
+    node = connect("reflex")
+    out = node.create_publisher("/reflex/out", STRING)
+    back = node.create_subscription("/reflex/out")
+    got = []
+
+    def reflex(sample):
+        got.append(sample)
+        out.publish_serialized(sample)
+        node.create_subscription("/reflex/third").close()
+        subscription.close()
+
+    source = connect("stimulus").create_publisher("/reflex/in", STRING)
+    subscription = node.create_subscription("/reflex/in", raw_callback=reflex, executor=IMMEDIATE)
+    wait_for(lambda: source.subscription_count() and out.subscription_count())
+    source.publish(data="now")
+    assert back.wait(10).message().data == "now"
+    wait_for(lambda: source.subscription_count() == 0)
+    assert len(got) == 1
+
+
+def test_a_host_name_that_is_unknown_is_told_with_the_remedy(connect, master, wait_for):
+    node = connect("lost")
+    subscription = node.create_subscription("/unknown_host")
+    wait_for(lambda: ["/unknown_host", ["/lost"]] in master.call("getSystemState")[1])
+    master.call("registerPublisher", "/unknown_host", STRING, "http://no-such-host.invalid:1/")
+    told = wait_for(lambda: subscription.problem, 20)
+    assert "no-such-host.invalid" in told
+    assert "ROS_HOSTNAME" in told
+
+
+def test_a_fork_does_not_publish_or_steal_messages(connect, wait_for):
+    node = connect("forked")
+    publisher = node.create_publisher("/forked", STRING)
+    subscription = node.create_subscription("/forked")
+    wait_for(lambda: publisher.subscription_count() == 1)
+    publisher.publish(data="before")
+    child = os.fork()
+    if child == 0:
+        try:
+            subscription.take()
+            publisher.publish(data="from the child")
+            os._exit(1)
+        except rosglass.NodeClosedError:
+            os._exit(0)
+    assert os.waitpid(child, 0)[1] == 0
+    assert subscription.wait(10).message().data == "before"
