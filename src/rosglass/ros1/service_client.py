@@ -14,7 +14,6 @@ from rosglass.comm.promise import check_timeout
 from rosglass.comm.readiness import Readiness
 from rosglass.comm.receiving import check_may_wait
 from rosglass.errors import (
-    ConnectionLostError,
     ConversionError,
     DecodeError,
     Error,
@@ -201,10 +200,11 @@ class Ros1ServiceClient(ServiceClient, Member):
     def _begin(self, entry: Request) -> None:
         """Send a request at once if a kept connection is idle; else let the loop do it."""
         link = self._kept
-        if link is not None and link.peer is not None and link.kind is entry.type:
+        if link is not None and link.peer is not None and self._right(link, entry.type):
             with self._lock:
                 alone = len(self._queue) == 1 and self._queue[0] is entry
-                free = alone and not (link.request or link.settling or link.ended)
+                taken = link.request is not None or link.settling or link.ended
+                free = alone and not taken and not entry.call.done()
                 if free:
                     self._queue.popleft()
                     link.request, entry.link = entry, link
@@ -310,11 +310,15 @@ class Ros1ServiceClient(ServiceClient, Member):
         for link in list(self._links):
             if link.peer is None or link.request is not None:
                 continue
-            if link.kind is not self.type or self._finder.place not in (None, link.place):
+            if not self._right(link, self.type):
                 link.end("")
             elif link.lives():
                 return link
         return None
+
+    def _right(self, link: ServiceLink, kind: ServiceType | None) -> bool:
+        """Return whether a connection is one of this type with who offers the service now."""
+        return link.kind is kind and self._finder.place in (None, link.place)
 
     def _encode(self, entry: Request, kind: ServiceType) -> Error | None:
         try:
@@ -374,7 +378,7 @@ class Ros1ServiceClient(ServiceClient, Member):
         if entry is not None:
             entry.link = None
             if entry.sent is not None:
-                entry.call.fail(self._loss(entry, reason))
+                entry.call.fail(entry.loss(f"the call of {self.name}", self._finder.server, reason))
             elif link.refusal and (entry.refused or self._finder.asked >= entry.made):
                 self._explain(entry, link)
             elif not entry.call.done():
@@ -410,14 +414,6 @@ class Ros1ServiceClient(ServiceClient, Member):
             entry.call.fail(rubbish)
         else:
             entry.call.fulfil(message)
-
-    def _loss(self, entry: Request, reason: str) -> ConnectionLostError:
-        since = time.monotonic() - (entry.sent or 0.0)
-        return ConnectionLostError(
-            f"{self._finder.server} went away before it answered the call of {self.name} sent "
-            f"{since:.1f} s ago ({reason or 'the connection was closed'}), and may have carried "
-            "it out or not; look what happened, and call again"
-        )
 
     def _explain(self, entry: Request, link: ServiceLink) -> None:
         """End a call that was refused: most likely the server has another definition."""

@@ -7,6 +7,7 @@ with a byte in front that says whether all went well; the failure text is its co
 from __future__ import annotations
 
 import struct
+import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -68,6 +69,15 @@ class Request:
             self.value, self.type = kind.request.encode(value), kind
             check_size(self.value, kind.request.name)
         return bytes(self.value)
+
+    def loss(self, what: str, server: str, reason: str) -> ConnectionLostError:
+        """Return the error that tells of its connection's end, after it was sent."""
+        since = time.monotonic() - (self.sent or 0.0)
+        return ConnectionLostError(
+            f"{server} went away before it answered {what} sent {since:.1f} s ago "
+            f"({reason or 'the connection was closed'}), and may have carried it out or not; look "
+            "what happened, and call again"
+        )
 
 
 class LinkOwner(Protocol):

@@ -259,6 +259,18 @@ def test_more_calls_than_connections_wait_for_their_turn(connect, node):
     assert [call.result(20).sum for call in calls] == list(range(300))
 
 
+def test_threads_that_share_a_client_get_their_own_answers(connect, client):
+    connect("robot").create_service_server("/add", ADD, add, executor=IMMEDIATE)
+
+    def work(number):
+        return [client.call({"a": 1000 * number, "b": turn}).sum for turn in range(50)]
+
+    with concurrent.futures.ThreadPoolExecutor(8) as pool:
+        for number, sums in enumerate(pool.map(work, range(8))):
+            assert sums == [1000 * number + turn for turn in range(50)]
+    assert client.pending == 0
+
+
 def test_a_call_can_be_awaited_and_calls_back(connect, client):
     connect("robot").create_service_server("/add", ADD, add)
 
@@ -422,6 +434,17 @@ def test_the_graph_changes_when_types_become_known(node, start_robot, eventually
     node.on_graph_change(lambda: told.append(node.services()["/add"]))
     node.services()
     eventually(lambda: ["rospy_tutorials/srv/AddTwoInts"] in told)
+
+
+def test_types_of_a_hundred_services_are_told(node, connect, eventually):
+    robot = connect("robot")
+    for number in range(100):
+        robot.create_service_server(f"/s{number}", (ADD, BOOL)[number % 2], dict)
+    eventually(lambda: len(node.services()) >= 100)
+    eventually(lambda: all(node.services().values()), 30)
+    found = node.services()
+    assert found["/s8"] == ["rospy_tutorials/srv/AddTwoInts"]
+    assert found["/s9"] == ["std_srvs/srv/SetBool"]
 
 
 def test_nobody_is_asked_for_types_that_nobody_wants(node, master, start_robot, eventually):
@@ -930,6 +953,20 @@ def test_a_callback_that_would_wait_for_itself_is_told(node, connect, caplog):
     outer = connect("other").create_service_client("/twice", ADD)
     with pytest.raises(rosglass.ServiceError, match="would wait for itself"):
         outer.call({"a": 1}, timeout=10)
+
+
+def test_an_event_loop_is_not_held_up_by_a_call_of_its_own_service(node):
+    async def slowly(request):
+        return {"sum": request.a}
+
+    async def main():
+        with node.create_service_server("/add", ADD, slowly):
+            client = node.create_service_client("/add", ADD)
+            with pytest.raises(rosglass.UnsupportedError, match="would wait for itself"):
+                client.call({"a": 1})
+            return (await client.call_async({"a": 1})).sum
+
+    assert asyncio.run(main()) == 1
 
 
 def test_a_callback_may_call_what_runs_elsewhere(node, connect):
