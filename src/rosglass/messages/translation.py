@@ -7,7 +7,8 @@ in blocks, arrays of messages included.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.errors import ConversionError
 from rosglass.interfaces import Counterparts
@@ -21,11 +22,11 @@ from rosglass.messages.types import MessageType
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from rosglass.interfaces import Definition, FieldType, Library, Pair, PairedField
+    from rosglass.interfaces import Definition, Library, Pair, PairedField
     from rosglass.messages.message import Message
     from rosglass.messages.schema import Member, Schema
 
-    _Convert = Callable[[Any, str], Any]
+    _Convert = Callable[[Any], Any]
 
 __all__ = ["ServiceTranslation", "Translation"]
 
@@ -125,11 +126,15 @@ class Translation:
 
     def convert(self, message: Message) -> Message:
         """Return a message of the other ROS; arguments and errors as in :meth:`encode`."""
-        return self._build(message, "")  # type: ignore[no-any-return]
+        try:
+            return self._build(message)  # type: ignore[no-any-return]
+        except ConversionError as error:
+            where = error.path, error.value, error.expected
+            raise ConversionError(*where, self.source.name) from None
 
     def _encode(self, data: bytes | bytearray | memoryview) -> bytes:
         message = self.source.decode(data, wire=_WIRES[self.source.ros])
-        return self.type.encode(self._build(message, ""), wire=_WIRES[self.type.ros])
+        return self.type.encode(self.convert(message), wire=_WIRES[self.type.ros])
 
     def _whole(self, data: bytes | bytearray | memoryview) -> bytes | bytearray | memoryview:
         return b"".join([_SEQ, data]) if self._seq and self.source.ros == 1 else data
@@ -177,34 +182,65 @@ def _of_pair(source: MessageType, pair: Pair, target: Definition) -> Translation
 # -- field by field --------------------------------------------------------------------------------
 
 
-def _builder(pair: Pair, ros: int, source: Schema, target: Schema) -> _Convert:
-    """Return ``build(message, path) -> message`` from ROS `ros` to the other."""
-    steps = [_step(field, ros, source, target) for field in pair.fields]
-    cls, log = plain_class(target), pair.two.name == "rcl_interfaces/msg/Log"
-    if len(steps) == 1 and not (steps[0][0] and steps[0][1]):
-        return _wrapper(pair, ros, target)
-    given = {step[1][0] for step in steps}
-    missing = [member for member in target.members if member.name not in given]
-    simple = all(member.number is not None and not member.is_array for member in missing)
-    whole = not simple or any(len(step[1]) > 1 for step in steps)
-    zeros = [(member.name, member.number.python()) for member in missing if member.number]
+class _Step(NamedTuple):
+    name: str
+    read: tuple[str, ...]
+    write: tuple[str, ...]
+    convert: _Convert | None
 
-    def build(message: Any, path: str) -> Any:
-        made = target.type.create() if whole else cls()
-        if not whole:
-            for name, zero in zeros:
-                made[name] = zero
-        for read, write, convert in steps:
-            value, place = message, path
-            for name in read:
-                value = value[name]
-                place = f"{place}.{name}" if place else name
-            if convert is not None:
-                value = convert(value, place)
-            holder = made
-            for name in write[:-1]:
-                holder = holder[name]
-            holder[write[-1]] = value
+
+def _builder(pair: Pair, ros: int, source: Schema, target: Schema) -> _Convert:
+    """Return ``build(message) -> message`` from ROS `ros` to the other."""
+    (field,) = pair.fields if len(pair.fields) == 1 else (None,)
+    if field is not None and not field.two:
+        return _wrapper(field, ros, target)
+    steps = [_step(field, ros, source, target) for field in pair.fields]
+    given = {step.write[0] for step in steps}
+    missing = [member for member in target.members if member.attr not in given]
+    zeros = {member.attr: member.number.python() for member in missing if member.number}
+    if (
+        any(len(step.read) > 1 or len(step.write) > 1 for step in steps)
+        or len(zeros) < len(missing)
+        or any(member.is_array for member in missing)
+    ):
+        return _careful(steps, ros, target, pair.two.name == "rcl_interfaces/msg/Log")
+    simple = [(s.read[0], s.write[0]) for s in steps if s.convert is None]
+    converted = [(s.read[0], s.write[0], s.convert) for s in steps if s.convert is not None]
+    cls, rest = plain_class(target), list(zeros.items())
+
+    def build(message: Any) -> Any:
+        made, read = cls(), ""
+        for read, write in simple:
+            setattr(made, write, getattr(message, read))
+        try:
+            for read, write, convert in converted:
+                setattr(made, write, convert(getattr(message, read)))
+        except ConversionError as error:
+            raise _inside(read, error) from None
+        for write, zero in rest:
+            setattr(made, write, zero)
+        return made
+
+    return build
+
+
+def _careful(steps: list[_Step], ros: int, target: Schema, log: bool) -> _Convert:
+    """Return what builds messages whose fields are elsewhere, or have to be made up."""
+
+    def build(message: Any) -> Any:
+        made, step = target.type.create(), None
+        try:
+            for step in steps:
+                value, holder = message, made
+                for part in step.read:
+                    value = getattr(value, part)
+                for part in step.write[:-1]:
+                    holder = getattr(holder, part)
+                value = value if step.convert is None else step.convert(value)
+                setattr(holder, step.write[-1], value)
+        except ConversionError as error:
+            assert step is not None
+            raise _inside(step.name, error) from None
         if log:
             made["level"] = _level(made["level"], ros)
         return made
@@ -212,93 +248,105 @@ def _builder(pair: Pair, ros: int, source: Schema, target: Schema) -> _Convert:
     return build
 
 
-def _wrapper(pair: Pair, ros: int, target: Schema) -> _Convert:
+def _inside(name: str, error: ConversionError) -> ConversionError:
+    """Return an error of a field as that of the message around it."""
+    joint = "." if error.path and not error.path.startswith("[") else ""
+    return ConversionError(f"{name}{joint}{error.path}", error.value, error.expected)
+
+
+def _wrapper(field: PairedField, ros: int, target: Schema) -> _Convert:
     """Return what turns std_msgs/Time into builtin_interfaces/msg/Time, or back."""
-    (field,) = pair.fields
-    name = field.one[0]
-    kind = field.type_one.name
+    name, kind = field.one[0], field.type_one.name
     if ros == 1:
         forth = _time(kind, 1, target)
-        return lambda message, path: forth(message[name], f"{path}.{name}" if path else name)
-    member = target.by_name[name]
-    assert member.struct is not None
-    back, cls = _time(kind, 2, member.struct), plain_class(target)
+        return lambda message: forth(getattr(message, name))
+    inner = target.by_name[name].struct
+    assert inner is not None
+    back, cls = _time(kind, 2, inner), plain_class(target)
 
-    def build(message: Any, path: str) -> Any:
+    def build(message: Any) -> Any:
         made = cls()
-        made[name] = back(message, path)
+        setattr(made, name, back(message))
         return made
 
     return build
 
 
-def _step(
-    field: PairedField, ros: int, source: Schema, target: Schema
-) -> tuple[tuple[str, ...], tuple[str, ...], _Convert | None]:
+def _step(field: PairedField, ros: int, source: Schema, target: Schema) -> _Step:
     read, write = (field.one, field.two) if ros == 1 else (field.two, field.one)
-    if not (read and write):
-        return read, write, None
-    ours, theirs = _member(source, read), _member(target, write)
-    kind: FieldType = field.type_one
-    convert: _Convert | None = None
-    if kind.name in _TIME_NAMES:
+    (reads, ours), (writes, theirs) = _member(source, read), _member(target, write)
+    name, convert = ".".join(read), _converter(field, ros, ours, theirs)
+    return _Step(name, reads, writes, convert)
+
+
+def _converter(field: PairedField, ros: int, ours: Member, theirs: Member) -> _Convert | None:
+    """Return what turns a field's value into the other ROS's; None for what stays as it is."""
+    if field.type_one.name in _TIME_NAMES:
         assert theirs.struct is not None
-        convert = _time(kind.name, ros, theirs.struct)
+        convert = _time(field.type_one.name, ros, theirs.struct)
     elif field.inner is not None:
         assert ours.struct is not None
         assert theirs.struct is not None
         convert = _builder(field.inner, ros, ours.struct, theirs.struct)
     elif ours.number is not None and theirs.number is not None:
-        if (ours.number.low, ours.number.high) != (theirs.number.low, theirs.number.high):
-            return read, write, _octets(theirs)
-        return read, write, None
+        same = (ours.number.low, ours.number.high) == (theirs.number.low, theirs.number.high)
+        return None if same else _octets(theirs)
     else:
-        return read, write, None
-    if kind.array is ArrayKind.NONE:
-        return read, write, convert
+        return None
+    if field.type_one.array is ArrayKind.NONE:
+        return convert
     alike = field.inner is not None and field.inner.exact and _plain(field.inner)
-    return read, write, _each(convert, theirs.struct if alike else None)
+    return _each(convert, theirs.struct if alike else None)
 
 
 _TIME_NAMES = ("time", "duration")
 
 
-def _member(schema: Schema, path: tuple[str, ...]) -> Member:
+def _member(schema: Schema, path: tuple[str, ...]) -> tuple[tuple[str, ...], Member]:
+    """Return the attributes that lead to a field, and its member."""
     member = schema.by_name[path[0]]
+    attributes = [member.attr]
     for name in path[1:]:
         assert member.struct is not None
         member = member.struct.by_name[name]
-    return member
+        attributes.append(member.attr)
+    return tuple(attributes), member
 
 
 def _each(convert: _Convert, alike: Schema | None) -> _Convert:
     """Return what converts an array of messages; those that are `alike` keep their bytes."""
 
-    def each(values: Any, path: str) -> Any:
+    def each(values: Any) -> Any:
         if alike is not None and isinstance(values, MessageSequence) and values._items is None:
-            made = codec_of(alike, values._codec.wire).sequence()
-            made._items = None
-            made._buffer, made._start, made._count = values._buffer, values._start, values._count
-            return made
-        return [convert(value, f"{path}[{index}]") for index, value in enumerate(values)]
+            kept = codec_of(alike, values._codec.wire).sequence()
+            kept._items = None
+            kept._buffer, kept._start, kept._count = values._buffer, values._start, values._count
+            return kept
+        made: list[Any] = []
+        try:
+            made.extend(map(convert, values))
+        except ConversionError as error:
+            raise _inside(f"[{len(made)}]", error) from None
+        return made
 
     return each
 
 
 def _time(kind: str, ros: int, target: Schema) -> _Convert:
-    names, others = _TIME_FIELDS[ros], _TIME_FIELDS[3 - ros]
-    ranges, cls = _TIME_RANGES[3 - ros, kind], plain_class(target)
+    names, cls = _TIME_FIELDS[ros], plain_class(target)
+    parts, (first, second) = attrgetter(*names), _TIME_FIELDS[3 - ros]
+    (low, high), (least, most) = ranges = _TIME_RANGES[3 - ros, kind]
 
-    def convert(value: Any, path: str) -> Any:
+    def convert(value: Any) -> Any:
+        seconds, rest = parts(value)
+        if not (low <= seconds <= high and least <= rest <= most):
+            for name, part, (bottom, top) in zip(names, (seconds, rest), ranges, strict=True):
+                if not bottom <= part <= top:
+                    told = f"from {bottom} to {top}, as ROS {3 - ros} has it"
+                    raise ConversionError(name, part, told)
         made = cls()
-        for name, other, (low, high) in zip(names, others, ranges, strict=True):
-            part = value[name]
-            if not low <= part <= high:
-                where = f"{path}.{name}" if path else name
-                raise ConversionError(
-                    where, part, f"from {low} to {high}, as ROS {3 - ros} has it", target.name
-                )
-            made[other] = part
+        setattr(made, first, seconds)
+        setattr(made, second, rest)
         return made
 
     return convert
@@ -310,19 +358,16 @@ def _octets(target: Member) -> _Convert:
     assert number is not None
     signed = bool(number.low)
 
-    def one(value: Any, _: str) -> int:
+    def one(value: Any) -> int:
         bits = int(value) & 0xFF
         return bits - 256 if signed and bits > 127 else bits
 
-    if not target.is_array:
-        return one
-
-    def many(values: Any, path: str) -> Any:
+    def many(values: Any) -> Any:
         if hasattr(values, "view"):
             return values.view("i1" if signed else "u1")
-        return [one(value, path) for value in values]
+        return [one(value) for value in values]
 
-    return many
+    return many if target.is_array else one
 
 
 def _level(level: int, ros: int) -> int:

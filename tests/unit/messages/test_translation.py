@@ -243,3 +243,12 @@ def test_services(ros, name, other):
     answer = server.response.create(sample_values(server.response._schema))
     told = found.type.response.encode(found.response.convert(answer))
     assert told == found.response.encode(server.response.encode(answer))
+
+
+def test_a_message_without_fields_whose_counterpart_has_some():
+    ours = MessageType.from_text("own_msgs/msg/Grown", "", ros=1)
+    grown = MessageType.from_text("own_msgs/msg/Grown", "int32 a 7\nstring[] b\n")
+    there, back = Translation(ours, [grown]), Translation(grown, [ours])
+    assert (there.type, there.added, back.left_out) == (grown, ("a", "b"), ("a", "b"))
+    assert grown.decode(there.encode(b"")).a == 7
+    assert back.encode(grown.encode({"a": 1})) == b""
