@@ -173,6 +173,19 @@ class Connection:
         """Return how many frames wait to be sent; from any thread."""
         return len(self._outgoing)
 
+    def quiet(self) -> bool:
+        """Return whether nothing waits in the socket, nor its end; from any thread."""
+        with self._io:
+            if self._closed:
+                return False
+            try:
+                self._sock.recv(1, socket.MSG_PEEK)
+            except (BlockingIOError, InterruptedError):
+                return True
+            except OSError:
+                pass  # whoever reads it next tells why
+            return False
+
     # -- sending ---------------------------------------------------------------------------------
 
     def send_header(self, fields: Mapping[str, str]) -> None:

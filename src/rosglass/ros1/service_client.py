@@ -204,7 +204,7 @@ class Ros1ServiceClient(ServiceClient, Member):
             with self._lock:
                 alone = len(self._queue) == 1 and self._queue[0] is entry
                 taken = link.request is not None or link.settling or link.ended
-                free = alone and not taken and not entry.call.done()
+                free = alone and not taken and not entry.call.done() and link.quiet()
                 if free:
                     self._queue.popleft()
                     link.request, entry.link = entry, link

@@ -94,7 +94,7 @@ class LinkOwner(Protocol):
 
 
 class ServiceLink:
-    """A connection to a server; in the loop's thread, except :meth:`send`.
+    """A connection to a server; in the loop's thread, except :meth:`send` and :meth:`quiet`.
 
     Args:
         core: The node.
@@ -147,6 +147,10 @@ class ServiceLink:
     def send(self, data: bytes) -> None:
         """Send a request; the server has accepted the connection."""
         self._connection.send([_length.pack(len(data)), data])
+
+    def quiet(self) -> bool:
+        """Return whether nothing has come that was not looked at; from any thread."""
+        return self._connection.quiet()
 
     def lives(self) -> bool:
         """Return whether the server has not closed it; takes in what has come until now."""
