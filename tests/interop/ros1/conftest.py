@@ -28,7 +28,8 @@ PEERS = Path(__file__).parent / "peers"
 PYTHON = "/usr/bin/python3"
 INSTALL = (
     "ROS 1 is not installed: sudo apt-get install python3-rosmaster python3-rospy "
-    "python3-actionlib rostopic rosservice python3-rosbag rosbash"
+    "python3-actionlib python3-rosnode python3-rosparam python3-rosservice python3-rostopic "
+    "python3-rosbag"
 )
 INSTALL_CPP = (
     "roscpp is not installed: sudo apt-get install g++ pkg-config libroscpp-dev libactionlib-dev"
