@@ -107,8 +107,10 @@ class Registrations:
     # -- the thread ------------------------------------------------------------------------------
 
     def _work(self) -> None:
-        while not self._closing:
+        while True:
             self._wanted.clear()
+            if self._closing:
+                break
             try:
                 self._look()
             except Exception:
@@ -190,8 +192,9 @@ class Registrations:
             try:
                 member.register(self._core.master)
                 self._registered.add(member)
-            except MasterError as error:
-                self._tried.discard(member)
+            except ConnectionLostError:
+                raise
+            except Error as error:
                 refused.append(str(error))
                 if self._complaints.fresh((member, str(error))):
                     _log.warning("%s: %s", member, error)
@@ -222,13 +225,20 @@ class Registrations:
         return looks == _LOOKS or looks % (10 * _LOOKS) == 0
 
     def _look_at_address(self) -> None:
+        host = self._core.address[0]
+        if host != self._doubted:
+            self._doubted, self._doubt = host, ""
+            # A name server may take its time.
+            self._core.errands.run(lambda: self._doubt_address(host))
+
+    def _doubt_address(self, host: str) -> None:
         core = self._core
-        if core.address[0] != self._doubted:
-            self._doubted = core.address[0]
-            master, _ = parse_uri(core.master.uri, "master")
-            self._doubt = doubt(self._doubted, core.options.source, master)
-            if self._doubt:
-                _log.warning("%s: %s", core.url, self._doubt)
+        master, _ = parse_uri(core.master.uri, "master")
+        found = doubt(host, core.options.source, master)
+        if found and host == self._doubted:
+            self._doubt = found
+            _log.warning("%s: %s", core.url, found)
+            self._wanted.set()
 
     def _lose(self, reason: str) -> None:
         core = self._core

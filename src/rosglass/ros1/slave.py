@@ -16,6 +16,8 @@ import xmlrpc.server
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Protocol
 
+from rosglass.comm.complaints import Complaints
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -100,6 +102,7 @@ class Slave(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCDispatcher):
         super().__init__(allow_none=True)
         self._api = api
         self._lock = threading.Lock()
+        self._complaints = Complaints()
         self._connections: set[socket.socket] = set()
         for name, method in (
             ("getBusStats", lambda _: api.bus_stats()),
@@ -122,7 +125,9 @@ class Slave(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCDispatcher):
             if not crowded:
                 self._connections.add(sock)
         if crowded:
-            _log.warning("%s: refused, %d connections are served", address, _MOST_CONNECTIONS)
+            if self._complaints.fresh("crowded"):
+                told = "%s: not served, the node's API has %d connections; others are not named"
+                _log.warning(told, address, _MOST_CONNECTIONS)
             sock.close()
             return
         try:

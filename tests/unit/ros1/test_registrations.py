@@ -159,8 +159,8 @@ def test_a_wrong_own_address_is_shown(master: FakeMaster, monkeypatch: pytest.Mo
     url = master.url.partition("?")[0]
     with rosglass.connect(url, "panel", own_services=False) as node:
         wait_for(lambda: node.status().state is ConnectionState.CONNECTED)
-        told = node.status().detail
-        assert told.startswith("ROS_IP=192.0.2.7 is no address of this machine")
+        told = "ROS_IP=192.0.2.7 is no address of this machine"
+        wait_for(lambda: node.status().detail.startswith(told))
         node.create_publisher("/a", "std_msgs/Empty")
         wait_for(lambda: "/panel" in master.publishers.get("/a", {}))
         assert master.publishers["/a"]["/panel"].startswith("http://192.0.2.7:")
