@@ -27,7 +27,8 @@ apt_test=(python3 python3-venv python3-genpy python3-genmsg xdotool x11-apps
           python3-rosmsg python3-std-msgs python3-std-srvs python3-geometry-msgs
           python3-sensor-msgs python3-nav-msgs python3-diagnostic-msgs python3-visualization-msgs
           python3-actionlib-msgs python3-tf2-msgs python3-trajectory-msgs python3-shape-msgs
-          python3-stereo-msgs libroscpp-dev libactionlib-dev libstd-msgs-dev
+          python3-stereo-msgs python3-map-msgs python3-pcl-msgs python3-bond
+          libroscpp-dev libactionlib-dev libstd-msgs-dev
           libstd-srvs-dev libgeometry-msgs-dev libsensor-msgs-dev)
 
 install_apt() {
