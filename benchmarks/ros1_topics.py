@@ -3,7 +3,8 @@
     python benchmarks/ros1_topics.py [--quick] [--only CASE] [--json FILE]
 
 Each subscriber is a process of its own. "raw" is a raw callback in the thread that receives,
-"message" a callback that reads fields, on the node's dispatcher; rospy runs in /usr/bin/python3,
+"message" one that reads fields, there as well, as rospy has it, "dispatched" one on the node's
+dispatcher, as it is without asking for anything; rospy runs in /usr/bin/python3,
 with the larger buffer that its users give it for images; roscpp is built here from the
 distribution's headers, with a spinner of its own. At a given rate, a roscpp node publishes for all;
 back to back, a node of ours hands the same blocks of messages to the socket again and again, as
@@ -36,6 +37,7 @@ TYPES = {
     "image": "sensor_msgs/Image",
     "pose": "geometry_msgs/PoseStamped",
 }
+OURS = ("raw", "message", "dispatched", "unread")
 #: Samples left out of latencies.
 _FIRST = 5
 #: At least so many times rospy's rate of 6.2 MB images, and of 64-byte messages.
@@ -107,11 +109,14 @@ def subscriber(url: str, kind: str, how: str, case: str) -> None:
     elif how == "raw":
         take = notes.raw_text if kind == "text" else notes.raw_stamp
         arguments = {"raw_callback": take, "executor": IMMEDIATE}
-    elif how == "message" and kind == "text":
+    elif how != "unread" and kind == "text":
         arguments = {"callback": lambda m: notes.text(m.data)}
-    elif how == "message":
+    elif how != "unread":
         arguments = {"callback": lambda m: notes.stamp(m.header.stamp)}
-    qos = rosglass.QoS(history=History.KEEP_ALL) if how == "message" else rosglass.QoS()
+    if how == "message":
+        arguments["executor"] = IMMEDIATE
+    dispatched = how == "dispatched"
+    qos = rosglass.QoS(history=History.KEEP_ALL) if dispatched else rosglass.QoS()
     subscription = node.create_subscription("/bench", TYPES[kind], qos=qos, **arguments)
     print("ready", flush=True)
     sys.stdin.readline()
@@ -223,7 +228,7 @@ class Bench:
             url = f"ros1://127.0.0.1:{self._port}"
             command = [sys.executable, __file__, "--role", how, "--kind", kind, "--url", url]
             command += ["--case", case]
-        receiving = self._start(command, how in ("raw", "message", "unread"))
+        receiving = self._start(command, how in OURS)
         _expect_ready(receiving)
         if hz:
             command = [str(self._program), "publish", kind, str(hz), str(self._seconds)]
@@ -278,11 +283,11 @@ def table(found: dict[str, Any], figure: str, peer: str) -> None:
     """Print the figures of each way, with the ratio to a peer."""
     for way, one in found.items():
         print(
-            f"  {way:8} "
+            f"  {way:10} "
             + (
                 f"median {one['median']:7.3f}  p99 {one['p99']:7.3f} ms"
                 if figure == "median"
-                else f"{one['rate']:9.0f}/s"
+                else f"{one['rate']:9.0f}/s  {one['cpu'] / one['rate'] * 1e6:8.2f} us each"
             )
             + f"  x{one[figure] / found[peer][figure]:.2f} of {peer}  cpu {one['cpu']:5.1%}"
             f"  received {one['count']}/{one['sent']}"
@@ -293,7 +298,7 @@ def run(bench: Bench, only: str) -> tuple[dict[str, Any], list[str]]:
     """Run the cases; returns the figures and the targets missed."""
     results: dict[str, Any] = {}
     missed: list[str] = []
-    everybody = ("rospy", "roscpp", "raw", "message")
+    everybody = ("rospy", "roscpp", *OURS[:3])
     if "latency" in only:
         print("64 B at 300 Hz, one way", flush=True)
         found = results["latency"] = bench.best("text", 300, everybody, "median", top=False)
@@ -336,7 +341,7 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="shorter runs, once each")
     parser.add_argument("--only", choices=cases, help="run this case only")
     parser.add_argument("--json", type=Path, help="write the figures to this file")
-    roles = ["raw", "message", "unread", "firehose"]
+    roles = [*OURS, "firehose"]
     parser.add_argument("--role", choices=roles, help=argparse.SUPPRESS)
     parser.add_argument("--case", help=argparse.SUPPRESS)
     parser.add_argument("--seconds", type=float, help=argparse.SUPPRESS)

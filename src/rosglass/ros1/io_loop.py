@@ -58,7 +58,7 @@ class IoLoop:
         self._selector = selectors.DefaultSelector()
         #: Sockets that are looked at now and then: one look for all costs next to nothing.
         self._unhurried = selectors.DefaultSelector()
-        self._next_look = 0.0
+        self._next_look, self._leisurely = 0.0, False
         self._lock = threading.Lock()
         self._jobs: deque[Callable[[], None]] = deque()
         self._later: list[tuple[float, int, Later]] = []
@@ -135,7 +135,9 @@ class IoLoop:
         """
         soon = events if hurry else events & ~READ
         _set(self._selector, sock, soon, handler)
-        _set(self._unhurried, sock, events & ~soon, handler)
+        if self._leisurely or events != soon:
+            _set(self._unhurried, sock, events & ~soon, handler)
+            self._leisurely = len(self._unhurried.get_map()) > 0
 
     def linger(self, handler: Ready, lasting: bool) -> None:
         """Say whether the loop, when it is closed, runs on until the handler is done."""
@@ -148,11 +150,8 @@ class IoLoop:
                     self._wake()
                 else:
                     self._run(key.data, events)
-            now = time.monotonic()
-            if now >= self._next_look and len(self._unhurried.get_map()):
-                self._next_look = now + _LEISURE
-                for key, events in self._unhurried.select(0):
-                    self._run(key.data, events)
+            if self._leisurely:
+                self._look()
             while self._later and self._later[0][0] <= time.monotonic():
                 job = heapq.heappop(self._later)[2].job
                 if job is not None:
@@ -161,10 +160,20 @@ class IoLoop:
                 self._run_job(self._jobs.popleft())
         self._finish()
 
+    def _look(self) -> None:
+        """Look at the sockets that nobody waits for, when it is time."""
+        now = time.monotonic()
+        if now >= self._next_look:
+            self._next_look = now + _LEISURE
+            for key, events in self._unhurried.select(0):
+                self._run(key.data, events)
+
     def _pause(self) -> float | None:
         """Return how long to wait for sockets, in seconds."""
         if self._jobs:
             return 0.0
+        if not (self._later or self._leisurely or self._closed):
+            return None
         pauses = []
         if self._closed:
             pauses.append(self._deadline - time.monotonic())
@@ -172,7 +181,7 @@ class IoLoop:
             heapq.heappop(self._later)
         if self._later:
             pauses.append(self._later[0][0] - time.monotonic())
-        if len(self._unhurried.get_map()):
+        if self._leisurely:
             pauses.append(self._next_look - time.monotonic())
         return max(0.0, min(pauses)) if pauses else None
 
