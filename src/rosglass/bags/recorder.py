@@ -67,7 +67,7 @@ class Recorder(Handle):
     Messages are stored as received, with the definitions of their types, so that the file can be
     played anywhere; types that nobody can describe are stored by name and hash. Messages of a type
     that the robot has to be asked for wait for its answer. What the file holds is complete up to a
-    second before a crash; of a ROS 1 bag, only we can read that then.
+    second before a crash; rosbag wants a ROS 1 bag reindexed then.
 
     Args:
         node: Where to listen.

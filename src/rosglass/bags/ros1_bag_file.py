@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import struct
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from rosbags.rosbag1 import Writer
 
 from rosglass.bags.recording_file import RecordingFile
+from rosglass.bags.ros1_cut_bag import MAGIC
 from rosglass.comm import Durability
 from rosglass.interfaces import full_text
 from rosglass.messages import OpaqueType
@@ -20,6 +22,10 @@ if TYPE_CHECKING:
     from rosglass.messages import MessageType
 
 __all__ = ["Ros1BagFile"]
+
+_length = struct.Struct("<I")
+#: Bytes of the header's fields (op, index_pos, conn_count, chunk_count), and of these with padding.
+_FIELDS, _HEADER = 69, 4096
 
 
 class Ros1BagFile(RecordingFile):
@@ -40,6 +46,11 @@ class Ros1BagFile(RecordingFile):
         if compression != "none":
             self._writer.set_compression(Writer.CompressionFormat[compression.upper()])
         self._writer.open()
+        self._path = path
+        # Another version of rosbags may do it by itself.
+        self._short = self._writer.bio.tell() == len(MAGIC) + _HEADER
+        if self._short:
+            _pad(self._writer.bio)
         self._connections: list[Any] = []
         self._indexed = 0
 
@@ -67,11 +78,7 @@ class Ros1BagFile(RecordingFile):
         self._forget()
 
     def flush(self) -> None:
-        """Write the chunk in progress.
-
-        The index comes at the end. Without, we read the file; ``rosbag reindex`` does not, because
-        it expects 8 bytes more of padding in the file's header than the rosbags package writes.
-        """
+        """Write the chunk in progress; its index comes at the end, ``rosbag reindex`` makes one."""
         self._writer.write_chunk(self._writer.chunks[-1])
         self._forget()
         self._writer.bio.flush()
@@ -83,6 +90,9 @@ class Ros1BagFile(RecordingFile):
     def finish(self) -> None:
         """Write the index."""
         self._writer.close()
+        if self._short:
+            with self._path.open("r+b") as file:
+                _pad(file)
 
     def close(self) -> None:
         """Close the file."""
@@ -100,3 +110,14 @@ class Ros1BagFile(RecordingFile):
             for number in places:
                 places[number] = range(len(places[number]))
             self._indexed += 1
+
+
+def _pad(file: Any) -> None:
+    """Make the file's header as long as rosbag's: 4096 bytes without the lengths of its two parts.
+
+    The rosbags package counts these, too. ``rosbag reindex`` writes a header anew in its own
+    length, and would write over the first chunk.
+    """
+    file.seek(len(MAGIC) + _length.size + _FIELDS)
+    file.write(_length.pack(_HEADER - _FIELDS))
+    file.write(b" " * (_HEADER - _FIELDS))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import base64
+import subprocess
+import sys
 import time
 from typing import TYPE_CHECKING
 
@@ -213,6 +215,36 @@ def test_what_comes_without_its_definition_is_kept_and_played_as_bytes(
             assert not player.problems
             sample = ears.create_subscription("/sealed", kind).wait(10)
     assert (sample.data, sample.type.md5) == (b"\x01\x02", "a" * 32)
+
+
+def test_rosbag_mends_a_recording_that_was_killed(connect, tmp_path, wait_for, master, tool):
+    publisher = connect("robot").create_publisher("/steady", STRING)
+    path = tmp_path / "killed.bag"
+    command = [sys.executable, "-m", "rosglass", "record", "/steady", "-o", str(path)]
+    process = subprocess.Popen(
+        [*command, "--url", f"{master.url}?ip=127.0.0.1"], stdout=subprocess.DEVNULL
+    )
+    try:
+        wait_for(publisher.subscription_count, 20)
+
+        def written():
+            publisher.publish(data="x" * 100)
+            return path.exists() and path.stat().st_size > 10_000
+
+        wait_for(written, 20, "the second that may be lost to have passed")
+    finally:
+        process.kill()
+        process.wait()
+    with open_bag(path) as bag:
+        (channel,) = bag.channels
+        assert "not closed properly" in bag.problem
+        assert channel.count > 10
+    tool("rosbag", "reindex", "-f", str(path))
+    lines = [line.split() for line in tool("rosbag", "info", str(path)).splitlines()]
+    assert ["messages:", str(channel.count)] in lines
+    with open_bag(path) as bag:
+        assert bag.problem == ""
+        assert len(list(bag.messages())) == channel.count
 
 
 def test_all_topics_are_recorded_whatever_their_names(connect, start_master, tmp_path, wait_for):
