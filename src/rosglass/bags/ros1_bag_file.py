@@ -48,9 +48,10 @@ class Ros1BagFile(RecordingFile):
         self._writer.open()
         self._path = path
         # Another version of rosbags may do it by itself.
-        self._short = self._writer.bio.tell() == len(MAGIC) + _HEADER
+        opened: Any = self._writer.bio
+        self._short = opened.tell() == len(MAGIC) + _HEADER
         if self._short:
-            _pad(self._writer.bio)
+            _pad(opened)
         self._connections: list[Any] = []
         self._indexed = 0
 
