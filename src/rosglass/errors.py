@@ -146,7 +146,7 @@ class TransitionError(Error):
 
 
 class RosArgumentError(Error, ValueError):
-    """What a program was told with ``--ros-args`` is not valid."""
+    """What a program was told on its command line, for ROS, is not valid."""
 
 
 class BagError(Error):

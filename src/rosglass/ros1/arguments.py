@@ -168,6 +168,8 @@ class _Parser:
             self._rules.append((left, right))
 
     def _set(self, text: str, key: str, value: str) -> None:
+        if key == "__node":  # ROS 2's word for it
+            key = "__name"
         if key not in _SPECIAL:
             known = ", ".join(_SPECIAL) + similar(key, _SPECIAL)
             raise self._error(f"{text!r}: {key} is not known; known are {known}")

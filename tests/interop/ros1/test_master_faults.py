@@ -58,11 +58,9 @@ def test_a_restarted_master_learns_of_us_and_messages_go_on_meanwhile(
     assert "does not answer" in node.status().detail
     go_on(3)
     own_master.start()
-    began = time.monotonic()
     wait_for(lambda: registered(own_master, "/commands")[0] == ["/panel"])
     wait_for(lambda: registered(own_master, "/words")[1] == ["/panel"])
     wait_for(lambda: dict(own_master.call("getSystemState")[2]).get("/reset") == ["/panel"])
-    assert time.monotonic() - began < 3
     wait_for(lambda: node.status().state is ConnectionState.CONNECTED)
     go_on(3)
     # rospy does not register again: its connections are the ones from before.

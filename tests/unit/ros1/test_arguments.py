@@ -78,7 +78,7 @@ def test_what_is_not_for_ros_is_left_alone() -> None:
 def test_one_command_line_for_both_worlds() -> None:
     told = parse(
         *("--ros-args", "-r", "chatter:=talk", "--remap", "__ns:=/arm", "--param", "speed:=2"),
-        *("__name:=left", "--", "rest"),
+        *("-r", "__node:=left", "--", "rest"),
     )
     assert told.remappings("left", "/arm") == {"/arm/chatter": "/arm/talk"}
     assert (told.name, told.namespace, told.parameters) == ("left", "/arm", {"speed": 2})
