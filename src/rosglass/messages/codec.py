@@ -198,11 +198,15 @@ class Codec:
 
     def decode_all(self, buffer: bytes | memoryview) -> Message:
         """Decode everything at once."""
-        eager = self.made("eager", self._eager)
         try:
-            return eager(buffer)  # type: ignore[no-any-return]
+            return self.reader(buffer)
         except Exception as error:
             raise self.explain(buffer, error) from None
+
+    @property
+    def reader(self) -> Callable[[bytes | memoryview], Message]:
+        """The function that decodes everything at once, and raises anything for damaged bytes."""
+        return self.made("eager", self._eager)  # type: ignore[no-any-return]
 
     def _eager(self) -> Any:
         source = Source()

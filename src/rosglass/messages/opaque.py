@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import re
 from functools import partial
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from rosglass.errors import InvalidNameError, TypeNotFoundError, UnsupportedError
 from rosglass.interfaces.names import join_name, split_name
 from rosglass.messages.types import MessageType
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 __all__ = ["OpaqueType"]
 
@@ -86,6 +89,9 @@ class OpaqueType(MessageType):
             self._hash,
             self.reason,
         )
+
+    def decode_small(self, buffers: Sequence[bytes | memoryview]) -> None:
+        """Return None: nothing can be decoded."""
 
     def _codec_for(self, *_: Any) -> NoReturn:
         raise self._unknown()

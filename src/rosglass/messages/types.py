@@ -14,11 +14,11 @@ from rosglass.messages.codec import Codec, codec_of
 from rosglass.messages.conversion import convert
 from rosglass.messages.diagnosis import encapsulation_error
 from rosglass.messages.emit_path import path_function
-from rosglass.messages.layout import Wire
+from rosglass.messages.layout import Wire, leaves
 from rosglass.messages.schema import Schema, schema_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from rosglass.interfaces.definition import Field
     from rosglass.messages.message import Message
@@ -35,6 +35,8 @@ _WIRES = {
 }
 _ORDERS = {"little": False, "big": True}
 _PADDING = 3
+#: Bytes of a message, and values in it, up to which it is decoded sooner at once than in two steps.
+_SMALL, _FEW_LEAVES = 1024, 16
 _MOST_PATHS = 1000
 
 
@@ -78,6 +80,7 @@ class MessageType:
         self._codecs: dict[Any, Codec] = {}
         self._dict_writers: dict[str | None, Any] = {}
         self._shells: dict[str, type[Any]] = {}
+        self._at_once: Callable[[bytes | memoryview], Message] | None = None
         self._paths: dict[Any, Callable[[Any], Any]] = {}
 
     @classmethod
@@ -259,6 +262,22 @@ class MessageType:
                 announced = data[3] & _PADDING if name == "cdr" else 0
                 fitting.append((left != announced, wide))
         return min(fitting)[1] if fitting else 2
+
+    def decode_small(self, buffers: Sequence[bytes | memoryview]) -> list[Message] | None:
+        """Return many small messages of ROS 1 at once, decoded: that takes less than leaving it.
+
+        None when they, or the type, are such that :meth:`decode` is better for each: big, damaged,
+        or with much in them.
+        """
+        read = self._at_once
+        if read is None:
+            if self.wire != "ros1" or leaves(self._schema) > _FEW_LEAVES:
+                return None
+            read = self._at_once = self._codec("ros1", False, _width(None)).reader
+        try:
+            return list(map(read, buffers)) if len(buffers[0]) <= _SMALL else None
+        except Exception:  # whoever reads the fields shall be told
+            return None
 
     def decode_all(
         self, buffer: Any, wire: str | None = None, *, wstring_width: int | None = None

@@ -70,7 +70,17 @@ class Incoming:
 
     def feed(self, data: bytes) -> None:
         """Take what came; raises DecodeError when it is no TCPROS."""
-        self.total += len(data)
+        end = len(data)
+        self.total += end
+        if (
+            self._headed
+            and end >= 4
+            and _length.unpack_from(data)[0] == end - 4
+            and not (self._rest or self._lead or self.stopped)
+        ):
+            # One message, whole: what comes at a moderate rate comes like this.
+            self.take([data[4:]], 0)
+            return
         if self._rest:
             data = self._rest + data
             self._rest = b""
