@@ -41,6 +41,8 @@ _LOG_EVERY = 10.0
 _data, _kind = itemgetter(0), itemgetter(2)
 #: Samples that are made ready for a callback at once.
 _BATCH = 256
+#: Seconds after which a callback lets others have their turn.
+_TURN = 0.01
 
 
 class Inbox:
@@ -75,6 +77,7 @@ class Inbox:
         self._lock = threading.Lock()
         self._waiters: list[Callable[[], object]] = []
         self._calling = self._closed = False
+        self._at_once = 1
         self._held = self._received = self._bytes = self._dropped = 0
         self._last = self._next_mark = self._next_log = -math.inf
         self._failed, self._next_failure = 0, -math.inf
@@ -255,14 +258,11 @@ class Inbox:
         )
 
     def _call_soon(self) -> None:
-        """Call back for what waits now: a fast topic must not keep an executor for itself."""
-        assert self._call is not None
-        with self._lock:
-            batch = list(self._samples)
-            self._samples.clear()
-            self._held = 0
-        for start in range(0, len(batch), _BATCH):
-            part = batch[start : start + _BATCH]
+        """Call back for what waits now; others have their turn before what comes meanwhile."""
+        left, end = len(self._samples), time.monotonic() + _TURN
+        while left > 0 and (part := self._take(min(left, self._at_once))):
+            left -= len(part)
+            begun = time.monotonic()
             call, given = self._prepare(part)
             for one in given:
                 if self._closed:
@@ -271,10 +271,21 @@ class Inbox:
                     call(one)
                 except Exception:
                     self._log_failure()
+            now = time.monotonic()
+            # What a slow callback has not begun with stays where newer samples take its place.
+            slow = (now - begun) * _BATCH > len(part) * _TURN
+            self._at_once = 1 if slow else _BATCH
+            if now >= end:
+                break
         with self._lock:
             self._calling = again = bool(self._samples)
         if again:
             self._executor.post(self._call_soon)
+
+    def _take(self, most: int) -> list[Sample]:
+        """Take some of the oldest samples out."""
+        with self._lock:
+            return [self._pop() for _ in range(min(most, len(self._samples)))]
 
     def _prepare(self, samples: Sequence[Sample]) -> tuple[Callable[[Any], None], Sequence[Any]]:
         """Return what to call, and with what: the samples, or the messages in them."""

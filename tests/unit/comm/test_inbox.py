@@ -55,6 +55,30 @@ def test_the_slow_callback_is_named(caplog):
     assert "much_too_slow is too slow" in caplog.text
 
 
+def test_a_slow_callback_lets_others_have_their_turn_and_goes_on_with_the_newest():
+    def slow(given):
+        order.append(f"slow {given.sequence}")
+        if len(order) == 1:
+            for number in range(5, 9):
+                sub.deliver(sample(sequence=number))
+        time.sleep(0.02)
+
+    order = []
+    dispatcher, gate = Dispatcher("test"), threading.Event()
+    dispatcher.post(lambda: gate.wait(5))
+    sub = subscription(QoS(4), dispatcher, raw_callback=slow)
+    for number in range(1, 5):
+        sub.deliver(sample(sequence=number))
+    dispatcher.post(lambda: order.append("other"))
+    gate.set()
+    deadline = time.monotonic() + 5
+    while len(order) < 6 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    dispatcher.close()
+    assert order == ["slow 1", "other", "slow 5", "slow 6", "slow 7", "slow 8"]
+    assert sub.statistics().dropped == 3
+
+
 def test_one_message_beyond_the_limit_is_kept_all_the_same():
     sub = subscription()
     sub.set_inbox_limit(100)

@@ -24,6 +24,8 @@ class Manual(Executor):
 
 
 class FakeType:
+    wire = "cdr"
+
     def decode(self, data, wire):
         if data == b"bad":
             raise ValueError("bad data")
