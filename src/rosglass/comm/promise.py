@@ -8,6 +8,7 @@ from concurrent.futures import CancelledError, Future, InvalidStateError
 from concurrent.futures import TimeoutError as _NotYet
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from rosglass.comm.receiving import check_may_wait
 from rosglass.errors import ConversionError, TimeoutError  # noqa: A004 - the field's own word
 
 if TYPE_CHECKING:
@@ -68,6 +69,7 @@ class Promise(Future[_T]):
 
         Raises:
             TimeoutError: It has not come within the time; it may still come.
+            UnsupportedError: Called in a thread that receives, where it could never come.
             concurrent.futures.CancelledError: It was given up.
         """
         self._wait(timeout)
@@ -116,6 +118,8 @@ class Promise(Future[_T]):
     def _wait(self, timeout: float | None) -> None:
         timeout = check_timeout(timeout, "result()")
         deadline = math.inf if timeout is None else time.monotonic() + timeout
+        if timeout != 0 and not self.done():
+            check_may_wait(self._what, following=True)
         while True:
             left = deadline - time.monotonic()
             try:

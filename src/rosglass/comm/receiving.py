@@ -12,21 +12,18 @@ if TYPE_CHECKING:
 
 __all__ = ["check_may_wait"]
 
-#: Where the threads begin that receive, follow the graph and keep time.
-_BEGINNINGS = (
-    "rosglass.ros2.dds.",
-    "rosglass.ros2.zenoh.",
-    "rosglass.ros1.io_loop",
-    "rosglass.comm.worker",
-    "rosglass.comm.timers",
-)
+#: Where the threads begin that receive.
+_RECEIVING = ("rosglass.ros2.dds.", "rosglass.ros2.zenoh.", "rosglass.ros1.io_loop")
+#: Where those begin that follow the graph and keep time; some of their jobs may wait for a moment.
+_FOLLOWING = ("rosglass.comm.worker", "rosglass.comm.timers")
 
 
-def check_may_wait(name: str) -> None:
+def check_may_wait(name: str, *, following: bool = False) -> None:
     """Raise UnsupportedError in a callback that runs in a thread that receives.
 
     Args:
-        name: The service or action that is about to be waited for.
+        name: The service, action or topic that is about to be waited for.
+        following: Whether threads that follow the graph and keep time may wait.
     """
     # Zenoh's threads are not Python's, and marking them would cost something with every sample.
     frame: FrameType | None = sys._getframe()
@@ -35,7 +32,7 @@ def check_may_wait(name: str) -> None:
         module = frame.f_globals.get("__name__", "")
         first = first if module == "threading" else module
         frame = frame.f_back
-    if first.startswith(_BEGINNINGS):
+    if first.startswith(_RECEIVING if following else (*_RECEIVING, *_FOLLOWING)):
         raise UnsupportedError(
             f"{name}: this callback runs in a thread that receives (executor=IMMEDIATE, or "
             "add_done_callback()), where what it waits for could never arrive; take call_async(), "

@@ -17,6 +17,7 @@ from rosglass.comm.inbox import ImmediateInbox, Inbox
 from rosglass.comm.loop import check_plain
 from rosglass.comm.node import Executor, Handle
 from rosglass.comm.promise import check_timeout
+from rosglass.comm.receiving import check_may_wait
 from rosglass.comm.sample import Sample
 from rosglass.comm.source import Source
 from rosglass.errors import ConversionError
@@ -198,6 +199,7 @@ class Subscription(Handle):
 
         Raises:
             ConversionError: The timeout is no number of seconds.
+            UnsupportedError: Called in a thread that receives, where none could come.
         """
         left = check_timeout(timeout, f"{self.topic}: wait()")
         deadline = math.inf if left is None else time.monotonic() + left
@@ -208,6 +210,7 @@ class Subscription(Handle):
                 remaining = deadline - time.monotonic()
                 if sample is not None or self.closed or remaining <= 0:
                     return sample
+                check_may_wait(self.topic, following=True)
                 ready = threading.Lock()
                 ready.acquire()
                 if self._inbox.enlist(ready.release):

@@ -11,7 +11,8 @@ import threading
 import pytest
 
 import rosglass
-from rosglass.comm import IMMEDIATE, Dispatcher, Promise
+from rosglass import QoS, UnsupportedError
+from rosglass.comm import IMMEDIATE, Dispatcher, Promise, Subscription, receiving
 
 
 @pytest.fixture(params=[True, False], ids=["cancellable", "not cancellable"])
@@ -94,3 +95,29 @@ def test_asyncio_is_imported_only_by_those_who_use_it():
     code = "import rosglass.ros2, sys; print('asyncio' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"
+
+
+def test_a_thread_that_receives_may_look_but_not_wait(monkeypatch):
+    """What it waits for could never arrive."""
+    monkeypatch.setattr(receiving, "_RECEIVING", (__name__,))
+    told = []
+
+    def receive():
+        promise = Promise("/add has not answered", cancellable=True)
+        subscription = Subscription("/chatter", None, QoS(), IMMEDIATE)
+        for wait in (promise.result, promise.exception, subscription.wait):
+            with pytest.raises(UnsupportedError) as refused:
+                wait()
+            told.append(str(refused.value))
+        with pytest.raises(TimeoutError):
+            promise.result(0)
+        assert subscription.wait(0) is None
+        promise.fulfil(3)
+        told.append(promise.result())
+
+    thread = threading.Thread(target=receive, daemon=True)
+    thread.start()
+    thread.join(5)
+    waiting = ["/add has not answered", "/add has not answered", "/chatter"]
+    assert [text.partition(":")[0] for text in told[:3]] == waiting
+    assert told[3:] == [3]
