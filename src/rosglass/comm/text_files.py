@@ -22,9 +22,7 @@ def read_text(path: str | os.PathLike[str], most: int) -> tuple[str, str]:
     Raises:
         ParameterError: It cannot be read, is too large, or is no UTF-8.
     """
-    if not isinstance(path, (str, os.PathLike)):
-        raise ParameterError(f"a parameter file is given by its path, got {path!r}")
-    label = os.fspath(path)
+    label = _checked(path)
     try:
         size = Path(label).stat().st_size
         if size > most:
@@ -42,7 +40,7 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
     Raises:
         ParameterError: That is not possible.
     """
-    target = Path(path)
+    target = Path(_checked(path))
     try:
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
         try:
@@ -58,3 +56,17 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
             raise
     except OSError as error:
         raise ParameterError(f"{target} cannot be written: {error.strerror or error}") from None
+
+
+def _checked(path: str | os.PathLike[str]) -> str:
+    """Return a path that the system can be asked for."""
+    name = os.fspath(path) if isinstance(path, (str, os.PathLike)) else None
+    if not isinstance(name, str):
+        raise ParameterError(f"a parameter file is given by its path, got {path!r:.200}")
+    try:
+        impossible = b"\0" in os.fsencode(name)
+    except UnicodeEncodeError:
+        impossible = True
+    if impossible or not name:
+        raise ParameterError(f"{name!r:.200} is no path of a file")
+    return name

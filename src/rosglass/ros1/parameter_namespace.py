@@ -14,7 +14,7 @@ from rosglass.comm import (
     ParameterType,
 )
 from rosglass.comm.loop import check_plain
-from rosglass.errors import ParameterError
+from rosglass.errors import ConversionError, ParameterError
 from rosglass.ros1.parameter_values import flat, same
 
 if TYPE_CHECKING:
@@ -77,6 +77,8 @@ class ParameterNamespace:
     def find(self, prefixes: Iterable[str], depth: int, timeout: float) -> list[str]:
         """Return the names below `prefixes` (all without), up to `depth` levels (0: all)."""
         wanted = texts(prefixes, "prefixes", self.name)
+        if type(depth) is not int or depth < 0:
+            raise ConversionError("depth", depth, "a number of levels, 0 for all", self.name)
         names = sorted(name for name, _ in flat(self.tree(timeout)))
         if not wanted:
             return [name for name in names if not depth or name.count("/") < depth]

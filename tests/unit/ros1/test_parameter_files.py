@@ -75,6 +75,13 @@ def test_files_that_cannot_be_opened_are_told(tmp_path, missing):
         write(tmp_path / "nowhere" / "robot.yaml", {})
 
 
+@pytest.mark.parametrize("path", [None, 3, b"x", "", "a\0b", "\ud800", [], object()])
+def test_what_is_no_path_is_refused(path):
+    for ask in (read, lambda path: write(path, {})):
+        with pytest.raises(ParameterError, match="path"):
+            ask(path)
+
+
 def test_values_on_command_lines_are_yaml():
     assert parse_value("1.5", "_speed") == 1.5
     assert parse_value("{a: [1]}", "_speed") == {"a": [1]}

@@ -448,6 +448,9 @@ def test_a_client_reads_and_sets_a_namespace(node, master):
         assert client.names(["b"]) == ["b/c", "b/d/e"]
         assert client.names("b", 1) == ["b/c"]
         assert client.names(depth=1) == ["a", "m"]
+        for odd in (-1, 1.5, True, "1", None):
+            with pytest.raises(ConversionError, match="/robot: depth"):
+                client.names(depth=odd)
         assert client.get() == {"a": 1, "b/c": [1, 2], "b/d/e": "x", "m": [1, 2.5]}
         assert client.get(["a", "x", "b"]) == {
             "a": 1,
