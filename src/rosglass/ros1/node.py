@@ -29,7 +29,6 @@ if TYPE_CHECKING:
         Executor,
         Handle,
         ParameterClient,
-        Publisher,
         Sample,
         ServerGoal,
         ServiceClient,
@@ -46,6 +45,7 @@ if TYPE_CHECKING:
     from rosglass.ros1.options import Ros1Options
     from rosglass.ros1.parameter_server import ParameterServer
     from rosglass.ros1.parameters import Ros1Parameters
+    from rosglass.ros1.publisher import Ros1Publisher
 
 __all__ = ["Ros1Node"]
 
@@ -97,7 +97,7 @@ class Ros1Node(Node):
 
     def create_publisher(
         self, topic: str, type: str | MessageType, qos: QoS | int = 10
-    ) -> Publisher:
+    ) -> Ros1Publisher:
         """Announce `topic`; see :meth:`rosglass.comm.Node.create_publisher`."""
         self._core.check_open()
         return self._topics.publish(
