@@ -10,16 +10,21 @@ import builtins
 __all__ = [
     "BagError",
     "ConnectionLostError",
+    "ConnectivityException",
     "ConversionError",
     "CyclicTypeError",
     "DecodeError",
     "DefinitionConflictError",
     "DefinitionError",
     "Error",
+    "ExtrapolationException",
     "FieldPathError",
     "GoalRejectedError",
+    "InvalidArgumentException",
     "InvalidNameError",
+    "LookupException",
     "MasterError",
+    "NoPictureError",
     "NodeClosedError",
     "ParameterError",
     "QmlError",
@@ -27,6 +32,8 @@ __all__ = [
     "ServiceError",
     "ServiceUnavailableError",
     "TimeoutError",
+    "TimeoutException",
+    "TransformException",
     "TransitionError",
     "TypeNotFoundError",
     "UnsupportedError",
@@ -109,6 +116,10 @@ class UnsupportedError(Error):
     """This world or middleware cannot do what was asked; the message says why."""
 
 
+class NoPictureError(Error):
+    """A video stream cannot be shown yet; the message says what it is waiting for."""
+
+
 class NodeClosedError(Error):
     """The node, or the object created from it, was closed before this call."""
 
@@ -155,3 +166,27 @@ class BagError(Error):
 
 class QmlError(Error):
     """A QML file is missing or has errors; the message lists them as ``file:line:column``."""
+
+
+class TransformException(Error):  # noqa: N818 - tf2's name
+    """A transform cannot be had, or is not valid; one class below says which. Names as in tf2."""
+
+
+class LookupException(TransformException):
+    """A frame does not exist, or the frames form a loop."""
+
+
+class ConnectivityException(TransformException):
+    """Both frames exist, but nothing connects them."""
+
+
+class ExtrapolationException(TransformException):
+    """There is no data for the time asked for: it is too old, too new, or the only one."""
+
+
+class InvalidArgumentException(TransformException):
+    """A frame name, a time or a transform is not valid."""
+
+
+class TimeoutException(TransformException, TimeoutError):  # noqa: N818 - tf2's name
+    """A transform that was waited for did not become available within the time."""

@@ -1,0 +1,497 @@
+"""The transform buffer: remembers the last seconds of every frame and answers where it was.
+
+Behaviour: tf2's ``BufferCore`` and tf2_ros's ``Buffer``.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import Counter
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from rosglass.comm.complaints import Complaints
+from rosglass.comm.executor import IMMEDIATE
+from rosglass.comm.node import Handle
+from rosglass.comm.promise import check_timeout
+from rosglass.comm.receiving import check_may_wait
+from rosglass.comm.similar import similar
+from rosglass.comm.time import Duration, Time
+from rosglass.errors import (
+    ConversionError,
+    InvalidArgumentException,
+    LookupException,
+    TimeoutException,
+    TransformException,
+)
+from rosglass.tf.arguments import check_name, nanoseconds_of
+from rosglass.tf.changes import Changes
+from rosglass.tf.frames import FrameInfo, FrameTree
+from rosglass.tf.store import FrameStore
+from rosglass.tf.transform import Transform
+from rosglass.tf.waiting import Waiting
+from rosglass.tf.walk import common_time, links_between, look_up
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from rosglass.comm.node import Executor
+    from rosglass.comm.promise import Promise
+    from rosglass.tf.cache import Entry
+
+__all__ = ["TransformBuffer", "Transformable"]
+
+_log = logging.getLogger("rosglass.tf")
+
+
+@dataclass(frozen=True, slots=True)
+class Transformable:
+    """Whether a transform is available; true if so.
+
+    Attributes:
+        error: Why not; None when it is.
+    """
+
+    error: TransformException | None = None
+
+    def __bool__(self) -> bool:
+        return self.error is None
+
+    @property
+    def reason(self) -> str:
+        """Why not, in words; empty when it is available."""
+        return "" if self.error is None else str(self.error)
+
+
+class TransformBuffer(Handle):
+    """Remembers transforms for some seconds and looks them up, at any time in between.
+
+    Times are :class:`rosglass.Time`; None and zero mean the newest time at which every link between
+    the two frames is known. Safe to use from any thread.
+
+    Args:
+        cache_time: How long transforms are kept, seconds or a Duration; measured back from the
+            newest of each frame, by the stamps.
+
+    Attributes:
+        ignored: How many transforms were not taken, by reason: ``old`` (older than what is kept),
+            ``repeated`` (same frame and stamp), ``self``, ``no name``, ``not finite``,
+            ``not normalised``, ``loop``.
+
+    Raises:
+        ConversionError: The time is not above zero.
+    """
+
+    def __init__(self, cache_time: float | Duration = 10.0) -> None:
+        kept = cache_time
+        if isinstance(kept, (int, float)) and not isinstance(kept, bool) and 0 < kept < 1e9:
+            kept = Duration.from_seconds(kept)
+        if not isinstance(kept, Duration) or kept <= Duration():
+            raise ConversionError("cache_time", cache_time, "seconds above zero, or a Duration")
+        self.cache_time = kept
+        self.ignored: Counter[str] = Counter()
+        self._lock = threading.Lock()
+        self._store = FrameStore(kept.nanoseconds)
+        self._complaints = Complaints(1000)
+        self._changes = Changes(self._links)
+        self._waiting = Waiting()
+
+    def __repr__(self) -> str:
+        return f"<TransformBuffer of {len(self._store.names)} frames>"
+
+    # -- filling ---------------------------------------------------------------------------------
+
+    def set_transform(
+        self, transform: Transform, authority: str = "", *, static: bool = False
+    ) -> bool:
+        """Remember a transform.
+
+        Args:
+            transform: A slash before its frames' names is left out, as in tf2.
+            authority: Who says so.
+            static: Whether it holds for ever. Of a frame that is published as static and as moving,
+                what comes last counts, and the log says who disagrees.
+
+        Returns:
+            Whether it was taken; not so when it is older than what is kept, or known already.
+
+        Raises:
+            InvalidArgumentException: A frame in itself or without a name, a quaternion that is not
+                normalised, a parent that is itself placed in the child.
+        """
+        if not isinstance(transform, Transform):
+            raise InvalidArgumentException(
+                f"expected a rosglass.tf.Transform, got {transform!r}; Transform.from_message() "
+                "makes one of a message"
+            )
+        entry = (transform.frame_id, *transform.translation, *transform.rotation)
+        item = (transform.child_frame_id, transform.stamp.nanoseconds, entry)
+        refused = self.set_many([item], authority, static)
+        for kind, told in refused:
+            if kind not in ("old", "repeated"):
+                raise InvalidArgumentException(told)
+        return not refused
+
+    def set_many(
+        self, items: Iterable[tuple[str, int, Entry]], authority: object = "", static: bool = False
+    ) -> list[tuple[str, str]]:
+        """Remember many transforms at once; for listeners.
+
+        Args:
+            items: Each the child's name, the stamp in nanoseconds, and where it is.
+            authority: Who says so; its text is taken when somebody asks.
+            static: Whether they hold for ever.
+
+        Returns:
+            What was refused: a key of :attr:`ignored` and the reason in words. What may be a fault
+            of others is logged, once for each frame and authority.
+        """
+        refused: list[tuple[str, str, str]] = []
+        changed = set()
+        store = self._store
+        with self._lock:
+            tree = store.version
+            for child, stamp, entry in items:
+                kind, name = store.put(child, stamp, entry, static, authority)
+                if kind:
+                    refused.append((kind, name, store.told(kind, name, stamp, entry)))
+                else:
+                    changed.add(name)
+            self.ignored.update(kind for kind, _, _ in refused)
+            moved = store.version != tree
+            disagreements, store.disagreements = store.disagreements, []
+        # What is logged may go round the world, and may ask the graph who it was.
+        for frame, first, second in disagreements:
+            if self._complaints.fresh(("kind", frame)):
+                _log.warning(
+                    "frame '%s' is published as static and as moving, by %s and %s: what comes "
+                    "last counts; let one of them publish it",
+                    frame,
+                    first,
+                    second,
+                )
+        for kind, child, told in refused:
+            if self._complaints.fresh((kind, child, authority)):
+                level = logging.DEBUG if kind == "repeated" else logging.WARNING
+                _log.log(level, "%s (from %s)", told, str(authority) or "an unnamed authority")
+        if changed:
+            if self._waiting:
+                self._waiting.test()
+            self._changes.tell(changed, moved)
+        return [(kind, told) for kind, _, told in refused]
+
+    def clear(self, *, static: bool = False) -> None:
+        """Forget all transforms, static ones only if told to; frames without any are gone then."""
+        with self._lock:
+            gone = self._store.clear(static)
+        self._changes.tell(gone, True)
+
+    def close(self) -> None:
+        """Fail all lookups that wait; safe to call twice. Everything else goes on working."""
+        self._waiting.close()
+
+    # -- looking up ------------------------------------------------------------------------------
+
+    def lookup_transform(
+        self, target: str, source: str, time: Time | None = None, *, timeout: float = 0.0
+    ) -> Transform:
+        """Return where the frame `source` is, seen from `target`.
+
+        Applied to a point in `source`, the result tells the point in `target`.
+
+        Args:
+            target: Frame to express it in.
+            source: Frame to express.
+            time: When; None for the newest.
+            timeout: Seconds to wait for it to become available. Blocks: not for GUI threads.
+
+        Raises:
+            LookupException: A frame does not exist.
+            ConnectivityException: Nothing connects the two.
+            ExtrapolationException: A link between them is not known at that time.
+            InvalidArgumentException: A frame's name starts with a slash or is empty, or the time
+                is none.
+            UnsupportedError: A thread that receives transforms cannot wait for them.
+        """
+        return self._now_or_within(
+            timeout,
+            f"{target} <- {source}",
+            lambda: self._look_up(target, source, nanoseconds_of(time, "time")),
+        )
+
+    def lookup_transform_full(
+        self,
+        target: str,
+        target_time: Time | None,
+        source: str,
+        source_time: Time | None,
+        fixed_frame: str,
+        *,
+        timeout: float = 0.0,
+    ) -> Transform:
+        """Return where `source` was at one time, seen from where `target` is at another.
+
+        Args:
+            target: Frame to express it in, as it is
+            target_time: at this time; None for the newest.
+            source: Frame to express, as it is
+            source_time: at this time; None for the newest.
+            fixed_frame: Frame that does not move in between, e.g. ``odom``.
+            timeout: Seconds to wait, as for :meth:`lookup_transform`, whose errors it has.
+        """
+        return self._now_or_within(
+            timeout,
+            f"{target} <- {source}",
+            lambda: self._look_up_full(target, target_time, source, source_time, fixed_frame),
+        )
+
+    def lookup_transform_async(
+        self,
+        target: str,
+        source: str,
+        time: Time | None = None,
+        *,
+        timeout: float | None = None,
+    ) -> Promise[Transform]:
+        """Return the promise of a transform, kept as soon as it is available.
+
+        It can be waited for, awaited in asyncio, call back (in the thread that receives, unless
+        ``on_done`` is given an executor), and be cancelled.
+
+        Args:
+            target: As for :meth:`lookup_transform`.
+            source: As above.
+            time: As above; a time to come is fine.
+            timeout: Seconds until the promise fails with a TimeoutException that has the reason;
+                None to wait for ever.
+
+        Raises:
+            InvalidArgumentException: A name or the time is not valid.
+            NodeClosedError: The buffer is closed.
+        """
+        when = nanoseconds_of(time, "time")
+        return self._waiting.add(
+            f"{target} <- {source}", lambda: self._look_up(target, source, when), timeout
+        )
+
+    def lookup_transform_full_async(
+        self,
+        target: str,
+        target_time: Time | None,
+        source: str,
+        source_time: Time | None,
+        fixed_frame: str,
+        *,
+        timeout: float | None = None,
+    ) -> Promise[Transform]:
+        """Promise :meth:`lookup_transform_full`; see :meth:`lookup_transform_async`."""
+        return self._waiting.add(
+            f"{target} <- {source}",
+            lambda: self._look_up_full(target, target_time, source, source_time, fixed_frame),
+            timeout,
+        )
+
+    def wait_for_transform(
+        self,
+        target: str,
+        source: str,
+        time: Time | None = None,
+        timeout: float | None = None,
+    ) -> Transform:
+        """Wait for a transform and return it.
+
+        Args:
+            target: As for :meth:`lookup_transform`.
+            source: As above.
+            time: As above.
+            timeout: Seconds to wait, None for ever.
+
+        Raises:
+            TimeoutException: It did not become available; says why.
+            InvalidArgumentException: A name or the time is not valid.
+            UnsupportedError: A thread that receives transforms cannot wait for them.
+            NodeClosedError: The buffer is closed, or gets closed meanwhile.
+        """
+        promise = self.lookup_transform_async(target, source, time, timeout=timeout)
+        if not promise.done():
+            _check_may_wait(promise, f"{target} <- {source}")
+        return promise.result()
+
+    def can_transform(
+        self, target: str, source: str, time: Time | None = None, *, timeout: float = 0.0
+    ) -> Transformable:
+        """Return whether :meth:`lookup_transform` would succeed, and if not, why."""
+        return _tried(lambda: self.lookup_transform(target, source, time, timeout=timeout))
+
+    def can_transform_full(
+        self,
+        target: str,
+        target_time: Time | None,
+        source: str,
+        source_time: Time | None,
+        fixed_frame: str,
+        *,
+        timeout: float = 0.0,
+    ) -> Transformable:
+        """Return whether :meth:`lookup_transform_full` would succeed, and if not, why."""
+        return _tried(
+            lambda: self.lookup_transform_full(
+                target, target_time, source, source_time, fixed_frame, timeout=timeout
+            )
+        )
+
+    def latest_common_time(self, target: str, source: str) -> Time:
+        """Return the newest time at which every link between two frames is known.
+
+        Zero when all are static. Errors as for :meth:`lookup_transform`.
+        """
+        with self._lock:
+            self._check_name(target, "target")
+            self._check_name(source, "source")
+            if target == source:
+                cache = self._store.caches.get(target)
+                return Time(0 if cache is None else cache.latest)
+            return Time(common_time(self._store.caches, target, source))
+
+    # -- the tree --------------------------------------------------------------------------------
+
+    def has_frame(self, name: str) -> bool:
+        """Return whether a frame exists."""
+        return name in self._store.names
+
+    def frame(self, name: str) -> FrameInfo | None:
+        """Return what is known of a frame; None when it does not exist."""
+        found = self._infos([name])
+        return found[0] if found else None
+
+    def tree(self) -> FrameTree:
+        """Return all frames as they are now."""
+        return FrameTree(self._infos(None))
+
+    # -- changes ---------------------------------------------------------------------------------
+
+    def on_change(
+        self, target: str, source: str, callback: Callable[[], None], executor: Executor = IMMEDIATE
+    ) -> Handle:
+        """Call `callback` when a transform came that lies between two frames.
+
+        Also when they become connected, or are no longer. Changes of a burst are merged.
+
+        Args:
+            target: A frame; need not exist yet.
+            source: Another one.
+            callback: What to call.
+            executor: Where it runs; by default in the thread that fills the buffer, where it must
+                not wait for anything.
+
+        Raises:
+            ConversionError: `callback` or `executor` is not what it should be.
+            InvalidArgumentException: A name is empty or starts with a slash.
+        """
+        for frame, what in ((target, "target"), (source, "source")):
+            check_name(frame, what)
+        return self._changes.on_pair(target, source, callback, executor)
+
+    def on_tree_change(
+        self, callback: Callable[[], None], executor: Executor = IMMEDIATE
+    ) -> Handle:
+        """Call `callback` when frames came, went, or have another parent; see :meth:`on_change`."""
+        return self._changes.on_tree(callback, executor)
+
+    def on_update(self, callback: Callable[[], None], executor: Executor = IMMEDIATE) -> Handle:
+        """Call `callback` when any transform came; see :meth:`on_change`."""
+        return self._changes.on_any(callback, executor)
+
+    # -- inside ----------------------------------------------------------------------------------
+
+    def _look_up(self, target: str, source: str, time: int) -> Transform:
+        with self._lock:
+            self._check_name(target, "target")
+            self._check_name(source, "source")
+            caches = self._store.caches
+            if target == source:
+                if not time and target in caches:
+                    time = caches[target].latest
+                return Transform(stamp=Time(time), frame_id=target, child_frame_id=source)
+            if not time:
+                time = common_time(caches, target, source)
+            translation, rotation = look_up(caches, target, source, time)
+        return Transform(translation, rotation, Time(time), target, source)
+
+    def _look_up_full(
+        self,
+        target: str,
+        target_time: Time | None,
+        source: str,
+        source_time: Time | None,
+        fixed_frame: str,
+    ) -> Transform:
+        times = (
+            nanoseconds_of(target_time, "target_time"),
+            nanoseconds_of(source_time, "source_time"),
+        )
+        with self._lock:
+            for frame, what in (
+                (target, "target"),
+                (source, "source"),
+                (fixed_frame, "fixed_frame"),
+            ):
+                self._check_name(frame, what)
+        before = self._look_up(fixed_frame, source, times[1])
+        return self._look_up(target, fixed_frame, times[0]).compose(before)
+
+    def _now_or_within(
+        self, timeout: float, what: str, query: Callable[[], Transform]
+    ) -> Transform:
+        # "now" is by far the commonest, and then nothing is made to wait with.
+        patience = check_timeout(timeout, what)
+        if patience == 0:
+            return query()
+        promise = self._waiting.add(what, query, patience)
+        if not promise.done():
+            _check_may_wait(promise, what)
+        try:
+            return promise.result()
+        except TimeoutException as late:
+            # As in tf2: what stands in the way, not that it was waited for.
+            raise (late.__cause__ or late) from None
+
+    def _check_name(self, name: str, what: str) -> None:
+        if name in self._store.names and name[:1] != "/":
+            return
+        check_name(name, what)
+        raise LookupException(
+            f'"{name}" passed as {what} does not exist{similar(name, self._store.names)}'
+        )
+
+    def _infos(self, names: list[str] | None) -> list[FrameInfo]:
+        store = self._store
+        with self._lock:
+            wanted = [name for name in names or store.names if name in store.names]
+            found = [(store.info(name), store.authorities.get(name, "")) for name in wanted]
+        # Outside the lock: to name the publisher, a listener may have to ask the graph.
+        return [replace(info, authority=str(authority)) for info, authority in found]
+
+    def _links(self, target: str, source: str) -> frozenset[str] | None:
+        with self._lock:
+            if target not in self._store.names or source not in self._store.names:
+                return None
+            found = links_between(self._store.caches, target, source)
+        return None if found is None else frozenset((*found[0], *found[1]))
+
+
+def _tried(query: Callable[[], Transform]) -> Transformable:
+    try:
+        query()
+    except TransformException as error:
+        return Transformable(error)
+    return Transformable()
+
+
+def _check_may_wait(promise: Promise[Transform], what: str) -> None:
+    try:
+        check_may_wait(what)
+    except Exception:
+        promise.cancel()
+        raise
