@@ -7,7 +7,7 @@ received buffer.
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -26,7 +26,16 @@ if TYPE_CHECKING:
 
     Array = NDArray[Any]
 
-__all__ = ["ANY_FORMAT", "ENCODINGS", "MAX_PIXELS", "convert", "opencv"]
+__all__ = [
+    "ANY_FORMAT",
+    "ENCODINGS",
+    "MAX_PIXELS",
+    "Encoding",
+    "convert",
+    "opencv",
+    "pixels_of",
+    "to_rgbx",
+]
 
 #: A display that takes everything.
 ANY_FORMAT = frozenset(PixelFormat)
@@ -36,7 +45,7 @@ _IMAGE = "sensor_msgs/msg/Image"
 
 
 @dataclass(frozen=True, slots=True)
-class _Encoding:
+class Encoding:
     """How pixels lie in memory and how they get onto a display.
 
     Attributes:
@@ -45,7 +54,8 @@ class _Encoding:
         direct: Layout under which a display takes the pixels unchanged, None when there is none.
         code: Name of OpenCV's conversion to RGBA, empty when `direct` is always accepted.
         special: Conversion by a function of this module instead.
-        rows: Rows in memory per row of pixels, as a fraction (3, 2) for planar 4:2:0.
+        rows: Rows in memory per row of pixels, as a fraction: (3, 2) for planar 4:2:0, (3, 1) for
+            planar 4:4:4, whose rows of chroma are twice as long.
     """
 
     channels: int
@@ -76,6 +86,28 @@ def _two_channels(pixels: Array) -> tuple[PixelFormat, Array]:
     return PixelFormat.RGBX, out
 
 
+#: ITU-R BT.601, studio swing, to RGBX: factors of Y, U and V, and what is added.
+_YUV_TO_RGBX = np.array(
+    [
+        [1.1644, 0.0, 1.5960, -222.92],
+        [1.1644, -0.3917, -0.8129, 135.58],
+        [1.1644, 2.0172, 0.0, -276.84],
+        [0.0, 0.0, 0.0, 255.0],
+    ],
+    np.float32,
+)
+
+
+def _nv24(pixels: Array) -> tuple[PixelFormat, Array]:
+    height, width = pixels.shape[0] // 3, pixels.shape[1]
+    chroma = np.lib.stride_tricks.as_strided(
+        pixels[height:], (height, width, 2), (2 * pixels.strides[0], 2, 1)
+    )
+    yuv = np.empty((height, width, 3), np.uint8)
+    yuv[..., 0], yuv[..., 1:] = pixels[:height], chroma
+    return PixelFormat.RGBX, opencv().transform(yuv, _YUV_TO_RGBX)
+
+
 def _wide(code: str, format: PixelFormat) -> Callable[[Array], tuple[PixelFormat, Array]]:
     """Return a conversion of 16-bit colours that keeps the high bytes."""
 
@@ -86,34 +118,35 @@ def _wide(code: str, format: PixelFormat) -> Callable[[Array], tuple[PixelFormat
 
 
 #: Every encoding that can be shown.
-ENCODINGS: dict[str, _Encoding] = {
-    "rgb8": _Encoding(3, code="RGB2RGBA"),
-    "bgr8": _Encoding(3, code="BGR2RGBA"),
-    "8UC3": _Encoding(3, code="BGR2RGBA"),
-    "rgba8": _Encoding(4, direct=PixelFormat.RGBA),
-    "bgra8": _Encoding(4, direct=PixelFormat.BGRA),
-    "8UC4": _Encoding(4, direct=PixelFormat.BGRA),
-    "mono8": _Encoding(1, direct=PixelFormat.GRAY8),
-    "8UC1": _Encoding(1, direct=PixelFormat.GRAY8),
-    "8UC2": _Encoding(2, special=_two_channels),
-    "mono16": _Encoding(1, 2, direct=PixelFormat.GRAY16),
-    "16UC1": _Encoding(1, 2, direct=PixelFormat.GRAY16),
-    "32FC1": _Encoding(1, 4, special=_depth_in_millimetres),
-    "rgb16": _Encoding(3, 2, special=_wide("RGB2RGBA", PixelFormat.RGBX)),
-    "bgr16": _Encoding(3, 2, special=_wide("BGR2RGBA", PixelFormat.RGBX)),
-    "rgba16": _Encoding(4, 2, special=_wide("", PixelFormat.RGBA)),
-    "bgra16": _Encoding(4, 2, special=_wide("", PixelFormat.BGRA)),
-    "yuv422": _Encoding(2, direct=PixelFormat.UYVY, code="YUV2RGBA_UYVY"),
-    "uyvy": _Encoding(2, direct=PixelFormat.UYVY, code="YUV2RGBA_UYVY"),
-    "yuv422_yuy2": _Encoding(2, direct=PixelFormat.YUYV, code="YUV2RGBA_YUY2"),
-    "yuyv": _Encoding(2, direct=PixelFormat.YUYV, code="YUV2RGBA_YUY2"),
-    "nv12": _Encoding(1, direct=PixelFormat.NV12, code="YUV2RGBA_NV12", rows=(3, 2)),
-    "nv21": _Encoding(1, direct=PixelFormat.NV21, code="YUV2RGBA_NV21", rows=(3, 2)),
+ENCODINGS: dict[str, Encoding] = {
+    "rgb8": Encoding(3, code="RGB2RGBA"),
+    "bgr8": Encoding(3, code="BGR2RGBA"),
+    "8UC3": Encoding(3, code="BGR2RGBA"),
+    "rgba8": Encoding(4, direct=PixelFormat.RGBA),
+    "bgra8": Encoding(4, direct=PixelFormat.BGRA),
+    "8UC4": Encoding(4, direct=PixelFormat.BGRA),
+    "mono8": Encoding(1, direct=PixelFormat.GRAY8),
+    "8UC1": Encoding(1, direct=PixelFormat.GRAY8),
+    "8UC2": Encoding(2, special=_two_channels),
+    "mono16": Encoding(1, 2, direct=PixelFormat.GRAY16),
+    "16UC1": Encoding(1, 2, direct=PixelFormat.GRAY16),
+    "32FC1": Encoding(1, 4, special=_depth_in_millimetres),
+    "rgb16": Encoding(3, 2, special=_wide("RGB2RGBA", PixelFormat.RGBX)),
+    "bgr16": Encoding(3, 2, special=_wide("BGR2RGBA", PixelFormat.RGBX)),
+    "rgba16": Encoding(4, 2, special=_wide("", PixelFormat.RGBA)),
+    "bgra16": Encoding(4, 2, special=_wide("", PixelFormat.BGRA)),
+    "yuv422": Encoding(2, direct=PixelFormat.UYVY, code="YUV2RGBA_UYVY"),
+    "uyvy": Encoding(2, direct=PixelFormat.UYVY, code="YUV2RGBA_UYVY"),
+    "yuv422_yuy2": Encoding(2, direct=PixelFormat.YUYV, code="YUV2RGBA_YUY2"),
+    "yuyv": Encoding(2, direct=PixelFormat.YUYV, code="YUV2RGBA_YUY2"),
+    "nv12": Encoding(1, direct=PixelFormat.NV12, code="YUV2RGBA_NV12", rows=(3, 2)),
+    "nv21": Encoding(1, direct=PixelFormat.NV21, code="YUV2RGBA_NV21", rows=(3, 2)),
+    "nv24": Encoding(1, special=_nv24, rows=(3, 1)),
 }
 for _order in ("rggb", "bggr", "gbrg", "grbg"):
     _code = f"Bayer{_order.upper()}2RGBA"
-    ENCODINGS[f"bayer_{_order}8"] = _Encoding(1, code=_code)
-    ENCODINGS[f"bayer_{_order}16"] = _Encoding(1, 2, special=_wide(_code, PixelFormat.RGBX))
+    ENCODINGS[f"bayer_{_order}8"] = Encoding(1, code=_code)
+    ENCODINGS[f"bayer_{_order}16"] = Encoding(1, 2, special=_wide(_code, PixelFormat.RGBX))
 
 
 @cache
@@ -143,8 +176,12 @@ def _to_rgba(pixels: Array, code: str, out: Array | None = None) -> Array:
     return rgba
 
 
-def _pixels(image: RawImage, encoding: _Encoding) -> Array:
-    """Return the pixels as rows x columns (x channels), sharing the received buffer."""
+def pixels_of(image: RawImage, encoding: Encoding) -> Array:
+    """Return the pixels as rows x columns (x channels), sharing the received buffer.
+
+    Raises:
+        DecodeError: Sizes, step and data contradict each other.
+    """
     rows, remainder = divmod(image.height * encoding.rows[0], encoding.rows[1])
     row_bytes = image.width * encoding.channels * encoding.size
     size = memoryview(image.data).nbytes
@@ -204,6 +241,29 @@ def _rows_of_bytes(pixels: Array) -> NDArray[np.uint8]:
     )
 
 
+def to_rgbx(frame: Frame) -> Frame:
+    """Return a picture of YUV, or of 8-bit grey, as RGBX.
+
+    Raises:
+        UnsupportedError: OpenCV is not installed, or the layout is another.
+    """
+    cv2 = opencv()
+    layout, width = frame.format, frame.width
+    if layout in {PixelFormat.NV12, PixelFormat.NV21}:
+        code = getattr(cv2, f"COLOR_YUV2RGBA_{layout.name}")
+        out = cv2.cvtColorTwoPlane(
+            frame.planes[0], frame.planes[1].reshape(frame.height // 2, width // 2, 2), code
+        )
+    elif layout in {PixelFormat.UYVY, PixelFormat.YUYV}:
+        code = "UYVY" if layout is PixelFormat.UYVY else "YUY2"
+        out = _to_rgba(frame.planes[0].reshape(frame.height, width, 2), f"YUV2RGBA_{code}")
+    elif layout is PixelFormat.GRAY8:
+        out = _to_rgba(frame.planes[0], "GRAY2RGBA")
+    else:
+        raise UnsupportedError(f"a picture of {layout.value} cannot be made RGBX")
+    return replace(frame, format=PixelFormat.RGBX, planes=(_rows_of_bytes(out),))
+
+
 def convert(
     image: RawImage,
     accept: frozenset[PixelFormat] = ANY_FORMAT,
@@ -233,7 +293,7 @@ def convert(
             f"image encoding {image.encoding[:40]!r} cannot be shown; "
             f"these can: {', '.join(sorted(ENCODINGS))}"
         )
-    pixels = _pixels(image, encoding)
+    pixels = pixels_of(image, encoding)
     if encoding.special is not None:
         layout, out = encoding.special(pixels)
     elif encoding.direct is not None and (not encoding.code or encoding.direct in accept):

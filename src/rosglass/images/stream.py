@@ -5,14 +5,16 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from collections import deque
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rosglass.comm.executor import IMMEDIATE
 from rosglass.comm.node import Handle
 from rosglass.comm.qos import QoS, Reliability
-from rosglass.errors import Error, NodeClosedError
-from rosglass.images.transports import TRANSPORTS, Choice, choose
+from rosglass.errors import Error, NodeClosedError, NoPictureError
+from rosglass.images.transports import choose
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -21,15 +23,22 @@ if TYPE_CHECKING:
     from rosglass.comm.sample import Sample
     from rosglass.comm.subscription import Subscription
     from rosglass.images.frame import RawImage
+    from rosglass.images.transports import Choice, PictureReader, Transport
     from rosglass.messages import MessageType
 
 __all__ = ["ImageStream", "StreamStatistics"]
 
+_T = TypeVar("_T")
 _log = logging.getLogger("rosglass.images")
 #: Seconds after which the graph is looked at again while there is nothing to receive.
 _RETRY = 1.0
 #: Seconds between two log lines about the same stream.
 _LOG_EVERY = 5.0
+#: Packets of a video that may wait: more would show the past, so the next key frame is awaited.
+_BACKLOG = 60
+_QUEUE = 16
+_STILLS = QoS(depth=1, reliability=Reliability.BEST_EFFORT)
+_VIDEO = QoS(depth=_QUEUE, reliability=Reliability.BEST_AVAILABLE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,10 +63,10 @@ class StreamStatistics:
 class ImageStream(Handle):
     """Receives the pictures of one camera.
 
-    Subscribes best effort to the preferred transport, or to another one while that is not
-    published. Decompression and conversion run in the stream's own thread, so that neither the
-    middleware nor the user interface waits for them; a picture that is overtaken by a newer one
-    is dropped.
+    Subscribes to the preferred transport, or to another one while that is not published: best
+    effort, but reliably to videos whose publisher offers it. Decompression and conversion run in
+    the stream's own thread, so that neither the middleware nor the user interface waits for them;
+    a picture that is overtaken by a newer one is dropped.
 
     Args:
         node: Where to subscribe.
@@ -83,11 +92,12 @@ class ImageStream(Handle):
         self._node, self._preferred = node, preferred
         self._show_picture, self._changed = show, changed
         self._wake = threading.Condition()
-        self._sample: Sample | None = None
+        self._samples: deque[tuple[Transport, Sample]] = deque()
+        self._overflow = False
         self._look, self._closing = True, False
         self._choice: Choice | None = None
         self._subscription: Subscription | None = None
-        self._reader: tuple[MessageType, str, Callable[[Sample], RawImage]] | None = None
+        self._reader: tuple[MessageType, str, PictureReader] | None = None
         self._problem, self._logged = "", ("", 0.0)
         self._received = self._shown = self._dropped = self._lost = self._invalid = 0
         self._sequence: tuple[bytes, int] = (b"", -1)
@@ -147,33 +157,38 @@ class ImageStream(Handle):
             self._look = True
             self._wake.notify_all()
 
-    def _on_sample(self, sample: Sample) -> None:
+    def _on_sample(self, transport: Transport, sample: Sample) -> None:
         with self._wake:
             self._received += 1
-            self._dropped += self._sample is not None
+            if not transport.video or len(self._samples) >= _BACKLOG:
+                self._overflow |= transport.video
+                self._dropped += len(self._samples)
+                self._samples.clear()
             publisher, last = self._sequence
             if sample.sequence >= 0:
                 if sample.publisher == publisher and sample.sequence > last >= 0:
                     self._lost += sample.sequence - last - 1
                 self._sequence = (sample.publisher, sample.sequence)
-            self._sample = sample
+            self._samples.append((transport, sample))
             self._wake.notify_all()
 
     def _work(self) -> None:
         while True:
             with self._wake:
                 self._wake.wait_for(
-                    lambda: self._sample is not None or self._look or self._closing,
+                    lambda: self._samples or self._look or self._closing,
                     _RETRY if self._subscription is None else None,
                 )
                 if self._closing:
                     break
                 look, self._look = self._look or self._subscription is None, False
-                sample, self._sample = self._sample, None
+                samples, self._samples = self._samples, deque()
+                overflow, self._overflow = self._overflow, False
             if look:
                 self._subscribe()
-            if sample is not None:
-                self._show(sample)
+            if overflow and self._reader is not None:
+                self._reader[2].lost()
+            self._decode(samples)
         if self._subscription is not None:
             self._subscription.close()
 
@@ -192,8 +207,8 @@ class ImageStream(Handle):
             subscription = self._node.create_subscription(
                 choice.topic,
                 choice.transport.type,
-                qos=QoS(depth=1, reliability=Reliability.BEST_EFFORT),
-                raw_callback=self._on_sample,
+                qos=_VIDEO if choice.transport.video else _STILLS,
+                raw_callback=partial(self._on_sample, choice.transport),
                 executor=IMMEDIATE,
             )
         except NodeClosedError:
@@ -209,28 +224,47 @@ class ImageStream(Handle):
         self._problem = ""
         self._tell()
 
-    def _show(self, sample: Sample) -> None:
+    def _decode(self, samples: deque[tuple[Transport, Sample]]) -> None:
+        """Decode what has come, and show the newest picture."""
+        newest: tuple[RawImage, Sample] | None = None
+        for transport, sample in samples:
+            choice = self._choice
+            if choice is None or transport is not choice.transport:
+                continue
+            picture = self._guarded(self._read, transport, sample)
+            if picture is not None:
+                with self._wake:
+                    self._dropped += newest is not None
+                newest = (picture, sample)
+        if newest is not None and self._guarded(self._show, *newest):
+            self._say("")
+
+    def _read(self, transport: Transport, sample: Sample) -> RawImage | None:
+        if self._reader is None or self._reader[:2] != (sample.type, sample.wire):
+            reader = transport.reader(sample.type, sample.wire)
+            self._reader = (sample.type, sample.wire, reader)
+        return self._reader[2](sample)
+
+    def _show(self, picture: RawImage, sample: Sample) -> bool:
+        self._show_picture(picture, sample)
+        with self._wake:
+            self._shown += 1
+        return True
+
+    def _guarded(self, step: Callable[..., _T], *arguments: Any) -> _T | None:
+        """Call a step; None when it failed: whatever a camera sends must not end the stream."""
         try:
-            if self._reader is None or self._reader[:2] != (sample.type, sample.wire):
-                transport = next(
-                    t for t in TRANSPORTS.values() if t.type == sample.type.definition.name
-                )
-                reader = transport.reader(sample.type, sample.wire)
-                self._reader = (sample.type, sample.wire, reader)
-            self._show_picture(self._reader[2](sample), sample)
+            return step(*arguments)
+        except NoPictureError as error:
+            self._say(str(error))
         except Error as error:
             with self._wake:
                 self._invalid += 1
             self._say(str(error))
-            return
         except Exception as error:
-            # Whatever a camera sends must not end the stream.
             _log.exception("%s: a picture could not be converted", self.topic)
             self._say(f"internal error: {error}")
-            return
-        self._say("")
-        with self._wake:
-            self._shown += 1
+        return None
 
     def _say(self, problem: str) -> None:
         """Remember why nothing is shown; log it, but not for every picture of a bad stream."""

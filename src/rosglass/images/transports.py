@@ -7,12 +7,15 @@ other transport a subtopic named after it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from rosglass.comm.time import Time
 from rosglass.errors import UnsupportedError
 from rosglass.images.compressed import decompress
+from rosglass.images.compressed_depth import decompress_depth
+from rosglass.images.ffmpeg import FfmpegDecoder
 from rosglass.images.frame import RawImage
+from rosglass.images.theora import TheoraDecoder
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -20,9 +23,30 @@ if TYPE_CHECKING:
     from rosglass.comm.sample import Sample
     from rosglass.messages import MessageType
 
-__all__ = ["TRANSPORTS", "Choice", "Transport", "choose"]
+__all__ = ["TRANSPORTS", "Choice", "PictureReader", "Transport", "choose"]
 
-_KNOWN_ELSEWHERE = ("compressedDepth", "theora", "ffmpeg", "zstd", "draco")
+_KNOWN_ELSEWHERE = ("zstd", "draco")
+
+
+class _Decoder(Protocol):
+    """Decodes one stream; the arguments of `read` are the stamp and the transport's fields."""
+
+    @property
+    def read(self) -> Callable[..., RawImage | None]:
+        """Make a picture."""
+
+    def lost(self) -> None:
+        """Tell that packets are missing."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Still:
+    """Decodes pictures that need no other."""
+
+    read: Callable[..., RawImage]
+
+    def lost(self) -> None:
+        """Do nothing: the next picture is whole."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,31 +56,63 @@ class Transport:
     Attributes:
         name: Its name, as ROS's image_transport knows it.
         type: Message type.
-        fields: Paths of the message's fields that `read` needs.
-        read: Makes a picture from the two parts of the stamp and those fields.
+        fields: Paths of the message's fields that the decoder needs.
+        decoder: Makes a stream's decoder.
+        video: Whether packets build upon earlier ones, so that each must be decoded.
     """
 
     name: str
     type: str
     fields: tuple[str, ...]
-    read: Callable[..., RawImage]
+    decoder: Callable[[], _Decoder]
+    video: bool = False
 
     def topic(self, base: str) -> str:
         """Return the topic that carries the pictures of the camera `base`."""
         return base if self.name == "raw" else f"{base}/{self.name}"
 
-    def reader(self, type: MessageType, wire: str) -> Callable[[Sample], RawImage]:
-        """Return a function that reads a picture out of a received sample without copying it.
+    def reader(self, type: MessageType, wire: str) -> PictureReader:
+        """Return what reads the pictures of one stream out of its samples."""
+        return PictureReader(self, type, wire)
 
-        The function raises DecodeError for malformed samples and UnsupportedError for pictures
-        that cannot be shown.
-        """
+
+class PictureReader:
+    """Reads the pictures of one stream out of its samples, without copying where possible.
+
+    Args:
+        transport: How they are sent.
+        type: The samples' type.
+        wire: The samples' format.
+    """
+
+    def __init__(self, transport: Transport, type: MessageType, wire: str) -> None:
         # ROS 1 has other names for the two parts of a time.
         stamp = ("secs", "nsecs") if type.ros == 1 else ("sec", "nanosec")
-        header = [f"header.stamp.{part}" for part in stamp]
-        get = type.path(*header, *self.fields, wire=wire)
-        read = self.read
-        return lambda sample: read(*get(sample.data))
+        header = [*(f"header.stamp.{part}" for part in stamp), "header.frame_id"]
+        self._get = type.path(*header, *transport.fields, wire=wire)
+        self._decoder = transport.decoder()
+        self._publisher, self._sequence = b"", -1
+
+    def __call__(self, sample: Sample) -> RawImage | None:
+        """Return the picture in a sample; None when the next sample is needed first.
+
+        Raises:
+            DecodeError: The sample is malformed.
+            NoPictureError: A video cannot be shown before its next key frame.
+            UnsupportedError: The picture cannot be shown.
+        """
+        if sample.sequence >= 0:
+            follows = (self._publisher, self._sequence + 1) == (sample.publisher, sample.sequence)
+            if self._sequence >= 0 and not follows:
+                self._decoder.lost()
+            self._publisher, self._sequence = sample.publisher, sample.sequence
+        sec, nanosec, frame_id, *fields = self._get(sample.data)
+        stamp = Time.from_parts(sec, nanosec) if sec or nanosec else None
+        return self._decoder.read(stamp, frame_id, *fields)
+
+    def lost(self) -> None:
+        """Tell that samples were left out before the next one."""
+        self._decoder.lost()
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,13 +133,8 @@ class Choice:
         return self.transport.topic(self.base)
 
 
-def _stamp(sec: int, nanosec: int) -> Time | None:
-    return Time.from_parts(sec, nanosec) if sec or nanosec else None
-
-
 def _read_raw(
-    sec: int,
-    nanosec: int,
+    stamp: Time | None,
     frame_id: str,
     height: int,
     width: int,
@@ -92,29 +143,54 @@ def _read_raw(
     step: int,
     data: Any,
 ) -> RawImage:
-    return RawImage(
-        width, height, encoding, step, data, bool(big_endian), _stamp(sec, nanosec), frame_id
-    )
+    return RawImage(width, height, encoding, step, data, bool(big_endian), stamp, frame_id)
 
 
-def _read_compressed(sec: int, nanosec: int, frame_id: str, format: str, data: Any) -> RawImage:
-    return decompress(data, format, _stamp(sec, nanosec), frame_id)
+def _read_compressed(stamp: Time | None, frame_id: str, format: str, data: Any) -> RawImage:
+    return decompress(data, format, stamp, frame_id)
 
 
-#: Every transport that can be shown.
+def _read_depth(stamp: Time | None, frame_id: str, format: str, data: Any) -> RawImage:
+    return decompress_depth(data, format, stamp, frame_id)
+
+
+#: Every transport that can be shown, those that need least to decode first.
 TRANSPORTS = {
-    "raw": Transport(
-        "raw",
-        "sensor_msgs/msg/Image",
-        ("header.frame_id", "height", "width", "encoding", "is_bigendian", "step", "data"),
-        _read_raw,
-    ),
-    "compressed": Transport(
-        "compressed",
-        "sensor_msgs/msg/CompressedImage",
-        ("header.frame_id", "format", "data"),
-        _read_compressed,
-    ),
+    transport.name: transport
+    for transport in (
+        Transport(
+            "raw",
+            "sensor_msgs/msg/Image",
+            ("height", "width", "encoding", "is_bigendian", "step", "data"),
+            lambda: _Still(_read_raw),
+        ),
+        Transport(
+            "compressed",
+            "sensor_msgs/msg/CompressedImage",
+            ("format", "data"),
+            lambda: _Still(_read_compressed),
+        ),
+        Transport(
+            "compressedDepth",
+            "sensor_msgs/msg/CompressedImage",
+            ("format", "data"),
+            lambda: _Still(_read_depth),
+        ),
+        Transport(
+            "theora",
+            "theora_image_transport/msg/Packet",
+            ("data", "packetno"),
+            TheoraDecoder,
+            video=True,
+        ),
+        Transport(
+            "ffmpeg",
+            "ffmpeg_image_transport_msgs/msg/FFMPEGPacket",
+            ("encoding", "pts", "flags", "data"),
+            FfmpegDecoder,
+            video=True,
+        ),
+    )
 }
 
 
@@ -154,6 +230,6 @@ def choose(topic: str, preferred: str, published: Mapping[str, list[str]]) -> Ch
     if topic in published:
         raise UnsupportedError(
             f"{topic} carries {', '.join(published[topic])}, not pictures "
-            f"({', '.join(t.type for t in TRANSPORTS.values())})"
+            f"({', '.join(dict.fromkeys(t.type for t in TRANSPORTS.values()))})"
         )
     return None

@@ -113,6 +113,10 @@ def yuv_picture(encoding: str) -> np.ndarray:
         out = [[v for y, u, w in pairs for v in (u, y, w, y)]] * H
     elif encoding in {"yuv422_yuy2", "yuyv"}:
         out = [[v for y, u, w in pairs for v in (y, u, y, w)]] * H
+    elif encoding == "nv24":
+        out = [[v for y, _, _ in pairs for v in (y, y)]] * H
+        chroma = [v for _, u, w in pairs for v in (u, w, u, w)]
+        out += [chroma[:W], chroma[W:]] * H
     else:
         out = [[v for y, _, _ in pairs for v in (y, y)]] * H
         order = (1, 2) if encoding == "nv12" else (2, 1)
@@ -140,6 +144,19 @@ def test_yuv_is_passed_through_or_converted(encoding: str) -> None:
     assert np.shares_memory(frame.planes[0], np.frombuffer(picture.data, np.uint8))
 
 
+def test_chroma_of_every_pixel() -> None:
+    picture = image("nv24", yuv_picture("nv24"))
+    np.testing.assert_allclose(shown(picture).astype(int), rgb(), atol=4)
+    # Rows of W + 2 bytes: rows of chroma are twice as long, padding included.
+    wide = np.zeros((3 * H, W + 2), np.uint8)
+    wide[:H, :W] = yuv_picture("nv24")[:H]
+    wide[H:].reshape(H, -1)[:, : 2 * W] = yuv_picture("nv24")[H:].reshape(H, -1)
+    padded = image("nv24", wide)
+    np.testing.assert_array_equal(shown(padded), shown(picture))
+    with pytest.raises(DecodeError, match="nv24 with step 8 needs 96 bytes, data has 95"):
+        convert(image("nv24", yuv_picture("nv24"), data=bytes(95)))
+
+
 @pytest.mark.parametrize("order", ["rggb", "bggr", "gbrg", "grbg"])
 @pytest.mark.parametrize("bits", [8, 16])
 def test_bayer_patterns(order: str, bits: int) -> None:
@@ -154,7 +171,7 @@ def test_bayer_patterns(order: str, bits: int) -> None:
 
 def test_every_encoding_has_a_test() -> None:
     tested = set(COLOUR_CASES) | set(YUV)
-    tested |= {"mono8", "8UC1", "mono16", "16UC1", "32FC1", "8UC2"}
+    tested |= {"mono8", "8UC1", "mono16", "16UC1", "32FC1", "8UC2", "nv24"}
     assert {name for name in ENCODINGS if not name.startswith("bayer")} == tested
 
 

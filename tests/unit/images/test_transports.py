@@ -41,7 +41,7 @@ def test_nothing_published_yet_is_no_error() -> None:
     ("preferred", "published", "reason"),
     [
         ("teleport", BOTH, "'teleport' is unknown; known are: raw, compressed"),
-        ("raw", {"/cam/theora": ["theora_image_transport/msg/Packet"]}, "only sent as theora"),
+        ("raw", {"/cam/zstd": ["zstd_image_transport/msg/Packet"]}, "only sent as zstd"),
         ("raw", {"/cam": ["std_msgs/msg/String"]}, "carries std_msgs/msg/String, not pictures"),
     ],
 )

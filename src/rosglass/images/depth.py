@@ -1,0 +1,165 @@
+"""Depth pictures in colours: near and far at a glance, black where nothing is known."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rosglass.errors import UnsupportedError
+from rosglass.images.encodings import ENCODINGS, opencv, pixels_of
+from rosglass.images.frame import Frame, PixelFormat
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rosglass.comm.time import Time
+    from rosglass.images.frame import RawImage
+
+__all__ = ["COLOR_MAPS", "DepthColors"]
+
+#: Colour maps, from near to far.
+COLOR_MAPS = ("turbo", "viridis", "jet", "gray")
+_DEPTHS = ("16UC1", "mono16", "32FC1")
+#: Share of the depths that the automatic range leaves out at either end: they are noise.
+_OUTLIERS = 2.0
+#: How far the automatic range follows a picture: colours that flicker cannot be read.
+_FOLLOW = 0.15
+_SAMPLES = 20_000
+_MIN_SPAN = 0.01
+
+
+@cache
+def _palette(name: str) -> NDArray[np.uint32]:
+    """Return 256 colours as RGBX, and black for unknown depths."""
+    ramp = np.arange(256, dtype=np.uint8)
+    colors = np.zeros((257, 4), np.uint8)
+    if name == "gray":
+        colors[:256, :3] = ramp[:, None]
+    else:
+        cv2 = opencv()
+        bgr = cv2.applyColorMap(ramp, getattr(cv2, f"COLORMAP_{name.upper()}"))
+        colors[:256, :3] = bgr.reshape(256, 3)[:, ::-1]
+    colors[:, 3] = 255
+    return colors.view(np.uint32).ravel()
+
+
+class DepthColors:
+    """Colours the depth pictures of one camera.
+
+    Args:
+        colors: Name of the colour map, one of :data:`COLOR_MAPS`.
+        near: Depth of the first colour, metres; None follows the pictures.
+        far: Depth of the last colour, metres; None follows the pictures.
+
+    Raises:
+        UnsupportedError: The colour map is unknown, or the range is empty.
+    """
+
+    def __init__(
+        self, colors: str = "turbo", near: float | None = None, far: float | None = None
+    ) -> None:
+        if colors not in COLOR_MAPS:
+            raise UnsupportedError(
+                f"colour map {colors!r} is unknown; known are: {', '.join(COLOR_MAPS)}"
+            )
+        for name, value in (("near", near), ("far", far)):
+            if value is not None and not 0 <= value < float("inf"):
+                raise UnsupportedError(f"the depth {name} = {value} is no distance in metres")
+        if near is not None and far is not None and not near < far:
+            raise UnsupportedError(
+                f"depths cannot be coloured from {near} m to {far} m: far must be beyond near"
+            )
+        self._colors, self._near, self._far = colors, near, far
+        self._seen: tuple[float, float] | None = None
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Depths of the first and the last colour, metres."""
+        near, far = self._seen or (0.0, 1.0)
+        near = near if self._near is None else self._near
+        far = far if self._far is None else self._far
+        if far - near >= _MIN_SPAN or None not in {self._near, self._far}:
+            return near, far
+        # A wall seen head-on has one depth: the fixed end stays where it was put.
+        return (max(0.0, far - _MIN_SPAN), far) if self._near is None else (near, near + _MIN_SPAN)
+
+    def convert(
+        self,
+        image: RawImage,
+        received: Time | None = None,
+        allocate: Callable[[int, int], NDArray[Any]] | None = None,
+    ) -> Frame:
+        """Colour a picture of 16UC1 (millimetres), mono16 (the same) or 32FC1 (metres).
+
+        Args:
+            image: The picture as received.
+            received: When it arrived.
+            allocate: Gives memory for a picture of a width and height, as rows x columns x RGBX.
+
+        Raises:
+            UnsupportedError: The encoding holds no depths.
+            DecodeError: Sizes, step and data contradict each other.
+        """
+        if image.encoding not in _DEPTHS:
+            raise UnsupportedError(
+                f"image encoding {image.encoding[:40]!r} holds no depths; "
+                f"these do: {', '.join(_DEPTHS)}"
+            )
+        depths = pixels_of(image, ENCODINGS[image.encoding])
+        unit = 1.0 if image.encoding == "32FC1" else 0.001
+        if self._near is None or self._far is None:
+            self._look(depths, unit)
+        near, far = (limit / unit for limit in self.range)
+        palette = _palette(self._colors)
+        if unit == 1.0:
+            colors = palette[_steps(depths, near, far)]
+        else:
+            every = np.arange(65536, dtype=np.float32)
+            colors = palette[_steps(every, near, far)][depths]
+        rgbx = colors.view(np.uint8).reshape(image.height, image.width, 4)
+        if allocate is not None:
+            memory = allocate(image.width, image.height)
+            memory[...] = rgbx
+            rgbx = memory
+        rows = np.lib.stride_tricks.as_strided(
+            rgbx, (image.height, image.width * 4), (rgbx.strides[0], 1)
+        )
+        return Frame(
+            PixelFormat.RGBX,
+            image.width,
+            image.height,
+            (rows,),
+            image.encoding,
+            image.stamp,
+            received,
+        )
+
+    def _look(self, depths: NDArray[Any], unit: float) -> None:
+        """Let the automatic range follow a picture."""
+        stride = max(1, int((depths.size / _SAMPLES) ** 0.5))
+        some = depths[::stride, ::stride]
+        some = some[np.isfinite(some) & (some > 0)]
+        if not some.size:
+            return
+        near, far = (float(v) * unit for v in np.percentile(some, [_OUTLIERS, 100 - _OUTLIERS]))
+        if self._seen is not None:
+            near = self._seen[0] + _FOLLOW * (near - self._seen[0])
+            far = self._seen[1] + _FOLLOW * (far - self._seen[1])
+        self._seen = near, far
+
+
+def _steps(depths: NDArray[Any], near: float, far: float) -> NDArray[np.uint16]:
+    """Return the number of each depth's colour; 256 where the depth is unknown."""
+    scale = 255.0 / (far - near)
+    steps = depths * np.float32(scale)
+    steps -= np.float32(near * scale)
+    np.clip(steps, 0, 255, out=steps)
+    # Comparisons with NaN are false.
+    known = (depths > 0) & (depths < np.inf)
+    np.copyto(steps, np.float32(256), where=~known)
+    numbers: NDArray[np.uint16] = steps.astype(np.uint16)
+    return numbers
