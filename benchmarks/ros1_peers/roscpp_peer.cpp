@@ -7,6 +7,7 @@
 // it sent; the subscriber, at another line, what it measured. Each message carries the system time
 // of its sending: the header's stamp, or the first 20 digits of a String.
 
+#include <geometry_msgs/PointStamped.h>
 #include <geometry_msgs/PoseStamped.h>
 #include <ros/ros.h>
 #include <sensor_msgs/Image.h>
@@ -135,6 +136,9 @@ int main(int argc, char** argv) {
     }
   } else if ((timed = argv[3] != std::string("rate")), message == "image") {
     subscribe<sensor_msgs::Image>([](const sensor_msgs::ImageConstPtr& m) { note(m->header.stamp); });
+  } else if (message == "point") {
+    subscribe<geometry_msgs::PointStamped>(
+        [](const geometry_msgs::PointStampedConstPtr& m) { note(m->header.stamp); });
   } else if (message == "pose") {
     subscribe<geometry_msgs::PoseStamped>(
         [](const geometry_msgs::PoseStampedConstPtr& m) { note(m->header.stamp); });

@@ -9,7 +9,7 @@ import sys
 import time
 
 import rospy
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PointStamped, PoseStamped
 from sensor_msgs.msg import Image
 from std_msgs.msg import String
 
@@ -23,9 +23,14 @@ class Count:
     def __init__(self):
         self.count = 0
 
-    def touch(self, message):
+    def touch_data(self, message):
         """Take a message."""
         if len(message.data):
+            self.count += 1
+
+    def touch_point(self, message):
+        """Take a PointStamped."""
+        if message.point.x:
             self.count += 1
 
 
@@ -45,10 +50,12 @@ def main():
     """Measure."""
     kind, case = sys.argv[1:3]
     rospy.init_node("rospy_subscriber", disable_rostime=True, disable_signals=True)
-    message = {"image": Image, "pose": PoseStamped, "text": String}[kind]
+    types = {"image": Image, "point": PointStamped, "pose": PoseStamped, "text": String}
+    message = types[kind]
     call = text if kind == "text" else stamped
     counted = Count()
-    call = {"unread": None, "rate": counted.touch}.get(case, call)
+    touch = counted.touch_point if kind == "point" else counted.touch_data
+    call = {"unread": None, "rate": touch}.get(case, call)
     big = {"buff_size": 16 * 1024 * 1024} if kind == "image" else {}
     rospy.Subscriber("/bench", message, call, tcp_nodelay=True, **big)
     print("ready", flush=True)

@@ -89,6 +89,11 @@ class Inbox:
         return self._closed
 
     @property
+    def waiting(self) -> int:
+        """How many samples wait."""
+        return len(self._samples)
+
+    @property
     def last(self) -> float:
         """When the last sample came, by :func:`time.monotonic`; minus infinity before the first."""
         return self._last
@@ -285,7 +290,11 @@ class Inbox:
     def _take(self, most: int) -> list[Sample]:
         """Take some of the oldest samples out."""
         with self._lock:
-            return [self._pop() for _ in range(min(most, len(self._samples)))]
+            pop = self._samples.popleft
+            part = [pop() for _ in range(min(most, len(self._samples)))]
+            if self._limit is not None:
+                self._held -= sum(map(len, map(_data, part))) + len(part) * _SAMPLE_SIZE
+            return part
 
     def _prepare(self, samples: Sequence[Sample]) -> tuple[Callable[[Any], None], Sequence[Any]]:
         """Return what to call, and with what: the samples, or the messages in them."""

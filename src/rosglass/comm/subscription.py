@@ -155,6 +155,11 @@ class Subscription(Handle):
         return (self._called and not self._patient) or self._waiting > 0 or recent
 
     @property
+    def waiting(self) -> int:
+        """How many samples wait to be taken, or for their callback."""
+        return self._inbox.waiting
+
+    @property
     def last_arrival(self) -> float:
         """When the last sample came, by :func:`time.monotonic`; minus infinity before the first."""
         return self._inbox.last
