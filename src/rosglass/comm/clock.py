@@ -9,6 +9,7 @@ from __future__ import annotations
 import heapq
 import itertools
 import logging
+import math
 import threading
 import time
 from contextlib import suppress
@@ -30,6 +31,8 @@ __all__ = ["Clock", "ClockChange", "Jump", "Timer"]
 _log = logging.getLogger("rosglass.comm")
 #: Longest pause of the timers' thread in seconds.
 _IDLE = 3600.0
+#: Seconds between two log lines about a callback that fails.
+_LOG_EVERY = 10.0
 
 
 class ClockChange(Enum):
@@ -295,6 +298,7 @@ class Timer(Handle):
         self._clock, self._callback, self._executor = clock, callback, executor
         self._waiting = threading.Lock()
         self._closed = False
+        self._failed, self._next_failure = 0, -math.inf
 
     def __repr__(self) -> str:
         return f"<Timer every {self.period.seconds} s{' closed' * self._closed}>"
@@ -315,9 +319,18 @@ class Timer(Handle):
             if not self._closed:
                 self._callback()
         except Exception:
-            _log.exception("the callback of %s failed", self)
+            self._log_failure()
         finally:
             self._waiting.release()
+
+    def _log_failure(self) -> None:
+        """Log what was just caught: a fast timer must not fill the log with it."""
+        self._failed += 1
+        now = time.monotonic()
+        if now >= self._next_failure:
+            self._next_failure = now + _LOG_EVERY
+            often = f", {self._failed} times so far" if self._failed > 1 else ""
+            _log.exception("the callback of %s failed%s", self, often)
 
 
 def _seconds(what: str, value: object) -> Duration:

@@ -70,11 +70,14 @@ class Ros1Options:
             host, port = parts.hostname, parts.port
         except ValueError as error:
             raise ConversionError("url", url, f"{_EXAMPLE} ({error})") from error
-        if parts.path not in ("", "/") or parts.fragment or "@" in parts.netloc:
+        host = unquote(host or "")
+        if parts.path not in ("", "/") or parts.fragment or "@" in parts.netloc or port == 0:
             raise ConversionError("url", url, _EXAMPLE)
+        if " " in host or not host.isprintable():
+            raise ConversionError("url", url, f"{_EXAMPLE} (no host is named {host!r})")
         options = _options(parts.query, url)
         if host or port:
-            master = f"http://{bracketed(unquote(host or 'localhost'))}:{port or _PORT}"
+            master = f"http://{bracketed(host or 'localhost')}:{port or _PORT}"
             source = "url"
         elif arguments.master:
             master, source = arguments.master, "__master"

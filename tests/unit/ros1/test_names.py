@@ -109,6 +109,9 @@ def test_the_master(url: str, env: dict[str, str], master: str) -> None:
     [
         ("ros1://robot:x", "url: expected a URL such as ros1://robot:11311"),
         ("ros1://robot:99999", "url: expected a URL"),
+        ("ros1://robot:0", "url: expected a URL"),
+        ("ros1://a b", "no host is named 'a b'"),
+        ("ros1://a%20b", "no host is named 'a b'"),
         ("ros1://[::1", "url: expected a URL"),
         ("ros1://robot/path", "url: expected a URL"),
         ("ros1://user@robot", "url: expected a URL"),
