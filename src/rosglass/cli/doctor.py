@@ -34,6 +34,7 @@ _PACKAGES = {
     "PySide6-Essentials": ("interfaces in QML", "qml"),
     "PySide6-Addons": ("camera pictures in QML", "camera"),
     "opencv-python-headless": ("compressed pictures", "images"),
+    "av": ("H.264, HEVC, AV1 and Theora videos", "video"),
     "mcap": ("recordings", "bags"),
     "rosbags": ("ROS 1 bags and SQLite bags", "bags"),
     "argcomplete": ("Tab completion", "completion"),

@@ -182,6 +182,7 @@ _EXTRA_OF = {
     "xxhash": "zenoh",
     "cyclonedds": "dds",
     "cv2": "images",
+    "av": "video",
     "mcap": "bags",
     "rosbags": "bags",
     "argcomplete": "completion",

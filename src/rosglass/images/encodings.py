@@ -86,26 +86,18 @@ def _two_channels(pixels: Array) -> tuple[PixelFormat, Array]:
     return PixelFormat.RGBX, out
 
 
-#: ITU-R BT.601, studio swing, to RGBX: factors of Y, U and V, and what is added.
-_YUV_TO_RGBX = np.array(
-    [
-        [1.1644, 0.0, 1.5960, -222.92],
-        [1.1644, -0.3917, -0.8129, 135.58],
-        [1.1644, 2.0172, 0.0, -276.84],
-        [0.0, 0.0, 0.0, 255.0],
-    ],
-    np.float32,
-)
-
-
 def _nv24(pixels: Array) -> tuple[PixelFormat, Array]:
     height, width = pixels.shape[0] // 3, pixels.shape[1]
     chroma = np.lib.stride_tricks.as_strided(
         pixels[height:], (height, width, 2), (2 * pixels.strides[0], 2, 1)
     )
-    yuv = np.empty((height, width, 3), np.uint8)
-    yuv[..., 0], yuv[..., 1:] = pixels[:height], chroma
-    return PixelFormat.RGBX, opencv().transform(yuv, _YUV_TO_RGBX)
+    cv2 = opencv()
+    luma = pixels[:height]
+    u, v = cv2.split(chroma)
+    # OpenCV knows no 4:4:4 of this range: each pixel becomes a pair of 4:2:2, of which one is kept.
+    pairs = cv2.merge([luma, u, luma, v]).reshape(height, 2 * width, 2)
+    twice = _to_rgba(pairs, "YUV2RGBA_YUY2").view(np.uint32)
+    return PixelFormat.RGBX, twice.reshape(height, 2 * width)[:, ::2].copy()
 
 
 def _wide(code: str, format: PixelFormat) -> Callable[[Array], tuple[PixelFormat, Array]]:
