@@ -20,6 +20,7 @@ from rosglass.comm.similar import similar
 from rosglass.comm.watchdog import Watchdog
 from rosglass.errors import DefinitionError, InvalidNameError, TypeNotFoundError
 from rosglass.interfaces import join_name, ros1_name
+from rosglass.interfaces.counterparts import RENAMED
 from rosglass.ros1.definitions import definition_text, opaque
 from rosglass.ros1.names import split
 from rosglass.ros1.types import ANY
@@ -133,7 +134,11 @@ class Reading(Source):
             self._core.errands.run(lambda: self._learn(link, header, decided))
 
     def _agrees(self, wanted: MessageType, full: str, md5: str) -> bool:
-        return full in ("", wanted.name) and (md5 in (ANY, wanted.md5) or not wanted.md5)
+        # tf's old message is tf2's under another name; roscpp, too, asks for nothing but the sum.
+        same = full in ("", wanted.name) or (
+            RENAMED.get(full) == wanted.name and md5 == wanted.md5 != ""
+        )
+        return same and (md5 in (ANY, wanted.md5) or not wanted.md5)
 
     def _learn(
         self, link: PublisherLink, header: dict[str, str], decided: Callable[[], None]

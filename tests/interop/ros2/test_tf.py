@@ -1,0 +1,92 @@
+"""Transforms between rosglass programs over Zenoh and DDS: latched ones of several publishers."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rosglass.comm import Time
+from rosglass.errors import ExtrapolationException, UnsupportedError
+from rosglass.tf import Transform, TransformBroadcaster, TransformListener
+
+PEERS = Path(__file__).parent / "peers"
+START = 1_700_000_000_123_456_789
+
+
+@pytest.fixture(params=["zenoh", "dds"])
+def node(request: pytest.FixtureRequest) -> Any:
+    connect = request.getfixturevalue("connect" if request.param == "zenoh" else "dds_connect")
+    return connect("cockpit")
+
+
+def test_two_robots(node: Any, start: Any, wait_for: Any) -> None:
+    robots = {}
+    for name, frames in (("left", ["camera", "lidar"]), ("right", ["gripper"])):
+        plan = {"url": node.url, "name": name, "static": frames}
+        robots[name] = start(str(PEERS / "tf_peer.py"), json.dumps(plan))
+    for robot in robots.values():
+        robot.event("ready")
+    # Who comes later gets the static ones of both.
+    listener = TransformListener(node)
+    buffer = listener.buffer
+    buffer.wait_for_transform("gripper", "camera", timeout=20)
+    buffer.wait_for_transform("gripper", "lidar", timeout=20)
+    wait_for(lambda: buffer.tree()["camera"].authority == "/left")
+    wait_for(lambda: buffer.tree()["gripper"].authority == "/right")
+
+    told: list[None] = []
+    buffer.on_change("map", "camera", lambda: told.append(None))
+    wait_for(lambda: listener.subscriptions[0].publisher_count() == 2)
+    later = Time(START + 50_000_000)
+    promise = buffer.lookup_transform_async("map", "camera", later, timeout=20)
+    for step in (0, 100_000_000):
+        robots["left"].ask(stamp=START + step)
+        robots["left"].event("sent")
+    found = promise.result(20)
+    assert found.translation == (1.0, 2.0, 0.0)
+    assert found.stamp == later
+    assert told
+    with pytest.raises(ExtrapolationException):
+        buffer.lookup_transform("map", "camera", Time(START - 1))
+
+    listener.close()
+
+
+def test_who_receives_cannot_wait(node: Any, start: Any, wait_for: Any) -> None:
+    plan = {"url": node.url, "name": "waker", "static": ["waker"]}
+    robot = start(str(PEERS / "tf_peer.py"), json.dumps(plan))
+    robot.event("ready")
+    listener = TransformListener(node)
+    caught: list[Exception] = []
+
+    def wait() -> None:
+        try:
+            listener.buffer.wait_for_transform("map", "never", timeout=5)
+        except Exception as error:
+            caught.append(error)
+
+    listener.buffer.wait_for_transform("base", "waker", timeout=20)
+    wait_for(listener.subscriptions[0].publisher_count)
+    listener.buffer.on_update(wait)
+    robot.ask(stamp=START)
+    wait_for(lambda: caught)
+    assert isinstance(caught[0], UnsupportedError)
+
+
+def test_a_clock_that_jumps_back(node: Any, wait_for: Any) -> None:
+    listener = TransformListener(node)
+    sent = Transform(stamp=Time(START), frame_id="table", child_frame_id="cup")
+    broadcaster = TransformBroadcaster(node, namespace="/")
+    wait_for(broadcaster.publisher.subscription_count)
+    broadcaster.send_transform(sent)
+    wait_for(lambda: listener.buffer.has_frame("cup"))
+    node.clock.simulate(True)
+    node.clock.advance(Time(START))
+    wait_for(lambda: not listener.buffer.has_frame("cup"))
+    broadcaster.send_transform(sent)
+    wait_for(lambda: listener.buffer.has_frame("cup"))
+    node.clock.advance(Time(START - 10**9))
+    wait_for(lambda: not listener.buffer.has_frame("cup"))

@@ -1,0 +1,295 @@
+"""The rules of the transform buffer."""
+
+from __future__ import annotations
+
+import logging
+import math
+import threading
+
+import pytest
+
+import rosglass
+from rosglass.comm import Duration, Time
+from rosglass.errors import (
+    ConnectivityException,
+    ConversionError,
+    ExtrapolationException,
+    InvalidArgumentException,
+    LookupException,
+)
+from rosglass.tf import Transform, TransformBuffer
+
+HALF = math.sqrt(0.5)
+#: A quarter turn to the left.
+LEFT = (0.0, 0.0, HALF, HALF)
+
+
+def at(seconds: float) -> Time:
+    return Time() + Duration.from_seconds(seconds)
+
+
+def put(
+    buffer: TransformBuffer,
+    parent: str,
+    child: str,
+    seconds: float = 1.0,
+    x: float = 1.0,
+    rotation: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0),
+    authority: str = "",
+    static: bool = False,
+) -> bool:
+    given = Transform((x, 0.0, 0.0), rotation, at(seconds), parent, child)
+    return buffer.set_transform(given, authority, static=static)
+
+
+def test_a_chain_up_down_and_across() -> None:
+    buffer = TransformBuffer()
+    put(buffer, "map", "base", rotation=LEFT)
+    put(buffer, "base", "arm", x=2.0)
+    put(buffer, "base", "head", x=3.0, static=True)
+    assert buffer.lookup_transform("map", "arm").translation == pytest.approx((1, 2, 0))
+    assert buffer.lookup_transform("arm", "map").translation == pytest.approx((-2, 1, 0))
+    assert buffer.lookup_transform("head", "arm").translation == pytest.approx((-1, 0, 0))
+    found = buffer.lookup_transform("map", "arm")
+    assert (found.frame_id, found.child_frame_id, found.stamp) == ("map", "arm", at(1))
+    assert found.rotation == pytest.approx(LEFT)
+
+
+def test_interpolation_and_time_travel() -> None:
+    buffer = TransformBuffer()
+    put(buffer, "map", "base", 1.0, 0.0)
+    put(buffer, "map", "base", 3.0, 4.0, LEFT)
+    between = buffer.lookup_transform("map", "base", at(2.5))
+    assert between.translation == pytest.approx((3, 0, 0))
+    angle = math.radians(90) * 0.75 / 2
+    assert between.rotation == pytest.approx((0, 0, math.sin(angle), math.cos(angle)))
+    with pytest.raises(ExtrapolationException, match=r"into the future.*3\.100.*3\.000.*'base'"):
+        buffer.lookup_transform("map", "base", at(3.1))
+    with pytest.raises(ExtrapolationException, match="into the past"):
+        buffer.lookup_transform("map", "base", at(0.9))
+
+
+def test_the_shorter_way_round() -> None:
+    buffer = TransformBuffer()
+    put(buffer, "map", "base", 1.0, rotation=(0.0, 0.0, 0.0, 1.0))
+    put(buffer, "map", "base", 2.0, rotation=(0.0, 0.0, -HALF, -HALF))
+    found = buffer.lookup_transform("map", "base", at(1.5)).rotation
+    assert found == pytest.approx((0, 0, math.sin(math.pi / 8), math.cos(math.pi / 8)))
+
+
+def test_a_fixed_frame_and_two_times() -> None:
+    buffer = TransformBuffer()
+    for second in (1, 2, 3):
+        put(buffer, "odom", "base", second, float(second))
+    found = buffer.lookup_transform_full("base", at(3), "base", at(1), "odom")
+    assert found.translation == pytest.approx((-2, 0, 0))
+    assert found.stamp == at(3)
+    assert buffer.can_transform_full("base", at(3), "base", at(1), "odom")
+    assert "never" in buffer.can_transform_full("base", None, "base", None, "never").reason
+
+
+@pytest.mark.parametrize("name", ["", "/base", None, 3])
+def test_names_that_are_none(name: object) -> None:
+    buffer = TransformBuffer()
+    put(buffer, "map", "base")
+    with pytest.raises(InvalidArgumentException):
+        buffer.lookup_transform("map", name)  # type: ignore[arg-type]
+    with pytest.raises(InvalidArgumentException):
+        buffer.on_change(name, "map", lambda: None)  # type: ignore[arg-type]
+
+
+def test_unknown_frames_and_what_they_may_be() -> None:
+    buffer = TransformBuffer()
+    put(buffer, "map", "base_link")
+    with pytest.raises(LookupException, match="did you mean base_link") as caught:
+        buffer.lookup_transform("map", "base_lnk")
+    assert isinstance(caught.value, rosglass.Error)
+    found = buffer.can_transform("map", "other")
+    assert not found
+    assert isinstance(found.error, LookupException)
+    assert "other" in found.reason
+    assert buffer.can_transform("map", "base_link")
+    assert buffer.can_transform("map", "base_link").reason == ""
+
+
+def test_two_trees() -> None:
+    buffer = TransformBuffer()
+    put(buffer, "map", "base")
+    put(buffer, "world", "camera")
+    with pytest.raises(ConnectivityException, match=r"'base' belongs to 'map'.*'world'"):
+        buffer.lookup_transform("base", "camera")
+
+
+@pytest.mark.parametrize("time", [1.5, 3, "now"])
+def test_times_that_are_none(time: object) -> None:
+    buffer = TransformBuffer()
+    put(buffer, "map", "base")
+    with pytest.raises(InvalidArgumentException, match=r"rosglass\.Time"):
+        buffer.lookup_transform("map", "base", time)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("time", [0, -1.0, "10", True, math.nan, Duration(-1)])
+def test_cache_times_that_are_none(time: object) -> None:
+    with pytest.raises(ConversionError, match="cache_time"):
+        TransformBuffer(time)  # type: ignore[arg-type]
+
+
+def test_the_newest_is_the_newest_common() -> None:
+    buffer = TransformBuffer()
+    put(buffer, "map", "base", 5.0)
+    put(buffer, "map", "base", 9.0)
+    put(buffer, "base", "arm", 7.0)
+    put(buffer, "arm", "hand", static=True)
+    assert buffer.lookup_transform("map", "hand").stamp == at(7)
+    assert buffer.latest_common_time("map", "hand") == at(7)
+    assert buffer.latest_common_time("arm", "hand") == Time()
+
+
+def test_a_leading_slash_is_left_out() -> None:
+    buffer = TransformBuffer()
+    told: list[str] = []
+    buffer.on_tree_change(lambda: told.append("tree"))
+    put(buffer, "/map", "/base")
+    put(buffer, "/map", "/base", 2.0)
+    assert list(buffer.tree()) == ["base", "map"]
+    assert told == ["tree"]
+
+
+@pytest.mark.parametrize(
+    ("change", "kind"),
+    [
+        ({"child_frame_id": "map"}, "self"),
+        ({"child_frame_id": ""}, "no name"),
+        ({"frame_id": "/"}, "no name"),
+        ({"rotation": (0.0, 0.0, 0.0, 0.0)}, "not normalised"),
+        ({"rotation": (0.0, 0.0, 0.0, 1.01)}, "not normalised"),
+    ],
+)
+def test_transforms_that_are_refused(
+    change: dict[str, object], kind: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    buffer = TransformBuffer()
+    fields = {"frame_id": "map", "child_frame_id": "base", **change}
+    with pytest.raises(InvalidArgumentException):
+        buffer.set_transform(Transform(**fields), "/one")  # type: ignore[arg-type]
+    with pytest.raises(InvalidArgumentException):
+        buffer.set_transform(Transform(**fields), "/one")  # type: ignore[arg-type]
+    assert buffer.ignored == {kind: 2}
+    assert not len(buffer.tree())
+    # Each fault is logged once.
+    assert [record.levelno for record in caplog.records] == [logging.WARNING]
+    assert "/one" in caplog.text
+
+
+def test_numbers_from_the_network_that_are_none() -> None:
+    buffer = TransformBuffer()
+    for bad in (math.nan, math.inf):
+        entry = ("map", bad, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+        assert buffer.set_many([("base", 1, entry)])[0][0] == "not finite"
+    assert buffer.ignored == {"not finite": 2}
+
+
+def test_old_and_repeated_data(caplog: pytest.LogCaptureFixture) -> None:
+    buffer = TransformBuffer(cache_time=Duration.from_seconds(2))
+    assert put(buffer, "map", "base", 10.0)
+    assert not put(buffer, "map", "base", 10.0, 5.0)
+    assert not put(buffer, "map", "base", 7.9)
+    assert not put(buffer, "map", "base", 7.8)
+    assert put(buffer, "map", "base", 9.0, 3.0)
+    assert buffer.ignored == {"repeated": 1, "old": 2}
+    assert buffer.lookup_transform("map", "base", at(9.5)).translation == pytest.approx((2, 0, 0))
+    warnings = [record for record in caplog.records if record.levelno == logging.WARNING]
+    assert len(warnings) == 1
+    assert "TF_OLD_DATA" in caplog.text
+
+
+def test_only_the_last_seconds_are_kept() -> None:
+    buffer = TransformBuffer(1.0)
+    for step in range(1000):
+        put(buffer, "map", "base", 1 + step * 0.01, float(step))
+    info = buffer.frame("base")
+    assert info is not None
+    assert info.count == 101
+    assert info.rate == pytest.approx(100)
+    assert info.oldest == at(9.99)
+    assert buffer.lookup_transform("map", "base", at(9.995)).translation[0] == pytest.approx(899.5)
+    with pytest.raises(ExtrapolationException):
+        buffer.lookup_transform("map", "base", at(9.98))
+
+
+def test_a_new_parent_counts_from_then_on() -> None:
+    buffer = TransformBuffer()
+    put(buffer, "left", "cup", 1.0)
+    put(buffer, "right", "cup", 2.0)
+    assert buffer.lookup_transform("left", "cup", at(1.5)).translation == (1, 0, 0)
+    assert buffer.lookup_transform("right", "cup").stamp == at(2)
+    info = buffer.frame("cup")
+    assert info is not None
+    assert info.parent == "right"
+
+
+def test_loops_are_refused() -> None:
+    buffer = TransformBuffer()
+    put(buffer, "a", "b")
+    put(buffer, "b", "c")
+    with pytest.raises(InvalidArgumentException, match="TF_LOOP"):
+        put(buffer, "c", "a")
+    assert buffer.lookup_transform("a", "c").translation == pytest.approx((2, 0, 0))
+    # Links that are older than what is kept make way: the tree was turned round.
+    put(buffer, "b", "c", 20.0)
+    assert put(buffer, "c", "a", 20.0)
+    assert buffer.tree().roots() == ["b"]
+
+
+def test_static_and_moving(caplog: pytest.LogCaptureFixture) -> None:
+    buffer = TransformBuffer()
+    put(buffer, "map", "base", 1.0, 1.0, static=True, authority="/one")
+    assert buffer.lookup_transform("map", "base", at(99)).translation == (1, 0, 0)
+    put(buffer, "map", "base", 2.0, 2.0, authority="/two")
+    with pytest.raises(ExtrapolationException, match="only time"):
+        buffer.lookup_transform("map", "base", at(99))
+    put(buffer, "map", "base", 1.0, 3.0, static=True, authority="/one")
+    assert buffer.lookup_transform("map", "base", at(99)).translation == (3, 0, 0)
+    assert len(caplog.records) == 1
+    assert "/one and /two" in caplog.text
+
+
+def test_clearing_keeps_what_never_moves() -> None:
+    buffer = TransformBuffer()
+    put(buffer, "map", "base")
+    put(buffer, "base", "camera", static=True)
+    buffer.clear()
+    assert sorted(buffer.tree()) == ["base", "camera"]
+    with pytest.raises(LookupException):
+        buffer.lookup_transform("map", "camera")
+    assert buffer.can_transform("base", "camera")
+    assert put(buffer, "map", "base", 0.5), "time may begin anew"
+    buffer.clear(static=True)
+    assert not len(buffer.tree())
+
+
+def test_many_threads_at_once() -> None:
+    buffer = TransformBuffer()
+    put(buffer, "map", "base", 1.0, 0.0)
+    faults: list[Exception] = []
+
+    def write(name: str) -> None:
+        for step in range(300):
+            put(buffer, "base", name, 1 + step * 0.01)
+
+    def read() -> None:
+        try:
+            for _ in range(300):
+                for name in buffer.tree():
+                    buffer.lookup_transform("base", name)
+        except Exception as error:
+            faults.append(error)
+
+    threads = [threading.Thread(target=write, args=(f"f{n}",)) for n in range(3)]
+    threads += [threading.Thread(target=read) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not faults
+    assert len(buffer.tree()) == 5

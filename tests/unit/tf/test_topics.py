@@ -1,0 +1,179 @@
+"""Listener and broadcasters on a node without a network."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+import rosglass
+from rosglass.comm import IMMEDIATE, Clock, QoS, Sample, Subscription, Time
+from rosglass.comm.qos import Durability
+from rosglass.errors import InvalidArgumentException, InvalidNameError, NodeClosedError
+from rosglass.tf import (
+    UNKNOWN_PUBLISHER,
+    StaticTransformBroadcaster,
+    Transform,
+    TransformBroadcaster,
+    TransformListener,
+)
+
+NAME = "tf2_msgs/msg/TFMessage"
+
+
+class Node:
+    """What tf needs of a node; keeps what is published."""
+
+    def __init__(self, ros: int = 2) -> None:
+        self.wire = "ros1" if ros == 1 else "cdr"
+        self.type: Any = rosglass.load(NAME, ros)
+        self.clock = Clock("test", IMMEDIATE)
+        self.subscriptions: dict[str, Subscription] = {}
+        self.profiles: dict[str, QoS] = {}
+        self.sent: list[tuple[str, bytes]] = []
+        self.known: list[Any] = []
+        self.asked = 0
+        self.refused = ""
+
+    def resolve(self, name: str) -> str:
+        return name if name.startswith("/") else f"/own/{name}"
+
+    def create_subscription(self, topic: str, type: str, **more: Any) -> Subscription:
+        if topic == self.refused:
+            raise NodeClosedError("closed")
+        made = Subscription(
+            topic, self.type, more["qos"], more["executor"], raw_callback=more["raw_callback"]
+        )
+        self.subscriptions[topic], self.profiles[topic] = made, more["qos"]
+        return made
+
+    def create_publisher(self, topic: str, type: str, qos: QoS) -> Any:
+        self.profiles[topic] = qos
+        send = lambda **fields: self.sent.append(  # noqa: E731
+            (topic, self.type.encode(fields, wire=self.wire))
+        )
+        return SimpleNamespace(topic=topic, publish=send, close=lambda: None)
+
+    def publishers(self, topic: str) -> list[Any]:
+        self.asked += 1
+        return self.known
+
+    def deliver(self, number: int, publisher: bytes = b"gid") -> None:
+        topic, data = self.sent[number]
+        sample = Sample(data, self.wire, self.type, 0, None, publisher)
+        self.subscriptions[topic].deliver(sample)
+
+
+def place(child: str, sec: int = 5) -> Transform:
+    return Transform(
+        (1.0, 0.0, 0.0), stamp=Time.from_parts(sec, 7), frame_id="map", child_frame_id=child
+    )
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+def test_sent_and_received(ros: int) -> None:
+    node: Any = Node(ros)
+    listener = TransformListener(node)
+    TransformBroadcaster(node).send_transform([place("base"), place("arm")])
+    fixed = StaticTransformBroadcaster(node)
+    fixed.send_transform(place("camera"))
+    fixed.send_transform(place("lidar"))
+    node.deliver(0, b"/robot")
+    # The last message has all.
+    node.deliver(2, b"/robot")
+    tree = listener.buffer.tree()
+    assert sorted(tree) == ["arm", "base", "camera", "lidar", "map"]
+    assert [name for name in tree if tree[name].static] == ["camera", "lidar"]
+    assert listener.buffer.lookup_transform("map", "arm").stamp == Time.from_parts(5, 7)
+    assert node.profiles["/tf_static"].durability is Durability.TRANSIENT_LOCAL
+    assert node.profiles["/tf"].durability is Durability.VOLATILE
+    assert tree["arm"].authority == ("/robot" if ros == 1 else UNKNOWN_PUBLISHER)
+
+
+def test_the_name_of_a_publisher_is_asked_for_once() -> None:
+    node: Any = Node()
+    listener = TransformListener(node)
+    TransformBroadcaster(node).send_transform(place("base"))
+    node.deliver(0)
+    assert node.asked == 0, "who receives has other things to do"
+    assert listener.buffer.tree()["base"].authority == UNKNOWN_PUBLISHER
+    name = SimpleNamespace(full="/robot/driver")
+    node.known = [SimpleNamespace(gid=b"other"), SimpleNamespace(gid=b"gid", node=name)]
+    assert listener.buffer.tree()["base"].authority == "/robot/driver"
+    node.known = []
+    assert listener.buffer.tree()["base"].authority == "/robot/driver"
+
+
+@pytest.mark.parametrize(
+    ("namespace", "topic"),
+    [("/", "/tf"), ("", "/own/tf"), ("/robot1", "/robot1/tf"), ("robot1/", "/own/robot1/tf")],
+)
+def test_namespaces(namespace: str, topic: str) -> None:
+    node: Any = Node()
+    listener = TransformListener(node, namespace=namespace)
+    assert [one.topic for one in listener.subscriptions] == [topic, f"{topic}_static"]
+    assert TransformBroadcaster(node, namespace).publisher.topic == topic
+    assert StaticTransformBroadcaster(node, namespace).publisher.topic == f"{topic}_static"
+
+
+def test_a_namespace_that_is_none() -> None:
+    with pytest.raises(InvalidNameError):
+        TransformListener(Node(), namespace=None)  # type: ignore[arg-type]
+
+
+def test_half_a_listener_is_none() -> None:
+    node: Any = Node()
+    node.refused = "/tf_static"
+    with pytest.raises(NodeClosedError):
+        TransformListener(node)
+    assert node.subscriptions["/tf"].closed
+
+
+def test_what_cannot_be_sent() -> None:
+    node: Any = Node()
+    for kind in (TransformBroadcaster, StaticTransformBroadcaster):
+        broadcaster = kind(node)
+        for bad in (None, 3, ["map"], Transform(), Transform(frame_id="a", child_frame_id="a")):
+            with pytest.raises(InvalidArgumentException):
+                broadcaster.send_transform([place("base"), bad] if bad == 3 else bad)  # type: ignore[list-item]
+    assert node.sent == []
+
+
+def test_rubbish_changes_nothing(caplog: pytest.LogCaptureFixture) -> None:
+    node: Any = Node()
+    listener = TransformListener(node)
+    node.sent.append(("/tf", b"\x00\x01\x00\x00\xff\xff\xff\xff"))
+    node.deliver(0)
+    assert not len(listener.buffer.tree())
+    assert "TFMessage" in caplog.text
+
+
+def test_closing() -> None:
+    node: Any = Node()
+    listener = TransformListener(node)
+    promise = listener.buffer.lookup_transform_async("map", "base")
+    TransformBroadcaster(node).send_transform(place("base"))
+    listener.close()
+    listener.close()
+    node.deliver(0)
+    assert not listener.buffer.has_frame("base")
+    with pytest.raises(NodeClosedError):
+        promise.result(1)
+
+
+def test_time_that_begins_anew() -> None:
+    node: Any = Node()
+    listener = TransformListener(node)
+    TransformBroadcaster(node).send_transform(place("base"))
+    StaticTransformBroadcaster(node).send_transform(place("camera"))
+    node.deliver(0)
+    node.deliver(1)
+    node.clock.simulate(True)
+    assert sorted(listener.buffer.tree()) == ["camera", "map"]
+    node.clock.advance(Time.from_parts(9, 0))
+    node.deliver(0)
+    node.clock.advance(Time.from_parts(10, 0))
+    assert listener.buffer.has_frame("base")
+    node.clock.advance(Time.from_parts(1, 0))
+    assert not listener.buffer.has_frame("base")
