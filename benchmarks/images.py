@@ -3,8 +3,8 @@
     python benchmarks/images.py [--quick]
 
 The peer is what a viewer built on OpenCV does with the same bytes: `cv2.cvtColor` into memory that
-exists already, or `cv2.imdecode`. Both make RGBA; pictures of the encodings marked as shared we hand
-on without touching them where the display takes them.
+exists already, or `cv2.imdecode`. Both make RGBA; pictures of the encodings marked as shared are
+handed on untouched where the display takes them.
 """
 
 from __future__ import annotations
@@ -47,13 +47,19 @@ ENCODINGS: dict[str, tuple[int, float, str]] = {
 }
 
 
-def best(work: Callable[[], Any], quick: bool) -> float:
-    """Return the fastest of several runs, milliseconds."""
-    times = timeit.repeat(work, number=2 if quick else 5, repeat=3 if quick else 7)
-    return min(times) / (2 if quick else 5) * 1000
+def best(quick: bool, *works: Callable[[], Any]) -> list[float]:
+    """Return the fastest run of each, milliseconds; in turns, so that noise meets all alike."""
+    fastest = [float("inf")] * len(works)
+    number, repeat = (2, 3) if quick else (5, 15)
+    for _ in range(repeat):
+        for index, work in enumerate(works):
+            seconds = timeit.timeit(work, number=number) / number
+            fastest[index] = min(fastest[index], seconds * 1000)
+    return fastest
 
 
-def line(name: str, size: str, ours: float, peer: float | None, note: str = "") -> None:
+def line(name: str, size: str, times: list[float], note: str = "") -> None:
+    ours, peer = times[0], times[1] if len(times) > 1 else None
     ratio = "" if peer is None else f"{peer:8.2f} {ours / peer:6.2f}x"
     print(f"{name:28} {size:>10} {ours:8.3f} {ratio:17} {note}", flush=True)
 
@@ -68,17 +74,19 @@ def encodings(width: int, height: int, quick: bool) -> None:
         if name == "32FC1":
             data = rng.uniform(0.3, 5, (height, width)).astype(np.float32).view(np.uint8)
         image = RawImage(width, height, name, width * per_pixel, data.reshape(-1))
-        ours = best(lambda: convert(image, frozenset(), None, lambda *_: memory), quick)  # noqa: B023
-        peer = None
+        works: list[Callable[[], Any]] = [
+            lambda: convert(image, frozenset(), None, lambda *_: memory)  # noqa: B023
+        ]
         if code:
             deep = name.endswith("16")
             pixels = (data.view(np.uint16) if deep else data).reshape(data.shape[0], width, -1)
             number = getattr(cv2, f"COLOR_{code}")
             out = memory if not deep else None
-            peer = best(lambda: cv2.cvtColor(pixels, number, dst=out), quick)  # noqa: B023
+            works.append(lambda: cv2.cvtColor(pixels, number, dst=out))  # noqa: B023
         direct = convert(image, ANY_FORMAT)
         shared = any(np.may_share_memory(plane, data) for plane in direct.planes)
-        line(name, size, ours, peer, "shared where the display takes it" if shared else "")
+        note = "shared where the display takes it" if shared else ""
+        line(name, size, best(quick, *works), note)
 
 
 def depths(width: int, height: int, quick: bool) -> None:
@@ -95,21 +103,28 @@ def depths(width: int, height: int, quick: bool) -> None:
             grey = cv2.convertScaleAbs(pixels, alpha=scale)
             cv2.cvtColor(cv2.applyColorMap(grey, cv2.COLORMAP_TURBO), cv2.COLOR_BGR2RGBA)
 
-        ours = best(lambda: colors.convert(image), quick)  # noqa: B023
-        line(f"{name} in colours", size, ours, best(by_opencv, quick))
+        times = best(quick, lambda: colors.convert(image), by_opencv)  # noqa: B023
+        line(f"{name} in colours", size, times)
     png = cv2.imencode(".png", millimetres)[1].tobytes()
     message = struct.pack("<iff", 0, 0.0, 0.0) + png
-    ours = best(lambda: decompress_depth(message, "16UC1; compressedDepth png"), quick)
     array = np.frombuffer(png, np.uint8)
-    peer = best(lambda: cv2.imdecode(array, cv2.IMREAD_UNCHANGED), quick)
-    line("compressedDepth png", size, ours, peer)
+    times = best(
+        quick,
+        lambda: decompress_depth(message, "16UC1; compressedDepth png"),
+        lambda: cv2.imdecode(array, cv2.IMREAD_UNCHANGED),
+    )
+    line("compressedDepth png", size, times)
     photo = cv2.GaussianBlur(
         np.random.default_rng(3).integers(0, 255, (height, width, 3), np.uint8), (0, 0), 3
     )
     jpeg = cv2.imencode(".jpg", photo)[1].tobytes()
-    ours = best(lambda: decompress(jpeg, "bgr8; jpeg compressed bgr8"), quick)
-    array = np.frombuffer(jpeg, np.uint8)
-    line("compressed jpeg", size, ours, best(lambda: cv2.imdecode(array, 1), quick))
+    coded = np.frombuffer(jpeg, np.uint8)
+    times = best(
+        quick,
+        lambda: decompress(jpeg, "bgr8; jpeg compressed bgr8"),
+        lambda: cv2.imdecode(coded, cv2.IMREAD_UNCHANGED),
+    )
+    line("compressed jpeg", size, times)
 
 
 def main() -> int:
