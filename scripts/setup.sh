@@ -26,8 +26,8 @@ apt_test=(python3 python3-venv python3-genpy python3-genmsg xdotool x11-apps
           python3-rostopic python3-rosservice python3-rosparam python3-rosnode python3-rosbag
           python3-rosmsg python3-std-msgs python3-std-srvs python3-geometry-msgs
           python3-sensor-msgs python3-nav-msgs python3-diagnostic-msgs python3-visualization-msgs
-          python3-actionlib-msgs python3-tf2-msgs python3-trajectory-msgs python3-shape-msgs
-          python3-stereo-msgs python3-map-msgs python3-pcl-msgs python3-bond
+          python3-actionlib-msgs python3-tf2-msgs python3-tf2-ros python3-trajectory-msgs
+          python3-shape-msgs python3-stereo-msgs python3-map-msgs python3-pcl-msgs python3-bond
           libroscpp-dev libactionlib-dev libstd-msgs-dev
           libstd-srvs-dev libgeometry-msgs-dev libsensor-msgs-dev)
 

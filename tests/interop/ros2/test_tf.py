@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,15 @@ import pytest
 
 from rosglass.comm import Time
 from rosglass.errors import ExtrapolationException, UnsupportedError
-from rosglass.tf import Transform, TransformBroadcaster, TransformListener
+from rosglass.tf import (
+    StaticTransformBroadcaster,
+    Transform,
+    TransformBroadcaster,
+    TransformListener,
+)
 
 PEERS = Path(__file__).parent / "peers"
+GUIDE = Path(__file__).parents[3] / "docs/tf.md"
 START = 1_700_000_000_123_456_789
 
 
@@ -90,3 +97,27 @@ def test_a_clock_that_jumps_back(node: Any, wait_for: Any) -> None:
     wait_for(lambda: listener.buffer.has_frame("cup"))
     node.clock.advance(Time(START - 10**9))
     wait_for(lambda: not listener.buffer.has_frame("cup"))
+
+
+def test_the_guide_as_it_is_printed(
+    node: Any,
+    wait_for: Any,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setenv("ROSGLASS_URL", node.url)
+    fixed = StaticTransformBroadcaster(node)
+    fixed.send_transform(Transform((2.0, 0.0, 0.0), frame_id="map", child_frame_id="base_link"))
+    names: dict[str, Any] = {}
+    blocks = re.findall(r"```python\n(.*?)```", GUIDE.read_text(encoding="utf-8"), re.DOTALL)
+    assert len(blocks) >= 4
+    try:
+        for block in blocks:
+            exec(compile(block, str(GUIDE), "exec"), names)
+        wait_for(lambda: "camera" in names["buffer"].tree())
+        wait_for(lambda: "odom" in names["buffer"].tree())
+    finally:
+        names["node"].close()
+    told = capsys.readouterr().out
+    assert "(3.0, 0.0, 0.0)" in told
+    assert "'camera'" in told
