@@ -22,7 +22,7 @@ __all__ = ["Door", "listen"]
 _log = logging.getLogger("rosglass.ros1")
 _BACKLOG = 128
 #: Seconds without accepting anybody after the system has run out of something.
-_REST = 1.0
+_REST = 0.1
 
 
 def listen(address: str, port: int, url: str) -> socket.socket:
@@ -73,6 +73,8 @@ class Door:
         accept: Callable[[socket.socket, str], None],
     ) -> None:
         self._loop, self._listener, self._accept = loop, listener, accept
+        #: Whether the log says already that nobody can be accepted.
+        self._told = False
 
     def open(self) -> None:
         """Begin to accept."""
@@ -89,11 +91,14 @@ class Door:
             except OSError as error:
                 if error.errno != errno.ECONNABORTED:
                     # It would be ready again at once, and nobody else would get a turn.
-                    _log.warning("cannot accept connections: %s", error.strerror)
+                    if not self._told:
+                        self._told = True
+                        _log.warning("cannot accept connections: %s", error.strerror)
                     self._loop.watch(self._listener, 0, self)
                     self._loop.after(_REST, self.open)
                     return
             else:
+                self._told = False
                 self._accept(sock, f"{address[0]}:{address[1]}")
 
     def end(self, reason: str = "") -> None:  # noqa: ARG002 - as all that belongs to a socket

@@ -146,10 +146,14 @@ class IoLoop:
     def _work(self) -> None:
         while not self._closed or (self._lingering and time.monotonic() < self._deadline):
             for key, events in self._selector.select(self._pause()):
-                if key.data is None:
+                handler = key.data
+                if handler is None:
                     self._wake()
-                else:
-                    self._run(key.data, events)
+                    continue
+                try:  # as _run() does, a step sooner
+                    handler.ready(events)
+                except Exception as error:
+                    self._fail(handler, error)
             if self._leisurely:
                 self._look()
             while self._later and self._later[0][0] <= time.monotonic():
@@ -210,10 +214,13 @@ class IoLoop:
         try:
             handler.ready(events)
         except Exception as error:
-            _log.exception("%s failed", handler)
-            reason = f"an error of ours, {error!r}"
-            # Whatever it did not take would make it fail again, at once and for ever.
-            self._run_job(lambda: handler.end(reason))
+            self._fail(handler, error)
+
+    def _fail(self, handler: Ready, error: Exception) -> None:
+        _log.exception("%s failed", handler)
+        reason = f"an error of ours, {error!r}"
+        # Whatever it did not take would make it fail again, at once and for ever.
+        self._run_job(lambda: handler.end(reason))
 
     def _run_job(self, job: Callable[[], None]) -> None:
         try:

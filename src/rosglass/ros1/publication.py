@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import struct
 import threading
@@ -52,12 +53,16 @@ class Publication(Member):
         topics: The node's topics.
         topic: Absolute topic name.
         type: What is published on it.
+
+    Attributes:
+        numbers: What messages that begin with a header are numbered with.
     """
 
     def __init__(self, core: Core, topics: Topics, topic: str, type: MessageType) -> None:
         self.topic, self.type = topic, type
         self._core, self._topics = core, topics
         self._lock = threading.Lock()
+        self.numbers = itertools.count(1)
         self.publishers: list[Ros1Publisher] = []
         self._links: list[Connection] = []
         #: The last message of each latched publisher.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import struct
 import threading
 import time
 from typing import TYPE_CHECKING, Any
@@ -35,6 +36,8 @@ _log = logging.getLogger("rosglass.ros1")
 _BIG = 64 * 1024
 #: Longest message in bytes that anybody takes.
 _MOST = 1_000_000_000
+_HEADER = "std_msgs/msg/Header"
+_number = struct.Struct("<I")
 #: Tells `publish()` from `publish(None)`.
 _NO_MESSAGE: Any = object()
 
@@ -79,6 +82,7 @@ class Ros1Publisher(Publisher):
         self._lock = threading.Lock()
         self._closed = False
         self._big = False
+        self._numbered = _has_header(type)
         self._problem = ""
         self._sent_at = 0.0
         self._missed = 0
@@ -88,7 +92,11 @@ class Ros1Publisher(Publisher):
     # -- sending ---------------------------------------------------------------------------------
 
     def publish(self, message: Message | dict[str, Any] = _NO_MESSAGE, /, **fields: Any) -> None:
-        """Encode and send a message; see :meth:`rosglass.comm.Publisher.publish`."""
+        """Encode and send a message; see :meth:`rosglass.comm.Publisher.publish`.
+
+        As with rospy and roscpp, ``header.seq`` of what is sent is the running number of the node's
+        messages on the topic, from 1 on, if the message begins with a header.
+        """
         if message is not _NO_MESSAGE and fields:
             raise ConversionError(
                 "", fields, "either a message or keyword fields, not both", self.type.name
@@ -99,11 +107,15 @@ class Ros1Publisher(Publisher):
             raise ConversionError("", None, "a message, a dict or keyword fields", self.type.name)
         value = fields if message is _NO_MESSAGE else message
         if self._big:
-            self._send(self.type.encode_parts(value, wire="ros1"))
+            parts: Sequence[Buffer] = self.type.encode_parts(value, wire="ros1")
         else:
             payload = self.type.encode(value, wire="ros1")
             self._big = len(payload) > _BIG
-            self._send((payload,))
+            parts = (payload,)
+        if self._numbered:
+            number = _number.pack(next(self.publication.numbers) & 0xFFFFFFFF)
+            parts = (number, memoryview(parts[0])[_number.size :], *parts[1:])
+        self._send(parts)
 
     def publish_serialized(self, data: bytes | bytearray | memoryview | Sample) -> None:
         """Send `data` unchanged; see :meth:`rosglass.comm.Publisher.publish_serialized`."""
@@ -203,6 +215,16 @@ class Ros1Publisher(Publisher):
             )
         if self._closed:
             raise NodeClosedError(f"the publisher of {self.topic} is closed; create another one")
+
+
+def _has_header(type: MessageType) -> bool:
+    """Return whether messages begin with a header, of which publishers set the number."""
+    from rosglass.messages import OpaqueType  # noqa: PLC0415 - numpy
+
+    if isinstance(type, OpaqueType):
+        return False
+    fields = type.definition.fields
+    return bool(fields) and (fields[0].name, str(fields[0].type)) == ("header", _HEADER)
 
 
 def _octets(data: bytes | bytearray | memoryview) -> bytes | memoryview:

@@ -130,6 +130,11 @@ def topic_of(direction: str, kind: str) -> str:
     return f"/{direction}/{kind.replace(' ', '_')}"
 
 
+def numbered(value: dict) -> dict:
+    """What arrives of a publisher's first message: publishers number headers themselves."""
+    return value | {"header": value["header"] | {"seq": 1}} if "header" in value else value
+
+
 def roscpp_type(name: str) -> dict[str, str]:
     """What roscpp has to be told about a type that it was not compiled with."""
     found = rosglass.load(name, ros=1)
@@ -148,8 +153,7 @@ def test_we_receive_what_rospy_publishes(kind, given, connect, rospy_peer):
     sample = subscription.wait(10)
     assert sample is not None, subscription.problem or node.status()
     assert sample.type.md5 == rosglass.load(name, ros=1).md5
-    if "header" in value:  # rospy counts them itself
-        value = value | {"header": HEADER | {"seq": 1}}
+    value = numbered(value)
     assert plain(sample.message().to_dict()) == value
     assert sample.publisher == b"/rospy_peer"
     assert sample.data == sample.type.encode(value, wire="ros1")
@@ -164,7 +168,7 @@ def test_rospy_receives_what_we_publish(kind, connect, rospy_peer):
     rospy_peer.call("subscribe", topic=topic, type=name)
     received = rospy_peer.event("received")
     assert received["topic"] == topic
-    assert received["value"] == value
+    assert received["value"] == numbered(value)
     assert received["header"]["latching"] == "1"
     assert received["header"]["callerid"] == "/writer"
     rospy_peer.call("unsubscribe", topic=topic)
@@ -173,7 +177,7 @@ def test_rospy_receives_what_we_publish(kind, connect, rospy_peer):
 @pytest.mark.parametrize("kind", KINDS)
 def test_roscpp_and_we_exchange_the_same_bytes(kind, connect, roscpp_peer):
     name, value = VALUES[kind]
-    data = rosglass.load(name, ros=1).encode(value, wire="ros1")
+    data = rosglass.load(name, ros=1).encode(numbered(value), wire="ros1")
     there, back = topic_of("to_roscpp", kind), topic_of("from_roscpp", kind)
     node = connect("exchanger")
     publisher = node.create_publisher(there, name, rosglass.QoS.latched())
@@ -186,7 +190,23 @@ def test_roscpp_and_we_exchange_the_same_bytes(kind, connect, roscpp_peer):
     roscpp_peer.call("publish", topic=back, data=data.hex(), latch=True, **roscpp_type(name))
     sample = node.create_subscription(back).wait(10)
     assert sample.data == data
-    assert plain(sample.message().to_dict()) == value
+    assert plain(sample.message().to_dict()) == numbered(value)
+
+
+def test_our_messages_are_numbered_as_rospy_numbers_its_own(connect, rospy_peer, wait_for):
+    name, topic = "geometry_msgs/PoseStamped", "/numbered"
+    publisher = connect("counter").create_publisher(topic, name)
+    rospy_peer.call("subscribe", topic=topic, type=name)
+    wait_for(publisher.subscription_count)
+    message = publisher.type(header={"seq": 40})
+    for _ in range(3):
+        publisher.publish(message)
+    publisher.publish_serialized(publisher.type.encode(message, wire="ros1"))
+    publisher.publish(message)
+    got = [rospy_peer.event("received")["value"]["header"]["seq"] for _ in range(5)]
+    assert got == [1, 2, 3, 40, 4]
+    assert message.header.seq == 40
+    rospy_peer.call("unsubscribe", topic=topic)
 
 
 def test_roscpp_decodes_what_we_publish_with_its_own_classes(connect, roscpp_peer):
@@ -222,7 +242,7 @@ def test_pictures_of_six_megabytes_arrive_whole_both_ways(connect, rospy_peer, r
     rospy_peer.call("subscribe", topic="/picture/ours", type="sensor_msgs/Image")
     received = rospy_peer.event("received")["value"]
     assert received["data"] == [SIZE, zlib.crc32(value["data"])]
-    assert received["header"] == HEADER
+    assert received["header"] == HEADER | {"seq": 1}
     whole = IMAGE | {"data": {"repeat": 9, "length": SIZE}}
     rospy_peer.call(
         "publish", topic="/picture/rospys", type="sensor_msgs/Image", value=whole, latch=True

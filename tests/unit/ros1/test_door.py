@@ -1,0 +1,53 @@
+"""Accepting connections when the system has run out of file descriptors."""
+
+from __future__ import annotations
+
+import errno
+import logging
+import os
+import socket
+import threading
+import time
+
+from rosglass.ros1.door import Door
+from rosglass.ros1.io_loop import IoLoop
+
+
+class Scarce(socket.socket):
+    """A listening socket of a process that has no file descriptors left, for a while."""
+
+    scarce = True
+    attempts = 0
+
+    def accept(self):
+        self.attempts += 1
+        if self.scarce:
+            raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+        return super().accept()
+
+
+def test_who_waits_is_accepted_once_there_are_descriptors_again(caplog):
+    loop = IoLoop("test door")
+    came = threading.Event()
+    listener = Scarce()
+    listener.bind(("127.0.0.1", 0))
+    listener.listen()
+    listener.setblocking(False)
+
+    def accept(sock: socket.socket, _: str) -> None:
+        sock.close()
+        came.set()
+
+    door = Door(loop, listener, accept)
+    with caplog.at_level(logging.WARNING, "rosglass.ros1"):
+        loop.call(door.open)
+        with socket.create_connection(listener.getsockname()):
+            time.sleep(0.5)
+            attempts = listener.attempts
+            listener.scarce = False
+            assert came.wait(10)
+    loop.call(door.end)
+    loop.close()
+    assert 2 <= attempts <= 10  # again and again, but it leaves time for others
+    told = [record.getMessage() for record in caplog.records]
+    assert told == [f"cannot accept connections: {os.strerror(errno.EMFILE)}"]
