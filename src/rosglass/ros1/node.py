@@ -14,6 +14,7 @@ from rosglass.ros1.connection import Connection
 from rosglass.ros1.core import Core
 from rosglass.ros1.furniture import Furniture
 from rosglass.ros1.names import absolute_namespace, split, validate_node_name
+from rosglass.ros1.outages import outlast
 from rosglass.ros1.reading import type_if_known
 from rosglass.ros1.services import Services
 from rosglass.ros1.topics import Topics
@@ -362,6 +363,7 @@ class Ros1Node(Node):
 
         def on_header(header: dict[str, str]) -> None:
             if "topic" in header:
+                outlast(sock)
                 reason = self._topics.accept(link, header)
             elif "service" in header:
                 reason = self._services.accept(link, header)
