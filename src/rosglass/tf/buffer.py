@@ -358,12 +358,11 @@ class TransformBuffer(Handle):
 
     def has_frame(self, name: str) -> bool:
         """Return whether a frame exists."""
-        return name in self._store.names
+        return isinstance(name, str) and name in self._store.names
 
     def frame(self, name: str) -> FrameInfo | None:
         """Return what is known of a frame; None when it does not exist."""
-        found = self._infos([name])
-        return found[0] if found else None
+        return self._infos([name])[0] if self.has_frame(name) else None
 
     def tree(self) -> FrameTree:
         """Return all frames as they are now."""
@@ -458,7 +457,7 @@ class TransformBuffer(Handle):
             raise (late.__cause__ or late) from None
 
     def _check_name(self, name: str, what: str) -> None:
-        if name in self._store.names and name[:1] != "/":
+        if isinstance(name, str) and name in self._store.names:
             return
         check_name(name, what)
         raise LookupException(

@@ -88,12 +88,14 @@ def test_a_fixed_frame_and_two_times() -> None:
     assert "never" in buffer.can_transform_full("base", None, "base", None, "never").reason
 
 
-@pytest.mark.parametrize("name", ["", "/base", None, 3])
+@pytest.mark.parametrize("name", ["", "/base", None, 3, []])
 def test_names_that_are_none(name: object) -> None:
     buffer = TransformBuffer()
     put(buffer, "map", "base")
     with pytest.raises(InvalidArgumentException):
         buffer.lookup_transform("map", name)  # type: ignore[arg-type]
+    assert not buffer.has_frame(name)  # type: ignore[arg-type]
+    assert buffer.frame(name) is None  # type: ignore[arg-type]
     with pytest.raises(InvalidArgumentException):
         buffer.on_change(name, "map", lambda: None)  # type: ignore[arg-type]
 
