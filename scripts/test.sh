@@ -14,8 +14,11 @@ say "documentation (mkdocs --strict)"
 NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict --quiet
 say "wheel"
 scripts/check_wheel.sh
+# Most tests wait for others most of the time: three side by side, each file in one process.
+side_by_side=(-n 3 --dist loadfile)
 say "tests on Debian's own Python ($(.venv-system/bin/python -V))"
-scripts/private_network.sh .venv-system/bin/python -m pytest -q tests/unit "$@"
+scripts/private_network.sh .venv-system/bin/python -m pytest -q "${side_by_side[@]}" tests/unit "$@"
 say "tests, standalone ($(.venv/bin/python -V))"
 # Coverage slows tight loops tenfold: what compares every type ran above, without it.
-scripts/private_network.sh .venv/bin/python -m pytest -q -m "not exhaustive" --cov --cov-report=term --cov-report=html "$@"
+scripts/private_network.sh .venv/bin/python -m pytest -q "${side_by_side[@]}" -m "not exhaustive" \
+  --cov --cov-report=term --cov-report=html "$@"

@@ -148,7 +148,8 @@ def test_the_window_shows_a_picture_that_is_not_older_than_it_claims(
 ) -> None:
     picture = picture_of(cockpit, tmp_path / "live.png")
     assert picture.shape[0] / picture.shape[1] == pytest.approx(HEIGHT / WIDTH, abs=0.02)
-    assert code_in(picture).age(time.time_ns()) < 1.0
+    # Grabbing the screen takes its share; the cockpit calls a picture stale after 3 s.
+    assert code_in(picture).age(time.time_ns()) < 2.0
     later = picture_of(cockpit, tmp_path / "later.png")
     assert code_in(later).number != code_in(picture).number
     colours = picture[:100].astype(int)

@@ -82,10 +82,9 @@ def pytest_report_header() -> str:
 
 
 @pytest.fixture(scope="module")
-def dds_domain() -> int:
+def dds_domain(ros_domains: list[int]) -> int:
     """A ROS domain for the tests of a module, most likely nobody else's on this machine."""
-    # Above 101 the ports are among those that Linux gives to programs that ask for any.
-    return random.SystemRandom().randint(1, 101)
+    return random.SystemRandom().choice(ros_domains)
 
 
 @pytest.fixture
