@@ -21,6 +21,7 @@ from rosglass.cli.output import (
 from rosglass.cli.subcommands import Subcommands
 from rosglass.cli.values import parse_fields, split_type
 from rosglass.cli.worlds import is_ros1, spelled
+from rosglass.comm.similar import similar
 
 if TYPE_CHECKING:
     import argparse
@@ -94,9 +95,11 @@ def _info(args: argparse.Namespace) -> int:
         name = node.resolve(args.action)
         find(node, lambda: any(_ends(node, name)), args.timeout)
         servers, clients = _ends(node, name)
-        types = node.actions().get(name, [])
+        known = node.actions()
+        types = known.get(name, [])
     if not servers and not clients:
-        note(f"nobody offers or uses {name}; rosglass action list shows what there is")
+        hint = similar(name, known) or "; rosglass action list shows what there is"
+        note(f"nobody offers or uses {name}{hint}")
         return 1
     if args.json:
         print_json(

@@ -26,8 +26,9 @@ def run(what: str, node: Node, args: argparse.Namespace) -> int:
         ParameterError: A parameter is not there, or a value can be no parameter's.
     """
     if what not in _DOES:
+        name = _name(args, args.parameter)
         raise UnsupportedError(
-            f"ROS 1 knows nothing of a parameter but its value: rosglass param get {args.node}"
+            f"ROS 1 knows nothing of a parameter but its value: rosglass param get {name}"
         )
     _DOES[what](_server(node), args)
     return 0

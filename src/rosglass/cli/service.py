@@ -29,6 +29,7 @@ from rosglass.cli.output import (
 from rosglass.cli.subcommands import Subcommands
 from rosglass.cli.values import parse_fields, split_type
 from rosglass.cli.worlds import is_hidden, is_ros1, spelled
+from rosglass.comm.similar import similar
 
 if TYPE_CHECKING:
     import argparse
@@ -107,8 +108,9 @@ def _info(args: argparse.Namespace) -> int:
         find(node, look, args.timeout)
         await_types(node, lambda: [end.type for end in look()], args.timeout)
         ends = look()
+        hint = similar(name, node.services()) or "; rosglass service list shows what there is"
     if not ends:
-        note(f"nobody offers or calls {name}; rosglass service list shows what there is")
+        note(f"nobody offers or calls {name}{hint}")
         return 1
     if args.json:
         print_json({"service": name, "endpoints": [describe(node, end) for end in ends]})

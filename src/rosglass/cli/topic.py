@@ -25,6 +25,7 @@ from rosglass.cli.topic_echo import echo
 from rosglass.cli.topic_rates import measure
 from rosglass.cli.values import parse_fields, profile, split_type
 from rosglass.cli.worlds import is_hidden, is_ros1, spelled
+from rosglass.comm.similar import similar
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -255,7 +256,8 @@ def _announced(node: Node, topic: str, timeout: float) -> str:
     if found:
         raise TypeNotFoundError(f"{topic} has several types, say which: {', '.join(found)}")
     example = spelled(node, "std_msgs/msg/String")
-    raise TypeNotFoundError(f"nobody uses {topic} yet: say its type, e.g. {example}")
+    hint = similar(topic, node.topics())
+    raise TypeNotFoundError(f"nobody uses {topic} yet: say its type, e.g. {example}{hint}")
 
 
 def _unknown(node: Node, topic: str) -> int:

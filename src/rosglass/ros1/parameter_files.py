@@ -73,7 +73,7 @@ def parse_value(text: str, label: str) -> Any:
     Raises:
         ParameterError: It is not YAML.
     """
-    values = _documents(text, label)
+    values = _documents(text, label, "no YAML")
     if len(values) > 1:
         raise ParameterError(f"{label}: this is more than one value")
     return values[0] if values else None
@@ -90,14 +90,14 @@ def write(path: str | os.PathLike[str], value: Any) -> None:
     write_text(path, dump(value))
 
 
-def _documents(text: str, label: str) -> list[Any]:
+def _documents(text: str, label: str, fault: str = "no parameter file") -> list[Any]:
     try:
         return list(yaml.load_all(text, Loader=_Loader))
     except (yaml.YAMLError, RecursionError) as error:
         mark = getattr(error, "problem_mark", None)
         where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
         problem = getattr(error, "problem", None) or str(error).partition("\n")[0]
-        raise ParameterError(f"{label}{where}: this is no parameter file: {problem}") from None
+        raise ParameterError(f"{label}{where}: this is {fault}: {problem}") from None
 
 
 class _Loader(yaml.SafeLoader):
