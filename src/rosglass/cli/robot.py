@@ -82,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _tell(status: Status) -> None:
     if status.state is not ConnectionState.CLOSED:
-        print(f"robot: {status.state.value}: {status.detail}", flush=True)
+        print(": ".join(filter(None, ("robot", status.state.value, status.detail))), flush=True)
 
 
 def _follow_leash(end: threading.Event) -> None:

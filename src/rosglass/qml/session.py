@@ -360,7 +360,7 @@ class Session(QtCore.QObject):
         before = (self.state, self.detail)
         self._status = status
         if (self.state, self.detail) != before or not self.is_initialized:
-            _log.info("%s: %s", self.state, self.detail or "no node")
+            _log.info("%s", ": ".join(filter(None, (self.state, self.detail))))
             self.connection_changed.emit()
 
 
