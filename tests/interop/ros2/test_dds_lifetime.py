@@ -61,7 +61,9 @@ def test_a_thousand_topics_leave_nothing_behind(dds_connect):
     for _ in range(1000):
         once()
     after = resources()
-    assert (after[0], after[1]) == (threads, files)
+    # Fewer, when what earlier tests left to end by itself has ended.
+    assert after[0] <= threads
+    assert after[1] <= files
     assert after[2] - memory < 3_000
     assert node.publishers("/t") == []
 
@@ -78,7 +80,9 @@ def test_a_hundred_nodes_leave_nothing_behind(dds_domain):
     for _ in range(100):
         once()
     after = resources()
-    assert (after[0], after[1]) == (threads, files)
+    # Fewer, when what earlier tests left to end by itself has ended.
+    assert after[0] <= threads
+    assert after[1] <= files
     assert after[2] - memory < 2_000
 
 

@@ -68,12 +68,15 @@ publishers = [
     for name, type_name in plan.get("publish", {}).items()
 ]
 tell(ready=True)
-left = plan.get("count", -1)
+left, told = plan.get("count", -1), False
 while True:
     for publisher, message in publishers if left else []:
         publisher.publish(message)
     left -= bool(left)
     time.sleep(0.1)
+    if left == 0 and not told:
+        told = True
+        tell(published=True)
     for name, subscription in subscriptions.items():
         while (message := subscription.next()) is not None:
             tell(received=name, value=summary(message.to_pylist()[0]))

@@ -37,4 +37,5 @@ while left:
         publisher.publish(value)
     time.sleep(plan.get("period", 0.1))
     left -= 1
+tell(published=True)
 time.sleep(600)
