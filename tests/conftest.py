@@ -5,8 +5,12 @@ from __future__ import annotations
 import os
 import random
 import signal
+from typing import TYPE_CHECKING
 
 import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
 
 # No test finds what robots told the developer's own programs, nor leaves anything there; the
 # processes that tests start inherit this.
@@ -25,3 +29,13 @@ def ros_domains() -> list[int]:
     share = DOMAINS // DOMAIN_SHARES
     number = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:]) % DOMAIN_SHARES
     return random.SystemRandom().sample(range(1 + number * share, 1 + (number + 1) * share), share)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Let processes of tests tell each other what was logged: lone surrogates cannot be sent."""
+    report = yield
+    report.sections = [
+        (name, text.encode("utf-8", "backslashreplace").decode()) for name, text in report.sections
+    ]
+    return report

@@ -17,6 +17,7 @@ from rosglass.errors import DecodeError
 from rosglass.ros1.header import encode_header, parse_header
 from rosglass.ros1.incoming import CHUNK, MAX_FRAME, Incoming
 from rosglass.ros1.io_loop import READ, WRITE
+from rosglass.ros1.outages import Unconfirmed
 from rosglass.ros1.outgoing import Frame, Outgoing
 
 if TYPE_CHECKING:
@@ -44,6 +45,8 @@ _LITTLE = 4096
 #: Bytes at one look after which a connection is not left to itself any more: the other end must not
 #: be held up by a full socket.
 _MUCH = 64 * 1024
+#: Seconds between looks whether a stalled connection goes on.
+_STALLED = 0.1
 _PENDING = (errno.EINPROGRESS, errno.EWOULDBLOCK, errno.EAGAIN)
 
 
@@ -88,6 +91,9 @@ class Connection:
         self._turn_of = 0
         self._lock = threading.Lock()
         self._outgoing = Outgoing()
+        self._unconfirmed = Unconfirmed(sock)
+        #: Whether what waits is for topics, so that it is held back while the other end is silent.
+        self._holds = self._held = False
         self._connected = False
         #: Bytes to read at once: memory that stays empty has to be had all the same.
         self._ask = _LITTLE
@@ -211,7 +217,8 @@ class Connection:
                 return
             sent = 0
             first = not self._outgoing
-            if first and self._connected:
+            self._holds = self._holds or keep > 0 or keep_bytes > 0
+            if first and self._connected and not (self._holds and self._unconfirmed.stalled()):
                 sent = self._write(frame.parts)
                 if sent == frame.size:
                     return
@@ -222,18 +229,23 @@ class Connection:
     def _write(self, parts: Sequence[memoryview]) -> int:
         """Send what the socket takes; return how much."""
         try:
-            return self._sock.sendmsg(parts)
+            sent = self._sock.sendmsg(parts)
         except (BlockingIOError, InterruptedError):
             return 0
         except OSError as error:
             reason = error.strerror or str(error)
             self._loop.call(lambda: self.end(reason))
             return 0
+        self._unconfirmed.written += sent
+        return sent
 
     def _send_waiting(self) -> None:
+        emptied = False
         with self._lock:
             if self._closed or not self._outgoing:
                 emptied = not self._closed
+            elif self._holds and self._unconfirmed.stalled():
+                self._hold()
             else:
                 self._outgoing.send(self._write)
                 emptied = not self._outgoing
@@ -241,6 +253,25 @@ class Connection:
             self._watch()
             if self.on_room is not None:
                 self.on_room()
+
+    @property
+    def stalled(self) -> bool:
+        """Whether the other end has not confirmed anything for half a second; from any thread."""
+        with self._lock:
+            return not self._closed and self._connected and self._unconfirmed.stalled()
+
+    def _hold(self) -> None:
+        """Send nothing for a moment: only what is newest then is of use."""
+        if self._held:
+            return
+        self._held = True
+
+        def look() -> None:
+            self._held = False
+            self._watch()
+
+        self._loop.after(_STALLED, look)
+        self._loop.call(self._watch)
 
     # -- receiving -------------------------------------------------------------------------------
 
@@ -398,6 +429,9 @@ class Connection:
             self.end("")
             return
         self.on_room = lambda: self.end("")
+        # The system goes on trying to deliver what it has: the last word may be a stop.
+        self._holds = self._held = False
+        self._watch()
         self._loop.linger(self, True)
         self._loop.after(patience, lambda: self.end(""))
 
@@ -422,7 +456,7 @@ class Connection:
     def _watch(self) -> None:
         if self._closed:
             return
-        sending = bool(self._outgoing) or not self._connected
+        sending = bool(self._outgoing and not self._held) or not self._connected
         events = (READ if self._reading else 0) | (WRITE if sending else 0)
         self._loop.watch(self._sock, events, self, hurry=self._hurried)
 

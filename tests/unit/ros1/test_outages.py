@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import socket
+import struct
 import sys
+import time
+from types import SimpleNamespace
 
 import pytest
 
-from rosglass.ros1.outages import outlast
+from rosglass.ros1 import outages
+from rosglass.ros1.connection import Connection
+from rosglass.ros1.io_loop import IoLoop
+from rosglass.ros1.outages import Unconfirmed, outlast
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have other options")
@@ -20,3 +26,79 @@ def test_a_subscriber_gives_a_connection_up_before_its_publisher_does():
     ros = 60 + 9 * 10  # rospy and roscpp set these
     assert idle + pause * count > ros
     assert given_up > ros
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    made = SimpleNamespace(now=100.0)
+    monkeypatch.setattr(outages.time, "monotonic", lambda: made.now)
+    return made
+
+
+def test_who_confirms_nothing_for_half_a_second_has_stalled(clock, monkeypatch):
+    watched, waiting = Unconfirmed(None), [0]
+    monkeypatch.setattr(watched, "_waiting", lambda: waiting[0])
+
+    def later(seconds, written, unconfirmed):
+        clock.now += seconds
+        watched.written, waiting[0] = written, unconfirmed
+        return watched.stalled()
+
+    # An idle connection does not stall, nor does its first word; it is asked before each.
+    assert not later(60, 0, 0)
+    assert not later(60, 0, 0)
+    assert not later(0.1, 10, 10)
+    assert not later(0.3, 20, 20)
+    assert later(0.2, 30, 30)
+    # Something was confirmed: it goes on, however much still waits.
+    assert not later(0.1, 40, 35)
+    assert later(0.6, 40, 35)
+    assert not later(0.1, 40, 0)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not tell what is confirmed")
+def test_a_silent_subscriber_gets_only_the_newest_afterwards(monkeypatch):
+    silent = [False]
+    real = Unconfirmed._waiting
+    # As if the network was away: what is sent stays unconfirmed.
+    monkeypatch.setattr(Unconfirmed, "_waiting", lambda u: u.written if silent[0] else real(u))
+    loop = IoLoop("test outages")
+    ours, peer = socket.socketpair()
+    link = Connection(loop, _Tcp(ours), print, print, print, peer="robot")
+    loop.call(link.accept)
+    peer.settimeout(10)
+    try:
+        silent[0] = True
+        end = time.monotonic() + 1.0
+        number = 0
+        while time.monotonic() < end:
+            number += 1
+            link.send([struct.pack("<I", number)], keep=1)
+            time.sleep(0.01)
+        assert link.stalled
+        assert link.waiting() == 1
+        assert link.lost > 10
+        silent[0] = False
+        data = b""
+        while not data.endswith(struct.pack("<I", number)):
+            data += peer.recv(4096)
+        received = [each for (each,) in struct.iter_unpack("<I", data)]
+        assert received[-1] == number
+        assert len(received) < number - 10
+    finally:
+        loop.close()
+        peer.close()
+        ours.close()
+
+
+class _Tcp:
+    """A socket without network that takes TCP's options."""
+
+    def __init__(self, sock):
+        self._sock = sock
+
+    def setsockopt(self, *_):
+        pass
+
+    def __getattr__(self, name):
+        return getattr(self._sock, name)

@@ -186,7 +186,7 @@ def _read(file: str) -> zenoh.Config:
         raise ConversionError(
             "ZENOH_SESSION_CONFIG_URI",
             file,
-            f"a Zenoh configuration file that can be read ({reason(error)})",
+            f"a Zenoh configuration file that can be read ({path}: {reason(error)})",
         ) from error
     return config
 
