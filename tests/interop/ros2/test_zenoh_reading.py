@@ -106,7 +106,7 @@ def test_closing_ends_every_way_of_receiving(connect, stream, wait_for):
     unread.close()
     fast.close()
     count = len(received.numbers)
-    assert not has_thread("/count")
+    wait_for(lambda: not has_thread("/count"), 5)
     wait_for(lambda: not has_thread("unread"), 1)
     time.sleep(0.1)
     assert len(received.numbers) == count
