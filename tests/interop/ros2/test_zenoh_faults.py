@@ -474,8 +474,8 @@ publishers = [
     node.create_publisher("/count", {twist!r}), node.create_publisher("/map", {twist!r}, latched)
 ]
 client = node.create_service_client("/add", {add!r})
-print("busy", flush=True)
 try:
+    print("busy", flush=True)
     while True:
         for publisher in publishers:
             publisher.publish()
