@@ -4,6 +4,7 @@ A goal of n above 0 tells 0 to n - 1 as feedback, one each 20 ms, and succeeds w
 0 is rejected, -1 aborts, -2 stays pending; one that is cancelled ends with what it has done.
 """
 
+import contextlib
 import threading
 
 import actionlib
@@ -26,6 +27,10 @@ class _Server:
         self.stopped[handle.get_goal_id().id].set()
 
     def work(self, handle, stop):
+        with contextlib.suppress(rospy.ROSException):  # the server was withdrawn meanwhile
+            self.execute(handle, stop)
+
+    def execute(self, handle, stop):
         wanted = handle.get_goal().goal
         if wanted == 0:
             handle.set_rejected(TestResult(-1), "not zero")
