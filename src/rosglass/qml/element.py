@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from rosglass.errors import Error
+from rosglass.qml.dialect import Dialect
 from rosglass.qml.log import Caller, RateLimit, log_from_qml
 from rosglass.qml.runtime import runtime_of
 from rosglass.qt import QtCore, Slot, is_alive
@@ -42,6 +43,8 @@ class Element(QtCore.QObject):
         runtime: For objects made by a function of QML; elements find their own.
     """
 
+    #: Whose habits its values follow.
+    DIALECT: ClassVar[Dialect] = Dialect.ROS2
     #: Attributes with messages and pictures, let go when QML destroys the object: PySide 6.11 never
     #: frees the Python half of what QML has made.
     _HOLDS: tuple[str, ...] = ()

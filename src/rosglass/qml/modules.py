@@ -7,12 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
-from rosglass.qml.api import Ros2
-from rosglass.qml.image_item import ImageItem
-from rosglass.qml.image_subscription import ImageTransportSubscription
-from rosglass.qml.logger import LoggerLevel
+from rosglass.qml import ros1, ros2
 from rosglass.qml.runtime import Runtime, runtime_of
-from rosglass.qml.subscription import Subscription
 from rosglass.qt import QtQml
 
 if TYPE_CHECKING:
@@ -28,18 +24,15 @@ IMPORT_PATH = Path(__file__).with_name("imports")
 def register() -> None:
     """Register the types with Qt, once per process."""
     register_type: Any = QtQml.qmlRegisterType
-    register_type(Ros2, "Ros2.Native", 1, 0, "Ros2Native")
-    for kind, name in (
-        (Subscription, "Subscription"),
-        (ImageTransportSubscription, "ImageTransportSubscription"),
-        (ImageItem, "ImageItem"),
-        (LoggerLevel, "Ros2LoggerLevel"),
-    ):
-        register_type(kind, "Ros2", 1, 0, name)
+    for uri, module in (("Ros", ros1), ("Ros2", ros2)):
+        for name, native in module.NATIVE.items():
+            register_type(native, f"{uri}.Native", 1, 0, name)
+        for name, kind in module.TYPES.items():
+            register_type(kind, uri, 1, 0, name)
 
 
 def install(engine: QtQml.QQmlEngine, session: Session | None = None) -> Session:
-    """Make ``import Ros2 1.0`` work in an engine.
+    """Make ``import Ros 1.0`` and ``import Ros2 1.0`` work in an engine.
 
     Args:
         engine: The engine, before it loads anything that imports the module.

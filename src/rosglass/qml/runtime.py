@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
+from rosglass.qml.dialect import Dialect
 from rosglass.qml.log import Caller, plain_path
 from rosglass.qml.session import Session
 from rosglass.qml.to_js import describe, exact, reader, to_json
@@ -32,9 +33,9 @@ _GARBAGE = 64 << 20
 class _Source(QtCore.QObject):
     """The long arrays of one message; lives as long as JavaScript holds one of them."""
 
-    def __init__(self, runtime: Runtime, arrays: list[LongArray]) -> None:
+    def __init__(self, runtime: Runtime, arrays: list[LongArray], dialect: Dialect) -> None:
         super().__init__()
-        self._runtime, self.arrays = runtime, arrays
+        self._runtime, self.arrays, self._dialect = runtime, arrays, dialect
 
     @Slot(int, int, result=QJSValue)
     def at(self, index: int, place: int) -> QJSValue:
@@ -43,7 +44,7 @@ class _Source(QtCore.QObject):
         try:
             value = values[place]
             if member.struct is not None:
-                return self._runtime.message(value)
+                return self._runtime.message(value, self._dialect)
         except Error as error:
             self._runtime.throw(str(error))
             return QJSValue()
@@ -77,7 +78,7 @@ class Runtime(QtCore.QObject):
         self.setObjectName(_NAME)
         self.session = session
         self._engine = engine
-        self._shapes: dict[Schema, QJSValue] = {}
+        self._shapes: dict[tuple[Schema, Dialect], QJSValue] = {}
         self._kept: set[QtCore.QObject] = set()
         self._debt = 0
         helpers = _evaluate(engine, _HELPERS.read_text(encoding="utf-8"), str(_HELPERS))
@@ -139,8 +140,8 @@ class Runtime(QtCore.QObject):
             made.setProperty(index, self.value(inner))
         return made
 
-    def message(self, message: Message) -> QJSValue:
-        """Return a message as a JavaScript value.
+    def message(self, message: Message, dialect: Dialect = Dialect.ROS2) -> QJSValue:
+        """Return a message as a JavaScript value, with the habits of a module.
 
         Raises:
             DecodeError: The received bytes are malformed.
@@ -153,10 +154,10 @@ class Runtime(QtCore.QObject):
         text, marked = to_json(reader(schema)(message, arrays))
         source = QJSValue()
         if arrays:
-            source = engine.newQObject(self.keep(_Source(self, arrays)))
+            source = engine.newQObject(self.keep(_Source(self, arrays, dialect)))
             self._charge(arrays)
         build = "buildWithNan" if marked else "build"
-        return self._call(build, [QJSValue(text), self._shape(schema), source])
+        return self._call(build, [QJSValue(text), self._shape(schema, dialect), source])
 
     def time(self, time: Time) -> QJSValue:
         """Return a time as messages carry it, with seconds(), toJSDate() and so on."""
@@ -171,8 +172,8 @@ class Runtime(QtCore.QObject):
         parts = (qos.reliability.value, qos.durability.value, qos.history.value, qos.depth)
         return self._call("makeQos", [self.value(part) for part in parts])
 
-    def _shape(self, schema: Schema) -> QJSValue:
-        shape = self._shapes.get(schema)
+    def _shape(self, schema: Schema, dialect: Dialect) -> QJSValue:
+        shape = self._shapes.get((schema, dialect))
         if shape is None:
             assert self.engine is not None
             constants, members = describe(schema)
@@ -180,10 +181,10 @@ class Runtime(QtCore.QObject):
             for index, (name, kind, inner) in enumerate(members):
                 field = self.value([name, kind, 0])
                 if inner is not None:
-                    field.setProperty(2, self._shape(inner))
+                    field.setProperty(2, self._shape(inner, dialect))
                 fields.setProperty(index, field)
             arguments = [QJSValue(schema.name), fields, self.value(constants)]
-            shape = self._shapes[schema] = self._call("shape", arguments)
+            shape = self._shapes[schema, dialect] = self._call("shape", arguments)
         return shape
 
     def _charge(self, arrays: list[LongArray]) -> None:

@@ -400,7 +400,7 @@ class Subscription(TopicElement):
         if sample is None or runtime is None:
             return QJSValue()
         try:
-            return runtime.message(sample.message())
+            return runtime.message(sample.message(), self.DIALECT)
         except Error as error:
             _log.error("%s: %s", self._resolved, error)
             return QJSValue()
