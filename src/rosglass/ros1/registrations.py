@@ -16,6 +16,7 @@ from rosglass.comm import ConnectionState, EndpointKind, Status
 from rosglass.comm.complaints import Complaints
 from rosglass.errors import ConnectionLostError, Error, MasterError
 from rosglass.ros1.address import doubt, own_address, parse_uri
+from rosglass.ros1.farewells import see_off
 
 if TYPE_CHECKING:
     from rosglass.ros1.core import Core, Member
@@ -78,7 +79,10 @@ class Registrations:
         self._wanted.set()
 
     def close(self) -> None:
-        """Unregister all, and end the thread; takes up to two seconds if the master is silent."""
+        """Unregister all, and end the thread; takes up to two seconds if the master is silent.
+
+        What it could not be told then, it is told in the background when it answers again.
+        """
         with self._lock:
             self._closing = True
             known = bool(self._tried)
@@ -90,6 +94,8 @@ class Registrations:
         self._core.master.close()
         if not self.is_current and self._thread.is_alive():
             self._thread.join(_END)
+        if left := self._tried.copy():
+            see_off(self._core, left)
 
     def owner(self) -> str:
         """Return the URI of the node that has this node's name; empty if it is this one, or nobody.
@@ -254,10 +260,10 @@ class Registrations:
         with suppress(ConnectionLostError):
             for member in [*self._leaving, *self._tried]:
                 if member in self._tried:
-                    self._tried.discard(member)
                     try:
                         member.unregister(core.master)
                     except ConnectionLostError:
                         raise
                     except Error as error:
                         _log.debug("%s: %s", member, error)
+                    self._tried.discard(member)

@@ -119,6 +119,8 @@ def test_a_master_that_hangs_holds_up_neither_topics_nor_closing(own_master, con
             assert node.status().state is ConnectionState.CLOSED
     finally:
         os.kill(pid, signal.SIGCONT)
+    # Once it answers again, it learns who has left meanwhile.
+    wait_for(lambda: registered(own_master, "/count") == ([], []), 30)
 
 
 def test_closing_while_connecting_leaves_nothing_behind(own_master, connect, wait_for):

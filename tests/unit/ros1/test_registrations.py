@@ -12,7 +12,7 @@ import pytest
 
 import rosglass
 from rosglass.comm import ConnectionState, EndpointKind, NodeName
-from rosglass.ros1 import address
+from rosglass.ros1 import address, farewells
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -242,3 +242,64 @@ def test_a_node_asks_little_of_its_master(master: FakeMaster, node: Ros1Node) ->
     master.calls.clear()
     wait_for(lambda: master.calls.count("getSystemState") >= 2)
     assert set(master.calls) == {"lookupNode", "getSystemState"}
+
+
+def test_who_closes_while_the_master_hangs_is_forgotten_once_it_answers(
+    master: FakeMaster, node: Ros1Node, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hung = connected(master, "hung")
+    hung.create_publisher("/a", "std_msgs/Empty")
+    hung.create_subscription("/b", "std_msgs/Empty")
+    hung.create_service_server("/c", "std_srvs/Empty", lambda _: None)
+    wait_for(lambda: "/c" in master.services and "/hung" in master.subscribers.get("/b", {}))
+    thaw, answer = threading.Event(), master._dispatch
+
+    def hang(*call: Any) -> Any:
+        # As with a process that is stopped: what was asked meanwhile is done afterwards.
+        thaw.wait(60)
+        return answer(*call)
+
+    monkeypatch.setattr(master, "_dispatch", hang)
+    began = time.monotonic()
+    hung.close()
+    assert time.monotonic() - began < 8, "about two seconds on a machine that is not loaded"
+    (thread,) = [one for one in threading.enumerate() if one.name == "rosglass farewells"]
+    thaw.set()
+    wait_for(lambda: "/hung" not in master.publishers["/a"], lambda: master.calls[-20:])
+    wait_for(lambda: "/hung" not in master.subscribers["/b"] and "/c" not in master.services)
+    assert node.status().state is not ConnectionState.CLOSED
+    thread.join(20)
+    assert not thread.is_alive()
+
+
+def test_a_master_that_stays_away_is_not_waited_for_for_ever(
+    master: FakeMaster, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(farewells, "_PATIENCE", 0.0)
+    gone = connected(master, "gone")
+    gone.create_publisher("/a", "std_msgs/Empty")
+    wait_for(lambda: "/gone" in master.publishers.get("/a", {}))
+    caplog.set_level(logging.INFO, "rosglass.ros1")
+    master.stop()
+    gone.close()
+    wait_for(lambda: "may list /gone still" in caplog.text)
+    wait_for(lambda: "rosglass farewells" not in [one.name for one in threading.enumerate()])
+    master.start()
+
+
+def test_a_node_on_the_ports_of_one_that_is_seen_off_stays_registered(
+    master: FakeMaster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = connected(master, "same")
+    first.create_publisher("/a", "std_msgs/Empty")
+    wait_for(lambda: "/same" in master.publishers.get("/a", {}))
+    (known,) = master.publishers["/a"].values()
+    master.stop()
+    first.close()
+    port = known.rstrip("/").rpartition(":")[2]
+    second = rosglass.connect(f"{master.url}&slave_port={port}", "same", own_services=False)
+    second.create_publisher("/a", "std_msgs/Empty")
+    master.start()
+    wait_for(lambda: "rosglass farewells" not in [one.name for one in threading.enumerate()])
+    wait_for(lambda: master.publishers.get("/a", {}).get("/same") == known)
+    second.close()
