@@ -4,66 +4,36 @@
 from __future__ import annotations
 
 import logging
-import re
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.qos import QoS
 from rosglass.comm.time import Time
 from rosglass.errors import Error, InvalidNameError
 from rosglass.qml.from_js import qos_from_js
-from rosglass.qml.log import log_from_qml
 from rosglass.qml.logger import Logger
 from rosglass.qml.publisher import Publisher
-from rosglass.qml.runtime import Runtime, runtime_of
+from rosglass.qml.singleton import RosSingleton, full_type, is_list, strings
 from rosglass.qml.subscription import DEFAULT_QOS, Subscription
-from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
+from rosglass.qt import QJSValue, QtCore, Signal, Slot
 
 if TYPE_CHECKING:
-    from rosglass.comm.node import Node
     from rosglass.qml.session import Session
 
 __all__ = ["Ros2"]
 
-_HIDDEN = "/_action/"
-_SHORT = re.compile(r"([A-Za-z]\w*)/([A-Za-z]\w*)\Z")
 
-
-class Ros2(QtCore.QObject):
+class Ros2(RosSingleton):
     """What QML calls ``Ros2``; one per engine, all of a session sharing its node."""
 
-    initialized = Signal()
     aboutToShutdown = Signal()
-    connectionChanged = Signal()
-    urlChanged = Signal()
 
     def __init__(self, parent: QtCore.QObject | None = None) -> None:
         super().__init__(parent)
-        self._bound: Runtime | None = None
         self._loggers: dict[str, Logger] = {}
-        # QML may only listen; without this, nothing would ever ask for the runtime.
-        QtCore.QTimer.singleShot(0, self._bind)
 
-    def _bind(self) -> None:
-        if is_alive(self):
-            _ = self._runtime
-
-    @property
-    def _runtime(self) -> Runtime:
-        if self._bound is None:
-            runtime = runtime_of(self)
-            if runtime is None:
-                raise Error("Ros2 belongs to no QML engine")
-            self._bound = runtime
-            session = runtime.session
-            session.initialized.connect(self.initialized)
-            session.about_to_shutdown.connect(self.aboutToShutdown)
-            session.connection_changed.connect(self.connectionChanged)
-            session.url_changed.connect(self.urlChanged)
-        return self._bound
-
-    @property
-    def _session(self) -> Session:
-        return self._runtime.session
+    def _listen(self, session: Session) -> None:
+        super()._listen(session)
+        session.about_to_shutdown.connect(self.aboutToShutdown)
 
     # The node.
 
@@ -74,11 +44,11 @@ class Ros2(QtCore.QObject):
         self, name: str, first: QJSValue | None = None, second: QJSValue | None = None
     ) -> None:
         """Ask for a node; arguments are name, optional command line, optional init options."""
-        args, options = (first, second) if _is_list(first) else (None, first)
+        args, options = (first, second) if is_list(first) else (None, first)
         try:
             namespace, domain = _read_options(options)
             if args is not None:
-                name, namespace = _remap(_strings(args), name, namespace)
+                name, namespace = _remap(strings(args), name, namespace)
             self._session.init(name, namespace, domain)
         except Error as error:
             self._runtime.throw(f"Ros2.init: {error}")
@@ -87,26 +57,6 @@ class Ros2(QtCore.QObject):
     def shutdown(self) -> None:
         """Close the node."""
         self._session.shutdown()
-
-    @Slot(result=bool)
-    def isInitialized(self) -> bool:
-        """Return whether a node was asked for and not shut down again."""
-        return self._session.is_initialized
-
-    @Slot(result=bool)
-    def ok(self) -> bool:
-        """Return whether there is a node, or one is being made; false after a failure."""
-        return self._session.state not in {"uninitialized", "failed"}
-
-    @Slot(result=str)
-    def getName(self) -> str:
-        """Return the node's base name; empty before init."""
-        return self._session.name
-
-    @Slot(result=str)
-    def getNamespace(self) -> str:
-        """Return the node's namespace; empty before init."""
-        return self._session.namespace
 
     @Slot(result=QJSValue)
     def now(self) -> QJSValue:
@@ -118,20 +68,6 @@ class Ros2(QtCore.QObject):
     def createInitOptions(self) -> QJSValue:
         """Return empty init options: setNamespace(), setDomainId()."""
         return self._runtime.options()
-
-    def _set_url(self, url: str) -> None:
-        self._session.url = url
-
-    url = Property(str, lambda self: self._session.url, _set_url, notify=urlChanged)
-    connectionState = Property(str, lambda self: self._session.state, notify=connectionChanged)
-    connectionDetail = Property(str, lambda self: self._session.detail, notify=connectionChanged)
-
-    def _get_hostname(self) -> str:
-        import platform  # noqa: PLC0415 - few interfaces ask
-
-        return platform.node()
-
-    hostname = Property(str, _get_hostname, constant=True)
 
     # Profiles.
 
@@ -187,7 +123,7 @@ class Ros2(QtCore.QObject):
         except Error as error:
             self._runtime.throw(f"Ros2.createPublisher: {error}")
             return None
-        publisher = Publisher(self._runtime, topic, _full_type(type_name), profile)
+        publisher = Publisher(self._runtime, topic, full_type(type_name), profile)
         return self._runtime.keep(publisher)
 
     @Slot(str, result=QtCore.QObject)
@@ -213,7 +149,7 @@ class Ros2(QtCore.QObject):
             self._runtime.throw(f"Ros2.createSubscription: {error}")
             return None
         subscription = Subscription(None, self._runtime)
-        subscription.configure(topic, _full_type(type_name), profile)
+        subscription.configure(topic, full_type(type_name), profile)
         return self._runtime.keep(subscription)
 
     @Slot(str, result=bool)
@@ -231,7 +167,7 @@ class Ros2(QtCore.QObject):
         from rosglass.messages import MessageType, load  # noqa: PLC0415 - brings in the definitions
 
         try:
-            kind = load(_full_type(type_name), ros=2)
+            kind = load(full_type(type_name), ros=2)
             if not isinstance(kind, MessageType):
                 raise InvalidNameError(f"{type_name} is not a message type")
             return self._runtime.message(kind.create())
@@ -245,7 +181,7 @@ class Ros2(QtCore.QObject):
     @Slot(str, result="QStringList")
     def queryTopics(self, datatype: str = "") -> list[str]:
         """Return the topics in the graph, those of one type if given; empty before init."""
-        wanted = _full_type(datatype)
+        wanted = full_type(datatype)
         return [name for name, types in self._topics().items() if not wanted or wanted in types]
 
     @Slot(result=QJSValue)
@@ -274,23 +210,6 @@ class Ros2(QtCore.QObject):
         """Return the types announced for a topic; another name of getTopicTypes."""
         return self.getTopicTypes(topic)
 
-    def _node(self, what: str) -> Node | None:
-        node = self._session.node
-        if node is None:
-            self._log(logging.DEBUG, f"Ros2.{what}: there is no node yet")
-        return node
-
-    def _topics(self) -> dict[str, list[str]]:
-        node = self._node("topics")
-        if node is None:
-            return {}
-        try:
-            found = node.topics()
-        except Error as error:
-            self._log(logging.WARNING, f"Ros2: the topics cannot be listed: {error}")
-            return {}
-        return {name: types for name, types in sorted(found.items()) if _HIDDEN not in name}
-
     def _check_topic(self, topic: str) -> None:
         from rosglass.ros2.names import expand  # noqa: PLC0415 - not needed at start-up
 
@@ -306,49 +225,6 @@ class Ros2(QtCore.QObject):
         if name not in self._loggers:
             self._loggers[name] = Logger(self._runtime, name, self)
         return self._loggers[name]
-
-    @Slot(QJSValue)
-    def debug(self, message: QJSValue) -> None:
-        """Log a message for developers."""
-        self._log(logging.DEBUG, message.toString())
-
-    @Slot(QJSValue)
-    def info(self, message: QJSValue) -> None:
-        """Log a message."""
-        self._log(logging.INFO, message.toString())
-
-    @Slot(QJSValue)
-    def warn(self, message: QJSValue) -> None:
-        """Log a warning."""
-        self._log(logging.WARNING, message.toString())
-
-    @Slot(QJSValue)
-    def error(self, message: QJSValue) -> None:
-        """Log an error."""
-        self._log(logging.ERROR, message.toString())
-
-    @Slot(QJSValue)
-    def fatal(self, message: QJSValue) -> None:
-        """Log an error after which the program is of no use."""
-        self._log(logging.CRITICAL, message.toString())
-
-    def _log(self, level: int, message: str) -> None:
-        log_from_qml("", level, message, self._runtime.caller())
-
-
-def _is_list(value: QJSValue | None) -> bool:
-    return value is not None and value.isArray()
-
-
-def _strings(value: QJSValue) -> list[str]:
-    count = value.property("length").toInt()
-    return [value.property(index).toString() for index in range(count)]
-
-
-def _full_type(name: str) -> str:
-    """Return ``pkg/msg/Type`` for ``pkg/Type``."""
-    match = _SHORT.match(name)
-    return f"{match[1]}/msg/{match[2]}" if match else name
 
 
 def _read_options(options: QJSValue | None) -> tuple[str, int]:

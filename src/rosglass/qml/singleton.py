@@ -1,0 +1,183 @@
+"""What the singletons of both modules have in common: the node's life, its name, its log."""
+# ruff: noqa: N802, N815 - the names of slots and signals are QML's
+
+from __future__ import annotations
+
+import logging
+import os
+import re
+from typing import TYPE_CHECKING, ClassVar
+
+from rosglass.errors import Error
+from rosglass.qml.dialect import Dialect
+from rosglass.qml.log import log_from_qml
+from rosglass.qml.runtime import Runtime, runtime_of
+from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
+
+if TYPE_CHECKING:
+    from rosglass.comm.node import Node
+    from rosglass.qml.session import Session
+
+__all__ = ["RosSingleton", "full_type", "is_list", "strings"]
+
+_HIDDEN = "/_action/"
+_SHORT = re.compile(r"([A-Za-z]\w*)/([A-Za-z]\w*)\Z")
+
+
+class RosSingleton(QtCore.QObject):
+    """Base of ``Ros`` and ``Ros2``; one per engine, all of a session sharing its node."""
+
+    #: Whose habits its values follow.
+    DIALECT: ClassVar[Dialect] = Dialect.ROS2
+    #: What QML calls it.
+    NAME: ClassVar[str] = "Ros2"
+
+    initialized = Signal()
+    connectionChanged = Signal()
+    urlChanged = Signal()
+    #: Nodes, topics, services or actions appeared or went.
+    graphChanged = Signal()
+
+    def __init__(self, parent: QtCore.QObject | None = None) -> None:
+        super().__init__(parent)
+        self._bound: Runtime | None = None
+        # QML may only listen; without this, nothing would ever ask for the runtime.
+        QtCore.QTimer.singleShot(0, self._bind)
+
+    @Slot()
+    def _bind(self) -> None:
+        if is_alive(self):
+            _ = self._runtime
+
+    @property
+    def _runtime(self) -> Runtime:
+        if self._bound is None:
+            runtime = runtime_of(self)
+            if runtime is None:
+                raise Error(f"{self.NAME} belongs to no QML engine")
+            self._bound = runtime
+            self._listen(runtime.session)
+        return self._bound
+
+    def _listen(self, session: Session) -> None:
+        """Pass the session's signals on."""
+        session.initialized.connect(self.initialized)
+        session.connection_changed.connect(self.connectionChanged)
+        session.url_changed.connect(self.urlChanged)
+        session.graph_changed.connect(self.graphChanged)
+
+    @property
+    def _session(self) -> Session:
+        return self._runtime.session
+
+    def _node(self, what: str) -> Node | None:
+        """Return the node; None, with a line in the log for developers, when there is none."""
+        node = self._session.node
+        if node is None:
+            self._log(logging.DEBUG, f"{self.NAME}.{what}: there is no node yet")
+        return node
+
+    # The graph.
+
+    def _topics(self) -> dict[str, list[str]]:
+        node = self._node("topics")
+        if node is None:
+            return {}
+        try:
+            found = node.topics()
+        except Error as error:
+            self._log(logging.WARNING, f"{self.NAME}: the topics cannot be listed: {error}")
+            return {}
+        return {name: types for name, types in sorted(found.items()) if _HIDDEN not in name}
+
+    # The node.
+
+    @Slot(result=bool)
+    def isInitialized(self) -> bool:
+        """Return whether a node was asked for and not shut down again."""
+        return self._session.is_initialized
+
+    @Slot(result=bool)
+    def ok(self) -> bool:
+        """Return whether there is a node, or one is being made; false after a failure."""
+        return self._session.state not in {"uninitialized", "failed"}
+
+    @Slot(result=str)
+    def getName(self) -> str:
+        """Return the node's base name; empty before init."""
+        return self._session.name
+
+    @Slot(result=str)
+    def getNamespace(self) -> str:
+        """Return the node's namespace; empty before init."""
+        return self._session.namespace
+
+    @Slot(str, result=str)
+    def getEnvironmentVariable(self, name: str) -> str:
+        """Return a variable of the environment; empty when it is not set."""
+        return os.environ.get(name, "")
+
+    def _set_url(self, url: str) -> None:
+        self._session.url = url
+
+    def _get_hostname(self) -> str:
+        import platform  # noqa: PLC0415 - few interfaces ask
+
+        return platform.node()
+
+    url = Property(str, lambda self: self._session.url, _set_url, notify=urlChanged)
+    connectionState = Property(str, lambda self: self._session.state, notify=connectionChanged)
+    connectionDetail = Property(str, lambda self: self._session.detail, notify=connectionChanged)
+    hostname = Property(str, _get_hostname, constant=True)
+
+    # Logging.
+
+    @Slot(QJSValue)
+    @Slot(QJSValue, str)
+    def debug(self, message: QJSValue, name: str = "") -> None:
+        """Log a message for developers."""
+        self._log(logging.DEBUG, message.toString(), name)
+
+    @Slot(QJSValue)
+    @Slot(QJSValue, str)
+    def info(self, message: QJSValue, name: str = "") -> None:
+        """Log a message."""
+        self._log(logging.INFO, message.toString(), name)
+
+    @Slot(QJSValue)
+    @Slot(QJSValue, str)
+    def warn(self, message: QJSValue, name: str = "") -> None:
+        """Log a warning."""
+        self._log(logging.WARNING, message.toString(), name)
+
+    @Slot(QJSValue)
+    @Slot(QJSValue, str)
+    def error(self, message: QJSValue, name: str = "") -> None:
+        """Log an error."""
+        self._log(logging.ERROR, message.toString(), name)
+
+    @Slot(QJSValue)
+    @Slot(QJSValue, str)
+    def fatal(self, message: QJSValue, name: str = "") -> None:
+        """Log an error after which the program is of no use."""
+        self._log(logging.CRITICAL, message.toString(), name)
+
+    def _log(self, level: int, message: str, name: str = "") -> None:
+        log_from_qml(name, level, message, self._runtime.caller())
+
+
+def is_list(value: QJSValue | None) -> bool:
+    """Return whether QML gave an array."""
+    return value is not None and value.isArray()
+
+
+def strings(value: QJSValue) -> list[str]:
+    """Return an array's elements as texts."""
+    count = value.property("length").toInt()
+    return [value.property(index).toString() for index in range(count)]
+
+
+def full_type(name: str) -> str:
+    """Return ``pkg/msg/Type`` for ``pkg/Type``."""
+    match = _SHORT.match(name)
+    return f"{match[1]}/msg/{match[2]}" if match else name
