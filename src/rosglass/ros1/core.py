@@ -4,23 +4,13 @@ from __future__ import annotations
 
 import atexit
 import logging
-import os
 import threading
-from abc import abstractmethod
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from rosglass.comm import (
-    Clock,
-    ConnectionState,
-    Dispatcher,
-    Handle,
-    Listeners,
-    Status,
-    Timers,
-    Worker,
-)
-from rosglass.errors import Error, NodeClosedError
+from rosglass.comm import ConnectionState, Status
+from rosglass.comm.core import NodeCore, NodeMember
+from rosglass.errors import Error
 from rosglass.ros1.address import bracketed, own_address
 from rosglass.ros1.door import Door, listen
 from rosglass.ros1.errands import Errands
@@ -44,13 +34,11 @@ if TYPE_CHECKING:
 __all__ = ["Core", "Member"]
 
 _log = logging.getLogger("rosglass.ros1")
-#: Seconds between the members' regular looks.
-_POLL = 1.0
 #: Seconds that closing waits until listeners were told that somebody else has closed the node.
 _TELLING = 1.0
 
 
-class Member(Handle):
+class Member(NodeMember):
     """Something created from a node: it is registered with the master, and ends with the node.
 
     Attributes:
@@ -75,20 +63,8 @@ class Member(Handle):
         """Return whether it is connected with fewer publishers than the master knows."""
         return False
 
-    def follow(self, moved: bool, idle: bool) -> None:
-        """Follow the graph; called on the node's own thread, and may take its time.
 
-        Args:
-            moved: Whether nodes or endpoints appeared or went since the last call.
-            idle: Whether this is the regular look, about once a second.
-        """
-
-    @abstractmethod
-    def close(self) -> None:
-        """End it; safe to call twice."""
-
-
-class Core:
+class Core(NodeCore[Member]):
     """Holds what a node consists of, and keeps its members registered and informed.
 
     Args:
@@ -105,12 +81,6 @@ class Core:
         errands: Runs what waits for others.
         uri: The node's own API.
         address: Host and port where connections are accepted.
-        clock: The node's clock.
-        dispatcher: Runs callbacks that bring no executor of their own.
-        own_dispatcher: Runs what the node answers for itself.
-        timers: Runs short jobs later.
-        graph_listeners: Told after each change of the graph.
-        status_listeners: Told each new status.
         services: Who takes a connection to a service, by its name; see :class:`Server`.
         topics: Who takes a connection to a topic, by its name.
 
@@ -121,25 +91,15 @@ class Core:
     def __init__(
         self, name: NodeName, url: str, options: Ros1Options, library: Library | None
     ) -> None:
-        self.name, self.url, self.options = name, url, options
+        super().__init__(name, url, _log)
+        self.options = options
         self._new_names = options.arguments.remappings(name.name, name.namespace)
         self.master = Master(options.master, name.full)
         self.graph, self.types = Graph(), Types(library, url)
-        self.graph_listeners: Listeners[None] = Listeners(merge=True)
-        self.status_listeners: Listeners[Status] = Listeners()
-        self.dispatcher = Dispatcher(f"{name.name} callbacks")
-        self.own_dispatcher = Dispatcher(f"{name.name} services")
-        self.clock = Clock(name.name, self.dispatcher)
-        self.timers = Timers(f"{name.name} timers")
         self.errands = Errands(f"{name.name} errands")
-        self._lock = threading.Lock()
-        self._closed = False
-        self._process = os.getpid()
         self.address, self.uri = ("", 0), ""
         self._doors: list[Door] = []
         self._api: Slave | None = None
-        self._members: dict[Member, None] = {}
-        self._moved = False
         self._telling = threading.Lock()
         self._status = Status(ConnectionState.CONNECTING, f"looking for {options.master}")
         sockets: list[socket.socket] = []
@@ -156,7 +116,7 @@ class Core:
         self.move(options.address or own_address())
         self.loop = IoLoop(f"{name.name} connections")
         self._registrations = Registrations(self)
-        self._worker = Worker(f"{name.name} graph", self._follow, _POLL)
+        self._worker = self._start_following()
 
     def start(self, api: SlaveApi, accept: Callable[[socket.socket, str], None]) -> None:
         """Begin to listen, and to look for the master.
@@ -186,16 +146,6 @@ class Core:
             self.uris.add(self.uri)
         return moved
 
-    @property
-    def closed(self) -> bool:
-        """Whether the node is closed."""
-        return self._closed
-
-    @property
-    def forked(self) -> bool:
-        """Whether this process is a fork of the one that the node belongs to."""
-        return self._process != os.getpid()
-
     def runs_here(self) -> bool:
         """Return whether the calling thread is one of the node's own."""
         threads = (
@@ -220,23 +170,9 @@ class Core:
         """Return the absolute name of anything, not remapped; raises InvalidNameError."""
         return expand(name, self.name.name, self.name.namespace)
 
-    def check_open(self) -> None:
-        """Raise NodeClosedError when the node is closed, or was left behind by a fork."""
-        if self.forked:
-            raise NodeClosedError(
-                f"node {self.name} belongs to the process that made it, and does not work "
-                "after a fork; connect again in this process"
-            )
-        if self._closed:
-            raise NodeClosedError(f"node {self.name} is closed; connect again")
-
     def add(self, member: Member) -> None:
         """Register a member and let it follow the graph; raises NodeClosedError after closing."""
-        with self._lock:
-            self._members[member] = None
-        if self._closed:
-            member.close()
-        self.check_open()
+        super().add(member)
         self._registrations.wake()
         self.wake()
 
@@ -247,20 +183,7 @@ class Core:
         if known and not self._closed:
             self._registrations.forget(member)
 
-    def members(self) -> list[Member]:
-        """Return all members."""
-        with self._lock:
-            return list(self._members)
-
-    def wake(self) -> None:
-        """Let the members follow soon; from any thread."""
-        self._moved = True
-        self._worker.wake()
-
-    def status(self) -> Status:
-        """Return the state of the connection and what is being done about it."""
-        if self.forked:
-            return Status(ConnectionState.CLOSED, "left behind by a fork; connect again here")
+    def _state(self) -> Status:
         return self._status
 
     def tell(self, status: Status) -> None:
@@ -338,17 +261,3 @@ class Core:
             self.status_listeners.clear()
         self.dispatcher.close()
         self.own_dispatcher.close()
-
-    def _follow(self, idle: bool) -> None:
-        moved, self._moved = self._moved, False
-        for member in self.members():
-            # Another thread may close the node, or this member, meanwhile.
-            with suppress(NodeClosedError):
-                try:
-                    member.follow(moved, idle)
-                except NodeClosedError:
-                    raise
-                except Exception:
-                    _log.exception("%s cannot follow the graph", member)
-        if moved:
-            self.graph_listeners.notify(None)

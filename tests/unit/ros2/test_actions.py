@@ -45,7 +45,7 @@ def fibonacci(goal):
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
     """Look ten times a second for what has no event."""
-    monkeypatch.setattr("rosglass.ros2.core._POLL", 0.1)
+    monkeypatch.setattr("rosglass.comm.core._POLL", 0.1)
 
 
 @pytest.fixture

@@ -1,0 +1,155 @@
+"""What everything created from one node shares in every world, and the node's end."""
+
+from __future__ import annotations
+
+import os
+import threading
+from abc import ABC, abstractmethod
+from contextlib import suppress
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+from rosglass.comm.clock import Clock
+from rosglass.comm.executor import Dispatcher
+from rosglass.comm.graph import ConnectionState, Status
+from rosglass.comm.listeners import Listeners
+from rosglass.comm.node import Handle
+from rosglass.comm.timers import Timers
+from rosglass.comm.worker import Worker
+from rosglass.errors import NodeClosedError
+
+if TYPE_CHECKING:
+    import logging
+
+    from rosglass.comm.graph import NodeName
+
+__all__ = ["NodeCore", "NodeMember"]
+
+#: Seconds between the members' regular looks at what has no event.
+_POLL = 1.0
+
+
+class NodeMember(Handle):
+    """Something created from a node: it follows the graph, and ends with the node."""
+
+    def follow(self, moved: bool, idle: bool) -> None:
+        """Follow the graph; called on the node's own thread, and may take its time.
+
+        Args:
+            moved: Whether nodes or endpoints appeared or went since the last call.
+            idle: Whether this is the regular look, about once a second.
+        """
+
+    @abstractmethod
+    def close(self) -> None:
+        """End it; safe to call twice."""
+
+
+_Member = TypeVar("_Member", bound=NodeMember)
+
+
+class NodeCore(ABC, Generic[_Member]):
+    """Holds a node's threads and listeners, and keeps its members informed.
+
+    Args:
+        name: The node's name.
+        url: What it was connected with, for people to read.
+        log: Where failures are told.
+
+    Attributes:
+        clock: The node's clock.
+        dispatcher: Runs callbacks that bring no executor of their own.
+        own_dispatcher: Runs what the node answers for itself, such as questions for its parameters;
+            no callback of a user can hold that up.
+        timers: Runs short jobs later, and jobs that the middleware's threads must not wait for.
+        graph_listeners: Told after each change of the graph.
+        status_listeners: Told each new status.
+    """
+
+    #: Calls :meth:`_follow`; made by the world, once all is there that this needs.
+    _worker: Worker
+
+    def __init__(self, name: NodeName, url: str, log: logging.Logger) -> None:
+        self.name, self.url, self._log = name, url, log
+        self.graph_listeners: Listeners[None] = Listeners(merge=True)
+        self.status_listeners: Listeners[Status] = Listeners()
+        self.dispatcher = Dispatcher(f"{name.name} callbacks")
+        self.own_dispatcher = Dispatcher(f"{name.name} services")
+        self.clock = Clock(name.name, self.dispatcher)
+        self.timers = Timers(f"{name.name} timers")
+        self._lock = threading.Lock()
+        self._closed = self._moved = False
+        self._process = os.getpid()
+        self._members: dict[_Member, None] = {}
+
+    def _start_following(self) -> Worker:
+        return Worker(f"{self.name.name} graph", self._follow, _POLL)
+
+    @property
+    def closed(self) -> bool:
+        """Whether the node is closed."""
+        return self._closed
+
+    @property
+    def forked(self) -> bool:
+        """Whether this process is a fork of the one that the node belongs to."""
+        return self._process != os.getpid()
+
+    def check_open(self) -> None:
+        """Raise NodeClosedError when the node is closed, or was left behind by a fork."""
+        if self.forked:
+            raise NodeClosedError(
+                f"node {self.name} belongs to the process that made it, and does not work "
+                "after a fork; connect again in this process"
+            )
+        if self._closed:
+            raise NodeClosedError(f"node {self.name} is closed; connect again")
+
+    def add(self, member: _Member) -> None:
+        """Let a member follow the graph from now on; raises NodeClosedError after closing it."""
+        with self._lock:
+            self._members[member] = None
+        if self._closed:
+            member.close()
+        self.check_open()
+
+    def remove(self, member: _Member) -> None:
+        """Forget a member that was closed."""
+        with self._lock:
+            self._members.pop(member, None)
+
+    def members(self) -> list[_Member]:
+        """Return all members."""
+        with self._lock:
+            return list(self._members)
+
+    def wake(self) -> None:
+        """Let the members follow soon, as if the graph had changed; from any thread."""
+        self._moved = True
+        self._worker.wake()
+
+    def status(self) -> Status:
+        """Return the state of the connection and what is being done about it."""
+        if self.forked:
+            return Status(ConnectionState.CLOSED, "left behind by a fork; connect again here")
+        return self._state()
+
+    @abstractmethod
+    def _state(self) -> Status:
+        """Return the state of the connection, in the process that it belongs to."""
+
+    def _follow(self, idle: bool) -> None:
+        """Let the members follow the graph; run by the worker."""
+        moved, self._moved = self._moved, False
+        if not moved and not idle:
+            return
+        for member in self.members():
+            # Another thread may close the node, or this member, meanwhile.
+            with suppress(NodeClosedError):
+                try:
+                    member.follow(moved, idle)
+                except NodeClosedError:
+                    raise
+                except Exception:
+                    self._log.exception("%s cannot follow the graph", member)
+        if moved:
+            self.graph_listeners.notify(None)
