@@ -52,6 +52,8 @@ class Registrations:
         self._leaving: deque[Member] = deque()
         self._complaints = Complaints()
         self._answered = False
+        #: The master's process, as it last said.
+        self._process: object = None
         #: Why others may not reach the node, for the address that was looked at.
         self._doubt, self._doubted = "", ""
         #: How many looks in a row missed a publisher, by topic.
@@ -154,18 +156,17 @@ class Registrations:
     def _find(self) -> str:
         """Notice a master that was restarted; return who has taken the node's name."""
         core = self._core
-        if not self._registered:
-            core.master.call("getPid")
-            return ""
-        try:
-            uri = core.master.call("lookupNode", core.name.full)
-        except MasterError:
-            # Nobody has the name: the master has forgotten everybody.
-            self._registered.clear()
-            self._tried.clear()
-            self._leaving.clear()
-            return ""
-        return "" if uri in core.uris else str(uri)
+        process, uri = core.master.call("getPid"), ""
+        if self._registered:
+            with suppress(MasterError):  # nobody has the name: the master has forgotten everybody
+                uri = core.master.call("lookupNode", core.name.full)
+            # Another call may have made the node known to a new master, without all it consists of.
+            if not uri or process != self._process:
+                self._registered.clear()
+                self._tried.clear()
+                self._leaving.clear()
+        self._process = process
+        return "" if not uri or uri in core.uris else str(uri)
 
     def _locate(self) -> None:
         """Find out under which address others reach the node: it may have changed network."""

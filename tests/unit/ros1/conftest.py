@@ -137,9 +137,10 @@ class FakeMaster(FakeParameters):
         self._lock = threading.Lock()
         self.start()
 
-    def start(self) -> None:
-        """Start with nobody registered, and no parameters."""
+    def start(self, tree: dict[str, Any] | None = None) -> None:
+        """Start with nobody registered, and no parameters but those of a `tree`."""
         FakeParameters.__init__(self)
+        self.tree = tree or {}
         self.publishers: dict[str, dict[str, str]] = {}
         self.subscribers: dict[str, dict[str, str]] = {}
         self.types: dict[str, str] = {}
@@ -276,9 +277,9 @@ def connect(master: FakeMaster) -> Iterator[Callable[..., Ros1Node]]:
 
 @pytest.fixture(scope="session")
 def eventually() -> Callable[..., Any]:
-    """Return the first true value of a condition; fail after 10 s."""
+    """Return the first true value of a condition; fail after 30 s."""
 
-    def eventually(condition: Callable[[], Any], timeout: float = 10.0) -> Any:
+    def eventually(condition: Callable[[], Any], timeout: float = 30.0) -> Any:
         deadline = time.monotonic() + timeout
         while not (value := condition()):
             assert time.monotonic() < deadline, f"not within {timeout} s: {condition}"
