@@ -28,6 +28,14 @@ _NAME = "rosglass.runtime"
 #: Bytes of long arrays handed to JavaScript after which it is asked to collect its garbage: it
 #: does not see how much memory its small objects hold on our side.
 _GARBAGE = 64 << 20
+_PROMISE = """(function () {
+    let made = {}
+    made.promise = new Promise(function (resolve, reject) {
+        made.resolve = resolve
+        made.reject = function (text) { reject(new Error(text)) }
+    })
+    return made
+})"""
 
 
 class _Source(QtCore.QObject):
@@ -88,6 +96,7 @@ class Runtime(QtCore.QObject):
             name: helpers.property(name)
             for name in ("build", "buildWithNan", "shape", "makeTime", "makeQos", "makeOptions")
         }
+        self._helper["makePromise"] = _evaluate(engine, _PROMISE)
 
     @property
     def engine(self) -> QtQml.QQmlEngine | None:
@@ -158,6 +167,11 @@ class Runtime(QtCore.QObject):
             self._charge(arrays)
         build = "buildWithNan" if marked else "build"
         return self._call(build, [QJSValue(text), self._shape(schema, dialect), source])
+
+    def promise(self) -> tuple[QJSValue, QJSValue, QJSValue]:
+        """Return a JavaScript promise, and the functions that resolve and reject it."""
+        made = self._call("makePromise", [])
+        return made.property("promise"), made.property("resolve"), made.property("reject")
 
     def time(self, time: Time) -> QJSValue:
         """Return a time as messages carry it, with seconds(), toJSDate() and so on."""
