@@ -5,12 +5,12 @@ from __future__ import annotations
 import logging
 import socket
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rosglass.errors import ConnectionLostError, ConversionError, MasterError
 from rosglass.ros1.connection import Connection
-from rosglass.ros1.master import call_node, reason_of
-from rosglass.ros1.types import ANY
+from rosglass.ros1.master import reason_of
+from rosglass.ros1.topic_probe import publisher_addresses, subscriber_header
 
 if TYPE_CHECKING:
     from rosglass.ros1.intake import Intake
@@ -125,8 +125,7 @@ class PublisherLink:
         topic = self.intake.topic
         reason, found = "", list[tuple[str, int]]()
         try:
-            answer = call_node(self.uri, "requestTopic", self._core.name.full, topic, [["TCPROS"]])
-            found = _addresses(answer, f"{self.uri} for {topic}")
+            found = publisher_addresses(self._core.name.full, self.uri, topic)
         except (ConnectionLostError, MasterError, ConversionError) as error:
             unknown = isinstance(error.__cause__, socket.gaierror)
             reason = f"{error}: {_UNKNOWN_HOST}" if unknown else str(error)
@@ -140,14 +139,7 @@ class PublisherLink:
             self._fail(reason)
             return
         self._addresses = addresses[1:]
-        header = {
-            "callerid": self._core.name.full,
-            "md5sum": ANY,
-            "message_definition": "",
-            "tcp_nodelay": "1",
-            "topic": self.intake.topic,
-            "type": ANY,
-        }
+        header = subscriber_header(self._core.name.full, self.intake.topic)
         try:
             self._connection = Connection.dial(
                 self._core.loop, addresses[0], header, self._on_header, _ignore, self._fail
@@ -211,24 +203,3 @@ class PublisherLink:
 
 def _ignore(_data: Received, _first: int) -> None:
     """Take a message by itself: nobody is asked to, they are taken together."""
-
-
-def _addresses(answer: Any, place: str) -> list[tuple[str, int]]:
-    """Return the resolved addresses in an answer to requestTopic; waits for the name service.
-
-    Raises:
-        MasterError: It offers no TCPROS.
-        ConnectionLostError: The host is not known here.
-    """
-    if not (isinstance(answer, (list, tuple)) and len(answer) >= 3 and answer[0] == "TCPROS"):
-        raise MasterError(f"{place} offers no TCPROS, but {answer!r:.80}")
-    host, port = str(answer[1]), answer[2]
-    if type(port) is not int or not 0 < port < 65536:
-        raise ConnectionLostError(f"{place} says to connect to port {port!r:.80}")
-    try:
-        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
-    except (OSError, UnicodeError) as error:
-        raise ConnectionLostError(
-            f"{place} says to connect to {host}:{port}, but {reason_of(error)}"
-        ) from error
-    return list(dict.fromkeys((str(one[4][0]), int(one[4][1])) for one in found))
