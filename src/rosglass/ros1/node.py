@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import EndpointKind, History, Node, NodeName, QoS, Subscription
+from rosglass.comm import EndpointKind, History, NodeName, QoS, Subscription
+from rosglass.comm.core_node import CoreNode
 from rosglass.comm.flags import check_flag
-from rosglass.comm.loop import check_plain
 from rosglass.errors import InvalidNameError
 from rosglass.ros1.action_types import actions
 from rosglass.ros1.answers import Answers
@@ -25,17 +25,13 @@ if TYPE_CHECKING:
 
     from rosglass.comm import (
         Answer,
-        Clock,
         EndpointInfo,
         Executor,
-        Handle,
         ParameterClient,
         Sample,
         ServerGoal,
         ServiceClient,
         ServiceServer,
-        Status,
-        Time,
     )
     from rosglass.comm.logger import NodeLogger
     from rosglass.comm.node import Result
@@ -51,7 +47,7 @@ if TYPE_CHECKING:
 __all__ = ["Ros1Node"]
 
 
-class Ros1Node(Node):
+class Ros1Node(CoreNode):
     """A node of a ROS 1 graph.
 
     Args:
@@ -70,6 +66,7 @@ class Ros1Node(Node):
     """
 
     wire = "ros1"
+    _core: Core
 
     def __init__(
         self,
@@ -259,16 +256,7 @@ class Ros1Node(Node):
         """The node's logger, whose messages go to ``/rosout``, too."""
         return self._furniture.logger
 
-    # -- the node's clock and names --------------------------------------------------------------
-
-    @property
-    def clock(self) -> Clock:
-        """The node's clock."""
-        return self._core.clock
-
-    def now(self) -> Time:
-        """Return the time of the node's clock."""
-        return self._core.clock.now()
+    # -- the node's names ------------------------------------------------------------------------
 
     @property
     def address(self) -> str:
@@ -321,27 +309,6 @@ class Ros1Node(Node):
         """Return what a node publishes, subscribes and serves; none when it is unknown."""
         full = node.full if isinstance(node, NodeName) else self._core.expand(node)
         return self._services.described(self._core.graph.endpoints_of(NodeName(*split(full))))
-
-    def on_graph_change(
-        self, callback: Callable[[], None], executor: Executor | None = None
-    ) -> Handle:
-        """Call `callback` after nodes or endpoints appeared or went; changes may be merged."""
-        self._core.check_open()
-        check_plain(callback, "on_graph_change()")
-        return self._core.graph_listeners.add(
-            lambda _: callback(), executor or self._core.dispatcher
-        )
-
-    def status(self) -> Status:
-        """Return the state of the connection and what is being done about it."""
-        return self._core.status()
-
-    def on_status_change(
-        self, callback: Callable[[Status], None], executor: Executor | None = None
-    ) -> Handle:
-        """Call `callback` with the new status whenever it changes."""
-        self._core.check_open()
-        return self._core.status_listeners.add(callback, executor or self._core.dispatcher)
 
     def close(self) -> None:
         """Leave the graph, close everything created from the node and end its threads.

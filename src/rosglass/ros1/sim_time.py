@@ -7,14 +7,13 @@ it, so that a screen which was there before the simulation keeps its time all th
 from __future__ import annotations
 
 import logging
-import threading
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import IMMEDIATE, Handle, QoS, Time
-from rosglass.errors import Error
+from rosglass.comm import IMMEDIATE, Time
+from rosglass.comm.sim_time import ClockFollower
 
 if TYPE_CHECKING:
-    from rosglass.comm import Clock, Node, Sample, Subscription, Timers
+    from rosglass.comm import Clock, Node, Timers
     from rosglass.ros1.parameter_server import ParameterServer
 
 __all__ = ["USE_SIM_TIME", "SimTime"]
@@ -25,7 +24,7 @@ USE_SIM_TIME = "/use_sim_time"
 _PATIENCE = 5.0
 
 
-class SimTime(Handle):
+class SimTime(ClockFollower):
     """Lets a node's clock follow ``/clock`` while ``/use_sim_time`` is set.
 
     Until the master has told the parameter, which takes some milliseconds after connecting, the
@@ -39,52 +38,24 @@ class SimTime(Handle):
     """
 
     def __init__(self, node: Node, clock: Clock, server: ParameterServer, timers: Timers) -> None:
-        self._node, self._clock, self._timers = node, clock, timers
-        self._lock = threading.Lock()
-        self._subscription: Subscription | None = None
-        self._closed = False
-        self._parameter = server.subscribe(USE_SIM_TIME, self._follow, IMMEDIATE)
+        super().__init__(node, clock, "rosgraph_msgs/Clock", _log)
+        self._timers = timers
+        self._parameter = server.subscribe(USE_SIM_TIME, self._changed, IMMEDIATE)
 
     def close(self) -> None:
         """Follow no longer; the clock keeps its time. Safe to call twice."""
         self._parameter.close()
-        with self._lock:
-            self._closed = True
-            subscription, self._subscription = self._subscription, None
-        if subscription is not None:
-            subscription.close()
+        super().close()
 
-    def _follow(self, value: Any) -> None:
+    def _changed(self, value: Any) -> None:
         """Do as the parameter says."""
         # As rospy has it: 1 counts, too.
-        wanted = bool(value)
-        made = None
-        with self._lock:
-            if self._closed or wanted == (self._subscription is not None):
-                return
-            if wanted:
-                try:
-                    made = self._node.create_subscription(
-                        "/clock",
-                        "rosgraph_msgs/Clock",
-                        qos=QoS.clock(),
-                        raw_callback=self._tick,
-                        executor=IMMEDIATE,
-                    )
-                except Error:
-                    _log.exception("%s: the time of the simulation cannot be followed", self._node)
-                    return
-            old, self._subscription = self._subscription, made
-        if old is not None:
-            old.close()
-        # As it is now: another thread may have changed it since.
-        self._clock.simulate(self._subscription is not None)
-        if made is not None:
+        if self.follow(bool(value)):
             self._timers.after(_PATIENCE, self._look)
 
     def _look(self) -> None:
         """Tell people why nothing moves, if nothing does."""
-        if self._subscription is not None and not self._clock.now().nanoseconds:
+        if self.following and not self._clock.now().nanoseconds:
             _log.warning(
                 "%s: %s is set, but nothing came on /clock: time stands still at zero until a "
                 "simulation publishes it, or the parameter is deleted",
@@ -92,6 +63,5 @@ class SimTime(Handle):
                 USE_SIM_TIME,
             )
 
-    def _tick(self, sample: Sample) -> None:
-        stamp = sample.message().clock
-        self._clock.advance(Time.from_parts(stamp.secs, stamp.nsecs))
+    def _time_of(self, stamp: Any) -> Time:
+        return Time.from_parts(stamp.secs, stamp.nsecs)

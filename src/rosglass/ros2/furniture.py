@@ -76,9 +76,6 @@ class Furniture(Member):
         """The node's logger; after closing it logs for Python's handlers only."""
         return self._logging().logger
 
-    def follow(self, moved: bool, idle: bool) -> None:
-        """Follow the graph, which is of no concern here."""
-
     def close(self) -> None:
         """Withdraw all of it; safe to call twice."""
         with self._lock:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rosglass.comm import EndpointKind, Node, NodeName, QoS, Subscription
+from rosglass.comm import EndpointKind, NodeName, QoS, Subscription
+from rosglass.comm.core_node import CoreNode
 from rosglass.comm.flags import check_flag
-from rosglass.comm.loop import check_plain
 from rosglass.errors import UnsupportedError
 from rosglass.ros2.arguments import NO_ARGUMENTS
 from rosglass.ros2.core import Core
@@ -25,10 +25,8 @@ if TYPE_CHECKING:
         ActionClient,
         ActionServer,
         Answer,
-        Clock,
         EndpointInfo,
         Executor,
-        Handle,
         LifecycleClient,
         Promise,
         Publisher,
@@ -36,8 +34,6 @@ if TYPE_CHECKING:
         ServerGoal,
         ServiceClient,
         ServiceServer,
-        Status,
-        Time,
     )
     from rosglass.comm.logger import NodeLogger
     from rosglass.comm.node import Result
@@ -51,7 +47,7 @@ if TYPE_CHECKING:
 __all__ = ["Ros2Node"]
 
 
-class Ros2Node(Node):
+class Ros2Node(CoreNode):
     """A ROS 2 node; made by :func:`rosglass.connect`.
 
     Args:
@@ -72,6 +68,7 @@ class Ros2Node(Node):
     """
 
     wire = "cdr"
+    _core: Core
 
     def __init__(
         self,
@@ -201,11 +198,6 @@ class Ros2Node(Node):
         """The node's logger, whose messages go to ``/rosout``, too."""
         return self._furniture.logger
 
-    @property
-    def clock(self) -> Clock:
-        """The node's clock, which follows ``/clock`` when the parameter use_sim_time is set."""
-        return self._core.clock
-
     def fetch_type_async(
         self,
         name: str,
@@ -258,34 +250,9 @@ class Ros2Node(Node):
         namespace, _, name = self._node_name(node).rpartition("/")
         return self._core.graph.endpoints_of(NodeName(namespace or "/", name))
 
-    def on_graph_change(
-        self, callback: Callable[[], None], executor: Executor | None = None
-    ) -> Handle:
-        """Call `callback` after nodes or endpoints appeared or went; changes may be merged."""
-        self._core.check_open()
-        check_plain(callback, "on_graph_change()")
-        return self._core.graph_listeners.add(
-            lambda _: callback(), executor or self._core.dispatcher
-        )
-
-    def status(self) -> Status:
-        """Return the state of the connection and what is being done about it."""
-        return self._core.status()
-
-    def on_status_change(
-        self, callback: Callable[[Status], None], executor: Executor | None = None
-    ) -> Handle:
-        """Call `callback` with the new status whenever it changes."""
-        self._core.check_open()
-        return self._core.status_listeners.add(callback, executor or self._core.dispatcher)
-
     def resolve(self, name: str) -> str:
         """Return the absolute name of a topic or service; raises InvalidNameError."""
         return self._core.resolve(name)
-
-    def now(self) -> Time:
-        """Return the time of the node's clock."""
-        return self._core.clock.now()
 
     def close(self) -> None:
         """Leave the graph, close everything created from the node and end its threads.

@@ -39,9 +39,6 @@ class _Flush(Member):
     def __init__(self, handler: RosoutHandler, core: Core) -> None:
         self._handler, self._core = handler, core
 
-    def follow(self, moved: bool, idle: bool) -> None:
-        """Follow the graph, which is of no concern here."""
-
     def close(self) -> None:
         self._handler.close()
         self._core.remove(self)

@@ -6,15 +6,14 @@ Behaviour: design article "Clock and Time", and rclcpp's ``TimeSource``.
 from __future__ import annotations
 
 import logging
-import threading
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import IMMEDIATE, Handle, QoS, Time
-from rosglass.errors import Error
+from rosglass.comm import IMMEDIATE, Time
+from rosglass.comm.sim_time import ClockFollower
 from rosglass.ros2.parameters import USE_SIM_TIME
 
 if TYPE_CHECKING:
-    from rosglass.comm import Clock, Node, Sample, Subscription
+    from rosglass.comm import Clock, Node
     from rosglass.ros2.parameters import Change, Ros2Parameters
 
 __all__ = ["SimTime"]
@@ -22,7 +21,7 @@ __all__ = ["SimTime"]
 _log = logging.getLogger("rosglass.ros2")
 
 
-class SimTime(Handle):
+class SimTime(ClockFollower):
     """Lets a node's clock follow ``/clock`` while ``use_sim_time`` is set.
 
     Args:
@@ -32,52 +31,23 @@ class SimTime(Handle):
     """
 
     def __init__(self, node: Node, clock: Clock, parameters: Ros2Parameters) -> None:
-        self._node, self._clock = node, clock
+        super().__init__(node, clock, "rosgraph_msgs/msg/Clock", _log)
         self._parameters = parameters
-        self._lock = threading.Lock()
-        self._subscription: Subscription | None = None
-        self._closed = False
         self._listener = parameters.changes.add(self._changed, IMMEDIATE)
-        self._follow()
+        self._obey()
 
     def close(self) -> None:
         """Follow no longer; the clock keeps its time. Safe to call twice."""
         self._listener.close()
-        with self._lock:
-            self._closed = True
-            subscription, self._subscription = self._subscription, None
-        if subscription is not None:
-            subscription.close()
+        super().close()
 
     def _changed(self, change: Change) -> None:
         if any(USE_SIM_TIME in names for names in change):
-            self._follow()
+            self._obey()
 
-    def _follow(self) -> None:
+    def _obey(self) -> None:
         """Do as the parameter says."""
-        wanted = self._parameters.typed_value(USE_SIM_TIME).value is True
-        made = None
-        with self._lock:
-            if self._closed or wanted == (self._subscription is not None):
-                return
-            if wanted:
-                try:
-                    made = self._node.create_subscription(
-                        "/clock",
-                        "rosgraph_msgs/msg/Clock",
-                        qos=QoS.clock(),
-                        raw_callback=self._tick,
-                        executor=IMMEDIATE,
-                    )
-                except Error:
-                    _log.exception("%s: the time of the simulation cannot be followed", self._node)
-                    return
-            old, self._subscription = self._subscription, made
-        if old is not None:
-            old.close()
-        # As it is now: another thread may have changed it since.
-        self._clock.simulate(self._subscription is not None)
+        self.follow(self._parameters.typed_value(USE_SIM_TIME).value is True)
 
-    def _tick(self, sample: Sample) -> None:
-        stamp = sample.message().clock
-        self._clock.advance(Time.from_parts(stamp.sec, stamp.nanosec))
+    def _time_of(self, stamp: Any) -> Time:
+        return Time.from_parts(stamp.sec, stamp.nanosec)
