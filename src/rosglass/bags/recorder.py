@@ -8,12 +8,14 @@ import threading
 import time
 from collections import Counter, deque
 from concurrent.futures import wait
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rosglass.bags.recording_file import create
 from rosglass.comm import IMMEDIATE, Handle, QoS
+from rosglass.comm.similar import similar
 from rosglass.errors import BagError, Error, NodeClosedError
 from rosglass.messages import OpaqueType
 
@@ -151,7 +153,7 @@ class Recorder(Handle):
                 if subscription.problem and not told:
                     problems[topic] = subscription.problem
             for topic in sorted(self._topics - types.keys() - problems.keys()):
-                problems[topic] = "nobody publishes it"
+                problems[topic] = f"nobody publishes it{self._guess(topic)}"
             counts = {topic: self._counts.get(topic, 0) for topic in sorted(types)}
             duration = time.monotonic() - self._started
             return RecordingStatus(counts, self._dropped, self._size, duration, problems)
@@ -202,6 +204,12 @@ class Recorder(Handle):
             hidden = self._ros2 and any(part.startswith("_") for part in topic.split("/"))
             chosen = not self._topics and (self._hidden or not hidden)
         return chosen and bool(self._node.publishers(topic))
+
+    def _guess(self, topic: str) -> str:
+        with suppress(NodeClosedError):
+            known = [name for name in self._node.topics() if self._node.publishers(name)]
+            return similar(topic, known)
+        return ""
 
     def _subscribe(self, topic: str, type_name: str) -> None:
         with self._lock:

@@ -6,7 +6,15 @@ import time
 from typing import TYPE_CHECKING
 
 from rosglass.cli.completion import complete
-from rosglass.cli.connecting import End, add_connection_options, connect, find, settle, wait
+from rosglass.cli.connecting import (
+    End,
+    add_connection_options,
+    connect,
+    find,
+    settle,
+    telling,
+    wait,
+)
 from rosglass.cli.endpoints import describe
 from rosglass.cli.output import (
     Style,
@@ -73,7 +81,8 @@ def _list(args: argparse.Namespace) -> int:
         settle(node)
         found = node.actions()
     if args.json:
-        print_json([{"action": name, "types": types} for name, types in found.items()])
+        print_json([{"action": name, "types": [spelled(node, t) for t in types]}
+                    for name, types in found.items()])  # fmt: skip
         return 0
     for name, types in found.items():
         print(
@@ -104,7 +113,7 @@ def _info(args: argparse.Namespace) -> int:
     if args.json:
         print_json(
             {
-                "action": name, "types": types,
+                "action": name, "types": [spelled(node, t) for t in types],
                 "servers": [describe(node, end)["node"] for end in servers],
                 "clients": [describe(node, end)["node"] for end in clients],
             }
@@ -139,7 +148,8 @@ def _send(args: argparse.Namespace) -> int:
     with connect(args) as node:
         name = node.resolve(args.action)
         with node.create_action_client(name, type_name) as client:
-            wait(node, lambda: client.type is not None, args.timeout)
+            with telling(lambda: client.problem):
+                wait(node, lambda: client.type is not None, args.timeout)
             if client.type is None:
                 raise ServiceUnavailableError(client.problem or f"nobody offers {name}")
             kind = client.type.goal
@@ -150,17 +160,18 @@ def _send(args: argparse.Namespace) -> int:
                 timeout=args.timeout,
             )
             told, end = GoalStatus.PENDING, End()
-            while not goal.done.done():
-                if goal.status is not told and not args.json:
-                    told = goal.status
-                    print(style(f"# goal {goal.id_text} {told.value}", "dim"), flush=True)
-                if end.wait(0.05):
-                    _cancel(goal)
-                    break
+            with telling(lambda: client.problem if goal.status is GoalStatus.PENDING else ""):
+                while not goal.done.done():
+                    if goal.status is not told and not args.json:
+                        told = goal.status
+                        print(style(f"# goal {goal.id_text} {told.value}", "dim"), flush=True)
+                    if end.wait(0.05):
+                        _cancel(goal)
+                        break
             try:
                 status, result = goal.result(0)
             except Error as error:
-                note(f"{name}: {error}")
+                note(spelled(node, f"{name}: {error}"))
                 return 1
     found = fields(result, None if args.json else 100)
     if args.json:

@@ -101,7 +101,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--statistics",
         type=seconds,
-        default=10.0,
+        default=5.0,
         metavar="SECONDS",
         help="time between two lines of statistics, 0 for none (default: %(default)g)",
     )

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import argparse
 import signal
-import sys
 import threading
 import time
+from contextlib import contextmanager, suppress
 from math import isfinite
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
+from rosglass.cli.output import note
 from rosglass.comm import ConnectionState, anonymous_name
+from rosglass.errors import Error
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Iterator
 
     from rosglass.comm import Node, Status
 
@@ -29,6 +31,7 @@ __all__ = [
     "natural",
     "seconds",
     "settle",
+    "telling",
     "wait",
 ]
 
@@ -37,8 +40,10 @@ _T = TypeVar("_T")
 TIMEOUT = 10.0
 #: Seconds that something which is there takes to show up in the graph, or to tell its type.
 _DISCOVERY = 3.0
-#: Seconds after which a command says what it is waiting for.
-_PATIENCE = 2.0
+#: Seconds after which a command says what it is waiting for, and knocks where nobody answers.
+_PATIENCE, _KNOCK = 2.0, 0.5
+#: The same once the robot has answered.
+_SOON = 1.0
 #: Seconds without news after which the graph counts as known; ROS 1's master knows it at once.
 _QUIET = {"zenoh": 0.3, "dds": 0.7, "ros1": 0.0}
 
@@ -61,6 +66,7 @@ def add_connection_options(
     group.add_argument(
         "--timeout",
         type=seconds,
+        action=_Given,
         default=timeout,
         metavar="SECONDS",
         help="how long to wait for the robot to answer "
@@ -85,7 +91,7 @@ def add_definitions_option(parser: argparse._ActionsContainer) -> None:
     )
 
 
-def connect(args: argparse.Namespace, *, own_services: bool = False) -> Node:
+def connect(args: argparse.Namespace, *, patient: bool = False) -> Node:
     """Join the graph that the options name, and wait until somebody answers.
 
     Says on standard error what it waits for, when that takes a while. Over DDS, where nobody has
@@ -93,7 +99,8 @@ def connect(args: argparse.Namespace, *, own_services: bool = False) -> Node:
 
     Args:
         args: The command's options.
-        own_services: Whether the node shows parameters and the like to others.
+        patient: Whether to wait even where nothing listens, for a robot that is about to start:
+            for commands that go on until they are ended. ``--timeout`` asks others to.
 
     Raises:
         Error: As :func:`rosglass.connect`; ConnectionLostError when nobody answers in time.
@@ -104,10 +111,11 @@ def connect(args: argparse.Namespace, *, own_services: bool = False) -> Node:
         args.url or None,
         name=args.node_name or anonymous_name(f"rosglass_{args.command}"),
         arguments=args.ros_arguments,
-        own_services=own_services,
+        own_services=False,
     )
+    waits = patient or getattr(args, "timeout_given", False)
     try:
-        _wait_for_connection(node, TIMEOUT if args.timeout is None else args.timeout)
+        _wait_for_connection(node, TIMEOUT if args.timeout is None else args.timeout, waits)
     except BaseException:
         node.close()
         raise
@@ -124,7 +132,7 @@ def join(url: str, name: str, timeout: float) -> Node:
 
     node = rosglass.connect(url, name=name, own_services=False)
     try:
-        _wait_for_connection(node, timeout)
+        _wait_for_connection(node, timeout, patient=True)
     except BaseException:
         node.close()
         raise
@@ -177,10 +185,53 @@ def find(node: Node, look: Callable[[], _T], timeout: float) -> _T:
     return look()
 
 
+@contextmanager
+def telling(reason: Callable[[], str]) -> Iterator[None]:
+    """Say on standard error what the block is waiting for when it takes longer than a second.
+
+    Args:
+        reason: Returns it in words, with the names that may be meant; empty for nothing. It is
+            asked each second, from another thread, and what is new is told.
+    """
+    done = threading.Event()
+
+    def tell() -> None:
+        told = ""
+        while not done.wait(_SOON):
+            text = ""
+            with suppress(Error):  # what ends the waiting is told by who waits
+                text = reason()
+            if text and text != told and not done.is_set():
+                told = text
+                note(f"waiting: {text}")
+
+    thread = threading.Thread(target=tell, name="telling", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        done.set()
+        thread.join()
+
+
 def await_types(node: Node, look: Callable[[], Iterable[object]], timeout: float) -> None:
     """Wait until all types that `look` returns are known, which ROS 1's servers are asked for."""
     if node.wire == "ros1":
         wait(node, lambda: all(look()), min(timeout, _DISCOVERY))
+
+
+class _Given(argparse.Action):
+    """Stores a value, and that it was given."""
+
+    def __call__(
+        self,
+        _parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        _option: str | None = None,
+    ) -> None:
+        setattr(namespace, self.dest, values)
+        setattr(namespace, f"{self.dest}_given", True)
 
 
 class End(threading.Event):
@@ -229,10 +280,11 @@ def natural(text: str) -> int:
     return int(text)
 
 
-def _wait_for_connection(node: Node, timeout: float) -> None:
+def _wait_for_connection(node: Node, timeout: float, patient: bool) -> None:
+    from rosglass.cli.network import refused
     from rosglass.errors import ConnectionLostError
 
-    connected = threading.Event()
+    connected, deadline = threading.Event(), time.monotonic() + timeout
 
     def look(status: Status) -> None:
         # Over DDS there may be nobody yet, and no way to tell that from a wrong address.
@@ -241,12 +293,20 @@ def _wait_for_connection(node: Node, timeout: float) -> None:
 
     with node.on_status_change(look):
         look(node.status())
-        if connected.wait(min(_PATIENCE, timeout)):
+        if connected.wait(min(_KNOCK, timeout)):
             return
-        if timeout > _PATIENCE:
-            print(f"rosglass: {node.url}: {node.status().detail}", file=sys.stderr, flush=True)
-            if connected.wait(timeout - _PATIENCE):
-                return
+        refusal = refused(node.url)
+        if refusal is not None:
+            told = f"{node.url}: {refusal[0]}; {refusal[1]}"
+            if not patient:
+                raise ConnectionLostError(told)
+            note(f"{told}. Waiting for it")
+        elif connected.wait(min(_PATIENCE, timeout)):
+            return
+        elif timeout > _PATIENCE:
+            note(f"{node.url}: {node.status().detail}")
+        if connected.wait(max(0.0, deadline - time.monotonic())):
+            return
     raise ConnectionLostError(
         f"{node.url}: {node.status().detail}; nobody answered within {timeout:g} s. Is the robot "
         "on, and the address right? rosglass doctor looks for the reason"

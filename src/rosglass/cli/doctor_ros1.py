@@ -95,13 +95,12 @@ def _join(url: str, timeout: float) -> Ros1Node | Finding:
 
 def _master(uri: str, timeout: float) -> Finding | None:
     """Knock where the master should be; None when it answers."""
-    from rosglass.ros1.address import is_loopback, parse_uri
+    from rosglass.cli.network import roscore
+    from rosglass.ros1.address import parse_uri
     from rosglass.ros1.master import call_node
 
     host, port = parse_uri(uri, "master")
-    start = "start it: roscore" + ("" if port == 11311 else f" -p {port}")
-    if not is_loopback(host):
-        start = f"on {host}, {start}; or correct the address"
+    start = roscore(host, port)
     try:
         with socket.create_connection((host, port), timeout):
             pass

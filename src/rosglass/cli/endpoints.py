@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rosglass.cli.worlds import is_ros1
+from rosglass.cli.worlds import is_ros1, spelled
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,7 +31,8 @@ class Problem(NamedTuple):
 def describe(node: Node, end: EndpointInfo) -> dict[str, Any]:
     """Return an endpoint of the node's graph as JSON has it."""
     if is_ros1(node):
-        found = {"kind": end.kind.value, "name": end.name, "node": str(end.node), "type": end.type}
+        found = {"kind": end.kind.value, "name": end.name, "node": str(end.node),
+                 "type": spelled(node, end.type)}  # fmt: skip
         return found | ({"md5": end.type_hash} if end.type_hash else {})
     qos = end.qos
     return {

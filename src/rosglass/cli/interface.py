@@ -59,7 +59,7 @@ def _list(args: argparse.Namespace) -> int:
     from rosglass.messages import default_library
 
     names = default_library().names(1 if args.ros1 else 2, args.kind)
-    if args.ros1 and not args.json:
+    if args.ros1:
         names = [ros1_name(name) for name in names]
     found = [name for name in names if args.text.lower() in name.lower()]
     if args.json:
@@ -86,7 +86,8 @@ def _show(args: argparse.Namespace) -> int:
     if args.json:
         print_json(
             {
-                "name": found.name, "ros": found.ros, "text": definition.text,
+                "name": ros1_name(found.name) if found.ros == 1 else found.name,
+                "ros": found.ros, "text": definition.text,
                 "hash": found.md5 if found.ros == 1 else found.rihs01,
                 "source": {"provider": source.provider, "file": source.file},
                 "fields": {name: _fields(part) for name, part in parts.items()},

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import socket
 import struct
 import sys
 from typing import NamedTuple
 from urllib.parse import urlsplit
 
-__all__ = ["Interface", "ask", "interfaces", "is_loopback"]
+__all__ = ["Interface", "ask", "interfaces", "is_loopback", "refused", "roscore"]
 
+#: Seconds that somebody who refuses may take to do so.
+_KNOCK = 1.0
 #: The request for an interface's flags, and some of these (Linux, netdevice(7)).
 _GET_FLAGS = 0x8913
 _UP, _LOOPBACK, _MULTICAST = 0x1, 0x8, 0x1000
@@ -48,6 +51,44 @@ def is_loopback(url: str) -> bool:
     """Return whether an URL names this machine, if only by leaving the host out."""
     host = urlsplit(url).hostname or ""
     return host in ("", "localhost", "::1") or host.startswith("127.")
+
+
+def roscore(host: str, port: int) -> str:
+    """Say how to start a ROS 1 master that does not run."""
+    from rosglass.ros1.address import is_loopback
+
+    start = "start it: roscore" + ("" if port == 11311 else f" -p {port}")
+    return start if is_loopback(host) else f"on {host}, {start}; or correct the address"
+
+
+def refused(url: str) -> tuple[str, str] | None:
+    """Return what is wrong, and what helps, when nothing listens where an URL says; else None.
+
+    None as well when nobody answers at all: that takes longer to tell from a slow network.
+    """
+    from rosglass.ros1.address import parse_uri
+    from rosglass.ros1.options import Ros1Options
+
+    if url.startswith("ros1:"):
+        host, port = parse_uri(Ros1Options.parse(url).master, "master")
+    elif url.startswith("zenoh:") and (
+        urlsplit(url).hostname or not os.environ.get("ZENOH_SESSION_CONFIG_URI")
+    ):
+        host, port = urlsplit(url).hostname or "127.0.0.1", urlsplit(url).port or _PORT
+    else:
+        return None
+    try:
+        socket.create_connection((host, port), _KNOCK).close()
+    except ConnectionRefusedError:
+        pass
+    except OSError:
+        return None
+    else:
+        return None
+    if url.startswith("zenoh:"):
+        return ask(url, _KNOCK)
+    text = f"no master runs: {host} is there, but nothing listens on its port {port}"
+    return text, roscore(host, port)
 
 
 def ask(url: str, timeout: float) -> tuple[str, str]:

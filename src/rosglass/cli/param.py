@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rosglass.cli.completion import complete
-from rosglass.cli.connecting import add_connection_options, connect, settle
+from rosglass.cli.connecting import add_connection_options, connect, settle, telling
 from rosglass.cli.output import Style, add_output_options, note, print_json, to_yaml
 from rosglass.cli.subcommands import Subcommands
 from rosglass.cli.worlds import names_ros1
+from rosglass.comm.similar import similar
 from rosglass.errors import Error
 
 if TYPE_CHECKING:
@@ -74,8 +75,19 @@ def run(args: argparse.Namespace) -> int:
         if getattr(args, name) is None:
             usage = " ".join(needed.upper() for needed in _NEEDED[args.what])
             raise Error(f"{name.upper()} is missing: rosglass param {args.what} {usage}")
-    with connect(args) as node:
+    with connect(args) as node, telling(lambda: _missing(node, args.node)):
         return int(args.handler(node, args))
+
+
+def _missing(node: Node, name: str | None) -> str:
+    """Say what keeps a node from telling its parameters; empty when nothing does."""
+    full = "/" + (name or "").lstrip("/")
+    if not name or node.service_servers(f"{full}/get_parameters"):
+        return ""
+    known = [other.full for other in node.nodes()]
+    if full in known:
+        return f"{full} does not serve its parameters"
+    return f"there is no node {full}{similar(full, known)}"
 
 
 def _node(parser: argparse.ArgumentParser, **options: Any) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rosglass.cli.output import print_json, to_yaml
+from rosglass.cli.output import note, print_json, to_yaml
 from rosglass.errors import Error, UnsupportedError
 
 if TYPE_CHECKING:
@@ -47,7 +47,16 @@ def _name(args: argparse.Namespace, parameter: str | None) -> str:
 
 
 def _list(server: ParameterServer, args: argparse.Namespace) -> None:
-    names = server.names(f"/{args.node or ''}", timeout=args.timeout)
+    place = "/" + (args.node or "").strip("/")
+    names = server.names(place, timeout=args.timeout)
+    if not names and place != "/":
+        # Raises, with similar names, unless it is a parameter itself, or an empty namespace.
+        if not isinstance(server.get(place, timeout=args.timeout), dict):
+            names = [place]
+        else:
+            note(f"the namespace {place} is empty")
+    elif not names:
+        note("no parameters are set")
     if args.json:
         print_json(names)
     else:

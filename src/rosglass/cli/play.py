@@ -19,7 +19,7 @@ from rosglass.cli.output import note
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from rosglass.bags import Bag, Player
+    from rosglass.bags import Bag, Channel, Player
 
 __all__ = ["configure", "run"]
 
@@ -112,7 +112,7 @@ def run(args: argparse.Namespace) -> int:
             # What is not played, and why, is told here.
             logging.getLogger("rosglass.bags").setLevel(logging.CRITICAL)
         with (
-            connect(args) as node,
+            connect(args, patient=True) as node,
             Player(
                 node,
                 bag,
@@ -224,21 +224,24 @@ def _table(bag: Bag) -> dict[str, Any]:
         "duration": bag.duration,
         "problem": bag.problem,
         "topics": [
-            {"topic": c.topic, "type": c.type_name, "wire": c.wire, "messages": c.count}
+            {"topic": c.topic, "type": _kind(c), "wire": c.wire, "messages": c.count}
             for c in bag.channels
         ],
     }
 
 
-def _listing(bag: Bag) -> str:
+def _kind(channel: Channel) -> str:
     from rosglass.interfaces import ros1_name
 
+    return ros1_name(channel.type_name) if channel.wire == "ros1" else channel.type_name
+
+
+def _listing(bag: Bag) -> str:
     began = datetime.fromtimestamp(bag.start / 1e9).astimezone()
     lines = [f"{bag.path}: {bag.duration:.1f} s from {began:%Y-%m-%d %H:%M:%S %Z}"]
     if bag.problem:
         lines.append(f"  {bag.problem}")
     for channel in bag.channels:
         count = "?" if channel.count < 0 else channel.count
-        kind = ros1_name(channel.type_name) if channel.wire == "ros1" else channel.type_name
-        lines.append(f"  {count:>8} {channel.topic} [{kind}]")
+        lines.append(f"  {count:>8} {channel.topic} [{_kind(channel)}]")
     return "\n".join(lines)

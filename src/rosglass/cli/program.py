@@ -14,6 +14,7 @@ import rosglass
 from rosglass.cli import is_interrupt
 from rosglass.cli.completion import is_completing, offer
 from rosglass.cli.subcommands import Parser, add_verbose
+from rosglass.cli.worlds import names_ros1, spelled_ros1
 
 if TYPE_CHECKING:
     import argparse
@@ -150,7 +151,12 @@ def _run(arguments: list[str]) -> int:
     logging.basicConfig(level=level, format="%(levelname)s %(name)s: %(message)s")
     for folder in getattr(args, "definitions", ()):
         import_module("rosglass.messages").default_library().add_path(folder)
-    return int(import_module(COMMANDS[args.command][0]).run(args))
+    try:
+        return int(import_module(COMMANDS[args.command][0]).run(args))
+    except rosglass.Error as error:
+        if getattr(args, "ros1", hasattr(args, "url") and names_ros1(args)):
+            return _fail(spelled_ros1(str(error)))
+        raise
 
 
 def _prepare_output() -> None:

@@ -86,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.verbose:
         # What keeps topics from being recorded is told here, once.
         logging.getLogger("rosglass.comm").setLevel(logging.ERROR)
-    with connect(args) as node:
+    with connect(args, patient=True) as node:
         recorder = Recorder(
             node,
             path,

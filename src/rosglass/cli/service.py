@@ -13,6 +13,7 @@ from rosglass.cli.connecting import (
     connect,
     find,
     settle,
+    telling,
     wait,
 )
 from rosglass.cli.endpoints import describe, short
@@ -81,7 +82,8 @@ def _list(args: argparse.Namespace) -> int:
             await_types(node, lambda: node.services().values(), args.timeout)
         found = {s: k for s, k in node.services().items() if args.hidden or not is_hidden(node, s)}
     if args.json:
-        print_json([{"service": name, "types": types} for name, types in found.items()])
+        print_json([{"service": name, "types": [spelled(node, t) for t in types]}
+                    for name, types in found.items()])  # fmt: skip
         return 0
     for name, types in found.items():
         print(
@@ -144,13 +146,15 @@ def _call(args: argparse.Namespace) -> int:
                 gone = is_ros1(node) and not node.service_servers(name)
                 return client.type is not None or gone
 
-            wait(node, settled, args.timeout)
+            with telling(lambda: client.problem):
+                wait(node, settled, args.timeout)
             if client.type is None:
                 raise ServiceUnavailableError(client.problem or f"nobody offers {name}")
             request = client.type.request
             values = parse_fields(text, request.name, template(request))
             began = time.monotonic()
-            response = client.call(values, timeout=round(max(deadline - began, 1.0), 1))
+            with telling(lambda: client.problem or f"{name} has not answered yet"):
+                response = client.call(values, timeout=round(max(deadline - began, 1.0), 1))
             took = time.monotonic() - began
     found = fields(response, None if args.json else 100)
     if args.json:

@@ -16,6 +16,7 @@ from rosglass.cli.connecting import (
     natural,
     seconds,
     settle,
+    telling,
     wait,
 )
 from rosglass.cli.endpoints import describe, problems, short
@@ -167,7 +168,8 @@ def _list(args: argparse.Namespace) -> int:
     if args.json:
         print_json(
             [
-                {"topic": t, "types": kinds, "publishers": counts[t][0],
+                {"topic": t, "types": [spelled(node, kind) for kind in kinds],
+                 "publishers": counts[t][0],
                  "subscriptions": counts[t][1]}
                 for t, kinds in found.items()
             ]
@@ -213,7 +215,7 @@ def _types(node: Node, names: Iterable[str]) -> str:
 
 def _publish(args: argparse.Namespace) -> int:
     type_name, text = split_type(args.rest)
-    with connect(args) as node:
+    with connect(args, patient=args.count is None) as node:
         topic = node.resolve(args.topic)
         if type_name is None:
             type_name = _announced(node, topic, args.timeout)
@@ -221,25 +223,41 @@ def _publish(args: argparse.Namespace) -> int:
         values = parse_fields(text, publisher.type.name, template(publisher.type))
         message = publisher.type.create(values)
         wanted = args.wait if args.wait is not None else int(args.count == 1)
-        if not wait(node, lambda: publisher.subscription_count() >= wanted, args.timeout):
+
+        def missing() -> str:
             there = publisher.subscription_count()
+            if there < wanted:
+                return publisher.hint or f"{topic}: {there} of {wanted} subscriptions are there"
+            return ""
+
+        with telling(missing):
+            wait(node, lambda: publisher.subscription_count() >= wanted, args.timeout)
+        there = publisher.subscription_count()
+        if there < wanted:
             note(f"{topic}: {there} of {wanted} subscriptions within {args.timeout:g} s; "
                  "nothing was published")  # fmt: skip
             return 1
         end = End()
         sent, due = 0, time.monotonic()
+        hint_at = due + 1.0
+        name = spelled(node, publisher.type.name)
+        shown = f"{name}{str(message).removeprefix(publisher.type.name)}"
         while not end.is_set():
             publisher.publish(message)
             sent += 1
             if not args.json:
-                print(f"{sent}: {message}", flush=True)
+                print(f"{sent}: {shown}", flush=True)
             if sent == args.count:
                 break
+            if hint_at and time.monotonic() > hint_at:
+                hint_at = 0.0
+                if publisher.hint:
+                    note(publisher.hint)
             due += 1 / args.rate
             end.wait(max(0.0, due - time.monotonic()))
         end.wait(args.keep_alive)
         if args.json:
-            print_json({"topic": topic, "type": type_name, "sent": sent})
+            print_json({"topic": topic, "type": name, "sent": sent})
     return end.code
 
 
@@ -250,7 +268,11 @@ def _announced(node: Node, topic: str, timeout: float) -> str:
         ends = [*node.subscriptions(topic), *node.publishers(topic)]
         return sorted({end.type for end in ends})
 
-    found = wait(node, types, timeout)
+    def missing() -> str:
+        return f"nobody uses {topic}{similar(topic, node.topics())}"
+
+    with telling(missing):
+        found = wait(node, types, timeout)
     if len(found) == 1:
         return found[0]
     if found:

@@ -25,7 +25,7 @@ def echo(args: argparse.Namespace) -> int:
     style = Style(args)
     limit = args.truncate or (SHOWN_JSON if args.json else SHOWN)
     received = 0
-    with connect(args) as node:
+    with connect(args, patient=True) as node:
         subscription = node.create_subscription(args.topic, args.type, qos=profile(args))
         get = _getter(args.field)
         end = End()

@@ -42,7 +42,7 @@ def measure(args: argparse.Namespace) -> int:
         with lock:
             seen.append(_Seen(sample.received_ns, len(sample.data), delay))
 
-    with connect(args) as node:
+    with connect(args, patient=True) as node:
         subscription = node.create_subscription(
             args.topic, args.type, qos=profile(args), raw_callback=receive, executor=IMMEDIATE
         )

@@ -7,7 +7,9 @@ import time
 from typing import TYPE_CHECKING
 
 from rosglass.cli.output import note, require_reader
+from rosglass.cli.worlds import spelled
 from rosglass.comm import ConnectionState
+from rosglass.comm.similar import similar
 
 if TYPE_CHECKING:
     import argparse
@@ -75,7 +77,7 @@ class Reasons:
             self._told = reason
             # Definitions that contradict each other take pages.
             shown = reason.partition("\n")[0].rstrip() if self._quiet else reason
-            note(f"{self._subscription.topic}: {shown}")
+            note(f"{self._subscription.topic}: {spelled(self._node, shown)}")
         return reason
 
     def _reason(self, silent: float) -> str:
@@ -88,7 +90,9 @@ class Reasons:
         if len(types) > 1 and found.type is None:
             return f"published with several types, say which: {self._command} {types[0]}"
         if not publishers:
-            return "nobody publishes it any more" if self._received else "nobody publishes it"
+            if self._received:
+                return "nobody publishes it any more"
+            return f"nobody publishes it{self._guess()}"
         if found.problem or found.hint:
             return found.problem or found.hint
         if not self._received:
@@ -96,6 +100,10 @@ class Reasons:
         if self._received > 1 and silent > max(_PATIENCE, _PAUSES * self._pause):
             return "nothing comes any more, though it is still announced"
         return ""
+
+    def _guess(self) -> str:
+        known = [name for name in self._node.topics() if self._node.publishers(name)]
+        return similar(self._subscription.topic, known)
 
     def _passes(self, record: logging.LogRecord) -> bool:
         """Keep what is told here from being told twice."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,12 @@ if TYPE_CHECKING:
 
     from rosglass.comm import Node
 
-__all__ = ["is_hidden", "is_ros1", "names_ros1", "spelled"]
+__all__ = ["is_hidden", "is_ros1", "names_ros1", "spelled", "spelled_ros1"]
+
+#: Names of types, but no parts of paths.
+_TYPE = re.compile(
+    r"(?<![\w./-])([A-Za-z]\w*)/(?:msg|srv|action)/([A-Za-z]\w*)(?![\w/]|\.(?:msg|srv|action)\b)"
+)
 
 
 def is_ros1(node: Node) -> bool:
@@ -38,12 +44,11 @@ def is_hidden(node: Node, name: str) -> bool:
     return not is_ros1(node) and hidden(name)
 
 
-def spelled(node: Node, type_name: str) -> str:
-    """Return a type's name as the node's world spells it: ``pkg/Type`` in ROS 1."""
-    from rosglass.errors import InvalidNameError
-    from rosglass.interfaces import ros1_name
+def spelled(node: Node, text: str) -> str:
+    """Return a type's name, or a text that has some, as the node's world spells them."""
+    return spelled_ros1(text) if is_ros1(node) else text
 
-    if is_ros1(node):
-        with suppress(InvalidNameError):  # nobody has told the type yet
-            return ros1_name(type_name)
-    return type_name
+
+def spelled_ros1(text: str) -> str:
+    """Return a text with all names of types as ROS 1 spells them: ``pkg/Type``."""
+    return _TYPE.sub(r"\1/\2", text)

@@ -97,8 +97,10 @@ class ServiceClient(Handle):
         """Call the service and return at once; the call carries the response or the error.
 
         A request for which there is no server yet waits for one, and is sent as soon as it is
-        there; requests are sent in the order of the calls. Arguments and errors as in
-        :meth:`call`; a ConversionError is raised here already, unless the type is not known yet.
+        there. Requests are sent in the order of the calls; not in ROS 1, unless the client is
+        persistent: there each call has a connection of its own, and they run side by side.
+        Arguments and errors as in :meth:`call`; a ConversionError is raised here already, unless
+        the type is not known yet.
         """
 
     @abstractmethod
