@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 # Python code that paints would deadlock with grabs under the threaded render loop.
 os.environ.setdefault("QSG_RENDER_LOOP", "basic")
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+# Debian's Python has Qt 5; programs that tests start inherit the choice.
+if find_spec("PySide6") is None:
+    os.environ.setdefault("ROSGLASS_QT", "pyside2")
 
 from memory_world import MemoryNode, MemoryWorld
 
@@ -29,20 +33,20 @@ if TYPE_CHECKING:
 
 @pytest.fixture(scope="session")
 def app() -> QCoreApplication:
-    from PySide6.QtGui import QGuiApplication
+    from rosglass.qt import QtGui
 
-    return QGuiApplication.instance() or QGuiApplication(["test"])
+    return QtGui.QGuiApplication.instance() or QtGui.QGuiApplication(["test"])
 
 
 @pytest.fixture
 def wait(app: QCoreApplication) -> Callable[..., None]:
     """Run the event loop until a condition holds; without one, for some milliseconds."""
-    from PySide6.QtCore import QEvent, QEventLoop
+    from rosglass.qt import QtCore, send_deferred_deletes
 
     def turn() -> None:
-        app.processEvents(QEventLoop.ProcessEventsFlag.AllEvents, 10)
-        # Deferred deletions otherwise wait for exec().
-        app.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+        app.processEvents(QtCore.QEventLoop.ProcessEventsFlag.AllEvents, 10)
+        # They otherwise wait for exec().
+        send_deferred_deletes()
         time.sleep(0.001)
 
     def wait_until(condition: Callable[[], Any] | int, timeout: float = 5.0) -> None:
@@ -69,17 +73,19 @@ class Bench:
         self._count = 0
 
     def load(self, body: str, imports: str = "") -> QObject:
-        """Create a QML file's root object out of an object declaration."""
-        from PySide6.QtCore import QUrl
-        from PySide6.QtQml import QQmlComponent
+        """Create a QML file's root object out of an object declaration.
+
+        Its functions can be called as methods: ``root.send(value)``.
+        """
+        from rosglass.qt import QtCore, QtQml
 
         self._count += 1
         # The engine remembers what is in a folder.
         folder = self.folder / str(self._count)
         folder.mkdir(parents=True)
         file = folder / f"Test{self._count}.qml"
-        file.write_text(f"import QtQml\nimport Ros2 1.0\n{imports}\n{body}")
-        component = QQmlComponent(self.engine, QUrl.fromLocalFile(str(file)))
+        file.write_text(f"import QtQml 2.15\nimport Ros2 1.0\n{imports}\n{body}")
+        component = QtQml.QQmlComponent(self.engine, QtCore.QUrl.fromLocalFile(str(file)))
         root = component.create()
         assert root is not None, component.errorString()
         self._roots += [root, component]
@@ -90,39 +96,34 @@ class Bench:
         import json
 
         body = "QtObject { function go() { return JSON.stringify((function() { SCRIPT })()) } }"
-        root = self.load(body.replace("SCRIPT", script), imports)
-        from PySide6.QtCore import Q_RETURN_ARG, QMetaObject
-
-        text = QMetaObject.invokeMethod(root, "go", Q_RETURN_ARG("QVariant"))
+        root: Any = self.load(body.replace("SCRIPT", script), imports)
+        text = root.go()
         return None if text is None else json.loads(text)
 
     def close(self) -> None:
-        import shiboken6
+        from rosglass.qt import is_alive
 
         for item in self._roots:
-            if shiboken6.isValid(item):
+            if is_alive(item):
                 item.deleteLater()
         self.session.close()
 
 
 @pytest.fixture
 def bench(app: QCoreApplication, tmp_path: Path, wait: Callable[..., None]) -> Iterator[Bench]:
-    from PySide6.QtCore import QCoreApplication as App
-    from PySide6.QtCore import QEvent
-    from PySide6.QtQml import QQmlEngine
-
     from rosglass.qml import Session, install
+    from rosglass.qt import QtQml, send_deferred_deletes
 
     world = MemoryWorld()
     session = Session(connect=world.connect)
-    engine = QQmlEngine()
+    engine = QtQml.QQmlEngine()
     install(engine, session)
     made = Bench(session, engine, world, tmp_path)
     yield made
     made.close()
-    App.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    send_deferred_deletes()
     engine.deleteLater()
-    App.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    send_deferred_deletes()
 
 
 @pytest.fixture

@@ -23,7 +23,7 @@ def load(bench: Any, properties: str = 'topic: "/cam"', more: str = "") -> Any:
             property QtObject sub: ImageTransportSubscription { videoSink: view.videoSink; %s }
             %s
         }""".replace("%s", properties, 1).replace("%s", more, 1),
-        "import QtQuick",
+        "import QtQuick 2.15",
     )
 
 
@@ -232,7 +232,7 @@ def test_what_cannot_be_shown_is_said(
 def test_other_sinks_are_refused(running: Any, caplog: Any) -> None:
     running.load(
         "Item { id: i; property QtObject s: ImageTransportSubscription { videoSink: i } }",
-        "import QtQuick",
+        "import QtQuick 2.15",
     )
     assert "videoSink must be" in caplog.text
 
@@ -294,13 +294,11 @@ def test_a_sink_that_is_destroyed_ends_the_subscription(
             Component.onCompleted: { view = maker.createObject(root); view.source = sub }
             function drop() { view.destroy() }
         }""",
-        "import QtQuick",
+        "import QtQuick 2.15",
     )
     sub = root.property("sub")
     wait(lambda: sub.property("subscribed"))
-    from PySide6.QtCore import QMetaObject
-
-    QMetaObject.invokeMethod(root, "drop")
+    root.drop()
     for _ in range(5):
         camera.publish(picture())
         wait(10)

@@ -18,11 +18,11 @@ def records(caplog: Any) -> Any:
 
 @pytest.fixture
 def messages(app: Any) -> Any:
-    from PySide6.QtCore import qInstallMessageHandler
+    from rosglass.qt import QtCore
 
     install_message_handler()
     yield
-    qInstallMessageHandler(None)
+    QtCore.qInstallMessageHandler(None)
 
 
 LEVELS = {

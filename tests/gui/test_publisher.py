@@ -39,9 +39,7 @@ def load(bench: Any, more: str = "") -> Any:
 
 
 def send(root: Any, value: Any) -> None:
-    from PySide6.QtCore import Q_ARG, QMetaObject
-
-    QMetaObject.invokeMethod(root, "send", Q_ARG("QVariant", value))
+    root.send(value)
 
 
 def test_partial_messages_get_defaults(running: Any, received: list, wait: Any) -> None:
@@ -113,9 +111,7 @@ def test_a_publisher_lives_as_long_as_javascript_holds_it(running: Any, wait: An
     running.engine.collectGarbage()
     wait(100)
     assert len(running.world.publishers) == 1
-    from PySide6.QtCore import QMetaObject
-
-    QMetaObject.invokeMethod(root, "drop")
+    root.drop()
     wait(lambda: not running.world.publishers)
 
 
@@ -186,9 +182,7 @@ def test_keep_all_never_waits_on_the_gui_thread(running: Any, wait: Any) -> None
     running.world.publishers[0].publish_serialized = lambda data: threads.append(
         threading.current_thread()
     )
-    from PySide6.QtCore import QMetaObject
-
     wait(50)
-    QMetaObject.invokeMethod(root, "send")
+    root.send()
     wait(lambda: threads)
     assert threads[0] is not threading.main_thread()

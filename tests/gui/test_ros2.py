@@ -7,11 +7,11 @@ import time
 from typing import Any
 
 import pytest
-from PySide6.QtQml import QQmlEngine
 
 from rosglass.comm import ConnectionState
 from rosglass.errors import ConnectionLostError, Error, UnsupportedError
 from rosglass.qml import Session, install
+from rosglass.qt import QtQml
 
 LOG = """QtObject {
     id: root
@@ -129,7 +129,7 @@ def engine_with(session: Session, tmp_path: Any) -> Any:
 
     from conftest import Bench
 
-    engine = QQmlEngine()
+    engine = QtQml.QQmlEngine()
     install(engine, session)
     return Bench(session, engine, MemoryWorld(), tmp_path)
 
@@ -174,7 +174,7 @@ def test_an_address_that_cannot_be_used_yet_is_tried_again(
 
 
 def test_engines_share_a_session_and_may_go_first(running: Any, wait: Any, tmp_path: Any) -> None:
-    engine = QQmlEngine()
+    engine = QtQml.QQmlEngine()
     install(engine, running.session)
     with pytest.raises(Error, match="only once"):
         install(engine, running.session)
@@ -191,7 +191,7 @@ def test_engines_share_a_session_and_may_go_first(running: Any, wait: Any, tmp_p
 
 
 def test_engines_without_a_session_share_the_application_s(app: Any) -> None:
-    engines = [QQmlEngine(), QQmlEngine()]
+    engines = [QtQml.QQmlEngine(), QtQml.QQmlEngine()]
     sessions = {install(engine) for engine in engines}
     assert sessions == {Session.default()}
     Session.default().close()

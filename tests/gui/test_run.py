@@ -11,7 +11,7 @@ import pytest
 if TYPE_CHECKING:
     from pathlib import Path
 
-GOOD = """import QtQuick
+GOOD = """import QtQuick 2.15
 Rectangle {
     width: 200; height: 100; color: "#204060"
     Component.onCompleted: console.log("up", width, Qt.application.arguments.slice(1))
@@ -27,10 +27,10 @@ def file(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("text", "place", "message"),
     [
-        ("import QtQuick\nItem {\n  widht: 5\n}", "3:3", 'non-existent property "widht"'),
-        ("import QtQuick\nItem {\n  width: 5 5\n}", "3:12", "Expected token"),
-        ("import QtQuick\nimport No.Such.Module 1.0\nItem {}", "2:1", "No.Such.Module"),
-        ("import QtQuick\nMissing {}", "2:1", "Missing is not a type"),
+        ("import QtQuick 2.15\nItem {\n  widht: 5\n}", "3:3", 'non-existent property "widht"'),
+        ("import QtQuick 2.15\nItem {\n  width: 5 5\n}", "3:12", "Expected token"),
+        ("import QtQuick 2.15\nimport No.Such.Module 1.0\nItem {}", "2:1", "No.Such.Module"),
+        ("import QtQuick 2.15\nMissing {}", "2:1", "Missing is not a type"),
         ("", "0:0", "File is empty"),
     ],
 )
@@ -45,8 +45,8 @@ def test_errors_are_listed_with_file_line_and_column(
 
 
 def test_errors_in_other_files_name_them(start: Any, file: Path) -> None:
-    file.write_text("import QtQuick\nItem { Part {} }")
-    file.with_name("Part.qml").write_text("import QtQuick\nItem {\n  oops: 1\n}")
+    file.write_text("import QtQuick 2.15\nItem { Part {} }")
+    file.with_name("Part.qml").write_text("import QtQuick 2.15\nItem {\n  oops: 1\n}")
     program = start("run", file)
     assert program.end() == 1
     assert f"{file.with_name('Part.qml')}:3:3: " in program.text
@@ -72,7 +72,7 @@ def test_signals_end_it(start: Any, file: Path, number: int) -> None:
 
 def test_ctrl_c_ends_an_interface_that_hangs(start: Any, file: Path) -> None:
     file.write_text(
-        """import QtQuick
+        """import QtQuick 2.15
         Item {
             Timer {
                 running: true; interval: 1
@@ -140,21 +140,21 @@ def test_a_screenshot_that_cannot_be_written(start: Any, file: Path, tmp_path: P
 def test_live_reload_keeps_the_last_good_interface(start: Any, file: Path) -> None:
     part = file.with_name("Part.qml")
     file.write_text(GOOD.replace("width: 200", "Part {}\nwidth: 200"))
-    part.write_text('import QtQuick\nItem { Component.onCompleted: console.log("part 1") }')
+    part.write_text('import QtQuick 2.15\nItem { Component.onCompleted: console.log("part 1") }')
     program = start("run", file, "--watch")
     program.until("part 1")
-    part.write_text('import QtQuick\nItem { Component.onCompleted: console.log("part 2") }')
+    part.write_text('import QtQuick 2.15\nItem { Component.onCompleted: console.log("part 2") }')
     program.until("part 2")
     program.until("reloaded")
-    part.write_text("import QtQuick\nItem {\n  oops: 1\n}")
+    part.write_text("import QtQuick 2.15\nItem {\n  oops: 1\n}")
     assert f"{part}:3:3: " in program.until("oops")
     # Editors save by renaming a new file over the old one.
     new = part.with_suffix(".tmp")
-    new.write_text('import QtQuick\nItem { Component.onCompleted: console.log("part 3") }')
+    new.write_text('import QtQuick 2.15\nItem { Component.onCompleted: console.log("part 3") }')
     new.replace(part)
     program.until("part 3")
     program.until("reloaded")
-    file.with_name("New.qml").write_text("import QtQuick\nItem { }")
+    file.with_name("New.qml").write_text("import QtQuick 2.15\nItem { }")
     file.write_text(GOOD.replace("width: 200", "New {}\nwidth: 333"))
     program.until("up 333")
     program.kill(signal.SIGINT)
@@ -172,7 +172,7 @@ def test_without_watch_nothing_is_reloaded(start: Any, file: Path) -> None:
 
 def test_an_address_that_nobody_listens_on_is_shown(start: Any, file: Path) -> None:
     file.write_text(
-        """import QtQuick
+        """import QtQuick 2.15
         import Ros2 1.0
         Item {
             Component.onCompleted: Ros2.init("ui")
@@ -190,7 +190,7 @@ def test_an_address_that_nobody_listens_on_is_shown(start: Any, file: Path) -> N
 
 def test_bad_urls_are_shown(start: Any, file: Path) -> None:
     file.write_text(
-        """import QtQuick
+        """import QtQuick 2.15
         import Ros2 1.0
         Item {
             Component.onCompleted: Ros2.init("ui")

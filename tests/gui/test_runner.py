@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-UI = """import QtQuick
+UI = """import QtQuick 2.15
 import Ros2 1.0
 Rectangle {
     property string title: "%s"
@@ -110,7 +110,7 @@ def test_roots_may_change_between_item_and_window(runner: Runner, file: Path, wa
 
 
 def test_a_file_with_errors_leaves_nothing_open(app: Any, file: Path, world: MemoryWorld) -> None:
-    file.write_text("import QtQuick\nItem { x: }")
+    file.write_text("import QtQuick 2.15\nItem { x: }")
     session = Session(connect=world.connect)
     with pytest.raises(QmlError, match=r"Main\.qml:2:11: "):
         Runner(file, session)
@@ -123,7 +123,7 @@ def test_a_file_with_errors_leaves_nothing_open(app: Any, file: Path, world: Mem
     [
         ("import QtCharts 2.2", True),
         ("import Qt.labs.platform as P", True),
-        ("import QtQuick", False),
+        ("import QtQuick 2.15", False),
         ("// import QtCharts", False),
     ],
 )

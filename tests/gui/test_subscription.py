@@ -217,13 +217,11 @@ def test_a_destroyed_element_is_left_alone_and_holds_nothing(
             function drop() { for (const one of made) one.destroy(); made = [] }
         }"""
     )
-    from PySide6.QtCore import QMetaObject
-
-    QMetaObject.invokeMethod(root, "make")
+    root.make()
     wait(lambda: len(running.world.subscriptions) == 21)
     chat.publish(data="x")
     wait(lambda: root.property("count") == 20)
-    QMetaObject.invokeMethod(root, "drop")
+    root.drop()
     wait(lambda: len(running.world.subscriptions) == 1)
     ages = root.property("ages")
     wait(lambda: root.property("ages") > ages + 3)
@@ -252,9 +250,7 @@ def test_subscriptions_made_by_a_function_end_with_their_owner(
     running.engine.collectGarbage()
     chat.publish(data="x")
     wait(lambda: root.property("shown") == "x")
-    from PySide6.QtCore import QMetaObject
-
-    QMetaObject.invokeMethod(root, "drop")
+    root.drop()
     wait(lambda: not running.world.subscriptions)
 
 

@@ -35,7 +35,7 @@ def convert(bench: Any, type_name: str, script: str) -> dict:
     from rosglass.qml.from_js import fields_from_js
 
     # Qt.vector3d() and its like need QtQuick.
-    bench.load("Item {}", "import QtQuick")
+    bench.load("Item {}", "import QtQuick 2.15")
     kind = rosglass.load(type_name)
     value = bench.engine.evaluate(f"({script})")
     assert not value.isError(), value.toString()

@@ -12,7 +12,7 @@ from rosglass.errors import QmlError
 from rosglass.qml.log import plain_path
 from rosglass.qml.modules import install
 from rosglass.qml.watcher import Watcher
-from rosglass.qt import QtCore, QtGui, QtQml, QtQuick, is_alive
+from rosglass.qt import QtCore, QtGui, QtQml, QtQuick, is_alive, send_deferred_deletes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -119,7 +119,7 @@ class Runner(QtCore.QObject):
             if is_alive(item) and item is not None:
                 item.deleteLater()
         self._component = None
-        QtCore.QCoreApplication.sendPostedEvents(None, int(QtCore.QEvent.Type.DeferredDelete))
+        send_deferred_deletes()
 
     def _create(self) -> tuple[QtCore.QObject, QtQml.QQmlComponent]:
         if not self.file.is_file():

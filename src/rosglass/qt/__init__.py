@@ -29,6 +29,7 @@ __all__ = [
     "engine_of",
     "is_alive",
     "optional",
+    "send_deferred_deletes",
 ]
 
 #: Binding -> major version of its Qt. PyQt is never chosen, but tells which Qt is loaded.
@@ -109,6 +110,11 @@ def optional(module: str) -> Any:
 def is_alive(item: QtCore.QObject | None) -> bool:
     """Return whether a QObject still exists on the C++ side."""
     return item is not None and bool(_shiboken.isValid(item))
+
+
+def send_deferred_deletes() -> None:
+    """Carry out every ``deleteLater()`` now; they otherwise wait for the event loop."""
+    QtCore.QCoreApplication.sendPostedEvents(None, int(QtCore.QEvent.Type.DeferredDelete))
 
 
 def engine_of(item: QtCore.QObject) -> QtQml.QQmlEngine | None:
