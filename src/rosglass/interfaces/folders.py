@@ -124,6 +124,19 @@ class Folders(Provider):
                 if ros in package.worlds:
                     yield from list_package(package.path, package.name, ros)
 
+    def package(self, name: str) -> str:
+        """Return the folder of a package, of either ROS; empty when there is none."""
+        found = (package.path for root in self._roots for package in root.packages(name))
+        return next(found, "")
+
+    def packages(self) -> dict[str, str]:
+        """Return the folders of all packages by name; the first of a name wins."""
+        found: dict[str, str] = {}
+        for root in self._roots:
+            for package in root.all_packages():
+                found.setdefault(package.name, package.path)
+        return found
+
     def describe(self, ros: int) -> str:
         """Name the folders."""
         paths = [root.path for root in self._roots if ros in root.worlds]

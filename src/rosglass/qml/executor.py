@@ -52,6 +52,8 @@ class GuiExecutor(Executor):
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._jobs: deque[Callable[[], None]] = deque()
+        #: Those whose turn it is.
+        self._turn: deque[Callable[[], None]] = deque()
         self._waker = _Waker(self._run)
         self._closed = False
 
@@ -70,12 +72,20 @@ class GuiExecutor(Executor):
         with self._lock:
             self._closed = True
             self._jobs.clear()
+            self._turn.clear()
+
+    def resume(self) -> None:
+        """Go on with the other jobs although one is running: it waits in an event loop."""
+        self._waker.wake()
 
     def _run(self) -> None:
         with self._lock:
-            jobs, self._jobs = self._jobs, deque()
-        for job in jobs:
-            _guarded(job)
+            self._turn.extend(self._jobs)
+            self._jobs.clear()
+        for _ in range(len(self._turn)):
+            # A job that waits may have let others take their turn.
+            if self._turn:
+                _guarded(self._turn.popleft())
 
 
 def _guarded(job: Callable[[], None]) -> None:

@@ -38,8 +38,9 @@ def _connect(url: str | None, name: str, namespace: str, arguments: Sequence[str
     return connect(url, name, namespace, arguments=arguments)
 
 
-def _parse(arguments: Sequence[str]) -> Arguments | None:
-    if not arguments:
+def _parse(arguments: Sequence[str], url: str) -> Arguments | None:
+    """Return what the command line tells a ROS 2 node; ROS 1's own tells its name itself."""
+    if not arguments or url.startswith("ros1:"):
         return None
     from rosglass.ros2.arguments import Arguments  # noqa: PLC0415 - few programs are told anything
 
@@ -86,9 +87,9 @@ class Session(QtCore.QObject):
         arguments: Sequence[str] = (),
     ) -> None:
         super().__init__()
-        if arguments:
-            connect = partial(connect, arguments=arguments)
-        self._told = _parse(arguments)
+        self._arguments = tuple(arguments)
+        self._asked: tuple[str, ...] = ()
+        self._told = _parse(arguments, url)
         self.executor = GuiExecutor()
         #: The node; None before it is there and after it is closed.
         self.node: Node | None = None
@@ -159,26 +160,35 @@ class Session(QtCore.QObject):
             self._drop_node()
             self._start()
 
-    def init(self, name: str, namespace: str = "/", domain: int = -1) -> bool:
+    def init(
+        self,
+        name: str,
+        namespace: str = "/",
+        domain: int = -1,
+        arguments: Sequence[str] = (),
+    ) -> bool:
         """Ask for a node.
 
         Args:
             name: Its base name.
             namespace: Its absolute namespace.
             domain: ROS domain, -1 for what the URL or the environment says.
+            arguments: What the node is told besides what the session was.
 
         Returns:
             False when there is a node already, which stays as it is.
 
         Raises:
             InvalidNameError: The name or namespace breaks ROS's rules.
+            RosArgumentError: One of `arguments` is not valid.
         """
         from rosglass.ros2.names import validate_namespace, validate_node_name  # noqa: PLC0415
 
         name = self._forced_name or name
-        if self._told is not None:
-            name = self._told.node_name(name)
-            namespace = self._told.namespace(name, namespace)
+        told = _parse((*self._arguments, *arguments), self._url)
+        if told is not None:
+            name = told.node_name(name)
+            namespace = told.namespace(name, namespace)
         validate_node_name(name)
         validate_namespace(namespace)
         if self.is_initialized:
@@ -190,7 +200,7 @@ class Session(QtCore.QObject):
         if domain >= 0:
             self._url = _with_domain(self._url, domain)
             self.url_changed.emit()
-        self.name, self.namespace = name, namespace
+        self.name, self.namespace, self._asked = name, namespace, tuple(arguments)
         self._start()
         self.initialized.emit()
         return True
@@ -298,6 +308,9 @@ class Session(QtCore.QObject):
         self._generation += 1
         generation, connect = self._generation, self._connect
         url, name, namespace = self._url or None, self.name, self.namespace
+        arguments = (*self._arguments, *self._asked)
+        if arguments:
+            connect = partial(connect, arguments=arguments)
         self._failed = False
         self._set_status(Status(ConnectionState.CONNECTING, f"connecting to {url or 'the robot'}"))
 
@@ -334,6 +347,8 @@ class Session(QtCore.QObject):
 
     def _take_node(self, node: Node) -> None:
         self.node = node
+        # The command line may have renamed it.
+        self.name, self.namespace = node.name, node.namespace
         self._handles = [
             node.on_status_change(self._on_status, self.executor),
             node.on_graph_change(self.graph_changed.emit, self.executor),

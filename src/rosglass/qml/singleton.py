@@ -177,7 +177,7 @@ def strings(value: QJSValue) -> list[str]:
     return [value.property(index).toString() for index in range(count)]
 
 
-def full_type(name: str) -> str:
-    """Return ``pkg/msg/Type`` for ``pkg/Type``."""
+def full_type(name: str, kind: str = "msg") -> str:
+    """Return ``pkg/msg/Type`` for ``pkg/Type``; `kind` is ``msg``, ``srv`` or ``action``."""
     match = _SHORT.match(name)
-    return f"{match[1]}/msg/{match[2]}" if match else name
+    return f"{match[1]}/{kind}/{match[2]}" if match else name

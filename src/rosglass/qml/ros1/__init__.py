@@ -1,15 +1,19 @@
 """What only ``import Ros 1.0`` has."""
 
 from rosglass.qml.image_item import ImageItem
+from rosglass.qml.ros1.console import ConsoleLevels, InitOptions
 from rosglass.qml.ros1.ros import Ros
+from rosglass.qml.ros1.service import Service
 from rosglass.qml.ros1.subscriber import Subscriber
 
 __all__ = ["NATIVE", "TYPES"]
 
 #: Bases of the module's singletons (``imports/Ros/*.qml``), by their name in ``Ros.Native``.
-NATIVE = {"RosNative": Ros}
+NATIVE = {"RosNative": Ros, "ServiceNative": Service}
 #: What QML can write, by name.
 TYPES = {
     "Subscriber": Subscriber,
     "ImageItem": ImageItem,
+    "RosConsoleLevels": ConsoleLevels,
+    "RosInitOptions": InitOptions,
 }

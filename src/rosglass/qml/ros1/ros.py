@@ -1,78 +1,250 @@
-"""The singleton ``Ros``: the node, and the makers of everything else."""
+"""The singleton ``Ros``: the node, the graph, and the makers of everything else."""
 # ruff: noqa: N802 - the names of slots and signals are QML's
 
 from __future__ import annotations
 
+import logging
 from typing import TYPE_CHECKING
 
-from rosglass.errors import Error
+from rosglass.errors import Error, InvalidNameError
+from rosglass.qml.callbacks import Deferred, call_back
 from rosglass.qml.dialect import Dialect
-from rosglass.qml.runtime import Runtime, runtime_of
-from rosglass.qt import QtCore, Signal, Slot, is_alive
+from rosglass.qml.from_js import qos_from_js
+from rosglass.qml.log import Caller, log_from_qml
+from rosglass.qml.message_waiting import wait_for_message
+from rosglass.qml.ros1.console import Console, InitOptions, short_logger
+from rosglass.qml.ros1.namespaces import within
+from rosglass.qml.ros1.package import Package
+from rosglass.qml.ros1.publisher import RosPublisher
+from rosglass.qml.ros1.subscriber import Subscriber
+from rosglass.qml.singleton import RosSingleton, full_type, is_list, strings
+from rosglass.qml.subscription import DEFAULT_QOS
+from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rosglass.qml.session import Session
 
 __all__ = ["Ros"]
 
+_OPTIONS = sum(InitOptions.Option)
 
-class Ros(QtCore.QObject):
+
+class Ros(RosSingleton):
     """What QML calls ``Ros``; one per engine, all of a session sharing its node."""
 
     DIALECT = Dialect.ROS1
+    NAME = "Ros"
 
-    initialized = Signal()
     shutdown = Signal()
 
     def __init__(self, parent: QtCore.QObject | None = None) -> None:
         super().__init__(parent)
-        self._bound: Runtime | None = None
-        # QML may only listen; without this, nothing would ever ask for the runtime.
-        QtCore.QTimer.singleShot(0, self._bind)
+        self._console: Console | None = None
+        self._package: Package | None = None
 
-    def _bind(self) -> None:
-        if is_alive(self):
-            _ = self._runtime
+    def _listen(self, session: Session) -> None:
+        super()._listen(session)
+        session.about_to_shutdown.connect(self.shutdown)
 
-    @property
-    def _runtime(self) -> Runtime:
-        if self._bound is None:
-            runtime = runtime_of(self)
-            if runtime is None:
-                raise Error("Ros belongs to no QML engine")
-            self._bound = runtime
-            runtime.session.initialized.connect(self.initialized)
-            runtime.session.about_to_shutdown.connect(self.shutdown)
-        return self._bound
+    # The node.
 
-    @property
-    def _session(self) -> Session:
-        return self._runtime.session
-
-    @Slot(str)
-    def init(self, name: str) -> None:
-        """Ask for a node."""
+    @Slot(QJSValue)
+    @Slot(QJSValue, QJSValue)
+    @Slot(QJSValue, QJSValue, QJSValue)
+    def init(
+        self, first: QJSValue, second: QJSValue | None = None, third: QJSValue | None = None
+    ) -> None:
+        """Ask for a node; arguments are optional command line, name, optional RosInitOptions."""
+        args: Sequence[str] = ()
+        if is_list(first):
+            args, first, second = strings(first), second or QJSValue(), third
         try:
-            self._session.init(name)
+            if not first.isString():
+                raise InvalidNameError(
+                    'the name must be a text: Ros.init("name"), or Ros.init(arguments, "name")'
+                )
+            options = 0 if second is None or second.isUndefined() else second.toInt()
+            if options & ~_OPTIONS:
+                raise InvalidNameError(f"the options {options} are not of RosInitOptions")
+            self._init(first.toString(), options, args)
         except Error as error:
             self._runtime.throw(f"Ros.init: {error}")
 
-    @Slot(result=bool)
-    def isInitialized(self) -> bool:
-        """Return whether a node was asked for and not shut down again."""
-        return self._session.is_initialized
+    def _init(self, name: str, options: int, args: Sequence[str]) -> None:
+        if options & InitOptions.Option.AnonymousName:
+            from rosglass.comm.anonymous import anonymous_name  # noqa: PLC0415 - few ask for it
 
-    @Slot(result=bool)
-    def ok(self) -> bool:
-        """Return whether there is a node, or one is being made; false after a failure."""
-        return self._session.state not in {"uninitialized", "failed"}
+            name = anonymous_name(name)
+        if options & InitOptions.Option.NoRosout:
+            self._log(logging.WARNING, "Ros.init: NoRosout has no effect: every node has its log")
+        self._session.init(name, arguments=args)
 
-    @Slot(result=str)
-    def getName(self) -> str:
-        """Return the node's base name; empty before init."""
-        return self._session.name
+    @Slot()
+    def spinOnce(self) -> None:
+        """Do nothing: callbacks come by themselves."""
 
-    @Slot(result=str)
-    def getNamespace(self) -> str:
-        """Return the node's namespace; empty before init."""
-        return self._session.namespace
+    @Slot(int)
+    def setThreads(self, count: int) -> None:
+        """Do nothing: messages are received beside the interface whatever their number."""
+        if count < 0:
+            self._runtime.throw(f"Ros.setThreads: {count} is negative")
+
+    # Topics.
+
+    @Slot(QJSValue, QJSValue, QJSValue, result=QtCore.QObject)
+    @Slot(QJSValue, QJSValue, QJSValue, QJSValue, result=QtCore.QObject)
+    @Slot(QJSValue, QJSValue, QJSValue, QJSValue, QJSValue, result=QtCore.QObject)
+    def advertise(self, *given: QJSValue) -> QtCore.QObject | None:
+        """Return a publisher; it lives as long as JavaScript holds it.
+
+        Arguments are optional namespace, message type, topic, queue size, and optionally whether
+        new subscribers get the last message.
+        """
+        try:
+            texts, rest = _split(given, "Ros.advertise([ns,] type, topic, queueSize, latch)")
+            namespace, type_name, topic = texts
+            size = qos_from_js(rest[0], DEFAULT_QOS).depth
+            topic = within(namespace, topic)
+            self._check_topic(topic)
+        except Error as error:
+            self._runtime.throw(f"Ros.advertise: {error}")
+            return None
+        latch = len(rest) > 1 and rest[1].toBool()
+        return self._runtime.keep(RosPublisher(self._runtime, type_name, topic, size, latch))
+
+    @Slot(QJSValue, QJSValue, result=QtCore.QObject)
+    @Slot(QJSValue, QJSValue, QJSValue, result=QtCore.QObject)
+    def subscribe(self, *given: QJSValue) -> QtCore.QObject | None:
+        """Return a subscriber; arguments are optional namespace, topic and queue size."""
+        try:
+            if not all(value.isString() for value in given[:-1]):
+                raise InvalidNameError("write Ros.subscribe([ns,] topic, queueSize)")
+            names = [value.toString() for value in given[:-1]]
+            topic = within(names[0] if len(names) > 1 else "", names[-1])
+            self._check_topic(topic)
+            qos = qos_from_js(given[-1], DEFAULT_QOS)
+        except Error as error:
+            self._runtime.throw(f"Ros.subscribe: {error}")
+            return None
+        subscriber = Subscriber(None, self._runtime)
+        subscriber.configure(topic, "", qos)
+        return self._runtime.keep(subscriber)
+
+    @Slot(str, QJSValue, result=QJSValue)
+    @Slot(str, QJSValue, QJSValue, result=QJSValue)
+    @Slot(str, result=QJSValue)
+    def waitForMessageAsync(
+        self, topic: str, first: QJSValue | None = None, second: QJSValue | None = None
+    ) -> QJSValue:
+        """Give the next message of a topic to a function, undefined when none came in time.
+
+        Arguments are topic, optional milliseconds (0: for ever) and function. Without a function,
+        a promise of the message is returned.
+        """
+        runtime = self._runtime
+        timed = first is not None and first.isNumber()
+        callback = second if timed else first
+        milliseconds = first.toNumber() if timed and first is not None else 0.0
+        deferred = Deferred(runtime, f"waiting for a message on {topic}")
+        if callback is None:
+
+            def settle(message: QJSValue | None) -> None:
+                if message is None:
+                    deferred.reject(f"none came within {milliseconds:g} ms")
+                else:
+                    deferred.resolve(message)
+
+            wait_for_message(runtime, Subscriber(None, runtime), topic, "", milliseconds, settle)
+            return deferred.promise
+        told = callback
+
+        def tell(message: QJSValue | None) -> None:
+            call_back(runtime, told, QJSValue() if message is None else message)
+
+        wait_for_message(runtime, Subscriber(None, runtime), topic, "", milliseconds, tell)
+        return QJSValue()
+
+    def _check_topic(self, topic: str) -> None:
+        from rosglass.ros1.names import expand  # noqa: PLC0415 - not needed at start-up
+
+        expand(topic, "node", "/")
+
+    # The graph.
+
+    @Slot(result="QStringList")
+    @Slot(str, result="QStringList")
+    def queryTopics(self, datatype: str = "") -> list[str]:
+        """Return the topics in the graph, those of one type if given; empty before init."""
+        wanted = full_type(datatype)
+        return [name for name, types in self._topics().items() if not wanted or wanted in types]
+
+    @Slot(result=QJSValue)
+    def queryTopicInfo(self) -> QJSValue:
+        """Return ``{name, datatype}`` of every topic."""
+        infos = [
+            {"name": name, "datatype": _short_type(types[0] if types else "")}
+            for name, types in self._topics().items()
+        ]
+        return self._runtime.value(infos)
+
+    @Slot(str, result=str)
+    def queryTopicType(self, topic: str) -> str:
+        """Return a topic's type; empty when nobody knows it."""
+        node = self._node("queryTopicType")
+        try:
+            types = self._topics().get(node.resolve(topic), []) if node is not None else []
+        except Error as error:
+            self._runtime.throw(f"Ros.queryTopicType: {error}")
+            return ""
+        return _short_type(types[0]) if types else ""
+
+    # Logging.
+
+    def _log(self, level: int, message: str, name: str = "") -> None:
+        super()._log(level, message, short_logger(name))
+
+    @Slot(int, str, str, int, QJSValue)
+    @Slot(int, str, str, int, QJSValue, str)
+    def logInternal(
+        self, level: int, function: str, file: str, line: int, message: QJSValue, name: str = ""
+    ) -> None:
+        """Log a message from a place that the caller gives; `level` is of RosConsoleLevels."""
+        levels = (logging.DEBUG, logging.INFO, logging.WARNING, logging.ERROR, logging.CRITICAL)
+        if not 0 <= level < len(levels):
+            self._runtime.throw(f"Ros.logInternal: {level} is not one of RosConsoleLevels")
+            return
+        caller = Caller(file, max(line, 0), function)
+        log_from_qml(short_logger(name), levels[level], message.toString(), caller)
+
+    def _get_console(self) -> Console:
+        if self._console is None:
+            self._console = Console(self._runtime, self)
+        return self._console
+
+    def _get_package(self) -> Package:
+        if self._package is None:
+            self._package = Package(self._runtime, self)
+        return self._package
+
+    console = Property(QtCore.QObject, _get_console, constant=True)
+    package = Property(QtCore.QObject, _get_package, constant=True)
+
+
+def _split(given: Sequence[QJSValue], usage: str) -> tuple[tuple[str, str, str], list[QJSValue]]:
+    """Return namespace (or an empty text), type and topic, and the arguments that follow."""
+    texts = [value.toString() for value in given if value.isString()]
+    count = len(texts)
+    if count not in {2, 3} or not all(value.isString() for value in given[:count]):
+        raise InvalidNameError(f"write {usage}")
+    if len(given) == count or not all(texts[-2:]):
+        raise InvalidNameError(f"something is missing; write {usage}")
+    namespace, type_name, topic = texts if count == 3 else ("", *texts)
+    return (namespace, type_name, topic), list(given[count:])
+
+
+def _short_type(name: str) -> str:
+    """Return ``pkg/Type`` for ``pkg/msg/Type``."""
+    package, _, rest = name.partition("/")
+    return f"{package}/{rest.rpartition('/')[2]}" if rest else name

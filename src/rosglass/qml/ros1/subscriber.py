@@ -1,11 +1,18 @@
 """The element ``Subscriber`` of ``Ros 1.0``."""
-# ruff: noqa: N815 - the names of signals are QML's
+# ruff: noqa: N802, N815 - the names of slots and signals are QML's
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from rosglass.errors import Error
 from rosglass.qml.dialect import Dialect
+from rosglass.qml.ros1.namespaces import within
 from rosglass.qml.subscription import Subscription
-from rosglass.qt import Property, Signal
+from rosglass.qt import Property, QtCore, Signal, Slot
+
+if TYPE_CHECKING:
+    from rosglass.qml.runtime import Runtime
 
 __all__ = ["Subscriber"]
 
@@ -16,10 +23,41 @@ class Subscriber(Subscription):
     DIALECT = Dialect.ROS1
 
     runningChanged = Signal()
+    nsChanged = Signal()
 
-    def _set_running(self, running: bool) -> None:
-        if running != self._enabled:
-            self._set_enabled(running)
-            self.runningChanged.emit()
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        super().__init__(parent, runtime)
+        self._namespace = ""
+        self.enabledChanged.connect(self.runningChanged)
 
-    running = Property(bool, lambda self: self._enabled, _set_running, notify=runningChanged)
+    def _get_namespace(self) -> str:
+        node = self.node
+        try:
+            return node.resolve(self._namespace) if node and self._namespace else self._namespace
+        except Error:
+            return self._namespace
+
+    def _set_namespace(self, namespace: str) -> None:
+        if namespace != self._namespace:
+            self._namespace, self._resolved = namespace, ""
+            self._forget()
+            self.nsChanged.emit()
+            self._schedule()
+
+    def _resolve(self, topic: str) -> str:
+        return super()._resolve(within(self._namespace, topic))
+
+    running = Property(
+        bool,
+        lambda self: self._enabled,
+        lambda self, running: self._set_enabled(running),
+        notify=runningChanged,
+    )
+    ns = Property(str, _get_namespace, _set_namespace, notify=nsChanged)
+
+    @Slot(result=int)
+    def getNumPublishers(self) -> int:
+        """Return how many publishers the topic has; 0 while not connected."""
+        return self.getPublisherCount()

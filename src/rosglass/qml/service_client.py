@@ -1,0 +1,340 @@
+"""Service clients made by ``Ros2.createServiceClient``, and behind ``Service`` of ``Ros 1.0``."""
+# ruff: noqa: N802, N815 - the names of slots and signals are QML's
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+from rosglass.errors import Error, ServiceUnavailableError, TypeNotFoundError
+from rosglass.qml.callbacks import Deferred, call_back
+from rosglass.qml.dialect import Dialect
+from rosglass.qml.element import RETRY, Element
+from rosglass.qml.from_js import fields_from_js
+from rosglass.qml.log import log_from_qml
+from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rosglass.comm.node import Handle, Node
+    from rosglass.comm.qos import QoS
+    from rosglass.comm.service import Call
+    from rosglass.comm.service import ServiceClient as Caller_
+    from rosglass.messages import Message, MessageType
+    from rosglass.qml.runtime import Runtime
+
+    #: Told the response, or why there is none; on the GUI thread.
+    Done: TypeAlias = Callable[[Message | Error], None]
+
+__all__ = ["ServiceClient"]
+
+#: Milliseconds that requests wait for a server.
+_PATIENCE = 10_000
+
+
+@dataclass(eq=False)
+class _Request:
+    """A request on its way."""
+
+    value: QJSValue
+    done: Done
+    call: Call | None = None
+
+
+class ServiceClient(Element):
+    """Calls a service; requests made before there is a server wait for it.
+
+    Args:
+        runtime: The engine's runtime.
+        name: Service name, as in QML.
+        type_name: Service type; empty takes the one that the server announces.
+        dialect: Whose habits responses follow.
+        qos: Profile of requests and replies; None for the usual one.
+    """
+
+    serviceReadyChanged = Signal()
+    connectionTimeoutChanged = Signal()
+    pendingRequestsChanged = Signal()
+    problemChanged = Signal()
+
+    def __init__(
+        self,
+        runtime: Runtime,
+        name: str,
+        type_name: str,
+        dialect: Dialect = Dialect.ROS2,
+        qos: QoS | None = None,
+    ) -> None:
+        super().__init__(None, runtime)
+        self._name, self._type, self._dialect, self._qos = name, type_name, dialect, qos
+        self._patience = _PATIENCE
+        self._requests: list[_Request] = []
+        self._client: Caller_ | None = None
+        self._watch: Handle | None = None
+        self._have: Node | None = None
+        self._ready = False
+
+    # Properties.
+
+    def _set_patience(self, milliseconds: int) -> None:
+        if milliseconds < 0:
+            self._refuse(f"service {self._name}: connectionTimeout {milliseconds} ms is negative")
+        elif milliseconds != self._patience:
+            self._patience = milliseconds
+            self.connectionTimeoutChanged.emit()
+
+    ready = Property(bool, lambda self: self._ready, notify=serviceReadyChanged)
+    name = Property(str, lambda self: self._name, constant=True)
+    type = Property(str, lambda self: self._type, constant=True)
+    connectionTimeout = Property(
+        int, lambda self: self._patience, _set_patience, notify=connectionTimeoutChanged
+    )
+    pendingRequests = Property(int, lambda self: len(self._requests), notify=pendingRequestsChanged)
+    problem = Property(str, lambda self: self._problem, notify=problemChanged)
+
+    @Slot(result=bool)
+    def isServiceReady(self) -> bool:
+        """Return whether a server is there."""
+        return self._ready
+
+    # Calling.
+
+    @Slot(QJSValue)
+    @Slot(QJSValue, QJSValue)
+    def sendRequestAsync(self, request: QJSValue, callback: QJSValue | None = None) -> None:
+        """Call the service; `callback` is told the response, or false.
+
+        A value that does not fit throws a JavaScript Error that names the field; nothing is sent.
+        """
+        runtime = self._runtime
+        assert runtime is not None
+        if callback is not None and not callback.isCallable():
+            if not (callback.isUndefined() or callback.isNull()):
+                runtime.throw(f"service {self._name}: the callback is not a function")
+                return
+            callback = None
+        caller = runtime.caller()
+
+        def done(result: Message | Error) -> None:
+            if isinstance(result, Error):
+                log_from_qml("", logging.ERROR, _told(self._name, result), caller)
+            if callback is not None:
+                call_back(runtime, callback, self.shown(result))
+
+        self.send(request, done)
+
+    @Slot(QJSValue, result=QJSValue)
+    @Slot(result=QJSValue)
+    def call(self, request: QJSValue | None = None) -> QJSValue:
+        """Call the service and return a promise of the response."""
+        runtime = self._runtime
+        assert runtime is not None
+        deferred = Deferred(runtime, f"service {self._name}")
+
+        def done(result: Message | Error) -> None:
+            if isinstance(result, Error):
+                deferred.reject(_told(self._name, result))
+            else:
+                deferred.resolve(runtime.message(result, self._dialect))
+
+        sent = self.send(QJSValue() if request is None else request, done)
+        return deferred.promise if sent else QJSValue()
+
+    @Slot()
+    def cancelRequests(self) -> None:
+        """Give up every request that has no response yet; servers are not told."""
+        self._fail_all(Error(f"the request to {self._name} was given up"))
+
+    def send(self, value: QJSValue, done: Done) -> bool:
+        """Send a request as soon as there is a server.
+
+        Args:
+            value: The request; one that does not fit throws into JavaScript.
+            done: Told the response or the error, on the GUI thread.
+
+        Returns:
+            Whether it is on its way; `done` is not called otherwise.
+        """
+        request = _Request(value, done)
+        self._requests.append(request)
+        self.pendingRequestsChanged.emit()
+        if self._client is not None and self._client.type is not None:
+            self._submit(request, running=True)
+        if request not in self._requests:
+            return False
+        if self._patience and not self._ready:
+            QtCore.QTimer.singleShot(self._patience, lambda: self._give_up(request))
+        return True
+
+    def _submit(self, request: _Request, *, running: bool = False) -> None:
+        """Hand a request to the client; `running` says whether QML is waiting for it right now."""
+        client, session = self._client, self._session
+        assert client is not None
+        assert client.type is not None
+        assert session is not None
+        try:
+            fields = _fields(request.value, client.type.request)
+            call = client.call_async(fields, timeout=None)
+        except Error as error:
+            self._end(request, error, tell=not running)
+            if running and self._runtime is not None:
+                self._runtime.throw(f"service {self._name}: {error}")
+            return
+        request.call = call
+        call.on_done(lambda ended: self._answered(request, ended), session.executor)
+
+    def _answered(self, request: _Request, call: Call) -> None:
+        if not is_alive(self) or request not in self._requests or call.cancelled():
+            return
+        error = call.exception()
+        if error is None:
+            self._end(request, call.result())
+        else:
+            self._end(request, error if isinstance(error, Error) else Error(str(error)))
+
+    def _give_up(self, request: _Request) -> None:
+        """End a request for which no server has appeared."""
+        if not is_alive(self) or request not in self._requests or self._ready:
+            return
+        reason = self._problem or "is it running, and is its name right?"
+        seconds = self._patience / 1000
+        self._end(
+            request,
+            ServiceUnavailableError(
+                f"{self._name}: no server appeared within {seconds:g} s: {reason}"
+            ),
+        )
+
+    def _end(self, request: _Request, result: Message | Error, *, tell: bool = True) -> None:
+        if request not in self._requests:
+            return
+        self._requests.remove(request)
+        if request.call is not None:
+            request.call.cancel()
+        self.pendingRequestsChanged.emit()
+        if tell:
+            request.done(result)
+
+    def _fail_all(self, error: Error) -> None:
+        for request in list(self._requests):
+            self._end(request, error)
+
+    def shown(self, result: Message | Error) -> QJSValue:
+        """Return what a callback is told."""
+        runtime = self._runtime
+        if isinstance(result, Error) or runtime is None:
+            return QJSValue(False)
+        if self._dialect is Dialect.ROS1 and not result.type.definition.fields:
+            return QJSValue(True)
+        return runtime.message(result, self._dialect)
+
+    # The client.
+
+    def _update(self) -> None:
+        node = self.node
+        if node is self._have:
+            return
+        self._withdraw()
+        self._have = node
+        if node is not None:
+            self._make(node, self._type or None)
+
+    def _make(self, node: Node, type_name: str | None) -> None:
+        session = self._session
+        assert session is not None
+
+        def done(result: Caller_ | Error) -> None:
+            if not is_alive(self) or self._have is not node:
+                if not isinstance(result, Error):
+                    session.background(result.close)
+            elif isinstance(result, TypeNotFoundError):
+                self._say(f"{self._name}: {result}")
+                self._fetch(node)
+            elif isinstance(result, Error):
+                self._say(f"{self._name}: {result}")
+                self._fail_all(result)
+            else:
+                self._made(result)
+
+        session.background(
+            lambda: node.create_service_client(self._name, type_name, self._qos), done
+        )
+
+    def _fetch(self, node: Node) -> None:
+        """Ask the robot for a type that nobody here knows."""
+        session = self._session
+        assert session is not None
+
+        def again() -> None:
+            if is_alive(self) and self._have is node and self._client is None:
+                self._make(node, self._type)
+
+        try:
+            promise = node.fetch_type_async(self._type)
+        except Error:
+            QtCore.QTimer.singleShot(RETRY, again)
+        else:
+            promise.on_done(
+                lambda got: again() if got.exception() is None else _later(again), session.executor
+            )
+
+    def _made(self, client: Caller_) -> None:
+        session = self._session
+        assert session is not None
+        self._client = client
+        self._watch = client.on_ready_change(self._on_ready, session.executor)
+        self._at_end["client"] = lambda: session.background(client.close)
+        self._say("")
+        self._on_ready(client.ready)
+        self._submit_waiting()
+
+    def _submit_waiting(self) -> None:
+        if self._client is None or self._client.type is None:
+            return
+        for request in list(self._requests):
+            if request.call is None and request in self._requests:
+                self._submit(request)
+
+    def _on_ready(self, ready: bool) -> None:
+        if not is_alive(self) or self._client is None:
+            return
+        self._say(self._client.problem)
+        self._submit_waiting()
+        if ready != self._ready:
+            self._ready = ready
+            self.serviceReadyChanged.emit()
+
+    def _withdraw(self) -> None:
+        client, self._client = self._client, None
+        watch, self._watch = self._watch, None
+        self._at_end.pop("client", None)
+        if watch is not None:
+            watch.close()
+        if client is not None and self._session is not None:
+            self._session.background(client.close)
+            self._fail_all(Error(f"{self._name}: the node was shut down"))
+        if self._ready:
+            self._ready = False
+            self.serviceReadyChanged.emit()
+
+    def _problem_changed(self) -> None:
+        self.problemChanged.emit()
+
+
+def _later(job: Callable[[], None]) -> None:
+    QtCore.QTimer.singleShot(RETRY, job)
+
+
+def _told(name: str, error: Error) -> str:
+    text = str(error)
+    return text if name in text else f"{name}: {text}"
+
+
+def _fields(value: QJSValue, type: MessageType) -> dict[str, object]:
+    from rosglass.messages.schema import schema_of  # noqa: PLC0415 - loaded by now
+
+    if value.isUndefined() or value.isNull():
+        return {}
+    return fields_from_js(value, schema_of(type.definition))

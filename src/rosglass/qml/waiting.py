@@ -1,0 +1,73 @@
+"""Waiting within a call from QML without freezing the screen."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rosglass.qt import QtCore, is_alive
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rosglass.qml.session import Session
+
+__all__ = ["wait_for"]
+
+
+class _Keeper(QtCore.QObject):
+    """Puts off the deletion of objects while a call waits.
+
+    Qt ends the program when an object is destroyed whose signal handler is still running, which
+    is what a page that is closed meanwhile would bring about.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._kept: list[QtCore.QObject] = []
+
+    def eventFilter(self, watched: QtCore.QObject, event: QtCore.QEvent) -> bool:  # noqa: N802
+        """Keep deletions back; Qt calls this before every event."""
+        if event.type() == QtCore.QEvent.Type.DeferredDelete:
+            self._kept.append(watched)
+            return True
+        return False
+
+    def release(self) -> None:
+        """Let the objects go."""
+        for item in self._kept:
+            if is_alive(item):
+                item.deleteLater()
+
+
+def wait_for(session: Session, begin: Callable[[Callable[[], None]], None]) -> None:
+    """Return once something has ended; meanwhile the interface lives on.
+
+    Events are handled as ever: pictures are drawn, a stop button works. Ends early when the
+    program does.
+
+    Args:
+        session: The session.
+        begin: Starts it; given the function to call, on the GUI thread, when it has ended.
+    """
+    app = QtCore.QCoreApplication.instance()
+    assert app is not None
+    loop, keeper = QtCore.QEventLoop(), _Keeper()
+    ended = False
+
+    def end() -> None:
+        nonlocal ended
+        ended = True
+        loop.quit()
+
+    begin(end)
+    if ended:
+        return
+    app.installEventFilter(keeper)
+    try:
+        # Jobs behind the one that is running now would wait for it.
+        session.executor.resume()
+        execute = loop.exec if hasattr(loop, "exec") else loop.exec_
+        execute()
+    finally:
+        app.removeEventFilter(keeper)
+        keeper.release()
