@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import inspect
 import logging
-import threading
 import time
-from concurrent.futures import CancelledError, Future
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import EndpointKind, QoS, ServiceServer
-from rosglass.comm.complaints import Complaints
-from rosglass.comm.loop import LoopExecutor, executor_for
-from rosglass.errors import DecodeError, Error, ServiceError
+from rosglass.comm import EndpointKind, QoS
+from rosglass.comm.answering import AnsweringServer
+from rosglass.errors import Error, ServiceError
 from rosglass.interfaces import ros1_name
 from rosglass.ros1.connection import MAX_FRAME
 from rosglass.ros1.core import Member
@@ -32,14 +28,12 @@ if TYPE_CHECKING:
 __all__ = ["Ros1ServiceServer"]
 
 _log = logging.getLogger("rosglass.ros1")
-#: Requests that wait for the callback; more come only from clients gone wild.
-_MAX_WAITING = 1000
 #: Seconds for which a client that was refused counts as a problem.
 _GRUDGE = 30.0
 _TRUE = ("1", "true")
 
 
-class Ros1ServiceServer(ServiceServer, Member):
+class Ros1ServiceServer(AnsweringServer[Session], Member):
     """A service server; made by :meth:`Ros1Node.create_service_server`.
 
     Args:
@@ -53,6 +47,8 @@ class Ros1ServiceServer(ServiceServer, Member):
             loop when `callback` is a coroutine function.
     """
 
+    _core: Core
+
     def __init__(
         self,
         core: Core,
@@ -63,16 +59,9 @@ class Ros1ServiceServer(ServiceServer, Member):
         qos: QoS,
         executor: Executor | None,
     ) -> None:
-        self.name, self.qos = name, qos
-        self.type = core.types.service(type)
-        self._core, self._services, self._callback = core, services, callback
-        self.executor = executor_for(callback, executor, core.dispatcher, name)
-        self._lock = threading.Lock()
-        self._closed = False
-        self._waiting = 0
-        self._running: set[Future[Any]] = set()
+        super().__init__(core, name, core.types.service(type), callback, executor)
+        self.qos, self._services = qos, services
         self._sessions: dict[Connection, Session] = {}
-        self._complaints = Complaints()
         #: Why clients were refused lately, and when, by their names.
         self._refused: dict[str, tuple[str, float]] = {}
         self._seen = False
@@ -162,68 +151,17 @@ class Ros1ServiceServer(ServiceServer, Member):
     # -- answering -------------------------------------------------------------------------------
 
     def _on_request(self, session: Session, data: bytes | memoryview) -> None:
-        with self._lock:
-            full = self._waiting >= _MAX_WAITING
-            if self._closed:
-                return
-            if not full:
-                self._waiting += 1
-        if full:
-            self._refuse(session, f"{_MAX_WAITING} requests wait for the callback already")
-            return
         try:
-            self.executor.post(lambda: self._serve(session, data))
+            self._take(session, data)
         except Exception as error:
-            with self._lock:
-                self._waiting -= 1
             self._failed(session, error)
 
-    def _serve(self, session: Session, data: bytes | memoryview) -> None:
-        with self._lock:
-            self._waiting -= 1
-            if self._closed:
-                return
-        if session.gone:
-            return  # nobody wants it done any more
-        kind = self.type.request
-        try:
-            kind.validate(data)
-            message = kind.decode(data)
-        except DecodeError as error:
-            self._refuse(session, f"the request is no {kind.name}: {error}")
-            return
-        try:
-            answer = self._callback(message)
-        except Exception as error:
-            self._failed(session, error)
-            return
-        if inspect.iscoroutine(answer):
-            if not isinstance(self.executor, LoopExecutor):
-                answer.close()
-                self._failed(session, TypeError("the callback must be an async def to be awaited"))
-                return
-            answer = self.executor.run(answer)
-            with self._lock:
-                self._running.add(answer)
-        if isinstance(answer, Future):
-            answer.add_done_callback(lambda future: self._finish(session, future))
-        else:
-            self._respond(session, answer)
+    def _given_up(self, session: Session) -> bool:
+        return session.gone
 
-    def _finish(self, session: Session, future: Future[Any]) -> None:
-        """Answer a request whose response was promised."""
-        with self._lock:
-            self._running.discard(future)
-        if self._closed:
-            return
-        try:
-            answer = future.result(0)
-        except CancelledError:
-            self._refuse(session, "the callback's future was cancelled")
-        except Exception as error:
-            self._failed(session, error)
-        else:
-            self._respond(session, answer)
+    def _decode(self, data: bytes | memoryview) -> Message:
+        self.type.request.validate(data)
+        return self.type.request.decode(data)
 
     def _respond(self, session: Session, answer: Any) -> None:
         try:
@@ -302,20 +240,11 @@ class Ros1ServiceServer(ServiceServer, Member):
             _log.warning("%s: %s", self.name, problem)
         self._warned = problem
 
-    def close(self) -> None:
-        """Withdraw the service; requests without response end unanswered. Safe to call twice."""
+    def _withdraw(self) -> None:
         with self._lock:
-            if self._closed:
-                return
-            self._closed = True
-            running, self._running = self._running, set()
             sessions = list(self._sessions.values())
-        if self._core.forked:
-            return
         for session in sessions:
             self._core.loop.call(session.close)
         self._core.remove(self)
         # Last: the farewell of this server must not remove the registration of the next one.
         self._services.end(self)
-        for future in running:
-            future.cancel()

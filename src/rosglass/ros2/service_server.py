@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import inspect
 import logging
-import threading
-from concurrent.futures import CancelledError, Future
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import Dispatcher, EndpointKind, QoS, ServiceServer
-from rosglass.comm.complaints import Complaints
-from rosglass.comm.loop import LoopExecutor, executor_for
-from rosglass.errors import DecodeError, Error, NodeClosedError
+from rosglass.comm import Dispatcher, EndpointKind, LoopExecutor, QoS
+from rosglass.comm.answering import AnsweringServer
+from rosglass.errors import Error, NodeClosedError
 from rosglass.ros2.announced import Announced, mismatches, nodes_of
 from rosglass.ros2.core import Member
+from rosglass.ros2.middleware import RequestId
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
@@ -21,16 +18,13 @@ if TYPE_CHECKING:
     from rosglass.comm import Answer, Executor
     from rosglass.messages import Message, ServiceType
     from rosglass.ros2.core import Core
-    from rosglass.ros2.middleware import RequestId
 
 __all__ = ["Ros2ServiceServer"]
 
 _log = logging.getLogger("rosglass.ros2")
-#: Requests that wait for the callback; more come only from a client gone wild.
-_MAX_WAITING = 1000
 
 
-class Ros2ServiceServer(ServiceServer, Member):
+class Ros2ServiceServer(AnsweringServer[RequestId], Member):
     """A service server; made by :meth:`Node.create_service_server`.
 
     Args:
@@ -43,6 +37,8 @@ class Ros2ServiceServer(ServiceServer, Member):
             loop when `callback` is a coroutine function.
     """
 
+    _core: Core
+
     def __init__(
         self,
         core: Core,
@@ -52,22 +48,15 @@ class Ros2ServiceServer(ServiceServer, Member):
         qos: QoS | None = None,
         executor: Executor | None = None,
     ) -> None:
-        self.name, self.qos = name, qos or QoS.services()
-        self.type = core.types.service(type)
-        self._core, self._callback = core, callback
-        self._executor = executor_for(callback, executor, core.dispatcher, name)
+        super().__init__(core, name, core.types.service(type), callback, executor)
+        self.qos = qos or QoS.services()
         self._announced = Announced(core, core.types.service, self.type, fixed=True)
-        self._lock = threading.Lock()
-        self._closed = False
-        self._waiting = 0
-        self._running: set[Future[Any]] = set()
-        self._complaints = Complaints()
         self._warned = ""
         self._replier = core.middleware.create_replier(
             core.name, name, self.type.name, self._announced.hash, self.qos, self._on_request
         )
         # Others' executors may do anything.
-        self._replier.quick = isinstance(self._executor, (Dispatcher, LoopExecutor))
+        self._replier.quick = isinstance(self.executor, (Dispatcher, LoopExecutor))
         core.add(self)
         core.wake()
 
@@ -92,7 +81,7 @@ class Ros2ServiceServer(ServiceServer, Member):
 
     def serves(self, service: str, executor: Executor) -> bool:
         """Return whether it answers `service` on `executor`."""
-        return service == self.name and executor is self._executor
+        return service == self.name and executor is self.executor
 
     def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - the graph alone matters
         """Follow a change of the graph: log what is wrong, once."""
@@ -103,82 +92,23 @@ class Ros2ServiceServer(ServiceServer, Member):
             _log.warning("%s: %s", self.name, problem)
         self._warned = problem
 
-    def close(self) -> None:
-        """Withdraw the service; requests without response end unanswered. Safe to call twice."""
-        with self._lock:
-            if self._closed:
-                return
-            self._closed = True
-            running, self._running = self._running, set()
-        if self._core.forked:
-            return
+    def _withdraw(self) -> None:
         self._replier.close()
         self._core.remove(self)
-        for future in running:
-            future.cancel()
 
     # -- answering -------------------------------------------------------------------------------
 
     def _on_request(self, request: RequestId, data: bytes | memoryview) -> None:
-        with self._lock:
-            full = self._waiting >= _MAX_WAITING
-            if self._closed:
-                return
-            if not full:
-                self._waiting += 1
         try:
-            if full:
-                self._refuse(request, f"{_MAX_WAITING} requests wait for the callback already")
-            else:
-                self._executor.post(lambda: self._serve(request, data))
+            self._take(request, data)
         except Exception:
             _log.exception("%s: a request of %s is lost", self.name, self._origin(request))
 
-    def _serve(self, request: RequestId, data: bytes | memoryview) -> None:
-        with self._lock:
-            self._waiting -= 1
-            if self._closed:
-                return
+    def _decode(self, data: bytes | memoryview) -> Message:
         kind = self.type.request
-        try:
-            if kind.fields:
-                kind.validate(data)
-            message = kind.decode(data)
-        except DecodeError as error:
-            self._refuse(request, f"the request is no {kind.name}: {error}")
-            return
-        try:
-            answer = self._callback(message)
-        except Exception as error:
-            self._failed(request, error)
-            return
-        if inspect.iscoroutine(answer):
-            if not isinstance(self._executor, LoopExecutor):
-                answer.close()
-                self._failed(request, TypeError("the callback must be an async def to be awaited"))
-                return
-            answer = self._executor.run(answer)
-            with self._lock:
-                self._running.add(answer)
-        if isinstance(answer, Future):
-            answer.add_done_callback(lambda future: self._finish(request, future))
-        else:
-            self._respond(request, answer)
-
-    def _finish(self, request: RequestId, future: Future[Any]) -> None:
-        """Answer a request whose response was promised."""
-        with self._lock:
-            self._running.discard(future)
-        if self._closed:
-            return
-        try:
-            answer = future.result(0)
-        except CancelledError:
-            self._refuse(request, "the callback's future was cancelled")
-        except Exception as error:
-            self._failed(request, error)
-        else:
-            self._respond(request, answer)
+        if kind.fields:
+            kind.validate(data)
+        return kind.decode(data)
 
     def _respond(self, request: RequestId, answer: Any) -> None:
         kind = self.type.response
