@@ -15,7 +15,8 @@ NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict --quiet
 say "wheel"
 scripts/check_wheel.sh
 # Most tests wait for others most of the time: three side by side, each file in one process.
-side_by_side=(-n 3 --dist loadfile)
+# Once more what failed: with other programs, machines under load can. Each is listed at the end.
+side_by_side=(-n 3 --dist loadfile --reruns 1 --rerun-show-tracebacks)
 say "tests on Debian's own Python ($(.venv-system/bin/python -V))"
 scripts/private_network.sh .venv-system/bin/python -m pytest -q "${side_by_side[@]}" tests/unit "$@"
 say "tests, standalone ($(.venv/bin/python -V))"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import random
 import signal
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from collections.abc import Generator
+    from collections.abc import Generator, Iterator
 
 # No test finds what robots told the developer's own programs, nor leaves anything there; the
 # processes that tests start inherit this.
@@ -18,6 +19,9 @@ os.environ["ROSGLASS_TYPE_CACHE"] = "off"
 
 #: ROS domains for tests: above 101 the ports are among those that Linux gives to anybody.
 DOMAINS, DOMAIN_SHARES = 100, 4
+
+#: Whether a test has failed.
+FAILED = pytest.StashKey[bool]()
 
 # Whoever starts the tests in the background has Ctrl-C ignored, in everything they start as well.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -31,11 +35,32 @@ def ros_domains() -> list[int]:
     return random.SystemRandom().sample(range(1 + number * share, 1 + (number + 1) * share), share)
 
 
+@pytest.fixture(autouse=True)
+def log_levels() -> Iterator[None]:
+    """Undo what commands that a test runs in this process have done to the library's logging."""
+    yield
+    for name, logger in list(logging.Logger.manager.loggerDict.items()):
+        if name.partition(".")[0] == "rosglass" and isinstance(logger, logging.Logger):
+            logger.propagate = True
+            if logger.level:
+                logger.setLevel(logging.NOTSET)
+
+
 @pytest.hookimpl(wrapper=True)
-def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
+def pytest_runtest_makereport(
+    item: pytest.Item,
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """Let processes of tests tell each other what was logged: lone surrogates cannot be sent."""
     report = yield
+    item.stash[FAILED] = report.failed or (report.when != "setup" and item.stash[FAILED])
     report.sections = [
         (name, text.encode("utf-8", "backslashreplace").decode()) for name, text in report.sections
     ]
     return report
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_teardown(item: pytest.Item) -> None:
+    """After a failure, end the peers of the whole module: neither it nor others get broken ones."""
+    if item.stash[FAILED]:
+        item.session._setupstate.teardown_exact(None)

@@ -86,7 +86,7 @@ class CockpitProcess:
         """Save what the window shows."""
         self._ask("grab", str(path))
 
-    def until(self, item: str, name: str, wanted: Any = True, timeout: float = 5.0) -> float:
+    def until(self, item: str, name: str, wanted: Any = True, timeout: float = 30.0) -> float:
         """Wait until a property has a value; returns how long it took, seconds."""
         begin = time.monotonic()
         while (value := self.get(item, name)) != wanted:
@@ -108,7 +108,7 @@ class CockpitProcess:
             assert self._process.stdin is not None
             self._process.stdin.close()
             try:
-                self._process.wait(10)
+                self._process.wait(30)
             except subprocess.TimeoutExpired:
                 self._process.kill()
         return self._process.wait()

@@ -125,7 +125,7 @@ def test_its_children_end_with_it(
 ) -> None:
     process, pids = demo
     process.send_signal(number)
-    process.communicate(timeout=15)
+    process.communicate(timeout=60)
     assert process.returncode == code
     wait_gone(pids, 8.0)
 
@@ -185,7 +185,7 @@ def test_a_robot_alone_waits_for_its_router_and_ends_with_its_leash(
         assert "connected" in process.stdout.readline()
         process.stdin.close()
         process.stdin = None
-        output, _ = process.communicate(timeout=10)
+        output, _ = process.communicate(timeout=60)
     assert process.returncode == 0, output
 
 

@@ -122,7 +122,7 @@ def test_a_scan_that_stops_is_stale(running: Any, view: Any, wait: Callable[...,
     wait(lambda: element.property("received"))
     assert not element.property("stale")
     assert element.property("metres") == 6.0
-    wait(lambda: element.property("stale"), 1.0)
+    wait(lambda: element.property("stale"))
     laser.publish(ranges=[], angle_increment=0.1)
     wait(lambda: not element.property("stale"))
 

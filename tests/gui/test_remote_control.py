@@ -104,7 +104,7 @@ def view(app: Any, url: str, wait: Any) -> Iterator[Any]:
     assert made.status() is QQuickView.Status.Ready, [e.toString() for e in made.errors()]
     made.resize(400, 300)
     made.show()
-    wait(lambda: session.state == "connected", 20)
+    wait(lambda: session.state == "connected")
     yield made
     made.close()
     made.deleteLater()

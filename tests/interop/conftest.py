@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def wait_for(
-    condition: Callable[[], Any], timeout: float = 10.0, what: str | Callable[[], str] = ""
+    condition: Callable[[], Any], timeout: float = 30.0, what: str | Callable[[], str] = ""
 ) -> Any:
     """Return the first true value of `condition`, which must come within `timeout` seconds.
 
@@ -61,7 +61,7 @@ class Process:
             else:
                 self.output.append(line)
 
-    def event(self, key: str, timeout: float = 20.0, **otherwise: Any) -> Any:
+    def event(self, key: str, timeout: float = 30.0, **otherwise: Any) -> Any:
         """Return the value of the next event that has `key`; other events wait for their turn.
 
         Without such an event the test fails, unless it says what to return `otherwise`.

@@ -32,7 +32,7 @@ def test_from_ros1(bridge, connect, rospy_peer, wait_for):
         rospy_peer.call(
             "publish", topic="/talk_one", type="std_msgs/String", value={"data": f"ü{number}"}
         )
-    found = [listener.wait(10).message().data for _ in range(20)]
+    found = [listener.wait(30).message().data for _ in range(20)]
     assert found == [f"ü{number}" for number in range(20)]
 
 
@@ -60,7 +60,7 @@ def test_pictures(bridge, connect, rospy_peer, wait_for, way):
         data = {"data": {"repeat": 7, "length": 6_220_800}}
         rospy_peer.call("publish", topic=name, type="sensor_msgs/Image", latch=True,
                         value=shape | data)  # fmt: skip
-        found = viewer.wait(20).message()
+        found = viewer.wait(30).message()
         assert (found.width, found.data[-1], len(found.data)) == (1920, 7, 6_220_800)
     else:
         camera = node.create_publisher(name, IMAGE)
@@ -85,7 +85,7 @@ def test_latched_both_ways(bridge, connect, rospy_peer, wait_for):
     (end,) = node.publishers("/map_one")
     assert end.qos.durability is Durability.TRANSIENT_LOCAL
     late = node.create_subscription("/map_one", STRING, qos=QoS.latched())
-    assert late.wait(10).message().data == "one"
+    assert late.wait(30).message().data == "one"
     rospy_peer.call("subscribe", topic="/map_two", type="std_msgs/String")
     assert rospy_peer.event("received")["value"] == {"data": "two"}
     # What is latched goes with whoever published it.
@@ -104,7 +104,7 @@ def test_several_latched_publishers_stay_apart(bridge, connect, wait_for):
         keeper.publish(transforms=[{"child_frame_id": text}])
     wait_for(lambda: made.status().count == 3, what=lambda: str(made.status()))
     late = connect("ros1", "late").create_subscription("/tf_static")
-    found = {late.wait(10).message().transforms[0].child_frame_id for _ in range(3)}
+    found = {late.wait(30).message().transforms[0].child_frame_id for _ in range(3)}
     assert found == set(texts)
 
 
@@ -130,7 +130,7 @@ def test_nothing_comes_back(bridge, connect, wait_for):
         ends[1].publish(data=f"two {number}")
     expected = sorted(f"{word} {number}" for word in ("one", "two") for number in range(10))
     for ear in ears:
-        found = [ear.wait(10).message().data for _ in range(20)]
+        found = [ear.wait(30).message().data for _ in range(20)]
         assert sorted(found) == expected
         assert ear.wait(0.7) is None
 
@@ -146,13 +146,13 @@ def test_another_bridge_takes_over(bridge, connect, wait_for):
     time.sleep(2.5)  # by then it would have begun
     assert not relays(second)
     first.close()
-    wait_for(lambda: relays(second), 15)
+    wait_for(lambda: relays(second))
 
     def heard():
         talker.publish(data="again")
         return listener.wait(0.1)
 
-    wait_for(heard, 15)
+    wait_for(heard)
 
 
 def test_directions_and_names(bridge, connect, wait_for):
@@ -183,7 +183,7 @@ def test_a_type_given_beforehand(bridge, connect, wait_for):
     talker = one.create_publisher("/cmd", "geometry_msgs/Twist")
     wait_for(talker.subscription_count)
     talker.publish(linear={"x": 0.5})
-    assert listener.wait(10).message().linear.x == 0.5
+    assert listener.wait(30).message().linear.x == 0.5
 
 
 def test_services_of_ros1(bridge, connect, rospy_peer):
@@ -198,12 +198,12 @@ def test_services_of_ros1(bridge, connect, rospy_peer):
         )
     node = connect("ros2", "caller")
     client = node.create_service_client("/arm/set", "std_srvs/srv/SetBool")
-    answer = client.call({"data": True}, timeout=20)
+    answer = client.call({"data": True}, timeout=30)
     assert (answer.success, answer.message) == (True, "set")
     assert rospy_peer.event("served")["request"] == {"data": True}
     broken = node.create_service_client("/arm/broken", "std_srvs/srv/SetBool")
     with pytest.raises(ServiceError, match="not homed"):
-        broken.call({"data": True}, timeout=20)
+        broken.call({"data": True}, timeout=30)
     assert relays(made)["/arm/broken", "->"].refused == 1
     rospy_peer.call("unserve", service="/arm/set")
     rospy_peer.call("unserve", service="/arm/broken")
@@ -217,7 +217,7 @@ def test_services_of_ros2(bridge, connect, rospy_peer):
     )
     node.create_service_server("/never", "std_srvs/srv/Trigger", lambda _: Future())
     adder = connect("ros1", "adder").create_service_client("/sum")
-    found = adder.call({"a": 2, "b": -5}, timeout=20)
+    found = adder.call({"a": 2, "b": -5}, timeout=30)
     assert found.sum == -3
     (told,) = rospy_peer.call("call", service="/never", type="std_srvs/Trigger")
     assert "within 1 s" in told
@@ -246,7 +246,7 @@ def test_what_does_not_fit_is_refused_and_told(bridge, connect, wait_for, caplog
     assert "stamp.sec" in relays(made)["/late", "<-"].problem
     assert caplog.text.count("a message is not relayed") == 1
     talker.publish(frame_id="fine")
-    assert listener.wait(10).message().frame_id == "fine"
+    assert listener.wait(30).message().frame_id == "fine"
 
 
 def test_survey(connect, rospy_peer, wait_for):
@@ -265,11 +265,11 @@ def test_an_unused_topic_costs_nothing(bridge, connect, wait_for):
     one, two = connect("ros1", "heavy_one"), connect("ros2", "heavy_two")
     talker = one.create_publisher("/heavy", STRING)
     wait_for(lambda: two.publishers("/heavy"))
-    wait_for(lambda: talker.subscription_count() == 0, 20)
+    wait_for(lambda: talker.subscription_count() == 0)
     listener = two.create_subscription("/heavy", STRING)
     wait_for(talker.subscription_count)
     talker.publish(data="wanted")
-    assert listener.wait(10).message().data == "wanted"
+    assert listener.wait(30).message().data == "wanted"
     assert relays(made)["/heavy", "->"].count == 1
 
 
@@ -283,11 +283,11 @@ def test_the_master_restarts(bridge, connect, start_master, start_rospy, wait_fo
         "publish", topic="/steady", type="std_msgs/String", value={"data": "."}, rate=20, count=0
     )
     listener = two.create_subscription("/steady", STRING)
-    assert listener.wait(20)
+    assert listener.wait(30)
     master.kill()
     while listener.take():
         pass
-    assert listener.wait(10), "connections outlive the master"
+    assert listener.wait(30), "connections outlive the master"
     master.start()
     again = start_rospy("steady_again", master=master)
     again.call(
@@ -298,7 +298,7 @@ def test_the_master_restarts(bridge, connect, start_master, start_rospy, wait_fo
         sample = listener.wait(0.5)
         return sample is not None and sample.message().data == "new"
 
-    wait_for(heard, 20)
+    wait_for(heard)
 
 
 def test_the_router_restarts(bridge, connect, rospy_peer, free_port, wait_for):
@@ -314,7 +314,7 @@ def test_the_router_restarts(bridge, connect, rospy_peer, free_port, wait_for):
             rate=20,
             count=0,
         )
-        assert listener.wait(20)
+        assert listener.wait(30)
     with Router(where):
         again = connect("ros2", "lasting_again", router.url)
         late = again.create_subscription("/lasting", STRING)
@@ -480,7 +480,7 @@ def test_one_thousand_messages_a_second(bridge, connect, wait_for):
         pass
     for number in range(1000):
         talker.publish(data=str(number))
-    found = [listener.wait(10).message().data for _ in range(1000)]
+    found = [listener.wait(30).message().data for _ in range(1000)]
     assert found == [str(number) for number in range(1000)]
     assert relays(made)["/burst", "->"].dropped == 0
 
@@ -489,7 +489,7 @@ def test_a_single_command_from_the_shell(bridge, connect, tool):
     bridge(["*"])
     listener = connect("ros2", "once").create_subscription("/once", "geometry_msgs/msg/Twist")
     tool("rostopic", "pub", "-1", "/once", "geometry_msgs/Twist", "{linear: {x: 0.25}}")
-    assert listener.wait(10).message().linear.x == 0.25
+    assert listener.wait(30).message().linear.x == 0.25
     assert listener.wait(0.5) is None
 
 
@@ -499,7 +499,7 @@ def test_a_service_called_from_the_shell(bridge, connect, tool, wait_for):
     server.create_service_server(
         "/shell/set", "std_srvs/srv/SetBool", lambda asked: {"success": asked.data, "message": "ok"}
     )
-    wait_for(lambda: "/shell/set" in tool("rosservice", "list"), 20)
+    wait_for(lambda: "/shell/set" in tool("rosservice", "list"))
     assert tool("rosservice", "type", "/shell/set").strip() == "std_srvs/SetBool"
     told = tool("rosservice", "call", "/shell/set", "true")
     assert "success: True" in told

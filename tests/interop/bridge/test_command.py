@@ -36,9 +36,9 @@ def test_it_relays_until_it_is_ended(master, router, connect, start_program, wai
         return listener.wait(0.1)
 
     assert wait_for(heard, 30).message().data == "from ROS 1"
-    wait_for(lambda: any("1 topic, 0 services" in line for line in process.output), 20)
+    wait_for(lambda: any("1 topic, 0 services" in line for line in process.output))
     process.popen.send_signal(signal.SIGINT)
-    assert process.popen.wait(10) == 130
+    assert process.popen.wait(30) == 130
     process.end()
     assert any("/cli -> [std_msgs/msg/String]" in line for line in process.output)
 

@@ -125,18 +125,18 @@ class Peer:
         self.process.ask(do=do, number=number, **plan)
         return number
 
-    def answer(self, number: int, timeout: float = 20.0) -> Any:
+    def answer(self, number: int, timeout: float = 30.0) -> Any:
         """Return what a request led to; fail the test if it failed there."""
         found = self.process.event(f"answer {number}", timeout)
         if "error" in found:
             pytest.fail(f"the peer failed:\n{found['error']}")
         return found.get("value")
 
-    def call(self, do: str, timeout: float = 20.0, **plan: Any) -> Any:
+    def call(self, do: str, timeout: float = 30.0, **plan: Any) -> Any:
         """Send a request and return what it led to."""
         return self.answer(self.start(do, **plan), timeout)
 
-    def event(self, key: str, timeout: float = 20.0, **otherwise: Any) -> Any:
+    def event(self, key: str, timeout: float = 30.0, **otherwise: Any) -> Any:
         """Return the value of the next event of this name that the peer told by itself."""
         return self.process.event(key, timeout, **otherwise)
 
@@ -289,7 +289,7 @@ def roscpp_peer(start_roscpp: Callable[..., Peer]) -> Peer:
 def tool(master: RosMaster) -> Callable[..., str]:
     """Run a ROS 1 command such as ``tool("rostopic", "list")``; return what it prints."""
 
-    def tool(*command: str, timeout: float = 20.0, status: int | None = 0, stdin: str = "") -> str:
+    def tool(*command: str, timeout: float = 30.0, status: int | None = 0, stdin: str = "") -> str:
         needs(command[0])
         done = subprocess.run(
             command,
@@ -325,5 +325,5 @@ def start_tool(
         # rosbag hands this on to the program that it started; it would outlive being killed.
         process.popen.send_signal(signal.SIGINT)
         with suppress(subprocess.TimeoutExpired):
-            process.popen.wait(10)
+            process.popen.wait(30)
         process.end()

@@ -14,13 +14,13 @@ ROSOUT = "/usr/lib/rosout/rosout"
 @pytest.fixture
 def node(connect, wait_for):
     node = connect("cockpit", "/ops")
-    wait_for(lambda: "/ops/cockpit/set_logger_level" in node.services(), 20)
+    wait_for(lambda: "/ops/cockpit/set_logger_level" in node.services())
     return node
 
 
 def test_rostopic_echo_shows_what_we_log(node, start_tool, wait_for):
     echo = start_tool("rostopic", "echo", "/rosout")
-    wait_for(lambda: node._furniture._rosout._handler._publisher.subscription_count() >= 1, 20)
+    wait_for(lambda: node._furniture._rosout._handler._publisher.subscription_count() >= 1)
     node.logger.warning("battery at %d %%: Grüße", 5)
     wait_for(lambda: echo.output.count("---\n") >= 1, 20, lambda: "".join(echo.output))
     told = "".join(echo.output)
@@ -73,22 +73,22 @@ def test_we_hear_the_log_and_see_the_levels_of_others(node, request, wait_for, k
         peer.call("log", text=text, **plan)
         return any(m.msg == text and m.name == f"/{kind}_peer" for m in heard)
 
-    wait_for(lambda: hears("hello"), 20)
+    wait_for(lambda: hears("hello"))
     first = next(m for m in heard if m.msg == "hello")
     assert first.level == 2
     assert first.file.endswith((".py", ".cpp"))
     assert first.line > 0
     ask = node.create_service_client(f"/{kind}_peer/get_loggers")
-    loggers = {entry.name: entry.level.lower() for entry in ask.call(timeout=20).loggers}
+    loggers = {entry.name: entry.level.lower() for entry in ask.call(timeout=30).loggers}
     assert loggers[logger] == "info"
 
 
 def test_we_set_the_levels_of_others(node, rospy_peer):
     # Not of a roscpp node: Debian 12's dies of it (SIGSEGV), whoever calls.
     change = node.create_service_client("/rospy_peer/set_logger_level", "roscpp/SetLoggerLevel")
-    change.call({"logger": "rosout", "level": "DEBUG"}, timeout=20)
+    change.call({"logger": "rosout", "level": "DEBUG"}, timeout=30)
     assert rospy_peer.call("log_level") == "DEBUG"
-    change.call({"logger": "rosout", "level": "INFO"}, timeout=20)
+    change.call({"logger": "rosout", "level": "INFO"}, timeout=30)
     assert rospy_peer.call("log_level") == "INFO"
 
 
@@ -99,22 +99,22 @@ def test_our_clock_follows_and_theirs_follows_ours(start_master, connect, reques
     node = connect("cockpit", url=master.url)
     before = node.clock.is_simulated
     master.call("setParam", "/use_sim_time", True)
-    wait_for(lambda: node.clock.is_simulated, 20)
+    wait_for(lambda: node.clock.is_simulated)
     assert not before
     clock = node.create_publisher("/clock", "rosgraph_msgs/Clock")
     peer = start_peer(f"follower_{start}", master=master)
-    wait_for(lambda: clock.subscription_count() == 2, 20)
+    wait_for(lambda: clock.subscription_count() == 2)
     clock.publish(clock={"secs": 100, "nsecs": 500_000_000})
     wait_for(lambda: node.now().seconds == 100.5)
     stamp = 100.5 if start == "start_roscpp" else {"secs": 100, "nsecs": 500_000_000}
-    wait_for(lambda: peer.call("now") == stamp, 20)
+    wait_for(lambda: peer.call("now") == stamp)
 
 
 def test_a_rospy_publisher_of_clock_drives_our_timers(start_master, connect, start_rospy, wait_for):
     master = start_master()
     master.call("setParam", "/use_sim_time", True)
     node = connect("cockpit", url=master.url)
-    wait_for(lambda: node.clock.is_simulated, 20)
+    wait_for(lambda: node.clock.is_simulated)
     jumps: list = []
     node.clock.on_jump(jumps.append)
     fired: list[float] = []
@@ -124,16 +124,16 @@ def test_a_rospy_publisher_of_clock_drives_our_timers(start_master, connect, sta
     def tick(secs: float) -> None:
         value = {"clock": {"secs": int(secs), "nsecs": int(secs % 1 * 1e9)}}
         gazebo.call("publish", topic="/clock", type="rosgraph_msgs/Clock", value=value)
-        wait_for(lambda: node.now().seconds == secs, 20)
+        wait_for(lambda: node.now().seconds == secs)
 
-    wait_for(lambda: gazebo.call("connections", topic="/clock") == 2, 20)
+    wait_for(lambda: gazebo.call("connections", topic="/clock") == 2)
     tick(10)
     node.create_timer(1.0, lambda: fired.append(node.now().seconds))
     tick(10.5)
     tick(11)
-    wait_for(lambda: fired == [11.0], 20)
+    wait_for(lambda: fired == [11.0])
     tick(5)
-    wait_for(lambda: any(jump.delta.seconds < 0 for jump in jumps), 20)
+    wait_for(lambda: any(jump.delta.seconds < 0 for jump in jumps))
     gazebo.end()  # the simulation is killed: time stands still
     assert node.now().seconds == 5.0
 
@@ -143,7 +143,7 @@ def test_roscores_own_node_collects_our_log(start_master, start_program, connect
     if not Path(ROSOUT).exists():
         pytest.skip("the node rosout is not installed: sudo apt-get install rosout")
     start_program(ROSOUT, "__name:=rosout", env=master.env())
-    wait_for(lambda: ["/rosout", ["/rosout"]] in master.call("getSystemState")[1], 20)
+    wait_for(lambda: ["/rosout", ["/rosout"]] in master.call("getSystemState")[1])
     node = connect("cockpit", url=master.url)
     listener = node.create_subscription("/rosout_agg", None)
 
@@ -151,10 +151,10 @@ def test_roscores_own_node_collects_our_log(start_master, start_program, connect
         node.logger.info("knock")
         return listener.wait(0.2) is not None
 
-    wait_for(knock, 20)
+    wait_for(knock)
     node.logger.error("motor stalled")
-    message = listener.wait(20).message()
+    message = listener.wait(30).message()
     while message.msg == "knock":
-        message = listener.wait(20).message()
+        message = listener.wait(30).message()
     assert (message.name, message.msg, message.level) == ("/cockpit", "motor stalled", 8)
     assert message.file == __file__

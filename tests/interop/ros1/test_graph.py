@@ -50,7 +50,7 @@ def test_a_node_that_was_killed_stays_until_it_is_cleaned_up_and_is_named(
     peer = start_rospy("doomed")
     peer.call("publish", topic="/pulse", type="std_msgs/Empty", value={}, rate=20, count=0)
     subscription = node.create_subscription("/pulse")
-    subscription.wait(10)
+    subscription.wait(30)
     peer.end()
     wait_for(lambda: subscription.publisher_count() == 0)
     wait_for(lambda: "Connection refused" in subscription.problem)
@@ -64,7 +64,7 @@ def test_a_node_that_was_killed_stays_until_it_is_cleaned_up_and_is_named(
     again.call("publish", topic="/pulse", type="std_msgs/Empty", value={}, rate=20, count=0)
     while subscription.take() is not None:
         pass
-    subscription.wait(10)
+    subscription.wait(30)
     again.end()
 
 
@@ -141,7 +141,7 @@ def test_a_relay_of_rospy_that_names_no_type_is_understood_when_we_give_one(
     wait_for(source.subscription_count)
     wait_for(typed.publisher_count)
     source.publish(data="whatever")
-    assert typed.wait(10).message().data == "whatever"
+    assert typed.wait(30).message().data == "whatever"
     # With the type known for the topic, or not: it must not stay silent without a reason.
     wait_for(lambda: untyped.problem or untyped.type)
     if untyped.type is None:

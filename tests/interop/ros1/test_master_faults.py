@@ -38,7 +38,7 @@ def test_a_restarted_master_learns_of_us_and_messages_go_on_meanwhile(
     peer.call("publish", topic="/words", type="std_msgs/String", value={"data": "w"}, rate=50,
               count=0)  # fmt: skip
     wait_for(commands.subscription_count)
-    words.wait(10)
+    words.wait(30)
     joined = []
     words.on_matched(joined.append)
 
@@ -50,7 +50,7 @@ def test_a_restarted_master_learns_of_us_and_messages_go_on_meanwhile(
         wait_for(lambda: peer.call("count", topic="/commands") == before + count)
         while words.take() is not None:
             pass
-        words.wait(10)
+        words.wait(30)
 
     go_on(3)
     own_master.kill()
@@ -76,7 +76,7 @@ def test_a_restarted_master_learns_of_us_and_messages_go_on_meanwhile(
     wait_for(lambda: words.publisher_count() == 2)
     wait_for(lambda: commands.subscription_count() == 2)
     commands.publish(data=7)
-    assert receiver.wait(10).message().data == 7
+    assert receiver.wait(30).message().data == 7
 
 
 def test_a_master_that_starts_late_is_found(own_master, connect, tool, wait_for):
@@ -92,7 +92,7 @@ def test_a_master_that_starts_late_is_found(own_master, connect, tool, wait_for)
     wait_for(lambda: told and told[-1].state is ConnectionState.CONNECTED)
     wait_for(publisher.subscription_count)
     publisher.publish()
-    subscription.wait(10)
+    subscription.wait(30)
 
 
 def test_a_master_that_hangs_holds_up_neither_topics_nor_closing(own_master, connect, wait_for):
@@ -104,11 +104,11 @@ def test_a_master_that_hangs_holds_up_neither_topics_nor_closing(own_master, con
     os.kill(pid, signal.SIGSTOP)
     try:
         publisher.publish(data=1)
-        assert subscription.wait(10).message().data == 1
+        assert subscription.wait(30).message().data == 1
         left = []
         publisher.on_matched(left.append)
         subscription.close()  # its connection ends at once, whatever the master does
-        wait_for(lambda: [event.change for event in left] == [1, -1], 3)
+        wait_for(lambda: [event.change for event in left] == [1, -1])
         wait_for(lambda: one.status().state is ConnectionState.LOST)
         assert "no answer in time" in one.status().detail
         new = connect("three", url=own_master.url, wait=False)
@@ -165,8 +165,8 @@ def test_the_master_is_told_again_of_what_it_forgot_alone(own_master, connect, w
     api = own_master.call("lookupNode", "/panel")
     own_master.call("unregisterPublisher", "/one", api, caller="/panel")
     own_master.call("unregisterSubscriber", "/three", api, caller="/panel")
-    wait_for(lambda: registered(own_master, "/one")[0] == ["/panel"], 5)
-    wait_for(lambda: registered(own_master, "/three")[1] == ["/panel"], 5)
+    wait_for(lambda: registered(own_master, "/one")[0] == ["/panel"])
+    wait_for(lambda: registered(own_master, "/three")[1] == ["/panel"])
     assert registered(own_master, "/two")[0] == ["/panel"]
 
 
@@ -184,7 +184,7 @@ def test_publishers_are_found_though_the_master_cannot_call_us(own_master, conne
     publisher = talker.create_publisher("/talk", "std_msgs/Int32")
     wait_for(publisher.subscription_count)
     publisher.publish(data=3)
-    assert subscription.wait(10).message().data == 3
+    assert subscription.wait(30).message().data == 3
 
 
 @pytest.mark.parametrize("peer", ["rosglass", "rospy", "roscpp"])
@@ -201,7 +201,7 @@ def test_the_older_of_two_nodes_of_a_name_ends(own_master, connect, request, wai
         start = request.getfixturevalue(f"start_{peer}")
         newer = start("twin", master=own_master)
     wait_for(lambda: older.status().state is ConnectionState.CLOSED)
-    done.wait(10)
+    done.wait(30)
     assert told[-1] == older.status()
     assert "same name" in told[-1].detail or "has the name /twin now" in told[-1].detail
     with pytest.raises(rosglass.NodeClosedError, match="/twin is closed"):
@@ -262,7 +262,7 @@ if not child:
     sys.exit(0)
 os.close(inner)
 publisher.publish(data=2)
-assert subscription.wait(10).message().data == 2
+assert subscription.wait(30).message().data == 2
 subscription.close()
 wait(lambda: not publisher.subscription_count())
 os.write(outer, b"x")
@@ -278,6 +278,6 @@ def test_a_fork_keeps_nothing_alive_and_an_end_without_closing_leaves_nothing(
 ):
     process = start("-c", _FORK, f"{own_master.url}?ip=127.0.0.1")
     assert process.event("done")
-    assert process.popen.wait(10) == 0
+    assert process.popen.wait(30) == 0
     assert "".join(process.output) == ""
     assert [part for part in own_master.call("getSystemState") if part] == []

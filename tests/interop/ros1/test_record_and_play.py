@@ -119,7 +119,7 @@ def test_a_recording_plays_to_rospy_as_it_was(recording, connect, rospy_peer, wa
         # The map was sent before rospy asks for it.
         rospy_peer.call("subscribe", topic="/map", type=GRID)
         grid = rospy_peer.event("received")
-        assert player.wait(10)
+        assert player.wait(30)
     assert [each["value"]["data"] for each in told] == [
         *(f"rospy {number}" for number in range(5)),
         *(f"ours {number}" for number in range(5)),
@@ -139,7 +139,7 @@ def test_rosbag_plays_our_recording_to_us(connect, rospy_peer, tmp_path, wait_fo
         wait_for(lambda: recorder.status().messages)
     robot.close()
     start_tool("rosbag", "play", "--quiet", "--keep-alive", str(tmp_path / "again.bag"))
-    assert ears.create_subscription("/again").wait(10).message().data == "once"
+    assert ears.create_subscription("/again").wait(30).message().data == "once"
 
 
 def test_a_bag_of_an_unknown_type_plays_by_the_definition_it_holds(connect, tmp_path, rospy_peer):
@@ -154,7 +154,7 @@ def test_a_bag_of_an_unknown_type_plays_by_the_definition_it_holds(connect, tmp_
         writer.write(connection, 1_000_000_000, data)
     node = connect("player")
     with open_bag(path) as bag, Player(node, bag, delay=0.1) as player:
-        player.wait(10)
+        player.wait(30)
         rospy_peer.call("subscribe", topic="/vault")
         received = rospy_peer.event("received")
     assert received["header"]["type"] == "secret_msgs/Vault"
@@ -211,9 +211,9 @@ def test_what_comes_without_its_definition_is_kept_and_played_as_bytes(
         (channel,) = bag.channels
         assert channel.type() == kind
         with Player(robot, bag, delay=0) as player:
-            assert player.wait(10)
+            assert player.wait(30)
             assert not player.problems
-            sample = ears.create_subscription("/sealed", kind).wait(10)
+            sample = ears.create_subscription("/sealed", kind).wait(30)
     assert (sample.data, sample.type.md5) == (b"\x01\x02", "a" * 32)
 
 
@@ -225,7 +225,7 @@ def test_rosbag_mends_a_recording_that_was_killed(connect, tmp_path, wait_for, m
         [*command, "--url", f"{master.url}?ip=127.0.0.1"], stdout=subprocess.DEVNULL
     )
     try:
-        wait_for(publisher.subscription_count, 20)
+        wait_for(publisher.subscription_count)
 
         def written():
             publisher.publish(data="x" * 100)

@@ -60,7 +60,7 @@ def test_rostopic_pub_reaches_us(node, start_tool):
     subscription = node.create_subscription("orders")
     start_tool("rostopic", "pub", "-r", "10", "/ops/orders", "geometry_msgs/Twist",
                "{linear: {x: 0.5}, angular: {z: -1.0}}")  # fmt: skip
-    message = subscription.wait(10).message()
+    message = subscription.wait(30).message()
     assert message.linear.x == 0.5
     assert message.angular.z == -1.0
     assert subscription.type.name == "geometry_msgs/msg/Twist"
@@ -68,7 +68,7 @@ def test_rostopic_pub_reaches_us(node, start_tool):
 
 def test_a_latched_rostopic_pub_reaches_us(node, start_tool):
     start_tool("rostopic", "pub", "-l", "/ops/plan", "std_msgs/Int32", "7")
-    assert node.create_subscription("plan", "std_msgs/Int32").wait(10).message().data == 7
+    assert node.create_subscription("plan", "std_msgs/Int32").wait(30).message().data == 7
 
 
 def test_rosnode_lists_pings_and_shows_our_node(node, tool, wait_for):
@@ -127,7 +127,7 @@ def test_rosbag_records_us_and_plays_to_us(node, start_tool, tool, tmp_path, wai
         words.publish(data=f"word {number}")
         if number:
             map_.publish(grid)
-    recorder.popen.wait(20)
+    recorder.popen.wait(30)
     told = tool("rosbag", "info", str(bag))
     assert "messages:    10" in told
     assert "nav_msgs/OccupancyGrid" in told
@@ -135,9 +135,9 @@ def test_rosbag_records_us_and_plays_to_us(node, start_tool, tool, tmp_path, wai
     map_.close()
     subscription, latched = node.create_subscription("words"), node.create_subscription("map")
     start_tool("rosbag", "play", "--quiet", "-d", "1", str(bag))
-    assert [subscription.wait(10).message().data for _ in range(5)] == [
+    assert [subscription.wait(30).message().data for _ in range(5)] == [
         f"word {number}" for number in range(5)
     ]
-    sample = latched.wait(10)
+    sample = latched.wait(30)
     assert list(sample.message().data) == [-1, 100]
     assert sample.message().info.resolution == 0.25

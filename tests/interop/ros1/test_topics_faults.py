@@ -44,7 +44,7 @@ def test_a_publisher_that_is_killed_is_told_of_and_replaced(connect, start_rospy
     plan = {"topic": "/killed", "type": STRING, "rate": 50, "count": 0}
     first = start_rospy("killed")
     first.call("publish", value={"data": "first"}, **plan)
-    assert subscription.wait(10).message().data == "first"
+    assert subscription.wait(30).message().data == "first"
     first.end()
     wait_for(
         lambda: (
@@ -67,11 +67,11 @@ def test_messages_flow_on_while_the_master_is_killed_and_restarted(
     peer = start_rospy("steady_peer", master=master)
     peer.call("publish", topic="/a", type=STRING, value={"data": "x"}, rate=50, count=0)
     subscription = node.create_subscription("/a", STRING)
-    assert subscription.wait(10)
+    assert subscription.wait(30)
     master.kill()
     wait_for(lambda: node.status().state.value == "lost")
     for _ in range(20):
-        assert subscription.wait(5)
+        assert subscription.wait(30)
     assert subscription.problem == ""
     master.start()
     wait_for(lambda: node.status().state.value == "connected")
@@ -113,7 +113,7 @@ def test_garbage_is_hung_up_on_and_others_go_on(garbage, connect, wait_for):
         sock.sendall(garbage)
         assert sock.recv(10) == b""
     publisher.publish(data="on")
-    assert subscription.wait(10).message().data == "on"
+    assert subscription.wait(30).message().data == "on"
 
 
 @pytest.mark.parametrize(
@@ -152,11 +152,11 @@ def test_what_nobody_can_define_is_passed_on_as_it_came(connect, wait_for):
     secret = OpaqueType("secret_msgs/Thing", "a" * 32, text="no definition {", ros=1)
     sent = source.create_publisher("/secret", secret, rosglass.QoS.latched())
     sent.publish_serialized(b"\1\2\3")
-    sample = relay.create_subscription("/secret").wait(10)
+    sample = relay.create_subscription("/secret").wait(30)
     assert (bytes(sample.data), sample.type) == (b"\1\2\3", secret)
     again = relay.create_publisher("/passed_on", sample.type, rosglass.QoS.latched())
     again.publish_serialized(sample)
-    end = sink.create_subscription("/passed_on").wait(10)
+    end = sink.create_subscription("/passed_on").wait(30)
     assert (bytes(end.data), end.type.text) == (b"\1\2\3", "no definition {")
     with pytest.raises(rosglass.TypeNotFoundError, match="md5"):
         relay.create_publisher("/nothing", OpaqueType("secret_msgs/Thing", ros=1))
@@ -171,9 +171,9 @@ def test_each_latched_publisher_of_a_node_is_heard_by_who_comes_late(connect, wa
     second.publish(data="b")
     for reader in (node, node, connect("late")):
         subscription = reader.create_subscription("/static")
-        assert {subscription.wait(10).message().data for _ in range(2)} == {"a", "b"}
+        assert {subscription.wait(30).message().data for _ in range(2)} == {"a", "b"}
     first.close()
-    assert connect("later").create_subscription("/static").wait(10).message().data == "b"
+    assert connect("later").create_subscription("/static").wait(30).message().data == "b"
 
 
 def test_creating_and_closing_a_thousand_times_leaves_nothing(connect, wait_for):
@@ -211,7 +211,7 @@ def test_creating_and_closing_a_thousand_times_leaves_nothing(connect, wait_for)
     subscription = node.create_subscription("/busy")
     wait_for(lambda: publisher.subscription_count() == 1)
     publisher.publish(data="x")
-    assert subscription.wait(10)
+    assert subscription.wait(30)
 
 
 def test_closing_while_connecting(connect, start_master):
@@ -244,7 +244,7 @@ def test_an_immediate_callback_may_publish_and_close(connect, wait_for):
     subscription = node.create_subscription("/reflex/in", raw_callback=reflex, executor=IMMEDIATE)
     wait_for(lambda: source.subscription_count() and out.subscription_count())
     source.publish(data="now")
-    assert back.wait(10).message().data == "now"
+    assert back.wait(30).message().data == "now"
     wait_for(lambda: source.subscription_count() == 0)
     assert len(got) == 1
 
@@ -254,7 +254,7 @@ def test_a_host_name_that_is_unknown_is_told_with_the_remedy(connect, master, wa
     subscription = node.create_subscription("/unknown_host")
     wait_for(lambda: ["/unknown_host", ["/lost"]] in master.call("getSystemState")[1])
     master.call("registerPublisher", "/unknown_host", STRING, "http://no-such-host.invalid:1/")
-    told = wait_for(lambda: subscription.problem, 20)
+    told = wait_for(lambda: subscription.problem)
     assert "no-such-host.invalid" in told
     assert "ROS_HOSTNAME" in told
 
@@ -274,4 +274,4 @@ def test_a_fork_does_not_publish_or_steal_messages(connect, wait_for):
         except rosglass.NodeClosedError:
             os._exit(0)
     assert os.waitpid(child, 0)[1] == 0
-    assert subscription.wait(10).message().data == "before"
+    assert subscription.wait(30).message().data == "before"

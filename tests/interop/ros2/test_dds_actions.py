@@ -39,16 +39,16 @@ def test_we_send_goals_to_dora(dds_connect, run_dora):
     node = dds_connect("cockpit")
     process = run_dora(do="serve action")
     client = node.create_action_client("/count", FIBONACCI)
-    assert client.wait_for_server(15), client.problem
+    assert client.wait_for_server(30), client.problem
     feedback = []
     goal = client.send_goal({"order": 5}, on_feedback=lambda m: feedback.append(len(m.sequence)))
-    status, result = goal.result(10)
+    status, result = goal.result(30)
     assert status is GoalStatus.SUCCEEDED
     assert list(result.sequence) == [0, 1, 2, 3, 4]
     assert feedback == [2, 3, 4, 5]
     goal = client.send_goal({"order": 100})
     goal.cancel()
-    status, result = goal.result(10)
+    status, result = goal.result(30)
     assert status is GoalStatus.CANCELED
     assert 0 < len(result.sequence) < 100
     assert [process.event("status") for _ in range(2)] == ["succeeded", "canceled"]

@@ -222,7 +222,7 @@ while True:
     assert process.stdout.readline() == "publishing\n"
     time.sleep(1.0)
     process.send_signal(signal.SIGINT)
-    told, _ = process.communicate(timeout=15)
+    told, _ = process.communicate(timeout=60)
     reader.kill()
     reader.wait()
     assert "KeyboardInterrupt" in told
@@ -242,10 +242,10 @@ while not heard:
     time.sleep(0.01)
 keep = node.create_subscription('/big', '{IMAGE}')
 node.create_publisher('/big', '{IMAGE}').publish(data=bytes(100_000))
-picture = keep.wait(5).message().data
+picture = keep.wait(30).message().data
 """
     process = program(text + end, dds_domain)
-    told, _ = process.communicate(timeout=20)
+    told, _ = process.communicate(timeout=60)
     assert process.returncode == code, told
     if not end.startswith("raise"):
         assert told == ""
@@ -270,10 +270,10 @@ if not child:
     sys.exit(0)
 print('child', os.waitpid(child, 0)[1], flush=True)
 publisher.publish(data='parent')
-print(subscription.wait(5).message().data, flush=True)
+print(subscription.wait(30).message().data, flush=True)
 """
     process = program(text, dds_domain)
-    told, _ = process.communicate(timeout=20)
+    told, _ = process.communicate(timeout=60)
     assert told.split("\n")[:5] == [
         NodeClosedError.__name__,
         NodeClosedError.__name__,

@@ -87,7 +87,7 @@ def linked(publisher: Any, wait_for: Any) -> Any:
 def test_we_receive_what_the_peer_publishes(dds_connect, both_ways, type_name, peer_values):
     node = dds_connect("cockpit")
     subscription = node.create_subscription(topic("from", type_name), type_name)
-    sample = subscription.wait(10)
+    sample = subscription.wait(30)
     assert sample is not None, (
         subscription.problem,
         node.status(),
@@ -98,7 +98,7 @@ def test_we_receive_what_the_peer_publishes(dds_connect, both_ways, type_name, p
     received = peer_values.summary(sample.message().to_dict())
     assert received == peer_values.summary(peer_values.VALUES[type_name])
     assert 0 <= (sample.received - sample.sent).seconds < 2
-    following = subscription.wait(10)
+    following = subscription.wait(30)
     assert following.publisher == sample.publisher
     assert len(sample.publisher) == 16
     assert [end.gid for end in node.publishers(subscription.topic)] == [sample.publisher]
@@ -134,7 +134,7 @@ def test_the_last_message_of_a_latched_peer_comes_late_but_comes(dds_connect, cy
     # far the peer is, Cyclone DDS gives one reader what is sent again for another.
     assert early.wait(0.5) is None
     latched = node.create_subscription("/latched", STRING, qos=QoS.latched(10))
-    wanted = [latched.wait(10).message().data for _ in range(2)]
+    wanted = [latched.wait(30).message().data for _ in range(2)]
     assert wanted == ["3", "4"]
     assert latched.wait(0.3) is None
 
@@ -166,7 +166,7 @@ def test_profiles_that_match_exchange_everything(dds_connect, cyclone, wait_for,
         time.sleep(0.002)
     expected = [str(number) for number in range(50)]
     assert [process.event("value")["data"] for _ in expected] == expected
-    assert [subscription.wait(5).message().data for _ in expected] == expected
+    assert [subscription.wait(30).message().data for _ in expected] == expected
 
 
 @pytest.mark.parametrize(
@@ -220,7 +220,7 @@ def test_another_type_on_the_topic_is_named_and_not_received(dds_connect, cyclon
     subscription = dds_connect("cockpit").create_subscription("/mixed", STRING)
     problem = wait_for(lambda: INT32 in subscription.problem and subscription.problem)
     assert STRING in problem
-    texts = {subscription.wait(5).message().data for _ in range(10)}
+    texts = {subscription.wait(30).message().data for _ in range(10)}
     assert texts == {"Grüße, robot"}
 
 
@@ -232,7 +232,7 @@ def test_rubbish_is_refused_and_disturbs_nobody(dds_connect, cyclone, caplog):
     texts: list[str] = []
     node.create_subscription("/noisy", STRING, lambda message: texts.append(message.data))
     raw = node.create_subscription("/noisy", STRING, qos=100)
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 30
     while texts.count("Grüße, robot") < 20 and time.monotonic() < deadline:
         time.sleep(0.05)
     assert set(texts) == {"Grüße, robot"}
@@ -245,12 +245,12 @@ def test_rubbish_is_refused_and_disturbs_nobody(dds_connect, cyclone, caplog):
 def test_a_peer_that_is_killed_leaves_and_another_takes_over(dds_connect, cyclone):
     subscription = dds_connect("cockpit").create_subscription("/relay", STRING)
     first = cyclone(publish={"/relay": STRING}, period=0.01)
-    one = subscription.wait(10)
+    one = subscription.wait(30)
     first.end()
     while subscription.wait(0.5) is not None:
         pass
     cyclone(publish={"/relay": STRING}, period=0.01)
-    two = subscription.wait(10)
+    two = subscription.wait(30)
     assert two is not None
     assert two.publisher != one.publisher
 
@@ -261,7 +261,7 @@ def test_a_subscription_says_who_left(dds_connect, wait_for):
         robot = dds_connect(name)
         publisher = linked(robot.create_publisher("/relay", STRING), wait_for)
         publisher.publish(data=name)
-        assert subscription.wait(10).message().data == name
+        assert subscription.wait(30).message().data == name
         wait_for(lambda: not subscription.problem, what="no problem while somebody publishes")
         robot.close()
         wait_for(lambda name=name: f"when /{name} left" in subscription.problem)
@@ -283,7 +283,7 @@ def test_several_publishers_in_and_outside_of_the_process(dds_connect, wait_for)
             publisher.publish(data=f"{index} {number}")
     heard: dict[bytes, list[str]] = {}
     for _ in range(200):
-        sample = subscription.wait(5)
+        sample = subscription.wait(30)
         heard.setdefault(sample.publisher, []).append(sample.message().data)
     assert len(heard) == 4
     expected = {f"{index}": [f"{index} {number}" for number in range(50)] for index in range(4)}
@@ -298,7 +298,7 @@ def test_big_messages_arrive_whole_and_are_not_copied(dds_connect, wait_for):
     fields = {"height": 1080, "width": 1920, "step": 5760, "encoding": "rgb8"}
     for _ in range(3):
         publisher.publish(data=pixels, **fields)
-    samples = [subscription.wait(10) for _ in range(3)]
+    samples = [subscription.wait(30) for _ in range(3)]
     for sample in samples:
         assert isinstance(sample.data, memoryview)
         assert sample.data.readonly
@@ -316,7 +316,7 @@ def test_a_picture_outlives_the_node_that_received_it(dds_connect, wait_for):
     subscription = screen.create_subscription("/camera", IMAGE)
     publisher = linked(dds_connect("robot").create_publisher("/camera", IMAGE), wait_for)
     publisher.publish(data=np.arange(100_000, dtype=np.uint8))
-    pixels = subscription.wait(10).message().data
+    pixels = subscription.wait(30).message().data
     screen.close()
     publisher.close()
     assert np.array_equal(pixels, np.arange(100_000, dtype=np.uint8))
@@ -332,7 +332,7 @@ def test_a_topic_is_passed_on_without_being_decoded(dds_connect, wait_for):
     linked(passed, wait_for)
     publisher = linked(source.create_publisher("/in", IMAGE), wait_for)
     publisher.publish(data=np.arange(200_000, dtype=np.uint8), encoding="mono8")
-    message = subscription.wait(10).message()
+    message = subscription.wait(30).message()
     assert message.encoding == "mono8"
     assert np.array_equal(message.data, np.arange(200_000, dtype=np.uint8))
 
@@ -343,7 +343,7 @@ def test_a_node_hears_itself(dds_connect):
     publisher = node.create_publisher("/echo", STRING)
     assert publisher.subscription_count() == 1
     publisher.publish(data="hello")
-    sample = subscription.wait(5)
+    sample = subscription.wait(30)
     assert sample.message().data == "hello"
     assert sample.publisher == node.publishers("/echo")[0].gid
 
@@ -353,7 +353,7 @@ def test_nothing_is_lost_at_full_speed(dds_connect, wait_for):
     publisher = linked(dds_connect("talks").create_publisher("/fast", STRING, KEEP_ALL), wait_for)
     for number in range(10_000):
         publisher.publish(data=str(number))
-    texts = [subscription.wait(5).message().data for _ in range(10_000)]
+    texts = [subscription.wait(30).message().data for _ in range(10_000)]
     assert texts == [str(number) for number in range(10_000)]
     assert subscription.statistics().dropped == 0
 

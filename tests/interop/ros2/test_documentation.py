@@ -234,7 +234,7 @@ class Reader:
             expected = ast.literal_eval(remark)
         except (SyntaxError, ValueError):
             return
-        deadline = time.monotonic() + 5
+        deadline = time.monotonic() + 30
         while not _is(value, expected) and time.monotonic() < deadline:
             time.sleep(0.05)  # what is known of the robot grows
             value = self._evaluate(statement)

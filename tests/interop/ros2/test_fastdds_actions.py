@@ -86,7 +86,7 @@ class Server:
             sequence.append(len(sequence))
             layout = "16s I " + "i " * len(sequence)
             self.fast.send("feedback", cdr(layout, goal, len(sequence), *sequence))
-        self.may_end.wait(10)
+        self.may_end.wait(30)
         status = CANCELED if goal in self.cancelled else SUCCEEDED
         self.tell(goal, status)
         layout = "b I " + "i " * len(sequence)
@@ -114,7 +114,7 @@ class Server:
 def test_we_send_goals_to_fast_dds(fast, node):
     server = Server(fast, "/fast/count")
     client = node.create_action_client("/fast/count", FIBONACCI)
-    assert client.wait_for_server(15), client.problem
+    assert client.wait_for_server(30), client.problem
     feedback: list[int] = []
 
     def follow(message: Any) -> None:
@@ -123,13 +123,13 @@ def test_we_send_goals_to_fast_dds(fast, node):
             server.may_end.set()
 
     goal = client.send_goal({"order": 5}, on_feedback=follow)
-    status, result = goal.result(15)
+    status, result = goal.result(30)
     assert status is GoalStatus.SUCCEEDED
     assert list(result.sequence) == [0, 1, 2, 3, 4]
     assert feedback == [2, 3, 4, 5]
     goals = [client.send_goal({"order": order}) for order in (1000, 10, 12)]
     goals[0].cancel()
-    ended = [goal.result(10) for goal in goals]
+    ended = [goal.result(30) for goal in goals]
     assert [status for status, _ in ended] == [
         GoalStatus.CANCELED,
         GoalStatus.SUCCEEDED,

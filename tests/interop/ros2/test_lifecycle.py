@@ -141,15 +141,15 @@ def test_a_router_that_dies_and_returns(mode, start_router, connect, wait_for, c
     wait_for(lambda: len(receiver.numbers) > 20)
     router.end()
     if mode == "client":
-        wait_for(lambda: listener.status().state is LOST, 1.0)
+        wait_for(lambda: listener.status().state is LOST)
         assert "lost, trying again every second" in listener.status().detail
-        wait_for(lambda: listener.nodes() == [NodeName("/", "listener")], 1.0)
+        wait_for(lambda: listener.nodes() == [NodeName("/", "listener")])
     else:
         # Two peers are linked with each other already and go on without the router.
-        wait_for(lambda: "no router" in listener.status().detail, 1.0)
+        wait_for(lambda: "no router" in listener.status().detail)
         assert listener.status().state is CONNECTED
         heard = len(receiver.numbers)
-        wait_for(lambda: len(receiver.numbers) > heard + 20, 1.0)
+        wait_for(lambda: len(receiver.numbers) > heard + 20)
     time.sleep(1)
     start_router()
     returned = time.monotonic()
@@ -193,13 +193,13 @@ def test_a_peer_that_is_killed_leaves_the_graph_at_once(router, start_peer, conn
     node.on_graph_change(lambda: changes.append(1))
     peer = start_peer("rosglass", router, publish={"/count": TWIST})
     subscription = node.create_subscription("/count")
-    assert subscription.wait(10) is not None
+    assert subscription.wait(30) is not None
     wait_for(lambda: NodeName("/own", "peer") in node.nodes())
     count = len(changes)
     os.kill(peer.pid, signal.SIGKILL)
-    wait_for(lambda: NodeName("/own", "peer") not in node.nodes(), 1.0)
+    wait_for(lambda: NodeName("/own", "peer") not in node.nodes())
     assert node.publishers("/count") == []
-    wait_for(lambda: len(changes) > count, 1.0)
+    wait_for(lambda: len(changes) > count)
     assert node.status().state is CONNECTED
     wait_for(lambda: "/own/peer left" in subscription.problem)
     again = start_peer("rosglass", router, publish={"/count": TWIST})
@@ -226,7 +226,7 @@ def test_every_new_connection_receives(router, start_peer):
     peer = start_peer("rosglass", router, publish={"/count": TWIST}, period=0.02)
     for _ in range(40):
         with rosglass.connect(router.url, "visitor") as node:
-            assert node.create_subscription("/count", TWIST).wait(2) is not None
+            assert node.create_subscription("/count", TWIST).wait(30) is not None
     peer.end()
 
 
@@ -361,13 +361,13 @@ def test_the_router_command_ends_cleanly(number, start_router):
         router.popen.args,
         capture_output=True,
         text=True,
-        timeout=20,
+        timeout=60,
         check=False,
     )
     assert second.returncode == 1
     assert "a Zenoh router runs there already" in second.stderr
     router.popen.send_signal(number)
-    assert router.popen.wait(5) == 0
+    assert router.popen.wait(30) == 0
     assert "Zenoh router ended\n" in router.output
 
 
@@ -396,6 +396,6 @@ def test_a_program_that_forgets_to_close_its_node_ends_all_the_same(router):
     program = FORGETFUL.format(url=router.url, type=TWIST)
     for _ in range(3):
         done = subprocess.run(
-            [sys.executable, "-c", program], capture_output=True, text=True, timeout=20, check=False
+            [sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False
         )
         assert (done.returncode, done.stderr) == (0, "")

@@ -85,24 +85,24 @@ def count(goal):
 
 def test_calls_in_every_way(node, server):
     client = node.create_service_client("/add")
-    assert client.wait_for_server(10), client.problem
+    assert client.wait_for_server(30), client.problem
     assert client.type.name == ADD
     assert client.call({"a": 1, "b": 2}).sum == 3
     calls = [client.call_async({"a": value, "b": 1}) for value in range(100)]
-    assert [call.result(10).sum for call in calls] == list(range(1, 101))
+    assert [call.result(30).sum for call in calls] == list(range(1, 101))
     assert client.problem == ""
 
 
 def test_a_callback_that_fails(node, server):
     client = node.create_service_client("/fail", TRIGGER)
-    assert client.wait_for_server(10), client.problem
+    assert client.wait_for_server(30), client.problem
     with pytest.raises((rosglass.ServiceError, rosglass.TimeoutError)):
         client.call(timeout=1)
 
 
 def test_no_callback_waits_in_the_thread_that_receives(node, server, wait_for, url):
     client = node.create_service_client("/add", ADD)
-    assert client.wait_for_server(10), client.problem
+    assert client.wait_for_server(30), client.problem
     told = []
 
     def ask(_):
@@ -127,22 +127,22 @@ def test_goals_in_every_way(node, server, wait_for):
         on_feedback=lambda message: feedback.append(len(message.sequence)),
         on_status_change=statuses.append,
     )
-    status, result = goal.result(10)
+    status, result = goal.result(30)
     assert status is GoalStatus.SUCCEEDED, client.problem
     assert list(result.sequence) == [0, 1, 2, 3, 4]
     wait_for(lambda: statuses[-1] is GoalStatus.SUCCEEDED, what=statuses)
     assert statuses[0] is GoalStatus.ACCEPTED
     assert feedback == [2, 3, 4, 5]
     with pytest.raises(rosglass.GoalRejectedError):
-        client.send_goal({"order": 1000}).result(10)
+        client.send_goal({"order": 1000}).result(30)
     goals = [client.send_goal({"order": 900}) for _ in range(3)]
-    assert all(goal.acceptance.result(10) for goal in goals)
-    assert goals[0].cancel().result(10) == CancelAnswer((goals[0].id,))
-    assert goals[0].result(10).status is GoalStatus.CANCELED
-    earlier = client.cancel_before(goals[1].accepted).result(10)
+    assert all(goal.acceptance.result(30) for goal in goals)
+    assert goals[0].cancel().result(30) == CancelAnswer((goals[0].id,))
+    assert goals[0].result(30).status is GoalStatus.CANCELED
+    earlier = client.cancel_before(goals[1].accepted).result(30)
     assert earlier.accepted == (goals[1].id,)
-    assert client.cancel_all().result(10).accepted == (goals[2].id,)
-    assert {goal.result(10).status for goal in goals} == {GoalStatus.CANCELED}
+    assert client.cancel_all().result(30).accepted == (goals[2].id,)
+    assert {goal.result(30).status for goal in goals} == {GoalStatus.CANCELED}
 
 
 def test_the_other_way_round(node, url, run_peer):
@@ -160,11 +160,11 @@ def test_the_status_of_goals_is_there_for_late_listeners(node, url, wait_for):
     node.create_action_server("/late", FIBONACCI, count)
     client = node.create_action_client("/late", FIBONACCI)
     goal = client.send_goal({"order": 2})
-    assert goal.result(10).status is GoalStatus.SUCCEEDED
+    assert goal.result(30).status is GoalStatus.SUCCEEDED
     with rosglass.connect(url, "late") as other:
         topic, kind = "/late/_action/status", "action_msgs/msg/GoalStatusArray"
         subscription = other.create_subscription(topic, kind, qos=rosglass.QoS.latched())
-        sample = subscription.wait(10)
+        sample = subscription.wait(30)
         assert sample is not None, subscription.problem
         entry = sample.message().status_list[0]
         assert (bytes(entry.goal_info.goal_id.uuid), entry.status) == (goal.id, 4)
@@ -183,21 +183,21 @@ def test_a_server_that_is_killed_at_work(new_url, run_peer, monkeypatch):
     with rosglass.connect(url, "cockpit") as node:
         client = node.create_service_client("/never", TRIGGER)
         actions = node.create_action_client("/count", FIBONACCI)
-        assert client.wait_for_server(10), client.problem
-        assert actions.wait_for_server(10), actions.problem
+        assert client.wait_for_server(30), client.problem
+        assert actions.wait_for_server(30), actions.problem
         call, goal = client.call_async(timeout=60), actions.send_goal({"order": 900}, timeout=60)
         server.event("asked")
-        assert goal.acceptance.result(10)
+        assert goal.acceptance.result(30)
         server.end()
         with pytest.raises(rosglass.ConnectionLostError, match="went away"):
-            call.result(15)
+            call.result(30)
         with pytest.raises(rosglass.ConnectionLostError, match="went away"):
-            goal.result(15)
+            goal.result(30)
         assert goal.status is GoalStatus.LOST
         assert not client.ready
         again = run_peer("offer", url, "victim")
         again.event("ready")
-        assert actions.send_goal({"order": 2}).result(10).status is GoalStatus.SUCCEEDED
+        assert actions.send_goal({"order": 2}).result(30).status is GoalStatus.SUCCEEDED
         again.end()
 
 
@@ -206,9 +206,9 @@ def test_closing_a_server_tells_its_clients(node, url):
         other.create_action_server("/closing", FIBONACCI, count)
         client = node.create_action_client("/closing", FIBONACCI)
         goal = client.send_goal({"order": 900})
-        assert goal.acceptance.result(10), client.problem
+        assert goal.acceptance.result(30), client.problem
         time.sleep(0.2)  # the request for the result is on its way
-    assert goal.result(10).status is GoalStatus.ABORTED
+    assert goal.result(30).status is GoalStatus.ABORTED
 
 
 def test_ctrl_c_ends_a_call(url, server, run_peer, wait_for):
@@ -216,8 +216,8 @@ def test_ctrl_c_ends_a_call(url, server, run_peer, wait_for):
     caller.event("waiting")
     server.event("asked")
     os.kill(caller.pid, signal.SIGINT)
-    assert caller.event("interrupted", timeout=5) < 2
-    assert caller.popen.wait(5) == 0
+    assert caller.event("interrupted", timeout=30) < 2
+    assert caller.popen.wait(30) == 0
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
@@ -254,11 +254,11 @@ def test_a_goal_survives_a_router_that_is_restarted(free_port, run_peer, wait_fo
         goal = actions.send_goal(
             {"order": 150}, on_feedback=lambda message: feedback.append(len(message.sequence))
         )
-        assert goal.acceptance.result(10), actions.problem
+        assert goal.acceptance.result(30), actions.problem
         wait_for(lambda: feedback, what="feedback")
     time.sleep(0.5)
     with Router(listen):
-        status, result = goal.result(15)
+        status, result = goal.result(30)
         assert status is GoalStatus.SUCCEEDED
         assert len(result.sequence) == 150
         assert feedback[-1] == 150
@@ -301,5 +301,5 @@ def test_the_examples(new_url, start, wait_for, server, client, told):
     shown = "".join(using.output)
     assert {text: shown.count(text) for text in told} == {text: told.count(text) for text in told}
     os.kill(serving.pid, signal.SIGINT)
-    assert serving.popen.wait(5) == 0
+    assert serving.popen.wait(30) == 0
     wait_for(lambda: serving.output[-1] == "bye\n", what=serving.output)

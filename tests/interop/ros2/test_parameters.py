@@ -54,7 +54,7 @@ def test_another_programs_parameters(join: Any, start_robot: Any, wait_for: Any)
     client = node.create_parameter_client("/arm/robot")
     events: list[Any] = []
     client.watch(events.append)
-    assert client.wait_for_server(10)
+    assert client.wait_for_server(30)
     assert client.names(["limits"]) == ["limits.low"]
     values = client.get()
     assert values == {
@@ -92,7 +92,7 @@ def test_a_program_killed_while_it_is_asked(join: Any, start_robot: Any, wait_fo
     node = join("cockpit")
     robot = start_robot(node.url)
     client = node.create_parameter_client("/arm/robot")
-    assert client.wait_for_server(10)
+    assert client.wait_for_server(30)
     errors: list[Error] = []
 
     def set_slow() -> None:
@@ -133,7 +133,7 @@ def test_doras_parameters(
     client = node.create_parameter_client("/dora/dora_node")
     events: list[Any] = []
     client.watch(events.append)
-    assert client.wait_for_server(10)
+    assert client.wait_for_server(30)
     assert client.names() == sorted([*given, "use_sim_time"])
     assert client.names(["na"]) == ["name", "names"]  # dora takes beginnings for prefixes
     assert client.get(list(given)) == given

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 STRING, GRID = "std_msgs/msg/String", "nav_msgs/msg/OccupancyGrid"
 
 
-def until(condition: Callable[[], Any], timeout: float = 10.0) -> Any:
+def until(condition: Callable[[], Any], timeout: float = 30.0) -> Any:
     deadline = time.monotonic() + timeout
     while not (value := condition()):
         assert time.monotonic() < deadline, f"not within {timeout} s"
@@ -114,14 +114,14 @@ def test_a_recording_is_read_by_others_and_played_by_us(
         Player(node, bag, rate=3.0, clock=50, remap={"/chatter": "/talk"}) as player,
     ):
         began = time.monotonic()
-        assert player.wait(20)
+        assert player.wait(30)
         assert player.status().state is PlayerState.FINISHED
         assert player.status().sent == 21
         assert player.problems == {}
         assert time.monotonic() - began > bag.duration / 3
         until(lambda: len(heard) == 10)
         assert heard == [f"n{i}" for i in range(10)]
-        sample = grid.wait(5)
+        sample = grid.wait(30)
         assert sample is not None
         assert list(sample.message().data) == [1, 2]
         until(lambda: secret.statistics().received == 10)
@@ -168,7 +168,7 @@ def test_mixing_with_a_robot_is_said(
         open_bag(recording) as bag,
         Player(node, bag, topics=["/chatter"], delay=0, rate=100) as player,
     ):
-        assert player.wait(10)
+        assert player.wait(30)
         assert "/robot2 publishes here, too" in player.problems["/chatter"]
 
 
@@ -227,7 +227,7 @@ def test_the_commands_with_a_ros1_bag(
         [*rosglass, "record", "/scan", "-o", str(output), "--url", router.url],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
-    until(output.exists, 20)
+    until(output.exists)
     played = subprocess.run(
         [*rosglass, "play", str(tmp_path / "a.bag"), "--url", router.url, "--delay", "2"],
         capture_output=True, text=True, check=True, timeout=60,

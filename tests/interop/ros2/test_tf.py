@@ -39,8 +39,8 @@ def test_two_robots(node: Any, start: Any, wait_for: Any) -> None:
     # Who comes later gets the static ones of both.
     listener = TransformListener(node)
     buffer = listener.buffer
-    buffer.wait_for_transform("gripper", "camera", timeout=20)
-    buffer.wait_for_transform("gripper", "lidar", timeout=20)
+    buffer.wait_for_transform("gripper", "camera", timeout=30)
+    buffer.wait_for_transform("gripper", "lidar", timeout=30)
     wait_for(lambda: buffer.tree()["camera"].authority == "/left")
     wait_for(lambda: buffer.tree()["gripper"].authority == "/right")
 
@@ -48,11 +48,11 @@ def test_two_robots(node: Any, start: Any, wait_for: Any) -> None:
     buffer.on_change("map", "camera", lambda: told.append(None))
     wait_for(lambda: listener.subscriptions[0].publisher_count() == 2)
     later = Time(START + 50_000_000)
-    promise = buffer.lookup_transform_async("map", "camera", later, timeout=20)
+    promise = buffer.lookup_transform_async("map", "camera", later, timeout=30)
     for step in (0, 100_000_000):
         robots["left"].ask(stamp=START + step)
         robots["left"].event("sent")
-    found = promise.result(20)
+    found = promise.result(30)
     assert found.translation == (1.0, 2.0, 0.0)
     assert found.stamp == later
     assert told
@@ -71,11 +71,11 @@ def test_who_receives_cannot_wait(node: Any, start: Any, wait_for: Any) -> None:
 
     def wait() -> None:
         try:
-            listener.buffer.wait_for_transform("map", "never", timeout=5)
+            listener.buffer.wait_for_transform("map", "never", timeout=30)
         except Exception as error:
             caught.append(error)
 
-    listener.buffer.wait_for_transform("base", "waker", timeout=20)
+    listener.buffer.wait_for_transform("base", "waker", timeout=30)
     wait_for(listener.subscriptions[0].publisher_count)
     listener.buffer.on_update(wait)
     robot.ask(stamp=START)

@@ -96,24 +96,24 @@ def test_services_and_latched_topics_after_a_router_was_restarted(
     answer = threading.Event()
 
     def add(request):
-        answer.wait(5)
+        answer.wait(30)
         return {"sum": request.a + request.b}
 
     robot.create_service_server("/add", ADD, add)
     robot.create_publisher("/map", STRING, rosglass.QoS.latched()).publish(data="hall")
     client = cockpit.create_service_client("/add", ADD)
-    assert client.wait_for_server(5), client.problem
-    call = client.call_async({"a": 1, "b": 2}, timeout=20)
+    assert client.wait_for_server(30), client.problem
+    call = client.call_async({"a": 1, "b": 2}, timeout=30)
     time.sleep(0.2)
     before = time.monotonic()
     router.end()
     if mode == "client":
         with pytest.raises(ConnectionLostError, match="went away before it answered"):
-            call.result(5)
+            call.result(30)
         assert time.monotonic() - before < 2
     answer.set()
     if mode == "peer":
-        assert call.result(5).sum == 3, "peers go on without the router"
+        assert call.result(30).sum == 3, "peers go on without the router"
     time.sleep(0.3)
     start_router()
     returned = time.monotonic()
@@ -138,8 +138,8 @@ def test_a_client_follows_its_servers_wherever_they_are(mode, start_router, conn
         return node
 
     def answers():
-        assert client.wait_for_server(10), client.problem
-        return client.call({"a": 1, "b": 2}, timeout=10).sum == 3
+        assert client.wait_for_server(30), client.problem
+        return client.call({"a": 1, "b": 2}, timeout=30).sum == 3
 
     def servers(*names):
         wait_for(lambda: {s.node.name for s in cockpit.service_servers("/add")} == set(names))
@@ -230,7 +230,7 @@ def test_a_slow_consumer_costs_no_memory(router, start, connect, wait_for):
     subscription = node.create_subscription("/camera", IMAGE, look, rosglass.QoS.sensor_data())
     wait_for(lambda: subscription.statistics().received > 20)
     before, received = memory(), subscription.statistics().received
-    wait_for(lambda: subscription.statistics().received > received + 150, 20)
+    wait_for(lambda: subscription.statistics().received > received + 150)
     statistics = subscription.statistics()
     # 140 MB have come meanwhile.
     assert memory() - before < 40e6
@@ -313,9 +313,9 @@ def test_a_server_that_answers_rubbish(router, connect, caplog):
             kept.append(session.liveliness().declare_token(token))
         for name in replies:
             client = node.create_service_client(f"/{name}", ADD)
-            assert client.wait_for_server(5), client.problem
+            assert client.wait_for_server(30), client.problem
             with pytest.raises(ServiceError, match=f"/{name}"):
-                client.call({"a": 1, "b": 2}, timeout=5)
+                client.call({"a": 1, "b": 2}, timeout=30)
         # One that lets the request go, without a word.
         kept.append(
             session.declare_queryable(f"0/silent/{kind}", lambda query: query.drop(), complete=True)
@@ -323,10 +323,10 @@ def test_a_server_that_answers_rubbish(router, connect, caplog):
         token = f"@ros2_lv/0/{own}/0/99/SS/%/%/liar/%silent/{kind}/::,10:,:,:,,"
         kept.append(session.liveliness().declare_token(token))
         client = node.create_service_client("/silent", ADD)
-        assert client.wait_for_server(5), client.problem
+        assert client.wait_for_server(30), client.problem
         before = time.monotonic()
         with pytest.raises(ConnectionLostError, match="/silent"):
-            client.call({"a": 1, "b": 2}, timeout=10)
+            client.call({"a": 1, "b": 2}, timeout=30)
         assert time.monotonic() - before < 3
         for one in kept:
             one.undeclare()
@@ -366,7 +366,7 @@ def test_a_thousand_of_everything_leave_nothing_behind(start_router, connect, wa
     for number in range(250):
         cycle(number)
     wait_for(settled)
-    wait_for(lambda: threading.active_count() <= threads, 3)
+    wait_for(lambda: threading.active_count() <= threads)
     gc.collect()
     assert descriptors() <= files + 2
     assert len(gc.get_objects()) < objects + 500
@@ -384,7 +384,7 @@ def test_nodes_that_call_each_other_leave_nothing_behind(router, wait_for):
             one.create_service_server("/add", ADD, lambda r: {"sum": r.a + r.b})
             subscription = two.create_subscription("/count", TWIST)
             client = two.create_service_client("/add", ADD)
-            assert client.call({"a": 1, "b": 2}, timeout=5).sum == 3
+            assert client.call({"a": 1, "b": 2}, timeout=30).sum == 3
             one.create_publisher("/count", TWIST).publish()
             client.call_async({"a": 1, "b": 2})  # left alone with its call
             subscription.wait(0.001)
@@ -424,7 +424,7 @@ def test_two_nodes_in_one_process(connect, wait_for):
     publisher = two.create_publisher("/count", TWIST)
     wait_for(publisher.subscription_count)
     publisher.publish(linear={"x": 4.0})
-    assert subscription.wait(5).message().linear.x == 4
+    assert subscription.wait(30).message().linear.x == 4
     assert two.create_service_client("/add", ADD).call({"a": 1, "b": 2}).sum == 3
     assert one.create_service_client("/add", ADD).call({"a": 2, "b": 2}).sum == 4
     one.close()
@@ -499,5 +499,5 @@ def test_ctrl_c_at_any_moment(delay, router):
     assert process.stdout.readline() == "busy\n"
     time.sleep(delay)
     process.send_signal(signal.SIGINT)
-    out, errors = process.communicate(timeout=10)
+    out, errors = process.communicate(timeout=60)
     assert (process.returncode, out, errors) == (0, "interrupted\n", "")

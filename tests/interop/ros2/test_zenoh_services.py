@@ -69,7 +69,7 @@ def server(kind, run_peer):
 @pytest.mark.parametrize("given", [ADD, None], ids=["type given", "type discovered"])
 def test_we_call_the_peer(node, server, given):
     client = node.create_service_client("/add", given)
-    assert client.wait_for_server(10), client.problem
+    assert client.wait_for_server(30), client.problem
     assert client.type.name == ADD
     assert client.call({"a": 2, "b": 40}).sum == 42
     assert [client.call({"a": value, "b": -1}).sum for value in range(20)] == list(range(-1, 19))
@@ -78,17 +78,17 @@ def test_we_call_the_peer(node, server, given):
 
 def test_five_in_flight_answered_in_reverse_order(node, server):
     client = node.create_service_client("/hold", ADD)
-    assert client.wait_for_server(10), client.problem
+    assert client.wait_for_server(30), client.problem
     calls = [client.call_async({"a": value, "b": 100}) for value in range(5)]
     assert client.pending == 5
     server.event("held")
-    assert [call.result(5).sum for call in calls] == [100, 101, 102, 103, 104]
+    assert [call.result(30).sum for call in calls] == [100, 101, 102, 103, 104]
     assert client.pending == 0
 
 
 def test_a_call_that_is_never_answered_ends_at_its_time(node, server):
     client = node.create_service_client("/never", ADD)
-    assert client.wait_for_server(10), client.problem
+    assert client.wait_for_server(30), client.problem
     before = time.monotonic()
     with pytest.raises(TimeoutError, match=r"did not answer within 0\.5 s"):
         client.call({"a": 1}, timeout=0.5)
@@ -134,23 +134,23 @@ def test_the_peer_is_told_when_our_callback_fails(node, kind, run_peer):
 
     node.create_service_server("/broken", ADD, fail)
     process = run_peer(kind, do="call", service="/broken", pairs=[[1, 2]])
-    assert process.event("failed", timeout=8)
+    assert process.event("failed", timeout=30)
     process.end()
 
 
 def test_a_peer_that_is_killed_in_mid_call(node, kind, run_peer, wait_for):
     process = run_peer(kind, do="serve", suffix="2")
     client = node.create_service_client("/add2", ADD)
-    assert client.wait_for_server(10), client.problem
+    assert client.wait_for_server(30), client.problem
     before = time.monotonic()
     with pytest.raises(ConnectionLostError, match="went away before it answered"):
-        client.call({"a": -2}, timeout=10)
+        client.call({"a": -2}, timeout=30)
     assert time.monotonic() - before < 2
-    assert process.popen.wait(5) == 1
-    wait_for(lambda: not client.ready, 1)
+    assert process.popen.wait(30) == 1
+    wait_for(lambda: not client.ready)
     # The one that comes after it serves the same client.
     again = run_peer(kind, do="serve", suffix="2")
-    assert client.call({"a": 1, "b": 1}, timeout=10).sum == 2
+    assert client.call({"a": 1, "b": 1}, timeout=30).sum == 2
     again.end()
 
 
@@ -170,16 +170,16 @@ def dora(request):
 def test_we_send_goals_to_dora(node, dora, run_peer):
     process = run_peer(dora, do="serve action")
     client = node.create_action_client("/count")
-    assert client.wait_for_server(10), client.problem
+    assert client.wait_for_server(30), client.problem
     feedback = []
     goal = client.send_goal({"order": 5}, on_feedback=lambda m: feedback.append(len(m.sequence)))
-    status, result = goal.result(10)
+    status, result = goal.result(30)
     assert status is GoalStatus.SUCCEEDED
     assert list(result.sequence) == [0, 1, 2, 3, 4]
     assert feedback == [2, 3, 4, 5]
     goal = client.send_goal({"order": 100})
     goal.cancel()
-    status, result = goal.result(10)
+    status, result = goal.result(30)
     assert status is GoalStatus.CANCELED
     assert 0 < len(result.sequence) < 100
     assert [process.event("status") for _ in range(2)] == ["succeeded", "canceled"]

@@ -85,12 +85,12 @@ def test_what_waits_is_bounded_and_counted():
 
     def send(one):
         began.set()
-        may_go.wait(10)
+        may_go.wait(30)
         sent.append(len(one.data))
 
     box = Outbox("test", send, 100)
     box.put(sample(1))
-    assert began.wait(10)
+    assert began.wait(30)
     for size in (30, 40, 50, 60):
         box.put(sample(size))
     assert box.dropped == 3

@@ -17,7 +17,7 @@ def dispatcher():
 def run_all(dispatcher):
     done = threading.Event()
     dispatcher.post(done.set)
-    assert done.wait(5)
+    assert done.wait(30)
 
 
 def test_jobs_run_in_order_on_one_other_thread(dispatcher):
@@ -41,9 +41,9 @@ def test_a_failing_job_is_logged_and_the_next_one_runs(kind, dispatcher, caplog)
 
 def test_closing_ends_the_thread_and_forgets_what_waits(dispatcher):
     started, go_on, seen = threading.Event(), threading.Event(), []
-    dispatcher.post(lambda: (started.set(), go_on.wait(5)))
+    dispatcher.post(lambda: (started.set(), go_on.wait(30)))
     dispatcher.post(lambda: seen.append("forgotten"))
-    assert started.wait(5)
+    assert started.wait(30)
     closing = threading.Thread(target=dispatcher.close)
     closing.start()
     go_on.set()
@@ -58,14 +58,14 @@ def test_closing_ends_the_thread_and_forgets_what_waits(dispatcher):
 def test_a_job_may_close_its_dispatcher(dispatcher):
     closed = threading.Event()
     dispatcher.post(lambda: (dispatcher.close(), closed.set()))
-    assert closed.wait(5)
+    assert closed.wait(30)
 
 
 def test_a_job_that_hangs_does_not_hang_closing(dispatcher, monkeypatch, caplog):
     monkeypatch.setattr("rosglass.comm.executor._PATIENCE", 0.05)
     started, go_on = threading.Event(), threading.Event()
-    dispatcher.post(lambda: (started.set(), go_on.wait(5)))
-    assert started.wait(5)
+    dispatcher.post(lambda: (started.set(), go_on.wait(30)))
+    assert started.wait(30)
     dispatcher.close()
     assert "still runs" in caplog.text
     go_on.set()
@@ -86,7 +86,7 @@ def test_listeners_hear_every_value_until_they_close():
 def test_merging_listeners_hear_the_newest_value_once(dispatcher):
     listeners = Listeners(merge=True)
     go_on, seen = threading.Event(), []
-    dispatcher.post(lambda: go_on.wait(5))
+    dispatcher.post(lambda: go_on.wait(30))
     listeners.add(seen.append, dispatcher)
     for value in range(10):
         listeners.notify(value)
@@ -98,7 +98,7 @@ def test_merging_listeners_hear_the_newest_value_once(dispatcher):
 def test_a_listener_closed_while_its_call_waits_is_not_called(dispatcher):
     listeners = Listeners()
     go_on, seen = threading.Event(), []
-    dispatcher.post(lambda: go_on.wait(5))
+    dispatcher.post(lambda: go_on.wait(30))
     handle = listeners.add(seen.append, dispatcher)
     listeners.notify(1)
     handle.close()
@@ -111,8 +111,8 @@ def test_a_worker_runs_when_asked_and_when_its_pause_is_over(caplog):
     ran, idle = threading.Event(), threading.Event()
     worker = Worker("test worker", lambda paused: (idle if paused else ran).set(), pause=0.01)
     worker.wake()
-    assert ran.wait(5)
-    assert idle.wait(5)
+    assert ran.wait(30)
+    assert idle.wait(30)
     worker.close()
     worker.close()
     assert "test worker" not in [t.name for t in threading.enumerate()]
@@ -129,7 +129,7 @@ def test_a_worker_survives_an_error_in_its_job(caplog):
         raise RuntimeError("of the job")
 
     worker = Worker("test worker", job, pause=0.01)
-    assert twice.wait(5)
+    assert twice.wait(30)
     worker.close()
     assert "of the job" in caplog.text
 
@@ -137,9 +137,9 @@ def test_a_worker_survives_an_error_in_its_job(caplog):
 def test_a_worker_that_hangs_does_not_hang_closing(monkeypatch, caplog):
     monkeypatch.setattr("rosglass.comm.worker._PATIENCE", 0.05)
     started, go_on = threading.Event(), threading.Event()
-    worker = Worker("test worker", lambda _: (started.set(), go_on.wait(5)), pause=10)
+    worker = Worker("test worker", lambda _: (started.set(), go_on.wait(30)), pause=10)
     worker.wake()
-    assert started.wait(5)
+    assert started.wait(30)
     worker.close()
     assert "test worker still runs" in caplog.text
     go_on.set()

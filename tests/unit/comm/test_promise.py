@@ -83,10 +83,10 @@ def test_callbacks_run_where_they_should():
     promise.on_done(told[2].append, IMMEDIATE)
     promise.fulfil(None)
     assert told[2] == [promise]
-    assert [future.result(5) for future in told[:2]] == ["home", "elsewhere"]
+    assert [future.result(30) for future in told[:2]] == ["home", "elsewhere"]
     late = concurrent.futures.Future()
     promise.on_done(late.set_result)
-    assert late.result(5) is promise
+    assert late.result(30) is promise
     home.close()
     elsewhere.close()
 

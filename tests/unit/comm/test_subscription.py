@@ -75,7 +75,7 @@ def test_wait_returns_a_sample_that_comes_later_and_none_after_the_timeout():
     assert sub.wait(0.01) is None
     later = threading.Timer(0.02, lambda: feed(sub, "a"))
     later.start()
-    assert sub.wait(5).data == b"a"
+    assert sub.wait(30).data == b"a"
     later.join()
 
 

@@ -35,7 +35,7 @@ class Counting:
 
     def read(self, stamp: object, frame_id: str, text: str) -> RawImage | None:
         self.entered.set()
-        self.gate.wait(10)
+        self.gate.wait(30)
         self.packets.append(text)
         if text == "bad":
             raise DecodeError(IMAGE, "the packet is corrupt", "data")
@@ -85,7 +85,7 @@ class Rig:
         self.shown: list[str] = []
         self.news = threading.Condition()
         self.stream = ImageStream(node, "/cam", self.show, changed=self.wake)
-        assert node.subscribed.wait(10)
+        assert node.subscribed.wait(30)
 
     def show(self, picture: RawImage, sample: Sample) -> None:
         with self.news:
@@ -98,7 +98,7 @@ class Rig:
 
     def until(self, condition: Callable[[], Any]) -> None:
         with self.news:
-            assert self.news.wait_for(condition, 10), self.stream.problem
+            assert self.news.wait_for(condition, 30), self.stream.problem
 
 
 @pytest.fixture
@@ -163,7 +163,7 @@ def test_waiting_is_told_and_is_no_fault(rig: Rig) -> None:
 def test_a_backlog_is_given_up_and_the_decoder_told(rig: Rig, decoder: Counting) -> None:
     decoder.gate.clear()
     send(rig, "p0")
-    assert decoder.entered.wait(10)
+    assert decoder.entered.wait(30)
     many = 2 * stream_module._BACKLOG
     send(rig, *(f"q{number}" for number in range(many)))
     decoder.gate.set()

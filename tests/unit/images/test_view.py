@@ -136,3 +136,36 @@ def test_what_cannot_be_saved_is_named(tmp_path: Path) -> None:
     with pytest.raises(UnsupportedError, match="cannot be written"):
         save(frame("rgb8"), tmp_path / "b.png")
     assert [path.name for path in tmp_path.iterdir()] == ["b.png"]
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
+def test_zoom_shows_the_middle(encoding: str) -> None:
+    picture = frame(encoding)
+    seen = View(zoom=2).apply(picture)
+    # Beginning at even places, so that no layout needs to be converted.
+    assert (seen.width, seen.height) == (W - 2 * 4, H - 2 * 2)
+    assert seen.format is picture.format
+    np.testing.assert_array_equal(pixels(seen), pixels(picture)[2:4, 4:8])
+
+
+@pytest.mark.parametrize("zoom", [1, 1.01, 3, 1000, 1e300])
+@pytest.mark.parametrize("size", [(1, 1), (2, 3), (64, 48), (641, 1)])
+def test_any_zoom_leaves_something(zoom: float, size: tuple[int, int]) -> None:
+    width, height = size
+    picture = convert(RawImage(width, height, "mono8", width, bytes(width * height)))
+    seen = View(zoom=zoom).apply(picture)
+    assert 1 <= seen.width <= width
+    assert 1 <= seen.height <= height
+    assert zoom < 3 or width < 5 or seen.width < width
+
+
+@pytest.mark.parametrize("zoom", [0.5, 0, -1, float("nan"), float("inf")])
+def test_impossible_zooms_are_refused(zoom: float) -> None:
+    with pytest.raises(UnsupportedError, match="zoom of 1 or more"):
+        View(zoom=zoom)
+
+
+def test_zoom_is_within_the_region() -> None:
+    picture = frame("mono8")
+    seen = View(region=(2, 0, 8, 4), zoom=2).apply(picture)
+    np.testing.assert_array_equal(pixels(seen), pixels(picture)[0:4, 2:10][0:4, 2:6])

@@ -21,7 +21,7 @@ def frame(content: bytes) -> bytes:
     return struct.pack("<I", len(content)) + content
 
 
-def until(check, seconds=10.0):
+def until(check, seconds=30.0):
     end = time.monotonic() + seconds
     while not (found := check()):
         assert time.monotonic() < end

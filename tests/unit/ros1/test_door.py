@@ -45,7 +45,7 @@ def test_who_waits_is_accepted_once_there_are_descriptors_again(caplog):
             time.sleep(0.5)
             attempts = listener.attempts
             listener.scarce = False
-            assert came.wait(10)
+            assert came.wait(30)
     loop.call(door.end)
     loop.close()
     assert 2 <= attempts <= 10  # again and again, but it leaves time for others

@@ -217,7 +217,7 @@ def test_a_request_waits_for_the_server_as_it_was_when_it_was_made(connect, clie
     request["a"] = 100
     assert client.pending == 3
     connect("robot").create_service_server("/add", ADD, add)
-    assert [call.result(5).sum for call in calls] == [3, 3, 3]
+    assert [call.result(30).sum for call in calls] == [3, 3, 3]
 
 
 def test_requests_through_one_connection_arrive_in_the_order_of_the_calls(connect, node):
@@ -245,18 +245,18 @@ def test_fifty_calls_are_answered_in_parallel(connect, node):
 
     connect("robot").create_service_server("/add", ADD, later)
     calls = [client.call_async({"a": value}) for value in range(50)]
-    assert together.wait(10)
+    assert together.wait(30)
     assert client.pending == 50
     for promise, value in reversed(promises):
         promise.set_result({"sum": value})
-    assert [call.result(5).sum for call in calls] == list(range(50))
+    assert [call.result(30).sum for call in calls] == list(range(50))
 
 
 def test_more_calls_than_connections_wait_for_their_turn(connect, node):
     client = node.create_service_client("/add", ADD)
     connect("robot").create_service_server("/add", ADD, add)
     calls = [client.call_async({"a": value}) for value in range(300)]
-    assert [call.result(20).sum for call in calls] == list(range(300))
+    assert [call.result(30).sum for call in calls] == list(range(300))
 
 
 def test_threads_that_share_a_client_get_their_own_answers(connect, client):
@@ -280,7 +280,7 @@ def test_a_call_can_be_awaited_and_calls_back(connect, client):
     assert asyncio.run(main()) == 2
     done = threading.Event()
     client.call_async().on_done(lambda _: done.set())
-    assert done.wait(5)
+    assert done.wait(30)
 
 
 def test_a_persistent_client_uses_one_connection_and_others_one_for_each_call(
@@ -339,10 +339,10 @@ def test_a_client_without_type_takes_the_servers(connect, node, persistent):
     with pytest.raises(rosglass.ConversionError, match="a message or a dict"):
         client.call_async(7)
     connect("robot").create_service_server("/add", ADD, add)
-    assert early.result(5).sum == 9
+    assert early.result(30).sum == 9
     assert client.type == rosglass.load(ADD, ros=1)
     with pytest.raises(rosglass.ConversionError, match="c"):
-        wrong.result(5)
+        wrong.result(30)
 
 
 def test_a_type_that_nobody_knows_here_is_named_with_what_to_do(node, start_robot, eventually):
@@ -367,7 +367,7 @@ def test_a_definition_that_is_added_later_is_taken(master, connect, start_robot,
     call = client.call_async({"a": 1})
     assert not client.wait_for_server(0.3)
     library.add_path(tmp_path)
-    assert call.result(10).sum == 3
+    assert call.result(30).sum == 3
     assert client.type.name == "acme_srvs/srv/Dance"
 
 
@@ -392,7 +392,7 @@ def test_another_md5_is_refused_naming_both(connect, node, persistent, eventuall
     client = node.create_service_client("/add", ADD, persistent=persistent)
     trigger = rosglass.load(TRIGGER, ros=1)
     with pytest.raises(rosglass.ServiceError) as caught:
-        client.call(timeout=5)
+        client.call(timeout=30)
     for told in (ADD.replace("/", "/srv/"), MD5, "std_srvs/srv/Trigger", trigger.md5, "int64 a"):
         assert told in str(caught.value)
     assert not isinstance(caught.value, rosglass.ServiceUnavailableError)
@@ -463,7 +463,7 @@ def test_a_server_is_waited_for_and_changes_are_told(connect, client, eventually
     assert not client.wait_for_server(0.05)
     robot = connect("robot")
     threading.Timer(0.1, lambda: robot.create_service_server("/add", ADD, add)).start()
-    assert client.wait_for_server(10)
+    assert client.wait_for_server(30)
     eventually(lambda: told == [True])
     robot.close()
     eventually(lambda: told == [True, False])
@@ -502,8 +502,10 @@ def test_a_place_that_makes_no_sense_is_named(node, master, uri):
         client.call(timeout=1)
 
 
-def test_a_server_that_was_killed_is_explained(client, master, free_port):
+def test_a_server_that_was_killed_is_explained(client, node, master, free_port, eventually):
     master.offer("/add", free_port)
+    eventually(lambda: node.service_servers("/add"))
+    master.calls.clear()
     with pytest.raises(rosglass.ServiceUnavailableError) as caught:
         client.call(timeout=0.6)
     assert f"/robot offers it at rosrpc://127.0.0.1:{free_port}" in str(caught.value)
@@ -527,7 +529,7 @@ def test_calls_go_on_while_the_master_is_away(client, master, start_robot):
     assert client.call().sum == 3
     master.stop()
     time.sleep(1.2)  # what it said last is not taken for its present word any more
-    assert client.call(timeout=5).sum == 3
+    assert client.call(timeout=30).sum == 3
     master.start()
 
 
@@ -583,7 +585,7 @@ def test_a_server_that_never_answers_is_told_apart_from_none(client, start_robot
         call.result(5)
     assert client.pending == 0
     # Given up, not in the way of the next one.
-    assert client.call(timeout=5).sum == 3
+    assert client.call(timeout=30).sum == 3
 
 
 def test_a_server_that_goes_in_mid_call_ends_it_at_once(client, start_robot):
@@ -607,7 +609,7 @@ def test_a_server_that_goes_in_mid_call_ends_it_at_once(client, start_robot):
 def test_responses_that_make_no_sense_or_tell_failures(client, start_robot, data, error, told):
     start_robot(garbage(data))
     with pytest.raises(error, match=told) as caught:
-        client.call(timeout=10)
+        client.call(timeout=30)
     assert type(caught.value) is error
     assert client.pending == 0
 
@@ -635,7 +637,7 @@ def test_a_header_without_what_is_needed_is_named(client, start_robot, tells):
 def test_a_server_that_refuses_is_quoted(client, start_robot):
     start_robot(tells={"error": "not today"})
     with pytest.raises(rosglass.ServiceError, match=r"refuses the call of /add.*not today") as told:
-        client.call(timeout=10)
+        client.call(timeout=30)
     assert not isinstance(told.value, rosglass.ServiceUnavailableError)
 
 
@@ -672,9 +674,9 @@ def test_a_cancelled_call_waits_no_more(client, start_robot):
 
     start_robot(answer)
     sent = client.call_async()
-    assert taken.wait(10)
+    assert taken.wait(30)
     assert sent.cancel()
-    assert client.call(timeout=5).sum == 3
+    assert client.call(timeout=30).sum == 3
 
 
 @pytest.mark.parametrize("what", ["client", "node"])
@@ -685,13 +687,13 @@ def test_closing_ends_the_calls(node, client, start_robot, what, eventually):
     (client if what == "client" else node).close()
     for call in calls:
         with pytest.raises(rosglass.NodeClosedError):
-            call.result(5)
+            call.result(30)
     client.close()
     for use in (client.call, client.call_async, lambda: client.on_ready_change(print)):
         with pytest.raises(rosglass.NodeClosedError):
             use()
     with pytest.raises(rosglass.NodeClosedError):
-        client.wait_for_server(1)
+        client.wait_for_server(30)
     assert not client.ready
     assert client.problem == "the client is closed"
 
@@ -705,7 +707,7 @@ def test_closing_while_connecting_leaves_nothing(master, connect, eventually):
         sock, _ = listener.accept()
         client.close()
         with pytest.raises(rosglass.NodeClosedError):
-            call.result(1)
+            call.result(30)
         sock.settimeout(5)
         while sock.recv(4096):
             pass  # until it is closed
@@ -727,7 +729,7 @@ def test_hundreds_of_clients_and_servers_leave_no_files_and_threads(connect, eve
         server = robot.create_service_server("/add", ADD, lambda _, t=turn: {"sum": t})
         client = node.create_service_client("/add", ADD, persistent=turn % 2 == 0)
         if turn % 30 == 0:
-            assert client.call(timeout=20).sum == turn
+            assert client.call(timeout=30).sum == turn
         client.close()
         server.close()
         if turn == 60:
@@ -810,7 +812,7 @@ def test_requests_that_are_not_read_yet_wait_outside(connect, eventually):
     sock.setblocking(False)
     data = (struct.pack("<I", 16) + bytes(16)) * 1000
     sent, full_since = 0, None
-    deadline = time.monotonic() + 20
+    deadline = time.monotonic() + 30
     while full_since is None or time.monotonic() - full_since < 0.5:
         assert time.monotonic() < deadline
         try:
@@ -906,11 +908,11 @@ def test_a_promise_answers_later(connect, client, ends):
         call.result(0.1)
     if ends == "result":
         promise.set_result({"sum": 4})
-        assert call.result(5).sum == 4
+        assert call.result(30).sum == 4
         return
     promise.set_exception(ValueError("late")) if ends == "exception" else promise.cancel()
     with pytest.raises(rosglass.ServiceError, match="late" if ends == "exception" else "cancel"):
-        call.result(5)
+        call.result(30)
 
 
 def test_coroutines_answer_in_their_event_loop(connect, node):
@@ -936,15 +938,15 @@ def test_a_slow_callback_holds_up_neither_other_services_nor_the_graph(connect, 
 
     def slow(_):
         begun.set()
-        go.wait(20)
+        go.wait(30)
 
     robot.create_service_server("/slow", TRIGGER, slow)
     robot.create_service_server("/add", ADD, add, executor=IMMEDIATE)
     held = node.create_service_client("/slow", TRIGGER).call_async()
-    assert begun.wait(10)
+    assert begun.wait(30)
     assert node.create_service_client("/add", ADD).call({"a": 1, "b": 2}).sum == 3
     go.set()
-    held.result(5)
+    held.result(30)
 
 
 def test_a_callback_that_would_wait_for_itself_is_told(node, connect, caplog):
@@ -953,7 +955,7 @@ def test_a_callback_that_would_wait_for_itself_is_told(node, connect, caplog):
     node.create_service_server("/twice", ADD, lambda r: client.call({"a": r.a}))
     outer = connect("other").create_service_client("/twice", ADD)
     with pytest.raises(rosglass.ServiceError, match="would wait for itself"):
-        outer.call({"a": 1}, timeout=10)
+        outer.call({"a": 1}, timeout=30)
 
 
 def test_an_event_loop_is_not_held_up_by_a_call_of_its_own_service(node):
@@ -976,7 +978,7 @@ def test_a_callback_may_call_what_runs_elsewhere(node, connect):
     node.create_service_server("/add", ADD, add, executor=own)
     node.create_service_server("/twice", ADD, lambda r: client.call({"a": r.a, "b": r.a}))
     outer = connect("other").create_service_client("/twice", ADD)
-    assert outer.call({"a": 4}, timeout=10).sum == 8
+    assert outer.call({"a": 4}, timeout=30).sum == 8
     own.close()
 
 
@@ -992,7 +994,7 @@ def test_a_callback_in_the_receiving_thread_may_not_wait(node, connect):
             failed.set_result(str(error))
 
     client.call_async().add_done_callback(callback)
-    assert "runs in a thread that receives" in failed.result(10)
+    assert "runs in a thread that receives" in failed.result(30)
 
 
 def test_a_service_has_one_server_in_a_node(node):
@@ -1036,10 +1038,10 @@ def test_closing_a_server_ends_the_calls_of_its_clients(connect, client):
 
     server = connect("robot").create_service_server("/add", ADD, never)
     call = client.call_async(timeout=30)
-    assert begun.wait(10)
+    assert begun.wait(30)
     server.close()
     with pytest.raises(rosglass.ConnectionLostError):
-        call.result(5)
+        call.result(30)
 
 
 def test_a_service_is_registered_again_after_the_master_was_restarted(
@@ -1060,7 +1062,7 @@ def test_what_a_client_that_has_gone_asked_for_is_not_begun(connect, eventually)
     def callback(request):
         seen.append(request.a)
         begun.set()
-        go.wait(20)
+        go.wait(30)
 
     robot.create_service_server("/add", ADD, callback)
     kind = rosglass.load(ADD, ros=1).request
@@ -1069,7 +1071,7 @@ def test_what_a_client_that_has_gone_asked_for_is_not_begun(connect, eventually)
     for number, sock in enumerate(socks):
         sock.sendall(struct.pack("<I", 16) + kind.encode({"a": number}))
         eventually(lambda n=number: len(seen) + server._waiting > n)
-    assert begun.wait(10)
+    assert begun.wait(30)
     socks[1].close()
     eventually(lambda: len(server._sessions) == 1)
     go.set()

@@ -369,12 +369,12 @@ def node(middleware: FakeMiddleware) -> Iterator[Ros2Node]:
 
 @pytest.fixture
 def eventually() -> Callable[[Callable[[], Any]], Any]:
-    """Return the first true value of a condition; fails after 5 s."""
+    """Return the first true value of a condition; fails after 30 s."""
 
     def eventually(condition: Callable[[], Any]) -> Any:
-        deadline = time.monotonic() + 5
+        deadline = time.monotonic() + 30
         while not (value := condition()):
-            assert time.monotonic() < deadline, "the condition did not come true within 5 s"
+            assert time.monotonic() < deadline, "the condition did not come true within 30 s"
             time.sleep(0.002)
         return value
 

@@ -60,8 +60,8 @@ def held(participant):
         def __enter__(self) -> None:
             self.free, stands = threading.Event(), threading.Event()
             self.entity = -1
-            participant.pump.visit(self.entity, lambda: stands.set() or self.free.wait(10))
-            assert stands.wait(5)
+            participant.pump.visit(self.entity, lambda: stands.set() or self.free.wait(30))
+            assert stands.wait(30)
 
         def __exit__(self, *_: object) -> None:
             participant.pump.forget(self.entity)
@@ -71,7 +71,7 @@ def held(participant):
 
 
 def ready(client):
-    assert client.wait_for_server(5), client.problem
+    assert client.wait_for_server(30), client.problem
     return client
 
 
@@ -80,7 +80,7 @@ def test_a_reply_is_ready_before_its_client_was_noticed(node, participant, serve
     ends.reader._on_matched = None
     participant.pump._acts[ends.writer.entity] = lambda: None
     client = ready(node.create_service_client(SERVICE, ADD))
-    assert client.call({"a": 1, "b": 2}, timeout=5).sum == 2
+    assert client.call({"a": 1, "b": 2}, timeout=30).sum == 2
 
 
 @pytest.mark.parametrize("noticed", [True, False])
@@ -104,7 +104,7 @@ def test_a_request_in_the_memory_of_another_is_not_taken_for_that(node, server):
 
     server._replier._ends.origins._noted = Haunted()
     client = ready(node.create_service_client(SERVICE, ADD))
-    assert client.call({"a": 1, "b": 2}, timeout=5).sum == 2
+    assert client.call({"a": 1, "b": 2}, timeout=30).sum == 2
 
 
 def test_a_reply_in_the_memory_of_another_is_not_taken_for_that(node, server):
@@ -114,7 +114,7 @@ def test_a_reply_in_the_memory_of_another_is_not_taken_for_that(node, server):
 
     client = ready(node.create_service_client(SERVICE, ADD))
     client._link.requester._ends.origins._noted = Haunted()
-    assert client.call({"a": 1, "b": 2}, timeout=5).sum == 2
+    assert client.call({"a": 1, "b": 2}, timeout=30).sum == 2
 
 
 def test_what_is_known_of_a_readers_samples_goes_with_it():
@@ -166,13 +166,13 @@ def test_who_looked_first_for_counterparts_has_not_the_last_word():
         found = answers.pop(0)
         if found == [1]:
             looked.set()
-            assert go_on.wait(5)
+            assert go_on.wait(30)
         return found
 
     matched = Matched(1, handles, lambda _, handle: SimpleNamespace(guid=bytes([handle])))
     first = threading.Thread(target=matched.refresh)
     first.start()
-    assert looked.wait(5)
+    assert looked.wait(30)
     second = threading.Thread(target=matched.refresh)
     second.start()
     second.join(0.1)

@@ -78,6 +78,14 @@ def do_stop_action_server(peer, name):
     peer.kept.pop(("action server", name)).server.stop()
 
 
+def do_wait_for_client(peer, name):
+    """Wait until feedback and results go to somebody; before, rospy drops what is published."""
+    server = peer.kept["action server", name].server
+    for publisher in (server.feedback_pub, server.result_pub):
+        while not publisher.get_num_connections():
+            rospy.sleep(0.01)
+
+
 def _client(peer, name):
     client = peer.kept.get(("action client", name))
     if client is None:
@@ -85,7 +93,7 @@ def _client(peer, name):
     return client
 
 
-def do_wait_for_server(peer, name, timeout=10.0):
+def do_wait_for_server(peer, name, timeout=30.0):
     """Return whether a server appears within the time."""
     return _client(peer, name).wait_for_server(rospy.Duration(timeout))
 
@@ -129,13 +137,13 @@ def do_cancel_before(peer, name, key):
 def do_simple_goal(peer, name, goal, cancel_after=None):
     """Send a goal as a SimpleActionClient and wait for its end; return how it ended."""
     client = actionlib.SimpleActionClient(name, TestAction)
-    if not client.wait_for_server(rospy.Duration(10)):
+    if not client.wait_for_server(rospy.Duration(30)):
         raise RuntimeError("no server")
     client.send_goal(TestGoal(goal))
     if cancel_after is not None:
         rospy.sleep(cancel_after)
         client.cancel_goal()
-    if not client.wait_for_result(rospy.Duration(10)):
+    if not client.wait_for_result(rospy.Duration(30)):
         raise RuntimeError("no result")
     ended = {
         "terminal": GoalStatus.to_string(client.get_state()),

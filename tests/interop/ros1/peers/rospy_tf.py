@@ -39,7 +39,7 @@ def do_tf_send(peer, transforms, static=False, old_on=None):
     broadcaster.sendTransform(messages)
 
 
-def do_tf_lookup(peer, target, source, timeout=10.0):
+def do_tf_lookup(peer, target, source, timeout=30.0):
     """Return where a frame is, as a tf2_ros listener has it."""
     import tf2_ros
 

@@ -4,6 +4,7 @@ import base64
 import threading
 
 import genpy
+import genpy.dynamic
 import roslib.message
 import rospy
 
@@ -107,3 +108,14 @@ def do_time(peer):
 def do_sources(peer, topic):
     """Return how many publishers a subscription is connected to."""
     return peer.kept["subscriber", topic].get_num_connections()
+
+
+def do_publish_own(peer, topic, type, text, value, latch=False):
+    """Publish `value` in a type that only this node has; return its md5 sum."""
+    kind = genpy.dynamic.generate_dynamic(type, text)[type]
+    publisher = rospy.Publisher(topic, kind, queue_size=100, latch=latch)
+    peer.kept["publisher", topic] = publisher
+    made = kind()
+    genpy.message.fill_message_args(made, [value])
+    publisher.publish(made)
+    return kind._md5sum

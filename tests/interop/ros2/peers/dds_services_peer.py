@@ -215,7 +215,7 @@ class Cyclone:
 
     def open(self, service: str, kind: str) -> None:
         self.clients[service] = self.ends(service, kind, f"clientid= 1.10.{kind};", False)
-        deadline = time.monotonic() + 10
+        deadline = time.monotonic() + 30
         reader, writer = self.clients[service]
         while not (reader.get_matched_publications() and writer.get_matched_subscriptions()):
             assert time.monotonic() < deadline
@@ -227,7 +227,7 @@ class Cyclone:
         me, answers = 4711, {}
         for number, given in enumerate(requests):
             writer.write(request(me, number, *([given] if kind == "blob" else given)))
-        deadline = time.monotonic() + 10
+        deadline = time.monotonic() + 30
         while len(answers) < len(requests):
             for reply in reader.take(100):
                 if getattr(reply, "client", None) == me:

@@ -94,7 +94,7 @@ class FastDds:
 
     def _wait(self, condition: Callable[[], bool]) -> None:
         with self._changed:
-            if not self._changed.wait_for(condition, 10):
+            if not self._changed.wait_for(condition, 30):
                 raise TimeoutError(f"matched {self._matched}, answered {list(self._answers)}")
 
     def _say(self, *words: object) -> None:
