@@ -331,7 +331,7 @@ class Node(Handle):
 
         Args:
             name: ``pkg/msg/Type``, ``pkg/srv/Type``, ``pkg/action/Type``, or ``pkg/Type``.
-            hash: RIHS01 hash of the version, when the robot uses several.
+            hash: RIHS01 hash (ROS 1: md5 sum) of the version, when the robot uses several.
             node: Full name of the node whose version it shall be.
             timeout: Seconds to wait in all, for somebody who uses the type to appear and for the
                 answer; None for ever.

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm import EndpointKind, History, NodeName, QoS, Subscription
 from rosglass.comm.core_node import CoreNode
 from rosglass.comm.flags import check_flag
+from rosglass.comm.promise import check_timeout
+from rosglass.comm.receiving import check_may_wait
 from rosglass.errors import InvalidNameError
 from rosglass.ros1.action_types import actions
 from rosglass.ros1.answers import Answers
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
         EndpointInfo,
         Executor,
         ParameterClient,
+        Promise,
         Sample,
         ServerGoal,
         ServiceClient,
@@ -248,8 +251,7 @@ class Ros1Node(CoreNode):
         from rosglass.ros1.parameter_client import Ros1ParameterClient  # noqa: PLC0415
 
         self._core.check_open()
-        full = node.full if isinstance(node, NodeName) else self._core.expand(node)
-        return Ros1ParameterClient(self._core, self._furniture.server, full)
+        return Ros1ParameterClient(self._core, self._furniture.server, self._node_name(node))
 
     @property
     def logger(self) -> NodeLogger:
@@ -292,6 +294,41 @@ class Ros1Node(CoreNode):
         """Return the publishers of a topic."""
         return self._topics.publishers(self.resolve(topic))
 
+    def ask_publishers(self, topic: str, timeout: float = 3.0) -> list[EndpointInfo]:
+        """Ask the publishers of a topic for its md5 sum, and whether they latch; wait for it.
+
+        The master does not know that, and :meth:`publishers` has it only of those to which this
+        node is connected. Asking is connecting for a moment, without receiving anything.
+
+        Args:
+            topic: Absolute, relative or private topic name.
+            timeout: Seconds to wait; who has not answered by then is returned without.
+
+        Raises:
+            ConversionError: The time is none.
+            UnsupportedError: Called in a thread that receives.
+        """
+        full = self.resolve(topic)
+        self._core.check_open()
+        limit = check_timeout(timeout, "ask_publishers()")
+        check_may_wait(f"the publishers of {full} have not answered")
+        return self._topics.ask_publishers(full, limit)
+
+    def fetch_type_async(
+        self,
+        name: str,
+        *,
+        hash: str = "",
+        node: str | NodeName | None = None,
+        timeout: float | None = 5.0,
+    ) -> Promise[MessageType | ServiceType | ActionType]:
+        """Ask for a type; see :meth:`rosglass.comm.Node.fetch_type_async`."""
+        from rosglass.ros1.type_fetching import fetch  # noqa: PLC0415 - for those who ask only
+
+        self._core.check_open()
+        owner = "" if node is None else self._node_name(node)
+        return fetch(self._core, self._topics, self._services, name, hash, owner, timeout)
+
     def subscriptions(self, topic: str) -> list[EndpointInfo]:
         """Return the subscribers of a topic."""
         return self._core.graph.endpoints(EndpointKind.SUBSCRIPTION, self.resolve(topic))
@@ -307,8 +344,8 @@ class Ros1Node(CoreNode):
 
     def endpoints(self, node: str | NodeName) -> list[EndpointInfo]:
         """Return what a node publishes, subscribes and serves; none when it is unknown."""
-        full = node.full if isinstance(node, NodeName) else self._core.expand(node)
-        return self._services.described(self._core.graph.endpoints_of(NodeName(*split(full))))
+        name = NodeName(*split(self._node_name(node)))
+        return self._services.described(self._core.graph.endpoints_of(name))
 
     def close(self) -> None:
         """Leave the graph, close everything created from the node and end its threads.
@@ -352,6 +389,10 @@ class Ros1Node(CoreNode):
     def _drop(self, link: Connection) -> None:
         self._topics.drop(link)
         self._services.drop(link)
+
+    def _node_name(self, node: str | NodeName) -> str:
+        """Return a node's full name; raises InvalidNameError."""
+        return node.full if isinstance(node, NodeName) else self._core.expand(node)
 
     def _topic_names(self) -> list[str]:
         return sorted({*self._topics.published(), *self._topics.subscribed()})

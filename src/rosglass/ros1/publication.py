@@ -158,23 +158,24 @@ class Publication(Member):
         with self._lock:
             if self._closed:
                 return f"{self.topic} is not published here any more"
-            latched = any(publisher.latched for publisher in self.publishers)
-            link.send_header(
-                {
-                    "callerid": self._core.name.full,
-                    "latching": "1" if latched else "0",
-                    "md5sum": md5,
-                    "message_definition": definition_text(self._core.types, self.type),
-                    "topic": self.topic,
-                    "type": name,
-                }
-            )
+            link.send_header(self.header())
             self._links.append(link)
             for frame in self._latched.values():
                 link.send_frame(frame)
         self._refused.pop(link.peer, None)
         self._core.wake()
         return ""
+
+    def header(self) -> dict[str, str]:
+        """Return what subscribers are told when they connect; from any thread."""
+        return {
+            "callerid": self._core.name.full,
+            "latching": "1" if any(publisher.latched for publisher in self.publishers) else "0",
+            "md5sum": self.type.md5,
+            "message_definition": definition_text(self._core.types, self.type),
+            "topic": self.topic,
+            "type": ros1_name(self.type.name),
+        }
 
     def drop(self, link: Connection) -> None:
         """Forget a subscriber that has gone."""

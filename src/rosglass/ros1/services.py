@@ -133,6 +133,10 @@ class Services:
             for one in found
         ]
 
+    def md5_of(self, name: str) -> str:
+        """Return the md5 sum of a service's type, empty as long as it is not known."""
+        return self._type_of(name)[1]
+
     def _type_of(self, name: str) -> tuple[str, str]:
         """Return a service's type and md5 sum, empty as long as they are not known."""
         own = self._servers.get(name)

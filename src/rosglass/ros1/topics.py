@@ -3,27 +3,32 @@
 from __future__ import annotations
 
 import threading
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rosglass.comm import EndpointKind, NodeName, QoS
+from rosglass.comm import EndpointKind, QoS
+from rosglass.errors import Error
 from rosglass.interfaces import ros1_name
 from rosglass.ros1.intake import Intake
-from rosglass.ros1.names import split
 from rosglass.ros1.publication import Publication
 from rosglass.ros1.publisher import Ros1Publisher
 from rosglass.ros1.reading import Reading
+from rosglass.ros1.topic_probe import ask_publisher
 from rosglass.ros1.types import ANY
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rosglass.comm import EndpointInfo, Subscription
+    from rosglass.comm import EndpointInfo, NodeName, Subscription
     from rosglass.messages import MessageType
     from rosglass.ros1.connection import Connection
     from rosglass.ros1.core import Core
 
 __all__ = ["Topics"]
+
+#: Seconds that a publisher may take for each of its answers.
+_TIMEOUT = 5.0
 
 
 class Topics:
@@ -134,21 +139,57 @@ class Topics:
 
     def publishers(self, topic: str) -> list[EndpointInfo]:
         """Return a topic's publishers: whom the master names, and what connections tell of them."""
-        known: dict[NodeName, tuple[str, bool]] = {}
+        ends = self._core.graph.endpoints(EndpointKind.PUBLISHER, topic)
+        return [_described(end, self._known(topic, end.node)) for end in ends]
+
+    def ask_publishers(self, topic: str, timeout: float | None) -> list[EndpointInfo]:
+        """Return a topic's publishers with what they say of themselves when asked; waits for it.
+
+        Those that do not answer in time are there all the same, as in :meth:`publishers`.
+
+        Args:
+            topic: Absolute topic name.
+            timeout: Seconds to wait in all; None for as long as each may take.
+        """
+        limit = _TIMEOUT if timeout is None else min(timeout, _TIMEOUT)
+        ends = self._core.graph.endpoints(EndpointKind.PUBLISHER, topic)
+        told: dict[NodeName, dict[str, str]] = {}
+        left, answered = len(ends), threading.Condition()
+
+        def ask(node: NodeName) -> None:
+            nonlocal left
+            header = {}
+            with suppress(Error):
+                header = self.header(topic, node, limit)
+            with answered:
+                told[node] = header
+                left -= 1
+                answered.notify_all()
+
+        for end in ends:
+            self._core.errands.run(lambda node=end.node: ask(node))  # type: ignore[misc]
+        with answered:
+            answered.wait_for(lambda: not left, timeout)
+            return [_described(end, told.get(end.node, {})) for end in ends]
+
+    def header(self, topic: str, node: NodeName, timeout: float) -> dict[str, str]:
+        """Return the connection header with which a node publishes a topic; waits for it.
+
+        Raises:
+            MasterError: It is not known, or does not publish the topic.
+            ConnectionLostError: It does not answer, or refuses.
+        """
+        return self._known(topic, node) or ask_publisher(self._core, topic, node.full, timeout)
+
+    def _known(self, topic: str, node: NodeName) -> dict[str, str]:
+        """Return what is known already of a publisher, empty for nothing."""
         publication, intake = self._publications.get(topic), self._intakes.get(topic)
+        if node == self._core.name:
+            return {} if publication is None else publication.header()
         for link in intake.links() if intake is not None else ():
-            if link.connected:
-                latches = link.header.get("latching") == "1"
-                known[NodeName(*split(link.name))] = link.header.get("md5sum", ""), latches
-        if publication is not None:
-            latches = any(publisher.latched for publisher in publication.publishers)
-            known[self._core.name] = publication.type.md5, latches
-        found = []
-        for end in self._core.graph.endpoints(EndpointKind.PUBLISHER, topic):
-            md5, latches = known.get(end.node, ("", False))
-            qos = QoS.latched() if latches else end.qos
-            found.append(replace(end, type_hash=md5, qos=qos))
-        return found
+            if link.connected and link.name == node.full:
+                return link.header
+        return {}
 
     def latched(self, topic: str) -> list[memoryview]:
         """Return the last message of each latched publisher of a topic."""
@@ -180,3 +221,8 @@ class Topics:
                 del self._intakes[intake.topic]
         if last:
             intake.close()
+
+
+def _described(end: EndpointInfo, header: dict[str, str]) -> EndpointInfo:
+    qos = QoS.latched() if header.get("latching") == "1" else end.qos
+    return replace(end, type_hash=header.get("md5sum", ""), qos=qos)

@@ -1,0 +1,351 @@
+"""Getting definitions that nobody here has from the nodes that use the types.
+
+In ROS 1, publishers tell the definition to who connects with them; services' servers tell name and
+md5 sum only; of actions, see :mod:`rosglass.ros1.action_discovery`.
+"""
+
+from __future__ import annotations
+
+import re
+import threading
+import time
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from rosglass.comm import ConnectionState, EndpointKind, NodeName, Promise
+from rosglass.comm.promise import check_timeout
+from rosglass.errors import (
+    DefinitionConflictError,
+    Error,
+    InvalidNameError,
+    NodeClosedError,
+    TypeNotFoundError,
+)
+from rosglass.interfaces import ros1_name, split_name
+from rosglass.ros1.action_discovery import ActionDiscovery
+from rosglass.ros1.action_types import actions
+from rosglass.ros1.core import Member
+from rosglass.ros1.names import split
+from rosglass.ros1.types import ANY
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
+    from typing import TypeAlias
+
+    from rosglass.messages import ActionType, MessageType, ServiceType
+    from rosglass.ros1.core import Core
+    from rosglass.ros1.services import Services
+    from rosglass.ros1.topics import Topics
+
+    AnyType: TypeAlias = MessageType | ServiceType | ActionType
+
+__all__ = ["fetch"]
+
+_PUBLISHER = EndpointKind.PUBLISHER
+_REMEDY = "add the definition with Library.add_path(), or --definitions FOLDER on the command line"
+_MD5 = re.compile("[0-9a-f]{32}")
+#: Seconds that a publisher may take to answer, and for which others are waited for once one has.
+_TIMEOUT, _GRACE = 5.0, 1.0
+#: Seconds until a publisher that did not answer is asked again.
+_AGAIN = 5.0
+#: Seconds that services may take to tell their types, where none is known to have this one.
+_SETTLED = 2.0
+
+
+def fetch(
+    core: Core,
+    topics: Topics,
+    services: Services,
+    name: str,
+    hash: str,
+    node: str,
+    timeout: float | None,
+) -> Promise[AnyType]:
+    """Fetch a type; see :meth:`rosglass.comm.Node.fetch_type_async`.
+
+    Args:
+        core: The node that asks.
+        topics: Its topics.
+        services: Its services.
+        name: The type's name.
+        hash: Md5 sum of the version; empty for the one that is in use.
+        node: Full name of the node whose version it shall be; empty for any.
+        timeout: Seconds to wait in all; None for ever.
+    """
+    split_name(name)
+    timeout = check_timeout(timeout, f"fetching {name}")
+    if hash and not (isinstance(hash, str) and _MD5.fullmatch(hash)):
+        raise InvalidNameError(
+            f"{hash!r:.90} is no md5 sum of {name}; write 32 hexadecimal digits in lower case"
+        )
+    promise: Promise[AnyType] = Promise(f"{name} has not come", core.dispatcher, cancellable=True)
+    if hash:
+        from rosglass.messages import load  # noqa: PLC0415 - numpy
+
+        with suppress(Error):
+            promise.fulfil(load(name, ros=1, library=core.types.library, hash=hash))
+            return promise
+    made = _Fetch(core, topics, services, name, hash, node, promise)
+    if timeout is not None:
+        timer = core.timers.after(timeout, lambda: made.expire(timeout))
+        promise.add_done_callback(lambda _: timer.close())
+    promise.add_done_callback(made.finish)
+    core.add(made)
+    return promise
+
+
+class _Fetch(Member):
+    """One type that is being fetched, from what the graph has at each moment.
+
+    Args:
+        core: The node that asks.
+        topics: Its topics.
+        services: Its services.
+        name: The type's name.
+        hash: Md5 sum of the version; empty for the one that is in use.
+        node: Full name of the node whose version it shall be; empty for any.
+        promise: Where it goes.
+    """
+
+    def __init__(
+        self,
+        core: Core,
+        topics: Topics,
+        services: Services,
+        name: str,
+        hash: str,
+        node: str,
+        promise: Promise[AnyType],
+    ) -> None:
+        self._core, self._topics, self._services = core, topics, services
+        self._name, self._hash, self._node, self._promise = name, hash, node, promise
+        self._package, self._kind, self._base = split_name(name)
+        self._lock = threading.Lock()
+        #: What publishers said of themselves, by node; and why others did not, and when.
+        self._headers: dict[str, dict[str, str]] = {}
+        self._failed: dict[str, tuple[str, float]] = {}
+        self._asked: set[str] = set()
+        self._began, self._first = time.monotonic(), 0.0
+        self._discoveries: dict[str, ActionDiscovery] = {}
+        #: Why it has not come, as far as is known.
+        self._problem = ""
+
+    def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - answers count, too
+        """See whether what is known by now is enough."""
+        if self._promise.done():
+            return
+        try:
+            found = self._look()
+        except Error as error:
+            self._promise.fail(error)
+            return
+        if found is not None:
+            self._promise.fulfil(found)
+
+    def expire(self, timeout: float) -> None:
+        """Give up: the time is over."""
+        who = f"{self._node} does not use it" if self._node else "nobody in the graph uses it"
+        if self._core.status().state is not ConnectionState.CONNECTED:
+            who = str(self._core.status())
+        self._promise.fail(
+            TypeNotFoundError(
+                f"no definition of {self._name} within {timeout:g} s: {self._problem or who}"
+            )
+        )
+
+    def finish(self, _: Future[AnyType]) -> None:
+        """Leave the node: it has come, failed or was given up."""
+        self._core.remove(self)
+        with self._lock:
+            open_, self._discoveries = list(self._discoveries.values()), {}
+        for discovery in open_:
+            discovery.close()
+
+    def close(self) -> None:
+        """Give up: the node is closed."""
+        self._promise.fail(NodeClosedError(f"node {self._core.name} was closed"))
+
+    # -- on the node's own thread ----------------------------------------------------------------
+
+    def _look(self) -> AnyType | None:
+        """Return the type once it is known; raises Error when it cannot be."""
+        if self._core.status().state is not ConnectionState.CONNECTED:
+            return None
+        self._problem = ""
+        users = self._publishers()
+        if users:
+            return self._message(users)
+        servers = self._actions()
+        if servers:
+            return self._action(servers)
+        offers, open_ = self._offers()
+        if offers:
+            return self._service(offers)
+        if open_ and time.monotonic() - self._began < _SETTLED:
+            self._problem = "services are still being asked for their types"
+            return None
+        # Nobody tells of another version: what the library has is right.
+        return None if self._node or self._hash else self._in_library()
+
+    def _in_library(self) -> AnyType | None:
+        from rosglass.messages import load  # noqa: PLC0415 - numpy
+
+        with suppress(TypeNotFoundError):
+            return load(self._name, ros=1, library=self._core.types.library)
+        return None
+
+    def _is_meant(self, node: str) -> bool:
+        return self._node in ("", node)
+
+    # -- messages --------------------------------------------------------------------------------
+
+    def _publishers(self) -> dict[str, str]:
+        """Return a topic of each node that publishes the type."""
+        if self._kind not in ("", "msg"):
+            return {}
+        graph, full = self._core.graph, f"{self._package}/msg/{self._base}"
+        found: dict[str, str] = {}
+        for topic, types in graph.topics().items():
+            if types == [full]:
+                ends = graph.endpoints(_PUBLISHER, topic)
+                found.update((e.node.full, topic) for e in ends if self._is_meant(e.node.full))
+                if not ends:
+                    self._problem = (
+                        f"{topic} is subscribed to only, and only publishers tell definitions; "
+                        f"{_REMEDY}"
+                    )
+        return found
+
+    def _message(self, users: dict[str, str]) -> MessageType | None:
+        now = time.monotonic()
+        for node, topic in users.items():
+            self._ask(node, topic, now)
+        with self._lock:
+            headers = {node: self._headers[node] for node in users if node in self._headers}
+            waited = [node for node in users if node not in headers and node not in self._failed]
+            failed = "; ".join(reason for reason, _ in self._failed.values())
+        if not headers:
+            self._problem = failed or f"{', '.join(sorted(users))} did not answer yet"
+            if not waited and now - self._began > _GRACE:
+                raise TypeNotFoundError(f"no definition of {self._name}: {failed}")
+            return None
+        self._first = self._first or now
+        if waited and now - self._first < _GRACE:
+            return None
+        return self._choose(headers)
+
+    def _choose(self, headers: dict[str, dict[str, str]]) -> MessageType | None:
+        versions: dict[str, list[str]] = {}
+        for node, header in headers.items():
+            versions.setdefault(header["md5sum"], []).append(node)
+        if self._hash and self._hash not in versions:
+            told = _told(versions)
+            self._problem = f"nobody publishes this version of it, but there are others ({told})"
+            return None
+        if len(versions) > 1 and not self._hash:
+            raise _conflict(self._name, versions)
+        md5 = self._hash or next(iter(versions))
+        texts = [headers[node].get("message_definition", "") for node in versions[md5]]
+        name = f"{self._package}/{self._base}"
+        return self._core.types.learn(name, md5, max(texts, key=lambda text: bool(text.strip())))
+
+    def _ask(self, node: str, topic: str, now: float) -> None:
+        """Ask a publisher for its definition, unless it was."""
+        with self._lock:
+            _, failed = self._failed.get(node, ("", -_AGAIN))
+            if node in self._asked or node in self._headers or now - failed < _AGAIN:
+                return
+            self._asked.add(node)
+        self._core.errands.run(lambda: self._question(node, topic))
+
+    def _question(self, node: str, topic: str) -> None:
+        try:
+            header = self._topics.header(topic, NodeName(*split(node)), _TIMEOUT)
+        except Error as error:
+            with self._lock:
+                self._failed[node] = str(error), time.monotonic()
+        else:
+            with self._lock:
+                self._headers[node] = header
+                self._failed.pop(node, None)
+        with self._lock:
+            self._asked.discard(node)
+        self._core.wake()
+
+    # -- actions ---------------------------------------------------------------------------------
+
+    def _actions(self) -> list[str]:
+        """Return the names of the actions that have the type."""
+        if self._kind not in ("", "action"):
+            return []
+        full = f"{self._package}/action/{self._base}"
+        graph = self._core.graph
+        found = []
+        for action, types in actions(graph).items():
+            servers = graph.endpoints(_PUBLISHER, f"{action}/status")
+            if types == [full] and any(self._is_meant(server.node.full) for server in servers):
+                found.append(action)
+        return found
+
+    def _action(self, names: list[str]) -> ActionType | None:
+        found: dict[str, tuple[str, ActionType]] = {}
+        for name in names:
+            with self._lock:
+                if self._promise.done():
+                    return None
+                discovery = self._discoveries.get(name)
+                if discovery is None:
+                    discovery = ActionDiscovery(self._core, self._topics, name)
+                    self._discoveries[name] = discovery
+            types = discovery.look()
+            self._problem = self._problem or discovery.problem
+            if types is not None and self._hash in ("", types.action.md5):
+                found.setdefault(types.action.md5, (name, types.action))
+        if not found:
+            self._problem = self._problem or f"{', '.join(names)} did not tell it yet"
+            return None
+        if len(found) > 1:
+            raise _conflict(self._name, {md5: [name] for md5, (name, _) in found.items()})
+        (_, action) = next(iter(found.values()))
+        with suppress(DefinitionConflictError):
+            self._core.types.library.add(action.definition)
+        return action
+
+    # -- services --------------------------------------------------------------------------------
+
+    def _offers(self) -> tuple[dict[str, list[str]], bool]:
+        """Return the md5 sums of services with the type, with their nodes; and whether to wait."""
+        if self._kind not in ("", "srv"):
+            return {}, False
+        full = f"{self._package}/srv/{self._base}"
+        graph, open_ = self._core.graph.services(), False
+        found: dict[str, list[str]] = {}
+        for service, types in self._services.listing().items():
+            nodes = [node for node in graph.get(service, []) if self._is_meant(node)]
+            open_ = open_ or (not types and bool(nodes))
+            if types == [full] and nodes:
+                found.setdefault(self._services.md5_of(service), []).extend(nodes)
+        return found, open_
+
+    def _service(self, offers: dict[str, list[str]]) -> ServiceType | None:
+        known = {md5: sorted(set(nodes)) for md5, nodes in offers.items()}
+        if self._hash and self._hash not in known:
+            told = _told(known)
+            self._problem = f"nobody offers this version of it, but there are others ({told})"
+            return None
+        sums = [md5 for md5 in known if md5 != ANY] or [ANY]
+        if len(sums) > 1 and not self._hash:
+            raise _conflict(self._name, known)
+        full = f"{self._package}/srv/{self._base}"
+        return self._core.types.announced_service(full, self._hash or sums[0])
+
+
+def _told(versions: dict[str, list[str]]) -> str:
+    return "; ".join(f"{md5} of {', '.join(nodes)}" for md5, nodes in versions.items())
+
+
+def _conflict(name: str, versions: dict[str, list[str]]) -> DefinitionConflictError:
+    return DefinitionConflictError(
+        f"{ros1_name(name)}: the graph has several versions ({_told(versions)}); choose one by its "
+        "hash or node"
+    )
