@@ -1,27 +1,28 @@
 """Values on their way from QML into a message, guided by the message's type.
 
 Nothing is guessed: what a field cannot take is left as it is, so that the codec refuses it with
-the field's path. Only what JavaScript has no word for is translated: integral numbers for integer
-fields, decimal text for 64-bit integers, milliseconds and dates for times, typed arrays.
+the field's path. Translated is what JavaScript has no word for (integral numbers for integer
+fields, decimal text for 64-bit integers, milliseconds and dates for times, typed arrays), and what
+the plugins take without loss.
 """
 
 from __future__ import annotations
 
-import math
-import re
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.qos import Durability, History, QoS, Reliability
 from rosglass.errors import ConversionError
-from rosglass.qt import QJSValue, QtGui, QtQml
+from rosglass.qml.dialect import Dialect
+from rosglass.qml.js_values import Shown, integral, is_model, properties_of, shown, wide
+from rosglass.qml.times import DECIMAL, from_milliseconds, known_parts, time_parts
+from rosglass.qt import QJSValue, QtCore, QtGui
 
 if TYPE_CHECKING:
     from rosglass.messages.schema import Member, Schema
 
-__all__ = ["fields_from_js", "qos_from_js"]
+__all__ = ["elements_from_js", "fields_from_js", "qos_from_js"]
 
-#: No 64-bit integer has more digits.
-_WHOLE = re.compile(r"-?0*[0-9]{1,20}\Z")
 _TYPED = {
     "Int8Array": "i1",
     "Uint8Array": "u1",
@@ -37,9 +38,12 @@ _TYPED = {
 _BULK = 32
 #: Longer arrays than this are a mistake (``a.length = 4e9``) that would freeze the screen.
 _LONGEST = 1 << 24
+_HEADER = "std_msgs/msg/Header"
 
 
-def fields_from_js(value: QJSValue, schema: Schema, path: str = "") -> dict[str, Any]:
+def fields_from_js(
+    value: QJSValue, schema: Schema, path: str = "", dialect: Dialect = Dialect.ROS2
+) -> dict[str, Any]:
     """Return the fields that a JavaScript value gives for a message; undefined ones are left out.
 
     Args:
@@ -47,149 +51,317 @@ def fields_from_js(value: QJSValue, schema: Schema, path: str = "") -> dict[str,
             names, or a vector or quaternion.
         schema: The message type.
         path: Field path of the message, for errors.
+        dialect: The module whose value it is. ``Ros2 1.0`` also takes texts for numbers, and the
+            other way round, where nothing is lost.
 
     Raises:
         ConversionError: The value cannot be a message of this type.
     """
-    if value.isQObject():
-        names = [member.name for member in schema.members if value.hasProperty(member.name)]
-        return _read(names, value, schema, path)
-    if not value.isObject() or value.isArray() or value.isCallable() or value.isDate():
-        raise ConversionError(path, _shown(value), f"an object with {schema.name}'s fields")
-    names = []
-    properties = QtQml.QJSValueIterator(value)
-    while properties.hasNext():
-        properties.next()
-        names.append(properties.name())
-    if not names and value.toString() != "[object Object]":
-        # A Map, a Set: their content would silently be lost.
-        raise ConversionError(path, _shown(value), f"an object with {schema.name}'s fields")
-    if "scalar" in names and "scalar" not in schema.by_name:
-        held = value.toVariant()
-        if isinstance(held, QtGui.QQuaternion):
-            return {"x": held.x(), "y": held.y(), "z": held.z(), "w": held.scalar()}
-    return _read([name for name in names if name != "#messageType"], value, schema, path)
+    return _Conversion(dialect).fields(value, schema, path)
 
 
-def _read(names: list[str], value: QJSValue, schema: Schema, path: str) -> dict[str, Any]:
-    fields = {}
-    for name in names:
-        inner = value.property(name)
-        if inner.isUndefined():
-            continue
-        member = schema.by_name.get(name)
-        # An unknown field goes along: the codec refuses it and names those that exist.
-        here = f"{path}.{name}" if path else name
-        fields[name] = _shown(inner) if member is None else _field(inner, member, here)
-    return fields
+def elements_from_js(values: QJSValue, kind: str) -> list[Any]:
+    """Return the elements of an array of 64-bit integers.
+
+    Args:
+        values: A JavaScript array of numbers and decimal texts.
+        kind: For errors.
+
+    Raises:
+        ConversionError: An element is no integer.
+    """
+    found = []
+    for index, value in enumerate(_list(values, kind)):
+        whole = wide(value) if isinstance(value, str) else integral(value)
+        if type(whole) is not int:
+            raise ConversionError(f"[{index}]", value, f"an integer ({kind})")
+        found.append(whole)
+    return found
 
 
-def _field(value: QJSValue, member: Member, path: str) -> Any:
-    if not member.is_array:
-        return _single(value, member, path)
-    # A long array that was received is a Proxy, which isArray() does not see through.
-    if value.isArray() or value.property("#index").isNumber():
-        return _elements(value, member, path)
-    constructor = value.property("constructor").property("name").toString()
-    if constructor in _TYPED and member.number is not None:
-        return _typed_array(value, constructor)
-    if constructor == "ArrayBuffer" and member.number is not None and member.number.size == 1:
-        return bytes(value.toVariant().data())
-    raise ConversionError(path, _shown(value), f"an array ({member.field.type})")
+def _renamed_time(given: dict[str, Any], schema: Schema) -> dict[str, Any]:
+    parts = known_parts(given, "", f"a time ({schema.name})")
+    return dict(zip((member.name for member in schema.members), parts, strict=True))
 
 
-def _elements(value: QJSValue, member: Member, path: str) -> Any:
-    source = value.property("#source")
-    if source.isQObject():
-        # A received array on its way back, untouched: no need to fetch it into JavaScript.
-        held: Any = source.toQObject()
-        return held.arrays[value.property("#index").toInt()][1]
+class _Conversion:
+    """The rules of one module."""
+
+    def __init__(self, dialect: Dialect) -> None:
+        self._dialect = dialect
+        self._loose = dialect is Dialect.ROS2
+
+    def fields(self, value: QJSValue, schema: Schema, path: str) -> dict[str, Any]:
+        """Return the fields that a value gives for a message."""
+        if schema.is_time:
+            parts = time_parts(value, path, f"a time ({schema.name})")
+            return dict(zip((member.name for member in schema.members), parts, strict=True))
+        names = self._names(schema)
+        if value.isQObject() and not is_model(value):
+            found = [name for name in names if value.hasProperty(name)]
+            return self._read(found, names, value, schema, path)
+        if (
+            not value.isObject()
+            or value.isArray()
+            or value.isCallable()
+            or value.isDate()
+            or value.isQObject()
+        ):
+            raise _no_message(value, schema, path)
+        found = properties_of(value)
+        if not found and value.toString() != "[object Object]":
+            # A Map, a Set, a url: their content would silently be lost.
+            raise _no_message(value, schema, path)
+        if "scalar" in found and "scalar" not in schema.by_name:
+            held = value.toVariant()
+            if isinstance(held, QtGui.QQuaternion):
+                return {"x": held.x(), "y": held.y(), "z": held.z(), "w": held.scalar()}
+        found = [name for name in found if name != "#messageType"]
+        return self._read(found, names, value, schema, path)
+
+    def _names(self, schema: Schema) -> dict[str, str]:
+        """Return the fields by what they may be called."""
+        names = {member.name: member.name for member in schema.members}
+        names.update({ours: theirs for theirs, ours in self._dialect.names(schema).items()})
+        return names
+
+    def _read(
+        self, found: list[str], names: dict[str, str], value: QJSValue, schema: Schema, path: str
+    ) -> dict[str, Any]:
+        fields: dict[str, Any] = {}
+        for name in found:
+            inner = value.property(name)
+            if inner.isUndefined() or self._is_needless(name, schema):
+                continue
+            member = schema.by_name.get(names.get(name, ""))
+            # An unknown field goes along: the codec refuses it and names those that exist.
+            here = f"{path}.{name}" if path else name
+            if member is None:
+                fields[name] = shown(inner)
+            else:
+                fields[member.name] = self._field(inner, member, here)
+        return fields
+
+    def _is_needless(self, name: str, schema: Schema) -> bool:
+        """Return whether it is the counter that only ROS 1's headers have."""
+        ros1 = self._dialect is Dialect.ROS1
+        return ros1 and name == "seq" and schema.name == _HEADER and name not in schema.by_name
+
+    def _field(self, value: QJSValue, member: Member, path: str) -> Any:
+        if not member.is_array:
+            return self._single(value, member, path)
+        # A long array that was received is a Proxy, which isArray() does not see through.
+        if value.isArray() or value.property("#index").isNumber():
+            return self._elements(value, member, path)
+        if is_model(value):
+            return self._rows(value.toQObject(), member, path)
+        constructor = value.property("constructor").property("name").toString()
+        if member.number is not None and value.isObject():
+            if constructor in _TYPED:
+                return _typed_array(value, constructor, member)
+            if constructor == "ArrayBuffer":
+                return _buffer(value, member, path)
+        if constructor == "DataView":
+            wanted = f"an array ({member.field.type}); pass the DataView's .buffer"
+            raise ConversionError(path, Shown("a DataView"), wanted)
+        held = value.toVariant() if value.isObject() and not value.isCallable() else None
+        if isinstance(held, list):
+            # A list of C++ or Python, which JavaScript does not call an array.
+            return [
+                self._python(item, member, f"{path}[{index}]") for index, item in enumerate(held)
+            ]
+        raise ConversionError(path, shown(value), f"an array ({member.field.type})")
+
+    def _elements(self, value: QJSValue, member: Member, path: str) -> Any:
+        source = value.property("#source")
+        if source.isQObject():
+            # A received array on its way back, untouched: no need to fetch it into JavaScript.
+            held: Any = source.toQObject()
+            theirs, values = held.arrays[value.property("#index").toInt()]
+            if theirs.struct is member.struct:
+                return values
+        if value.property("#index").isNumber():
+            value = value.property("toArray").callWithInstance(value)
+        length = _length(value, path)
+        if length > _BULK and member.struct is None:
+            items = value.toVariant()
+            if None not in items:
+                return [
+                    self._python(item, member, f"{path}[{index}]")
+                    for index, item in enumerate(items)
+                ]
+        return [
+            self._element(value.property(index), member, f"{path}[{index}]")
+            for index in range(length)
+        ]
+
+    def _element(self, value: QJSValue, member: Member, path: str) -> Any:
+        if value.isUndefined():
+            # What a growing length skipped.
+            return _default(member)
+        return self._single(value, member, path)
+
+    def _rows(self, model: Any, member: Member, path: str) -> list[Any]:
+        """Return the rows of an item model: its first role, or messages of its roles."""
+        roles = {number: bytes(name.data()).decode() for number, name in model.roleNames().items()}
+        struct = member.struct
+        found: list[Any] = []
+        count = model.rowCount()
+        if count > _LONGEST:
+            raise ConversionError(path, Shown(f"{count} rows"), f"at most {_LONGEST} rows")
+        for row in range(count):
+            index, here = model.index(row, 0), f"{path}[{row}]"
+            if struct is None:
+                item = model.data(index, min(roles))
+                found.append(self._python(item, member, here))
+                continue
+            items = {name: model.data(index, number) for number, name in roles.items()}
+            found.append(self._python_fields(items, struct, here))
+        return found
+
+    def _python_fields(self, items: dict[str, Any], schema: Schema, path: str) -> dict[str, Any]:
+        names = self._names(schema)
+        fields = {}
+        for name, item in items.items():
+            # An item model answers None for roles that a row does not have.
+            if item is None:
+                continue
+            member = schema.by_name.get(names.get(name, ""))
+            here = f"{path}.{name}"
+            if member is None:
+                fields[name] = item
+            elif not member.is_array:
+                fields[member.name] = self._python(item, member, here)
+            elif isinstance(item, QtCore.QAbstractItemModel):
+                fields[member.name] = self._rows(item, member, here)
+            elif isinstance(item, list):
+                fields[member.name] = [self._python(inner, member, here) for inner in item]
+            else:
+                fields[member.name] = item
+        return fields
+
+    def _python(self, value: Any, member: Member, path: str) -> Any:
+        """Return one element that Qt has made a Python value of."""
+        if isinstance(value, QJSValue):
+            return self._single(value, member, path)
+        struct = member.struct
+        if struct is None:
+            return self._scalar(value, member, in_array=True)
+        if isinstance(value, dict):
+            if struct.is_time:
+                return _renamed_time(value, struct)
+            return self._python_fields(value, struct, path)
+        if isinstance(value, QtCore.QDateTime):
+            value = value.toMSecsSinceEpoch()
+        if struct.is_time and isinstance(value, (int, float)):
+            parts = from_milliseconds(value, path)
+            return dict(zip((inner.name for inner in struct.members), parts, strict=True))
+        names = [inner.name for inner in struct.members]
+        if all(callable(getattr(value, name, None)) for name in names):
+            return {name: getattr(value, name)() for name in names}
+        return value
+
+    def _single(self, value: QJSValue, member: Member, path: str) -> Any:
+        if member.struct is not None:
+            return self.fields(value, member.struct, path)
+        if value.isNumber():
+            return self._scalar(value.toNumber(), member, member.is_array)
+        if value.isString():
+            return self._scalar(value.toString(), member, member.is_array)
+        if value.isBool():
+            return self._scalar(value.toBool(), member, member.is_array)
+        if member.number is None and value.isObject() and not value.isQObject():
+            held = value.toVariant()
+            if isinstance(held, QtCore.QUrl):
+                return held.toString()
+        return shown(value)
+
+    def _scalar(self, value: Any, member: Member, in_array: bool) -> Any:
+        """Return a number, text or bool for a field, translated if nothing gets lost."""
+        number = member.number
+        if number is None:
+            if isinstance(value, QtCore.QUrl):
+                return value.toString()
+            plain = isinstance(value, (bool, int, float))
+            return _text(value) if plain and (self._loose or in_array) else value
+        if isinstance(value, str) and number.code in "qQ":
+            return wide(value)
+        if self._loose and not in_array:
+            value = _as_number(value, number.code)
+        return integral(value) if number.low is not None else value
+
+
+def _no_message(value: QJSValue, schema: Schema, path: str) -> ConversionError:
+    return ConversionError(path, shown(value), f"an object with {schema.name}'s fields")
+
+
+def _length(value: QJSValue, path: str) -> int:
     count = value.property("length").toNumber()
     if count > _LONGEST:
         raise ConversionError(
-            path, _Shown(f"{count:.0f}"), f"an array of at most {_LONGEST} elements"
+            path, Shown(f"{count:.0f}"), f"an array of at most {_LONGEST} elements"
         )
-    length = int(count)
-    if length > _BULK and member.struct is None:
-        whole = member.number is not None and member.number.low is not None
-        elements = value.toVariant()
-        if _is_wide(member):
-            return [_wide(v) if isinstance(v, str) else _integral(v) for v in elements]
-        return [_integral(v) if whole else v for v in elements]
-    return [_single(value.property(i), member, f"{path}[{i}]") for i in range(length)]
+    return int(count)
 
 
-def _typed_array(value: QJSValue, constructor: str) -> Any:
+def _list(value: QJSValue, path: str) -> list[Any]:
+    _length(value, path)
+    items = value.toVariant()
+    return items if isinstance(items, list) else []
+
+
+def _default(member: Member) -> Any:
+    if member.struct is not None:
+        return {}
+    return "" if member.number is None else member.number.python()
+
+
+def _typed_array(value: QJSValue, constructor: str, member: Member) -> Any:
     import numpy as np  # noqa: PLC0415 - few programs send typed arrays
 
     data = bytes(value.property("buffer").toVariant().data())
     count, offset = value.property("length").toInt(), value.property("byteOffset").toInt()
-    return np.frombuffer(data, np.dtype(_TYPED[constructor]), count, offset)
+    found = np.frombuffer(data, np.dtype(_TYPED[constructor]), count, offset)
+    if member.number is not None and member.number.code == "?" and found.dtype.kind != "f":
+        # Bools are received as bytes.
+        return found.astype(bool) if ((found == 0) | (found == 1)).all() else found
+    return found
 
 
-def _single(value: QJSValue, member: Member, path: str) -> Any:
-    schema = member.struct
-    if schema is not None:
-        if schema.is_time and (value.isNumber() or value.isDate()):
-            return _time(value, schema)
-        return fields_from_js(value, schema, path)
-    if value.isNumber():
-        number = value.toNumber()
-        whole = member.number is not None and member.number.low is not None
-        return _integral(number) if whole else number
-    if value.isString():
-        text = value.toString()
-        return _wide(text) if _is_wide(member) else text
-    if value.isBool():
-        return value.toBool()
-    return _shown(value)
+def _buffer(value: QJSValue, member: Member, path: str) -> Any:
+    """Return an ArrayBuffer's elements: what ``buffer()`` of a received array gives."""
+    assert member.number is not None
+    data, size = bytes(value.toVariant().data()), member.number.size
+    if size == 1 and member.number.low is not None:
+        return data
+    if len(data) % size:
+        wanted = f"a multiple of {size} bytes ({member.field.type})"
+        raise ConversionError(path, Shown(f"an ArrayBuffer of {len(data)} bytes"), wanted)
+    import numpy as np  # noqa: PLC0415 - few programs send buffers
+
+    found = np.frombuffer(data, np.dtype(member.number.dtype))
+    is_bool = member.number.code == "?" and bool((found <= 1).all())
+    return found.astype(bool) if is_bool else found
 
 
-def _is_wide(member: Member) -> bool:
-    return member.number is not None and member.number.code in "qQ"
+def _text(value: float) -> str:
+    """Return a number or bool as JavaScript writes it."""
+    return QJSValue(value if isinstance(value, bool) else float(value)).toString()
 
 
-def _wide(text: str) -> int | str:
-    return int(text) if _WHOLE.match(text) else text
-
-
-def _integral(value: Any) -> Any:
-    return int(value) if isinstance(value, float) and value.is_integer() else value
-
-
-def _time(value: QJSValue, schema: Schema) -> dict[str, Any]:
-    """Take a number for milliseconds, and a Date for a point in time."""
-    if value.isDate():
-        milliseconds: float = value.toDateTime().toMSecsSinceEpoch()
-    else:
-        milliseconds = value.toNumber()
-    if not math.isfinite(milliseconds) or abs(milliseconds) > 2**53:
-        raise ConversionError("", milliseconds, "milliseconds")
-    whole, rest = divmod(round(milliseconds * 1_000_000), 1_000_000_000)
-    return dict(zip((member.name for member in schema.members), (whole, rest), strict=True))
-
-
-def _shown(value: QJSValue) -> Any:
-    """Return a Python value that shows in an error what was given."""
-    if value.isNull() or value.isUndefined():
-        return None
-    if value.isNumber():
-        return value.toNumber()
-    if value.isBool():
-        return value.toBool()
-    if value.isCallable():
-        return _Shown("a function")
-    return value.toString() if value.isString() else _Shown(value.toString())
-
-
-class _Shown:
-    """A value of no Python type, shown as JavaScript shows it."""
-
-    def __init__(self, text: str) -> None:
-        self._text = text
-
-    def __repr__(self) -> str:
-        return self._text
+def _as_number(value: Any, code: str) -> Any:
+    """Return what a text or bool says as a number, and a number or text as a bool."""
+    if code == "?":
+        words = {"true": True, "false": False, "1": True, "0": False, 1: True, 0: False}
+        return words.get(value, value) if isinstance(value, (str, int, float)) else value
+    if isinstance(value, bool):
+        return int(value)
+    if isinstance(value, str) and DECIMAL.match(value.strip()):
+        found = Fraction(value.strip())
+        if code in "fd":
+            return float(value)
+        return int(found) if found.denominator == 1 else value
+    return value
 
 
 def qos_from_js(value: QJSValue | None, default: QoS) -> QoS:
@@ -212,7 +384,7 @@ def qos_from_js(value: QJSValue | None, default: QoS) -> QoS:
             history=History(value.property("history").toString()),
         )
     except ValueError:
-        raise ConversionError("qos", _shown(value), "a queue size or Ros2.QoS()") from None
+        raise ConversionError("qos", shown(value), "a queue size or Ros2.QoS()") from None
 
 
 def _depth(value: float) -> int:

@@ -81,7 +81,7 @@ class Publisher(Element):
             self._complain(f"nothing was published on {self._topic}: {reason}", logging.WARNING)
             return False
         try:
-            fields = fields_from_js(message, schema)
+            fields = fields_from_js(message, schema, dialect=self.DIALECT)
             if self._qos.history is History.KEEP_ALL and self._session is not None:
                 # Who must not lose anything waits for a network that is stuck: not here.
                 data = sender.type.encode(fields)

@@ -10,12 +10,13 @@ from rosglass.errors import Error
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.log import Caller, plain_path
 from rosglass.qml.session import Session
-from rosglass.qml.to_js import describe, exact, reader, to_json
-from rosglass.qt import QJSValue, QtCore, QtQml, Slot, engine_of, is_alive
+from rosglass.qml.to_js import describe, reader, to_json
+from rosglass.qml.value_host import Host, LongArrays
+from rosglass.qt import QJSValue, QtCore, QtQml, engine_of, is_alive
 
 if TYPE_CHECKING:
     from rosglass.comm.qos import QoS
-    from rosglass.comm.time import Time
+    from rosglass.comm.time import Duration, Time
     from rosglass.messages import Message
     from rosglass.messages.schema import Schema
     from rosglass.qml.to_js import LongArray
@@ -23,11 +24,22 @@ if TYPE_CHECKING:
 __all__ = ["Runtime", "runtime_of"]
 
 _log = logging.getLogger("rosglass.qml")
-_HELPERS = Path(__file__).with_name("helpers.js")
+_FOLDER = Path(__file__).parent
 _NAME = "rosglass.runtime"
 #: Bytes of long arrays handed to JavaScript after which it is asked to collect its garbage: it
 #: does not see how much memory its small objects hold on our side.
 _GARBAGE = 64 << 20
+#: Functions that helpers.js gives.
+_HELPERS = (
+    "build",
+    "buildWithNan",
+    "shape",
+    "makeTime",
+    "createTime",
+    "timeParts",
+    "makeQos",
+    "makeOptions",
+)
 _PROMISE = """(function () {
     let made = {}
     made.promise = new Promise(function (resolve, reject) {
@@ -36,41 +48,6 @@ _PROMISE = """(function () {
     })
     return made
 })"""
-
-
-class _Source(QtCore.QObject):
-    """The long arrays of one message; lives as long as JavaScript holds one of them."""
-
-    def __init__(self, runtime: Runtime, arrays: list[LongArray], dialect: Dialect) -> None:
-        super().__init__()
-        self._runtime, self.arrays, self._dialect = runtime, arrays, dialect
-
-    @Slot(int, int, result=QJSValue)
-    def at(self, index: int, place: int) -> QJSValue:
-        """Return one element of an array."""
-        member, values = self.arrays[index]
-        try:
-            value = values[place]
-            if member.struct is not None:
-                return self._runtime.message(value, self._dialect)
-        except Error as error:
-            self._runtime.throw(str(error))
-            return QJSValue()
-        if member.number is None:
-            return QJSValue(str(value))
-        if member.number.code == "?":
-            return QJSValue(bool(value))
-        whole = exact(int(value)) if member.number.low is not None else float(value)
-        return self._runtime.value(whole)
-
-    @Slot(int, result="QVariant")
-    def buffer(self, index: int) -> QtCore.QByteArray | None:
-        """Return a numeric array's bytes in this machine's byte order, otherwise None."""
-        member, values = self.arrays[index]
-        if member.number is None:
-            return None
-        native = values.astype(values.dtype.newbyteorder("="), copy=False)
-        return QtCore.QByteArray(native.tobytes())
 
 
 class Runtime(QtCore.QObject):
@@ -89,13 +66,13 @@ class Runtime(QtCore.QObject):
         self._shapes: dict[tuple[Schema, Dialect], QJSValue] = {}
         self._kept: set[QtCore.QObject] = set()
         self._debt = 0
-        helpers = _evaluate(engine, _HELPERS.read_text(encoding="utf-8"), str(_HELPERS))
-        if helpers.isError():
-            raise Error(f"{_HELPERS}: {helpers.toString()}")
-        self._helper = {
-            name: helpers.property(name)
-            for name in ("build", "buildWithNan", "shape", "makeTime", "makeQos", "makeOptions")
-        }
+        self._host = Host(self)
+        parts = [self._script(name) for name in ("times.js", "arrays.js")]
+        made = self._script("helpers.js").call([*parts, engine.newQObject(self._host)])
+        self._helper = {name: made.property(name) for name in _HELPERS}
+        for name, helper in self._helper.items():
+            if not helper.isCallable():
+                raise Error(f"helpers.js: {name}: {made.toString()}")
         self._helper["makePromise"] = _evaluate(engine, _PROMISE)
 
     @property
@@ -160,10 +137,10 @@ class Runtime(QtCore.QObject):
             return QJSValue()
         schema = message._schema__
         arrays: list[LongArray] = []
-        text, marked = to_json(reader(schema)(message, arrays))
+        text, marked = to_json(reader(schema, dialect)(message, arrays))
         source = QJSValue()
         if arrays:
-            source = engine.newQObject(self.keep(_Source(self, arrays, dialect)))
+            source = engine.newQObject(self.keep(LongArrays(self, arrays, dialect)))
             self._charge(arrays)
         build = "buildWithNan" if marked else "build"
         return self._call(build, [QJSValue(text), self._shape(schema, dialect), source])
@@ -173,9 +150,28 @@ class Runtime(QtCore.QObject):
         made = self._call("makePromise", [])
         return made.property("promise"), made.property("resolve"), made.property("reject")
 
-    def time(self, time: Time) -> QJSValue:
-        """Return a time as messages carry it, with seconds(), toJSDate() and so on."""
-        return self._call("makeTime", [self.value(time.sec), self.value(time.nanosec)])
+    def time(self, time: Time, dialect: Dialect = Dialect.ROS2) -> QJSValue:
+        """Return a time as the module's messages carry it: with seconds(), or toSec()."""
+        return self._make_time(dialect, "time", time.sec, time.nanosec)
+
+    def duration(self, duration: Duration, dialect: Dialect = Dialect.ROS2) -> QJSValue:
+        """Return a duration as the module's messages carry it: in ``Ros 1.0`` milliseconds."""
+        return self._make_time(dialect, "duration", *divmod(duration.nanoseconds, 10**9))
+
+    def _make_time(self, dialect: Dialect, kind: str, sec: int, nanosec: int) -> QJSValue:
+        return self._call("makeTime", [self.value(v) for v in (dialect.ros, kind, sec, nanosec)])
+
+    def create_time(
+        self, dialect: Dialect, kind: str, first: QJSValue, second: QJSValue
+    ) -> QJSValue:
+        """Return what ``Ros2.time()`` and its like make of their arguments.
+
+        Returns:
+            The value; a JavaScript error when the arguments are none of what is accepted.
+        """
+        arguments = [self.value(dialect.ros), self.value(kind), first, second]
+        result: QJSValue = self._helper["createTime"].call(arguments)
+        return result
 
     def options(self) -> QJSValue:
         """Return an empty set of init options."""
@@ -190,16 +186,25 @@ class Runtime(QtCore.QObject):
         shape = self._shapes.get((schema, dialect))
         if shape is None:
             assert self.engine is not None
-            constants, members = describe(schema)
-            fields = self.engine.newArray(len(members))
-            for index, (name, kind, inner) in enumerate(members):
+            found = describe(schema, dialect)
+            fields = self.engine.newArray(len(found.fields))
+            for index, (name, kind, inner) in enumerate(found.fields):
                 field = self.value([name, kind, 0])
                 if inner is not None:
                     field.setProperty(2, self._shape(inner, dialect))
                 fields.setProperty(index, field)
-            arguments = [QJSValue(schema.name), fields, self.value(constants)]
-            shape = self._shapes[schema, dialect] = self._call("shape", arguments)
+            number = self._host.know(schema, dialect)
+            head = [QJSValue(found.name), QJSValue(found.time), fields]
+            shape = self._call("shape", [*head, self.value(found.constants), self.value(number)])
+            self._shapes[schema, dialect] = shape
         return shape
+
+    def _script(self, name: str) -> QJSValue:
+        file = _FOLDER / name
+        result = _evaluate(self._engine, file.read_text(encoding="utf-8"), str(file))
+        if result.isError():
+            raise Error(f"{file}:{result.property('lineNumber').toString()}: {result.toString()}")
+        return result
 
     def _charge(self, arrays: list[LongArray]) -> None:
         self._debt += sum(getattr(values, "nbytes", 0) for _, values in arrays)

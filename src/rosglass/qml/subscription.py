@@ -362,7 +362,7 @@ class Subscription(TopicElement):
             return
         except TypeNotFoundError:
             return  # only bytes; the subscription's own problem says why
-        name = sample.type.definition.name
+        name = self.DIALECT.type_name(sample.type.definition.name)
         new_type = name != self._found_type and not self._wanted_type
         self._found_type = name
         self._sample, self._value = sample, None

@@ -9,19 +9,34 @@ from __future__ import annotations
 import json
 import math
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rosglass.qml.dialect import Dialect
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from rosglass.interfaces import Definition
     from rosglass.messages import Message
     from rosglass.messages.schema import Member, Schema
 
-__all__ = ["INLINE", "LongArray", "describe", "exact", "reader", "to_json"]
+__all__ = [
+    "INLINE",
+    "LongArray",
+    "Shape",
+    "constants_of",
+    "describe",
+    "exact",
+    "is_duration",
+    "milliseconds",
+    "reader",
+    "to_json",
+]
 
 #: Arrays of more numbers, texts or messages than this are fetched when they are asked for.
 INLINE = {"number": 64, "text": 32, "message": 16}
 _EXACT = 1 << 53
+_HEADER = "std_msgs/msg/Header"
 
 #: A long array: its member and its values.
 LongArray = tuple["Member", Any]
@@ -32,21 +47,29 @@ def exact(value: int) -> int | str:
     return value if -_EXACT < value < _EXACT else str(value)
 
 
-def reader(schema: Schema) -> Callable[[Message, list[LongArray]], dict[str, Any]]:
+def reader(
+    schema: Schema, dialect: Dialect = Dialect.ROS2
+) -> Callable[[Message, list[LongArray]], dict[str, Any]]:
     """Return a function that reads a message's short parts and collects its long arrays."""
     made: Callable[[Message, list[LongArray]], dict[str, Any]] = schema.cached(
-        "qml reader", lambda: _make_reader(schema)
+        ("qml reader", dialect), lambda: _make_reader(schema, dialect)
     )
     return made
 
 
-def _make_reader(schema: Schema) -> Callable[[Message, list[LongArray]], dict[str, Any]]:
+def _make_reader(
+    schema: Schema, dialect: Dialect
+) -> Callable[[Message, list[LongArray]], dict[str, Any]]:
     members = schema.members
     if not members:
         return lambda message, arrays: {}  # noqa: ARG005 - the signature is shared
-    names = [member.name for member in members]
+    names = _names(schema, dialect)
     get = attrgetter(*(member.attr for member in members))
-    fixes = [(member.name, fix) for member in members if (fix := _fix(member)) is not None]
+    fixes = [
+        (name, fix)
+        for name, member in zip(names, members, strict=True)
+        if (fix := _fix(member, dialect)) is not None
+    ]
     single = len(members) == 1
 
     def read(message: Message, arrays: list[LongArray]) -> dict[str, Any]:
@@ -59,12 +82,38 @@ def _make_reader(schema: Schema) -> Callable[[Message, list[LongArray]], dict[st
     return read
 
 
-def _fix(member: Member) -> Callable[[Any, list[LongArray]], Any] | None:
+def _names(schema: Schema, dialect: Dialect) -> list[str]:
+    """Return what the module calls the fields."""
+    if schema.is_time:
+        return list(dialect.time_fields)
+    renamed = dialect.names(schema)
+    return [renamed.get(member.name, member.name) for member in schema.members]
+
+
+def is_duration(schema: Schema) -> bool:
+    """Return whether a type is a span of time."""
+    return schema.is_time and schema.name.endswith("uration")
+
+
+def milliseconds(duration: Message) -> float:
+    """Return a duration as ``Ros 1.0`` shows it."""
+    (first, second) = (getattr(duration, member.attr) for member in duration._schema__.members)
+    return float(first * 1000 + second / 1_000_000)
+
+
+def _is_number(member: Member, dialect: Dialect) -> bool:
+    """Return whether a field is a duration that is shown as a number."""
+    return dialect is Dialect.ROS1 and member.struct is not None and is_duration(member.struct)
+
+
+def _fix(member: Member, dialect: Dialect) -> Callable[[Any, list[LongArray]], Any] | None:
     """Return what has to be done to a member's value, None when it can stay as it is."""
     if member.is_array:
-        return _array_fix(member)
+        return _array_fix(member, dialect)
+    if _is_number(member, dialect):
+        return lambda value, arrays: milliseconds(value)  # noqa: ARG005
     if member.struct is not None:
-        return reader(member.struct)
+        return reader(member.struct, dialect)
     if _is_wide(member):
         return lambda value, arrays: exact(int(value))  # noqa: ARG005
     return None
@@ -74,10 +123,14 @@ def _is_wide(member: Member) -> bool:
     return member.number is not None and member.number.code in "qQ"
 
 
-def _array_fix(member: Member) -> Callable[[Any, list[LongArray]], Any]:
+def _array_fix(member: Member, dialect: Dialect) -> Callable[[Any, list[LongArray]], Any]:
     limit = 0 if _is_wide(member) else INLINE[member.kind.value]
-    element = reader(member.struct) if member.struct is not None else None
     boolean = member.number is not None and member.number.code == "?"
+    element: Callable[[Any, list[LongArray]], Any] | None = None
+    if _is_number(member, dialect):
+        element = lambda value, arrays: milliseconds(value)  # noqa: E731, ARG005
+    elif member.struct is not None:
+        element = reader(member.struct, dialect)
 
     def fix(values: Any, arrays: list[LongArray]) -> Any:
         count = len(values)
@@ -92,24 +145,49 @@ def _array_fix(member: Member) -> Callable[[Any, list[LongArray]], Any]:
     return fix
 
 
-def describe(schema: Schema) -> tuple[dict[str, Any], list[tuple[str, str, Schema | None]]]:
-    """Return a type's constants, and its fields that are more than a single value.
+class Shape(NamedTuple):
+    """What JavaScript has to know about a type.
 
-    Each of those fields is given as name, kind of array element (empty for a nested message) and
-    schema of the nested message.
+    Attributes:
+        name: The type's name.
+        time: Which times' methods its values have (see ``times.js``); empty for none.
+        constants: Its constants.
+        fields: Fields that are more than a single value: name, kind of array element (empty for a
+            nested message), schema of the nested message.
     """
-    constants = {
-        constant.name: exact(constant.value) if type(constant.value) is int else constant.value
-        for constant in schema.definition.constants
-    }
+
+    name: str
+    time: str
+    constants: dict[str, Any]
+    fields: list[tuple[str, str, Schema | None]]
+
+
+def describe(schema: Schema, dialect: Dialect = Dialect.ROS2) -> Shape:
+    """Return what JavaScript has to know about a type."""
+    constants = constants_of(schema.definition)
+    if dialect is Dialect.ROS1 and schema.name == _HEADER and "seq" not in schema.by_name:
+        # Interfaces of ROS 1 may show it; ROS 2 does not count.
+        constants["seq"] = 0
+    time = ""
+    if schema.is_time:
+        time = f"{'duration' if is_duration(schema) else 'time'}{dialect.ros}"
     fields = []
-    for member in schema.members:
+    for name, member in zip(_names(schema, dialect), schema.members, strict=True):
+        number = _is_number(member, dialect)
         if member.is_array:
             kind = member.number.name if member.number is not None else member.kind.value
-            fields.append((member.name, kind, member.struct))
-        elif member.struct is not None:
-            fields.append((member.name, "", member.struct))
-    return constants, fields
+            fields.append((name, "duration", None) if number else (name, kind, member.struct))
+        elif member.struct is not None and not number:
+            fields.append((name, "", member.struct))
+    return Shape(dialect.type_name(schema.name), time, constants, fields)
+
+
+def constants_of(definition: Definition) -> dict[str, Any]:
+    """Return a message's constants as JavaScript can hold them."""
+    return {
+        constant.name: exact(constant.value) if type(constant.value) is int else constant.value
+        for constant in definition.constants
+    }
 
 
 def to_json(value: Any) -> tuple[str, bool]:

@@ -1,0 +1,66 @@
+"""JavaScript values in Python: what they are, and how errors show them."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+from rosglass.qt import QJSValue, QtCore, QtQml
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+__all__ = ["Shown", "integral", "is_model", "properties_of", "shown", "wide"]
+
+#: No 64-bit integer has more digits.
+_WHOLE = re.compile(r"-?0*[0-9]{1,20}\Z")
+
+
+def properties_of(value: QJSValue) -> list[str]:
+    """Return the names of an object's own properties."""
+    return list(_iterate(value))
+
+
+def _iterate(value: QJSValue) -> Iterator[str]:
+    properties = QtQml.QJSValueIterator(value)
+    while properties.hasNext():
+        properties.next()
+        yield properties.name()
+
+
+def is_model(value: QJSValue) -> bool:
+    """Return whether it is an item model: a ListModel, or one of C++ or Python."""
+    return value.isQObject() and isinstance(value.toQObject(), QtCore.QAbstractItemModel)
+
+
+def wide(text: str) -> int | str:
+    """Return the integer that a decimal text says, otherwise the text."""
+    return int(text) if _WHOLE.match(text) else text
+
+
+def integral(value: Any) -> Any:
+    """Return a whole float as an integer, everything else as it is."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+def shown(value: QJSValue) -> Any:
+    """Return a Python value that shows in an error what was given."""
+    if value.isNull() or value.isUndefined():
+        return None
+    if value.isNumber():
+        return value.toNumber()
+    if value.isBool():
+        return value.toBool()
+    if value.isCallable():
+        return Shown("a function")
+    return value.toString() if value.isString() else Shown(value.toString())
+
+
+class Shown:
+    """A value of no Python type, shown as JavaScript shows it."""
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+
+    def __repr__(self) -> str:
+        return self._text
