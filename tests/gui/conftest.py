@@ -16,7 +16,6 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 # Python code that paints would deadlock with grabs under the threaded render loop.
 os.environ.setdefault("QSG_RENDER_LOOP", "basic")
-os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 # Debian's Python has Qt 5; programs that tests start inherit the choice.
 if find_spec("PySide6") is None:
     os.environ.setdefault("ROSGLASS_QT", "pyside2")
@@ -30,11 +29,24 @@ if TYPE_CHECKING:
 
     from rosglass.qml import Session
 
+QT5 = os.environ.get("ROSGLASS_QT") == "pyside2"
+
 
 @pytest.fixture(scope="session")
-def app() -> QCoreApplication:
+def platform(request: pytest.FixtureRequest) -> dict[str, str]:
+    """The environment in which Qt draws without anybody's screen."""
+    if not QT5:
+        return {"QT_QPA_PLATFORM": "offscreen"}
+    # Offscreen, Qt 5 needs OpenGL of a display as well, and gives no pictures without it.
+    display = request.getfixturevalue("screen")
+    return {"QT_QPA_PLATFORM": "xcb", "DISPLAY": display, "QT_QUICK_BACKEND": "software"}
+
+
+@pytest.fixture(scope="session")
+def app(platform: dict[str, str]) -> QCoreApplication:
     from rosglass.qt import QtGui
 
+    os.environ.update(platform)
     return QtGui.QGuiApplication.instance() or QtGui.QGuiApplication(["test"])
 
 
@@ -208,15 +220,16 @@ class Program:
 
 
 @pytest.fixture
-def start(request: Any) -> Iterator[Callable[..., Program]]:
-    """Start ``rosglass`` with arguments; `display` empty is offscreen, None none at all."""
+def start(platform: dict[str, str]) -> Iterator[Callable[..., Program]]:
+    """Start ``rosglass`` with arguments; `display` empty is nobody's, None none at all."""
     programs = []
 
     def start(*arguments: Any, display: str | None = "", **extra: str) -> Program:
-        gone = {"DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM", "QSG_RENDER_LOOP", "ROSGLASS_URL"}
+        gone = {"DISPLAY", "WAYLAND_DISPLAY", "QSG_RENDER_LOOP", "ROSGLASS_URL"}
+        gone |= {"QT_QPA_PLATFORM", "QT_QUICK_BACKEND"}
         environment = {k: v for k, v in os.environ.items() if k not in gone} | extra
         if display == "":
-            environment["QT_QPA_PLATFORM"] = "offscreen"
+            environment = platform | environment
         elif display is not None:
             environment["DISPLAY"] = display
         command = [sys.executable, "-m", "rosglass.cli", *map(str, arguments)]

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 UI = """import QtQuick 2.15
+import QtQuick.Window 2.15
 import Ros2 1.0
 Rectangle {
     property string title: "%s"
@@ -79,7 +80,7 @@ def test_errors_are_shown_over_the_last_good_interface(
     assert not runner.reload()
     wait(50)
     assert runner.window.title() == "one"
-    assert f"{file}:7:5: " in caplog.text
+    assert f"{file}:8:5: " in caplog.text
     covered = colour(runner)
     assert covered != before
     file.write_text(UI % ("good", "red"))

@@ -1,4 +1,4 @@
-import QtQuick
+import QtQuick 2.15
 
 // Shown over the last good interface while a reloaded one has errors.
 Rectangle {
