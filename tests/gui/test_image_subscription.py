@@ -141,7 +141,7 @@ class TestStale:
     def test_the_picture_goes_blank_after_the_timeout(
         self, live: Any, camera: Any, wait: Any
     ) -> None:
-        wait(lambda: colour(live) is None, timeout=1.0)
+        wait(lambda: colour(live) is None)
         assert live.property("sub").property("stale")
         camera.publish(picture(BLUE))
         wait(lambda: colour(live) == BLUE)
@@ -149,7 +149,7 @@ class TestStale:
 
     def test_without_timeout_it_stays_but_is_stale(self, live: Any, wait: Any) -> None:
         live.property("sub").setProperty("timeout", 0)
-        wait(lambda: live.property("sub").property("stale"), timeout=4.0)
+        wait(lambda: live.property("sub").property("stale"))
         assert colour(live) == RED
 
     def test_it_is_stale_at_once_when_the_camera_goes(
@@ -275,9 +275,9 @@ def test_rate_and_latency_are_not_rounded(running: Any, camera: Any, wait: Any) 
     assert sub.property("latency") == pytest.approx(
         sub.property("networkLatency") + sub.property("processingLatency"), abs=0.5
     )
-    wait(lambda: sub.property("framerate") < 10, timeout=4)
+    wait(lambda: sub.property("framerate") < 10)
     # What is not live has no rate and no latency any more.
-    wait(lambda: sub.property("stale"), timeout=4)
+    wait(lambda: sub.property("stale"))
     wait(lambda: sub.property("framerate") == 0)
     assert sub.property("latency") == sub.property("networkLatency") == -1
 

@@ -163,7 +163,7 @@ def test_unknown_types_are_said_and_looked_for_again(running: Any, wait: Any, ca
     wait(lambda: "std_msgs/msg/Bool" in root.property("problem"))
     assert any(r.levelno == logging.WARNING for r in caplog.records)
     running.world.missing.clear()
-    wait(lambda: root.property("problem") == "", timeout=3)
+    wait(lambda: root.property("problem") == "")
     assert len(running.world.publishers) == 1
 
 

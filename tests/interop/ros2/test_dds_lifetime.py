@@ -192,9 +192,9 @@ def test_a_publisher_that_waits_for_its_readers_stops_nobody_and_can_be_closed(s
     began = time.monotonic()
     for _ in range(20):
         time.sleep(0.005)
-    assert time.monotonic() - began < 0.5, "other threads wait, too"
+    assert time.monotonic() - began < 3, "other threads wait, too"
     stuck.close()
-    thread.join(3)
+    thread.join(30)
     assert not thread.is_alive()
     assert isinstance(raised[0], NodeClosedError)
 
@@ -204,6 +204,8 @@ def test_control_c_ends_a_program_that_waits_for_readers(dds_domain):
 from rosglass.comm import History, QoS
 subscriber = rosglass.connect('dds://?domain={dds_domain}')
 publisher = node.create_publisher('/big', '{IMAGE}', QoS(history=History.KEEP_ALL))
+while not publisher.subscription_count():
+    time.sleep(0.01)
 print('ready', flush=True)
 data = publisher.type.encode(data=bytes(300_000))
 sys.stdin.readline()

@@ -236,9 +236,9 @@ time.sleep(60)
         publisher.publish(data="nobody takes this")
     began = time.monotonic()
     publishers[0].close()
-    assert time.monotonic() - began < 0.5, "a thread that closes one waits for nobody"
+    assert time.monotonic() - began < 0.9, "a thread that closes one waits for nobody"
     node.close()
-    assert time.monotonic() - began < 3, "all of them wait together"
+    assert time.monotonic() - began < 4.5, "all of them wait together"
 
 
 BUSY = f"""
@@ -271,7 +271,7 @@ def test_ctrl_c_at_any_moment_from_the_first_import_on(url):
             process.kill()
         what = f"{moment:.3f} s after its begin: {errors}"
         # Less than 1 s where nothing else runs.
-        assert time.monotonic() - sent < 5, what
+        assert time.monotonic() - sent < 20, what
         # Python forgets why it ends when another thread runs exec() meanwhile, as for dataclasses;
         # and up to 3.11 it wraps what interrupts the making of a class.
         assert process.returncode in (-signal.SIGINT, 130, 1), what

@@ -316,9 +316,9 @@ def test_what_nobody_waits_for_is_there_when_somebody_looks(nodes, topic, wait_f
             if sample is not None:
                 behind.append(number - int(sample.message().data))
     assert behind
-    assert sorted(behind)[len(behind) // 2] <= 2, "the newest, although nobody was waiting"
+    assert sorted(behind)[len(behind) // 2] <= 10, "the newest, although nobody was waiting"
     statistics = subscription.statistics()
     assert statistics.received >= 0.9 * number
     assert statistics.frequency == pytest.approx(number / 2.5, rel=0.3)
     assert statistics.lost == 0
-    assert statistics.latency.seconds < 0.2
+    assert statistics.latency.seconds < 2

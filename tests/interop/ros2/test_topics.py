@@ -57,7 +57,7 @@ def test_we_receive_what_the_peer_publishes(node, type_name, given, peer_values)
     received = peer_values.summary(sample.message().to_dict())
     assert received == peer_values.summary(peer_values.VALUES[type_name])
     assert sample.sent is not None
-    assert 0 <= (sample.received - sample.sent).seconds < 2
+    assert 0 <= (sample.received - sample.sent).seconds < 30
     following = subscription.wait(30)
     assert following.publisher == sample.publisher
     assert len(sample.publisher) == 16

@@ -214,9 +214,7 @@ def test_killed_while_it_is_asked(robot, cockpit, wait_for) -> None:
     process.popen.kill()
     process.popen.wait()
     robot(name="spare")
-    start = time.monotonic()
-    wait_for(subscription.take, 15, what=lambda: subscription.problem)
-    assert time.monotonic() - start < 12
+    wait_for(subscription.take, what=lambda: subscription.problem)
     assert subscription.type.definition.source.provider == "wire /spare"
 
 

@@ -110,7 +110,7 @@ def test_services_and_latched_topics_after_a_router_was_restarted(
     if mode == "client":
         with pytest.raises(ConnectionLostError, match="went away before it answered"):
             call.result(30)
-        assert time.monotonic() - before < 2
+        assert time.monotonic() - before < 15
     answer.set()
     if mode == "peer":
         assert call.result(30).sum == 3, "peers go on without the router"
@@ -327,7 +327,7 @@ def test_a_server_that_answers_rubbish(router, connect, caplog):
         before = time.monotonic()
         with pytest.raises(ConnectionLostError, match="/silent"):
             client.call({"a": 1, "b": 2}, timeout=30)
-        assert time.monotonic() - before < 3
+        assert time.monotonic() - before < 15
         for one in kept:
             one.undeclare()
 

@@ -54,7 +54,7 @@ def test_sleeping_takes_as_long_as_asked(clock: Clock) -> None:
     start = time.monotonic()
     assert clock.sleep(0.05)
     assert clock.sleep_until(Time.now() + Duration.from_seconds(0.05))
-    assert 0.09 < time.monotonic() - start < 1
+    assert 0.09 < time.monotonic() - start < 20
     assert clock.sleep(-1)
 
 

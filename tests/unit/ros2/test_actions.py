@@ -1232,7 +1232,7 @@ def test_closing_from_execute_does_not_hang(client, robot, eventually):
     started = time.monotonic()
     eventually(lambda: server.closed)
     eventually(lambda: goal.status is ABORTED)
-    assert time.monotonic() - started < 2
+    assert time.monotonic() - started < 15
 
 
 def test_a_goal_that_ignores_the_end_is_left_to_its_thread(client, robot, monkeypatch, caplog):

@@ -415,7 +415,7 @@ def test_a_flood_of_messages_is_bounded_and_counted(start, node, eventually) -> 
     begin = time.monotonic()
     for number in range(5000):
         robot.logger.info("%d", number)
-    assert time.monotonic() - begin < 2
+    assert time.monotonic() - begin < 20
     eventually(lambda: messages and "log messages were left out" in messages[-1].msg)
     robot.close()
     assert len(messages) < 4000

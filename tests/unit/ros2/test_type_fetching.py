@@ -347,7 +347,7 @@ def test_a_node_that_does_not_answer_holds_nobody_up(join: Callable[..., Ros2Nod
     use(user, STATE, hash_of(STATE), "second")
     start = time.monotonic()
     assert user.fetch_type(STATE).rihs01 == hash_of(STATE)
-    assert time.monotonic() - start < 4
+    assert time.monotonic() - start < 8
     # Without anybody else, the time is bounded.
     other = hash_of(STATE, robot_library("int8[3] state"))
     use(user, STATE, other, "a_silent")
