@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 import subprocess
 import sys
 import threading
@@ -20,13 +21,14 @@ os.environ.setdefault("QSG_RENDER_LOOP", "basic")
 if find_spec("PySide6") is None:
     os.environ.setdefault("ROSGLASS_QT", "pyside2")
 
-from memory_world import MemoryNode, MemoryWorld
+from memory_world import MemoryWorld
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from PySide6.QtCore import QCoreApplication, QObject
 
+    from rosglass.comm import Node
     from rosglass.qml import Session
 
 QT5 = os.environ.get("ROSGLASS_QT") == "pyside2"
@@ -61,7 +63,7 @@ def wait(app: QCoreApplication) -> Callable[..., None]:
         send_deferred_deletes()
         time.sleep(0.001)
 
-    def wait_until(condition: Callable[[], Any] | int, timeout: float = 5.0) -> None:
+    def wait_until(condition: Callable[[], Any] | int, timeout: float = 20.0) -> None:
         if isinstance(condition, int):
             timeout, until = condition / 1000, time.monotonic() + condition / 1000
             while time.monotonic() < until:
@@ -76,11 +78,17 @@ def wait(app: QCoreApplication) -> Callable[..., None]:
 
 
 class Bench:
-    """A QML engine with our modules, and a robot on the other side of memory."""
+    """A QML engine with our modules, and a robot on the other side of memory.
 
-    def __init__(self, session: Session, engine: Any, world: MemoryWorld, folder: Path) -> None:
+    Attributes:
+        module: What :meth:`load` and :meth:`run` import besides QtQml.
+        robot: The robot's node.
+    """
+
+    def __init__(self, session: Session, engine: Any, world: Any, folder: Path) -> None:
         self.session, self.engine, self.world, self.folder = session, engine, world, folder
-        self.robot: MemoryNode = world.connect(None, "robot")
+        self.module = "Ros2 1.0"
+        self.robot: Any = world.connect(None, "robot")
         self._roots: list[Any] = []
         self._count = 0
 
@@ -96,7 +104,7 @@ class Bench:
         folder = self.folder / str(self._count)
         folder.mkdir(parents=True)
         file = folder / f"Test{self._count}.qml"
-        file.write_text(f"import QtQml 2.15\nimport Ros2 1.0\n{imports}\n{body}")
+        file.write_text(f"import QtQml 2.15\nimport {self.module}\n{imports}\n{body}")
         component = QtQml.QQmlComponent(self.engine, QtCore.QUrl.fromLocalFile(str(file)))
         root = component.create()
         assert root is not None, component.errorString()
@@ -144,6 +152,61 @@ def running(bench: Bench, wait: Callable[..., None]) -> Bench:
     bench.session.init("ui")
     wait(lambda: bench.session.node is not None)
     return bench
+
+
+class RealWorld:
+    """Nodes on a real middleware."""
+
+    def __init__(self, url: str) -> None:
+        self.url = url
+
+    def connect(self, url: str | None, name: str, namespace: str = "/") -> Node:
+        import rosglass
+
+        return rosglass.connect(url or self.url, name, namespace)
+
+
+@pytest.fixture(params=["zenoh", "ros1"])
+def url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
+    """Where a robot and its operator meet: a Zenoh router, or a ROS 1 master."""
+    if request.param == "zenoh":
+        from rosglass.ros2.zenoh.router import Router
+
+        with Router("tcp/127.0.0.1:0") as router:
+            yield router.url
+        return
+    if not Path("/usr/bin/rosmaster").exists():
+        pytest.skip("ROS 1 is not installed: sudo apt-get install python3-rosmaster")
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    env = {"PATH": "/usr/bin:/bin", "HOME": str(tmp_path), "ROS_HOME": str(tmp_path)}
+    command = ["/usr/bin/rosmaster", "--core", "-p", str(port)]
+    with (tmp_path / "rosmaster").open("wb") as output:
+        master = subprocess.Popen(command, env=env, stdout=output, stderr=output)
+        yield f"ros1://127.0.0.1:{port}?ip=127.0.0.1"
+        master.kill()
+        master.wait()
+
+
+@pytest.fixture
+def live(app: QCoreApplication, url: str, tmp_path: Path, wait: Any) -> Iterator[Bench]:
+    """A bench whose session and robot are connected over a real middleware."""
+    from rosglass.qml import Session, install
+    from rosglass.qt import QtQml, send_deferred_deletes
+
+    session = Session(url)
+    engine = QtQml.QQmlEngine()
+    install(engine, session)
+    made = Bench(session, engine, RealWorld(url), tmp_path)
+    session.init("ui")
+    wait(lambda: session.state == "connected", 30)
+    yield made
+    made.close()
+    made.robot.close()
+    send_deferred_deletes()
+    engine.deleteLater()
+    send_deferred_deletes()
 
 
 @pytest.fixture(scope="session")

@@ -1,0 +1,126 @@
+"""The singleton Service of Ros 1.0, on a ROS 1 and on a ROS 2 robot."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from conftest import Bench
+
+
+@pytest.fixture
+def told(live: Bench) -> list[Any]:
+    """What the robot's lamp was told; it is on the robot as the service /lamp."""
+    live.module = "Ros 1.0"
+    told = []
+
+    def switch(request: Any) -> dict[str, Any]:
+        told.append(request.data)
+        return {"success": request.data, "message": "done"}
+
+    live.robot.create_service_server("/lamp", "std_srvs/srv/SetBool", switch)
+    return told
+
+
+def test_a_call_returns_the_response(live: Bench, told: list[Any]) -> None:
+    answer = live.run('return Service.call("/lamp", "std_srvs/SetBool", {data: true})')
+    assert answer == {"success": True, "message": "done"}
+    assert told == [True]
+
+
+def test_an_empty_response_is_true(live: Bench, told: list[Any]) -> None:
+    live.robot.create_service_server("/reset", "std_srvs/srv/Empty", lambda request: None)
+    assert live.run('return Service.call("/reset", "std_srvs/Empty", {})') is True
+    assert live.run('return Service.call("/reset", "std_srvs/Empty")') is True
+
+
+def test_a_failure_is_false_and_logged(live: Bench, told: list[Any], caplog: Any) -> None:
+    def fail(request: Any) -> None:
+        raise RuntimeError("no power")
+
+    live.robot.create_service_server("/lift", "std_srvs/srv/Trigger", fail)
+    script = 'return Service.call("/lift", "std_srvs/Trigger", {})'
+    if live.session.url.startswith("ros1"):
+        assert live.run(script) is False
+        assert "/lift" in caplog.text
+
+
+def test_a_wrong_field_throws_its_path(live: Bench, told: list[Any]) -> None:
+    script = """
+        Service.call("/lamp", "std_srvs/SetBool", {data: true})
+        try { Service.call("/lamp", "std_srvs/SetBool", {data: "yes"}) }
+        catch (error) { return error.toString() }
+        return "nothing"
+    """
+    assert "data" in live.run(script)
+    assert told == [True]
+
+
+def test_an_unknown_type_calls_back_with_false(live: Bench, told: list[Any], wait: Any) -> None:
+    root: Any = live.load("""
+        QtObject {
+            property var answer
+            Component.onCompleted: {
+                Service.callAsync("/nowhere", "no_msgs/No", {}, function (a) { answer = a })
+            }
+        }
+    """)
+    wait(lambda: root.property("answer") is False)
+
+
+def test_asynchronously(live: Bench, told: list[Any], wait: Any) -> None:
+    root: Any = live.load("""
+        QtObject {
+            property var answer
+            Component.onCompleted: {
+                Service.callAsync("/lamp", "std_srvs/SetBool", {data: true},
+                                  function (a) { answer = a.message })
+            }
+        }
+    """)
+    wait(lambda: root.property("answer") == "done")
+    assert told == [True]
+
+
+def test_the_interface_lives_while_a_call_waits(live: Bench, told: list[Any], wait: Any) -> None:
+    """A timer runs, and the page that called is destroyed, while its handler waits."""
+    go = threading.Event()
+
+    def slow(request: Any) -> dict[str, Any]:
+        assert go.wait(30)
+        return {"success": True}
+
+    live.robot.create_service_server("/slow", "std_srvs/srv/Trigger", slow)
+    root: Any = live.load(
+        """
+        QtObject {
+            id: root
+            property int ticks: 0
+            property var answer
+            property QtObject page
+            property Component pages: Component {
+                QtObject {
+                    function go() {
+                        const answer = Service.call("/slow", "std_srvs/Trigger", {})
+                        root.answer = answer.success
+                    }
+                    Component.onCompleted: Qt.callLater(go)
+                }
+            }
+            property Timer timer: Timer {
+                interval: 10; repeat: true; running: true
+                onTriggered: {
+                    root.ticks += 1
+                    if (root.ticks === 30) root.page.destroy()
+                }
+            }
+            Component.onCompleted: page = pages.createObject(root)
+        }
+    """
+    )
+    threading.Timer(1.5, go.set).start()
+    wait(lambda: root.property("answer") is True)
+    assert root.property("ticks") > 30
