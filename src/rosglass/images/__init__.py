@@ -2,7 +2,7 @@
 
 from rosglass.images.compressed import decompress
 from rosglass.images.compressed_depth import decompress_depth
-from rosglass.images.depth import COLOR_MAPS, DepthColors
+from rosglass.images.depth import COLOR_MAPS, DEPTH_ENCODINGS, DepthColors
 from rosglass.images.encodings import ANY_FORMAT, ENCODINGS, convert
 from rosglass.images.frame import Frame, PixelFormat, RawImage
 from rosglass.images.snapshot import FILE_TYPES, save
@@ -13,6 +13,7 @@ from rosglass.images.view import View
 __all__ = [
     "ANY_FORMAT",
     "COLOR_MAPS",
+    "DEPTH_ENCODINGS",
     "ENCODINGS",
     "FILE_TYPES",
     "TRANSPORTS",

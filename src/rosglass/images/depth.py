@@ -19,11 +19,12 @@ if TYPE_CHECKING:
     from rosglass.comm.time import Time
     from rosglass.images.frame import RawImage
 
-__all__ = ["COLOR_MAPS", "DepthColors"]
+__all__ = ["COLOR_MAPS", "DEPTH_ENCODINGS", "DepthColors"]
 
 #: Colour maps, from near to far.
 COLOR_MAPS = ("turbo", "viridis", "jet", "gray")
-_DEPTHS = ("16UC1", "mono16", "32FC1")
+#: Encodings that can hold depths.
+DEPTH_ENCODINGS = ("16UC1", "mono16", "32FC1")
 #: Share of the depths that the automatic range leaves out at either end: they are noise.
 _OUTLIERS = 2.0
 #: How far the automatic range follows a picture: colours that flicker cannot be read.
@@ -104,10 +105,10 @@ class DepthColors:
             UnsupportedError: The encoding holds no depths.
             DecodeError: Sizes, step and data contradict each other.
         """
-        if image.encoding not in _DEPTHS:
+        if image.encoding not in DEPTH_ENCODINGS:
             raise UnsupportedError(
                 f"image encoding {image.encoding[:40]!r} holds no depths; "
-                f"these do: {', '.join(_DEPTHS)}"
+                f"these do: {', '.join(DEPTH_ENCODINGS)}"
             )
         depths = pixels_of(image, ENCODINGS[image.encoding])
         unit = 1.0 if image.encoding == "32FC1" else 0.001

@@ -37,6 +37,8 @@ _LOG_EVERY = 5.0
 #: Packets of a video that may wait: more would show the past, so the next key frame is awaited.
 _BACKLOG = 60
 _QUEUE = 16
+#: Arrivals from which the time between two pictures is told, and how few are enough.
+_ARRIVALS, _ENOUGH = 12, 4
 _STILLS = QoS(depth=1, reliability=Reliability.BEST_EFFORT)
 _VIDEO = QoS(depth=_QUEUE, reliability=Reliability.BEST_AVAILABLE)
 
@@ -75,6 +77,9 @@ class ImageStream(Handle):
             it. A rosglass.Error that it raises becomes the stream's problem.
         preferred: Name of the transport to prefer.
         changed: Called from any thread when :attr:`problem` or :attr:`transport` changed.
+        wanted: Asked by any thread whether a picture that has come is wanted; one that is not
+            is neither decoded nor counted as dropped. Not asked for videos, whose pictures build
+            upon each other. None wants them all.
 
     Raises:
         InvalidNameError: The topic name breaks ROS's rules.
@@ -87,14 +92,16 @@ class ImageStream(Handle):
         show: Callable[[RawImage, Sample], None],
         preferred: str = "compressed",
         changed: Callable[[], None] | None = None,
+        wanted: Callable[[], bool] | None = None,
     ) -> None:
         self.topic = node.resolve(topic)
         self._node, self._preferred = node, preferred
-        self._show_picture, self._changed = show, changed
+        self._show_picture, self._changed, self._wanted = show, changed, wanted
         self._wake = threading.Condition()
         self._samples: deque[tuple[Transport, Sample]] = deque()
         self._overflow = False
-        self._look, self._closing = True, False
+        self._look, self._closing, self._resting = True, False, False
+        self._arrivals: deque[float] = deque(maxlen=_ARRIVALS)
         self._choice: Choice | None = None
         self._subscription: Subscription | None = None
         self._reader: tuple[MessageType, str, PictureReader] | None = None
@@ -118,8 +125,40 @@ class ImageStream(Handle):
 
     @property
     def subscribed(self) -> bool:
-        """Whether there is a subscription."""
-        return self._subscription is not None
+        """Whether there is a subscription, or there would be if the stream did not :meth:`rest`."""
+        return self._subscription is not None or self._resting
+
+    @property
+    def video(self) -> bool:
+        """Whether the transport received is a video, which must be received without a gap."""
+        return self._choice is not None and self._choice.transport.video
+
+    @property
+    def period(self) -> float:
+        """Seconds between two pictures of the camera, as last seen; 0 until that is known."""
+        with self._wake:
+            arrivals = list(self._arrivals)
+        if len(arrivals) < _ENOUGH:
+            return 0.0
+        return (arrivals[-1] - arrivals[0]) / (len(arrivals) - 1)
+
+    def rest(self) -> None:
+        """Receive nothing until :meth:`resume`: the robot neither compresses nor sends for us."""
+        with self._wake:
+            self._resting = True
+            self._wake.notify_all()
+
+    def resume(self) -> bool:
+        """Receive again after :meth:`rest`; return whether it was resting."""
+        with self._wake:
+            if not self._resting:
+                return False
+            self._resting, self._look = False, True
+            # The time between this picture and the last, and the numbers skipped, were our wish.
+            self._arrivals.clear()
+            self._sequence = (b"", -1)
+            self._wake.notify_all()
+        return True
 
     def publisher_count(self) -> int:
         """Return how many publishers the transport in use has."""
@@ -158,39 +197,61 @@ class ImageStream(Handle):
             self._wake.notify_all()
 
     def _on_sample(self, transport: Transport, sample: Sample) -> None:
+        now = time.monotonic()
         with self._wake:
+            if self._resting:
+                return
             self._received += 1
-            if not transport.video or len(self._samples) >= _BACKLOG:
-                self._overflow |= transport.video
-                self._dropped += len(self._samples)
-                self._samples.clear()
+            self._arrivals.append(now)
             publisher, last = self._sequence
             if sample.sequence >= 0:
                 if sample.publisher == publisher and sample.sequence > last >= 0:
                     self._lost += sample.sequence - last - 1
                 self._sequence = (sample.publisher, sample.sequence)
+        if not (transport.video or self._wanted is None or self._wanted()):
+            return
+        with self._wake:
+            if not transport.video or len(self._samples) >= _BACKLOG:
+                self._overflow |= transport.video
+                self._dropped += len(self._samples)
+                self._samples.clear()
             self._samples.append((transport, sample))
             self._wake.notify_all()
 
     def _work(self) -> None:
         while True:
             with self._wake:
+                idle = self._subscription is None
                 self._wake.wait_for(
-                    lambda: self._samples or self._look or self._closing,
-                    _RETRY if self._subscription is None else None,
+                    lambda: self._samples or self._is_called,
+                    _RETRY if idle and not self._resting else None,
                 )
                 if self._closing:
                     break
-                look, self._look = self._look or self._subscription is None, False
+                resting = self._resting
+                look, self._look = self._look or idle, False
                 samples, self._samples = self._samples, deque()
                 overflow, self._overflow = self._overflow, False
+            if resting:
+                self._unsubscribe()
+                continue
             if look:
                 self._subscribe()
             if overflow and self._reader is not None:
                 self._reader[2].lost()
             self._decode(samples)
-        if self._subscription is not None:
-            self._subscription.close()
+        self._unsubscribe()
+
+    @property
+    def _is_called(self) -> bool:
+        """Whether the thread has something else to do than to decode."""
+        idle = self._subscription is None
+        return self._closing or (not idle if self._resting else self._look)
+
+    def _unsubscribe(self) -> None:
+        subscription, self._subscription = self._subscription, None
+        if subscription is not None:
+            subscription.close()
 
     def _subscribe(self) -> None:
         try:
@@ -201,7 +262,8 @@ class ImageStream(Handle):
             }
             choice = choose(self.topic, self._preferred, published)
             # A camera that went away may come back as it was: keep listening.
-            if choice is None or choice == self._choice:
+            listening = self._subscription is not None
+            if choice is None or (choice == self._choice and listening):
                 self._say("" if choice is not None else self._problem)
                 return
             subscription = self._node.create_subscription(

@@ -1,4 +1,4 @@
-"""Pictures for Qt: video frames for a video sink, images for painting."""
+"""Pictures for Qt: video frames for a video sink or surface, images for painting."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from rosglass.errors import UnsupportedError
 from rosglass.images.frame import PixelFormat
-from rosglass.qt import QtCore, QtGui, optional
+from rosglass.qt import QT6, QtCore, QtGui, optional
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,7 +27,7 @@ _IMAGE = {
     PixelFormat.GRAY16: _ImageFormat.Format_Grayscale16,
 }
 _VIDEO: dict[PixelFormat, Any] = {}
-if _MULTIMEDIA is not None:
+if _MULTIMEDIA is not None and QT6:
     _names = _MULTIMEDIA.QVideoFrameFormat.PixelFormat
     _VIDEO = {
         PixelFormat.RGBX: _names.Format_RGBX8888,
@@ -42,8 +42,9 @@ if _MULTIMEDIA is not None:
     }
 #: What can be painted.
 IMAGE_FORMATS = frozenset(_IMAGE)
-#: What a video sink takes; empty without QtMultimedia.
-VIDEO_FORMATS = frozenset(_VIDEO)
+#: What a video sink takes; empty without QtMultimedia. PySide2 cannot fill the planes of a frame,
+#: so there it goes by way of an image.
+VIDEO_FORMATS = frozenset(_VIDEO if QT6 or _MULTIMEDIA is None else _IMAGE)
 
 
 def to_image(frame: Frame) -> QtGui.QImage:
@@ -62,7 +63,7 @@ def to_image(frame: Frame) -> QtGui.QImage:
 class VideoFrame:
     """A video frame in the making; usable from any thread.
 
-    Pass :meth:`allocate` to :func:`rosglass.images.convert`, and what that returns to
+    Pass :attr:`allocate` to :func:`rosglass.images.convert`, and what that returns to
     :meth:`finish`.
 
     Raises:
@@ -76,17 +77,15 @@ class VideoFrame:
                 'pip install "rosglass[camera]", or show the picture in an ImageItem'
             )
         self._video: Any = None
-
-    def allocate(self, width: int, height: int) -> NDArray[np.uint8]:
-        """Return the memory of a new RGBX frame, as rows x columns x 4."""
-        memory, stride = self._map(PixelFormat.RGBX, width, height)[0]
-        pixels: NDArray[np.uint8] = np.ndarray(
-            (height, width, 4), np.uint8, memory, 0, (stride, 4, 1)
-        )
-        return pixels
+        #: Gives the memory of a new RGBX frame; None where Qt does not let it be filled.
+        self.allocate = self._allocate if QT6 else None
 
     def finish(self, frame: Frame) -> Any:
         """Return the ``QVideoFrame`` of `frame`, copying only what is not in it already."""
+        if not QT6:
+            kinds = (_ImageFormat.Format_RGB32, _ImageFormat.Format_ARGB32)
+            image = to_image(frame).convertToFormat(kinds[frame.has_alpha])
+            return _MULTIMEDIA.QVideoFrame(image)
         filled = False
         if self._video is not None:
             target = np.frombuffer(self._video.bits(0), np.uint8)
@@ -100,6 +99,14 @@ class VideoFrame:
         video = self._video
         self._release()
         return video
+
+    def _allocate(self, width: int, height: int) -> NDArray[np.uint8]:
+        """Return the memory of a new RGBX frame, as rows x columns x 4."""
+        memory, stride = self._map(PixelFormat.RGBX, width, height)[0]
+        pixels: NDArray[np.uint8] = np.ndarray(
+            (height, width, 4), np.uint8, memory, 0, (stride, 4, 1)
+        )
+        return pixels
 
     def _map(self, format: PixelFormat, width: int, height: int) -> list[tuple[Any, int]]:
         """Make the frame and return memory and stride of each of its planes."""

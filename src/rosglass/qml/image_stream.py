@@ -6,51 +6,33 @@ import threading
 import time
 from collections import deque
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from rosglass.comm.time import Time
-from rosglass.images import ImageStream, convert
-from rosglass.qml.frames import IMAGE_FORMATS, VIDEO_FORMATS, VideoFrame, to_image
+from rosglass.images import ImageStream
+from rosglass.qml.image_rendering import Look, Picture, Renderer
 from rosglass.qt import QtCore, is_alive
 
 if TYPE_CHECKING:
     from rosglass.comm.node import Node
     from rosglass.comm.sample import Sample
-    from rosglass.images.frame import Frame, RawImage
+    from rosglass.images.frame import RawImage
     from rosglass.qml.session import Session
-    from rosglass.qt import QtGui
 
-__all__ = ["Picture", "SharedStream", "Viewer"]
+__all__ = ["SharedStream", "Viewer"]
 
 #: Milliseconds that a stream without viewers stays subscribed: changing pages costs nothing.
 _LINGER = 1000
 _RATE_WINDOW, _LATENCY_WINDOW = 30, 10
-
-
-@dataclass(frozen=True, slots=True)
-class Picture:
-    """A picture as it is handed to viewers.
-
-    Attributes:
-        frame: Its size, encoding and stamps.
-        video: The ``QVideoFrame``; None when nobody wants one.
-        image: The ``QImage``; None when nobody wants one.
-        received: When it arrived.
-        late: Seconds that it was kept back on its way.
-    """
-
-    frame: Frame
-    video: Any
-    image: QtGui.QImage | None
-    received: Time
-    late: float = 0.0
+#: By how much pictures must be wanted more rarely than they can be had before they are fetched
+#: one by one.
+_HYSTERESIS = 1.1
+#: What remains of the price of fetching after each picture that was not fetched.
+_FORGETTING = 0.9
 
 
 class Viewer(Protocol):
     """Shows the pictures of a stream; all its methods are called on the GUI thread."""
-
-    #: Whether it takes video frames; otherwise it takes images.
-    wants_video: bool
 
     def show_picture(self, picture: Picture) -> None:
         """Show a picture."""
@@ -59,41 +41,104 @@ class Viewer(Protocol):
         """Look at the stream's problem, transport and so on again."""
 
 
+class Channel:
+    """The viewers of a stream that want the same, of which each picture is made once.
+
+    Args:
+        look: What they want.
+    """
+
+    def __init__(self, look: Look) -> None:
+        self.look = look
+        self.viewers: list[Viewer] = []
+        #: The newest picture shown, for viewers that come later.
+        self.last: Picture | None = None
+        #: Why pictures that can be shown cannot be shown like this; empty when they can.
+        self.problem = ""
+        self._due = 0.0
+        self._arrivals: deque[float] = deque(maxlen=_RATE_WINDOW)
+
+    def is_due(self, now: float) -> bool:
+        """Return whether a picture is wanted."""
+        return now >= self._due
+
+    def take(self, now: float) -> None:
+        """Count a picture, so that the mean rate stays within what is wanted."""
+        interval = self.look.interval
+        self._due = max(self._due, now - interval) + interval
+
+    def show(self, picture: Picture) -> None:
+        """Show a picture to all viewers."""
+        self.last = picture
+        self._arrivals.append(time.monotonic())
+        for viewer in list(self.viewers):
+            viewer.show_picture(picture)
+
+    @property
+    def frame_rate(self) -> float:
+        """Pictures shown per second, falling when they stop."""
+        arrivals = self._arrivals
+        if len(arrivals) < 2:
+            return 0.0
+        span = arrivals[-1] - arrivals[0]
+        period = span / (len(arrivals) - 1)
+        span += max(0.0, time.monotonic() - arrivals[-1] - 1.5 * period)
+        return (len(arrivals) - 1) / span if span > 0 else 0.0
+
+
+@dataclass(slots=True)
+class _Pending:
+    """What the stream's thread has for the GUI thread."""
+
+    pictures: dict[Channel, Picture]
+    received: Time
+    stamp: Time | None
+
+
 class SharedStream(QtCore.QObject):
     """An :class:`ImageStream` and its viewers; lives on the GUI thread.
 
     The newest picture wins: one that the GUI thread has not taken before the next one is ready is
-    dropped and counted.
+    dropped and counted. While all viewers want fewer pictures than the camera sends, they are
+    fetched one by one, at times that the session's load balancer gives.
     """
 
     def __init__(self, session: Session, node: Node, topic: str, preferred: str) -> None:
         super().__init__(session)
         self._session = session
         self._key = (node, topic, preferred)
-        self._viewers: list[Viewer] = []
+        #: Replaced, never changed: the stream's thread reads it.
+        self._channels: tuple[Channel, ...] = ()
+        self._renderer = Renderer()
         self._lock = threading.Lock()
-        self._pending: Picture | None = None
+        self._pending: _Pending | None = None
         self._overtaken = 0
-        self._video = self._image = False
-        self._arrivals: deque[float] = deque(maxlen=_RATE_WINDOW)
         self._network: deque[float] = deque(maxlen=_LATENCY_WINDOW)
         self._processing: deque[float] = deque(maxlen=_LATENCY_WINDOW)
         self._total: deque[float] = deque(maxlen=_LATENCY_WINDOW)
-        #: The newest picture shown, for viewers that come later.
-        self.last: Picture | None = None
+        #: Seconds between two pictures that satisfy everybody; 0 when somebody wants all.
+        self._interval = 0.0
+        #: Seconds between two pictures when none are left out, and those that fetching one takes.
+        self._period = self._price = 0.0
+        self._asked: float | None = None
+        self._last_stamp: Time | None = None
         executor = session.executor
         self.stream = ImageStream(
-            node, topic, self._render, preferred, lambda: executor.post(self._tell)
+            node, topic, self._render, preferred, lambda: executor.post(self._tell), self._wanted
         )
         self._linger = QtCore.QTimer(self)
         self._linger.setSingleShot(True)
         self._linger.setInterval(_LINGER)
         self._linger.timeout.connect(self.close)
+        self._turn = QtCore.QTimer(self)
+        self._turn.setSingleShot(True)
+        self._turn.setTimerType(QtCore.Qt.TimerType.PreciseTimer)
+        self._turn.timeout.connect(self._fetch)
         self._detach = session.attach(self, node_changed=self._node_changed)
 
     @classmethod
     def join(
-        cls, session: Session, node: Node, topic: str, preferred: str, viewer: Viewer
+        cls, session: Session, node: Node, topic: str, preferred: str, look: Look, viewer: Viewer
     ) -> SharedStream:
         """Return the stream of a camera with `viewer` among its viewers.
 
@@ -105,16 +150,30 @@ class SharedStream(QtCore.QObject):
         if stream is None:
             stream = session.streams[key] = cls(session, node, topic, preferred)
         made: SharedStream = stream
-        made._add(viewer)
+        made._linger.stop()
+        made.change_look(viewer, look)
         return made
+
+    def change_look(self, viewer: Viewer, look: Look) -> None:
+        """Let a viewer have its pictures in another way, from the next one on."""
+        self._take_out(viewer)
+        channel = next((c for c in self._channels if c.look == look), None)
+        if channel is None:
+            channel = Channel(look)
+            self._channels = (*self._channels, channel)
+        channel.viewers.append(viewer)
+        self._look_at_channels()
 
     def leave(self, viewer: Viewer) -> None:
         """Take a viewer away; the stream ends some time after the last one has left."""
-        if viewer in self._viewers:
-            self._viewers.remove(viewer)
-        self._look_at_viewers()
-        if not self._viewers:
+        self._take_out(viewer)
+        self._look_at_channels()
+        if not self._channels:
             self._linger.start()
+
+    def channel(self, viewer: Viewer) -> Channel | None:
+        """Return the channel that a viewer belongs to."""
+        return next((c for c in self._channels if viewer in c.viewers), None)
 
     def close(self) -> None:
         """End the stream; safe to call twice."""
@@ -123,7 +182,9 @@ class SharedStream(QtCore.QObject):
         if not is_alive(self):
             return
         self._linger.stop()
-        self._viewers.clear()
+        self._turn.stop()
+        self._session.balancer.forget(self)
+        self._channels = ()
         self._session.streams.pop(self._key, None)
         self.deleteLater()
 
@@ -138,71 +199,118 @@ class SharedStream(QtCore.QObject):
         return self.stream.statistics().lost
 
     @property
-    def frame_rate(self) -> float:
-        """Pictures shown per second, falling when they stop."""
-        arrivals = self._arrivals
-        if len(arrivals) < 2:
-            return 0.0
-        span = arrivals[-1] - arrivals[0]
-        period = span / (len(arrivals) - 1)
-        span += max(0.0, time.monotonic() - arrivals[-1] - 1.5 * period)
-        return (len(arrivals) - 1) / span if span > 0 else 0.0
-
-    @property
     def latencies(self) -> tuple[float, float, float]:
         """Milliseconds from stamp to arrival, from arrival to display, and both; -1 unknown."""
         return _mean(self._network), _mean(self._processing), _mean(self._total)
 
-    def _add(self, viewer: Viewer) -> None:
-        self._linger.stop()
-        self._viewers.append(viewer)
-        self._look_at_viewers()
+    # Who wants what.
 
-    def _look_at_viewers(self) -> None:
-        self._video = any(viewer.wants_video for viewer in self._viewers)
-        self._image = any(not viewer.wants_video for viewer in self._viewers)
+    def _take_out(self, viewer: Viewer) -> None:
+        channel = self.channel(viewer)
+        if channel is not None:
+            channel.viewers.remove(viewer)
+            if not channel.viewers:
+                self._channels = tuple(c for c in self._channels if c is not channel)
+
+    def _look_at_channels(self) -> None:
+        intervals = [channel.look.interval for channel in self._channels]
+        interval = min(intervals, default=self._interval)
+        if interval != self._interval:
+            self._interval = interval
+            # Somebody may want pictures sooner than the next turn.
+            self._turn.stop()
+            self._session.balancer.forget(self)
+            self._fetch()
+
+    def _wanted(self) -> bool:
+        """Return whether a picture that has come is wanted; in any thread."""
+        now = time.monotonic()
+        return any(channel.is_due(now) for channel in self._channels)
+
+    # Turns.
+
+    def _may_rest(self) -> bool:
+        """Return whether pictures are to be fetched one by one; in the stream's thread."""
+        stream, now = self.stream, time.monotonic()
+        self._period = stream.period or self._period
+        if self._asked is None:
+            self._price *= _FORGETTING
+        else:
+            self._price, self._asked = now - self._asked, None
+        if not (self._interval and self._period and self._session.balancer.enabled):
+            return False
+        # Between the key frames of a video, a picture that is fetched alone cannot be decoded.
+        if stream.video:
+            return False
+        return self._interval > _HYSTERESIS * max(self._period, self._price)
+
+    def _plan(self) -> None:
+        """Wait for the next turn; on the GUI thread."""
+        if not is_alive(self) or self._turn.isActive():
+            return
+        if not self._interval:
+            self._fetch()
+            return
+        now = time.monotonic()
+        due = self._session.balancer.place(self, self._interval, now)
+        self._turn.start(max(0, round((due - now) * 1000)))
+
+    def _fetch(self) -> None:
+        if self.stream.resume():
+            self._asked = time.monotonic()
+
+    # Pictures.
 
     def _render(self, image: RawImage, sample: Sample) -> None:
-        """Convert a picture for the viewers there are; in the stream's thread."""
-        wants_video, wants_image = self._video, self._image
-        if not (wants_video or wants_image):
+        """Make the pictures that are wanted; in the stream's thread."""
+        now = time.monotonic()
+        channels = [channel for channel in self._channels if channel.is_due(now)]
+        repeated = image.stamp is not None and image.stamp == self._last_stamp
+        # A publisher that repeats its last picture to whoever comes has sent nothing new.
+        if not channels or (repeated and self._interval):
             return
-        video = picture = None
-        if wants_video and not wants_image:
-            target = VideoFrame()
-            frame = convert(image, VIDEO_FORMATS, sample.received, target.allocate)
-            video = target.finish(frame)
-        else:
-            accept = IMAGE_FORMATS & VIDEO_FORMATS if wants_video else IMAGE_FORMATS
-            frame = convert(image, accept, sample.received)
-            picture = to_image(frame)
-            video = VideoFrame().finish(frame) if wants_video else None
+        self._last_stamp = image.stamp
         late = self.stream.lateness(sample)
+        looks = {channel.look for channel in channels}
+        made, failed = self._renderer.render(image, sample.received, late, looks)
+        for channel in channels:
+            channel.take(now)
+            channel.problem = failed.get(channel.look, "")
+        pictures = {c: made[c.look] for c in channels if c.look in made}
+        if pictures:
+            self._hand_over(_Pending(pictures, sample.received, image.stamp))
+        if failed:
+            self._session.executor.post(self._tell)
+        if self._may_rest():
+            self.stream.rest()
+            self._session.executor.post(self._plan)
+
+    def _hand_over(self, pending: _Pending) -> None:
         with self._lock:
-            waiting = self._pending is not None
-            self._overtaken += waiting
-            self._pending = Picture(frame, video, picture, sample.received, late)
-        if not waiting:
+            before, self._pending = self._pending, pending
+            if before is not None:
+                self._overtaken += not before.pictures.keys().isdisjoint(pending.pictures)
+                pending.pictures = {**before.pictures, **pending.pictures}
+        if before is None:
             self._session.executor.post(self._present)
 
     def _present(self) -> None:
         with self._lock:
-            picture, self._pending = self._pending, None
-        if picture is None:
+            pending, self._pending = self._pending, None
+        if pending is None:
             return
-        self.last = picture
-        self._arrivals.append(time.monotonic())
-        for viewer in list(self._viewers):
-            viewer.show_picture(picture)
+        for channel, picture in pending.pictures.items():
+            channel.show(picture)
         shown = Time.now()
-        self._processing.append((shown - picture.received).seconds * 1000)
-        if picture.frame.stamp is not None:
-            self._network.append((picture.received - picture.frame.stamp).seconds * 1000)
-            self._total.append((shown - picture.frame.stamp).seconds * 1000)
+        self._processing.append((shown - pending.received).seconds * 1000)
+        if pending.stamp is not None:
+            self._network.append((pending.received - pending.stamp).seconds * 1000)
+            self._total.append((shown - pending.stamp).seconds * 1000)
 
     def _tell(self) -> None:
-        for viewer in list(self._viewers):
-            viewer.stream_changed()
+        for channel in self._channels:
+            for viewer in list(channel.viewers):
+                viewer.stream_changed()
 
     def _node_changed(self) -> None:
         if self._session.node is not self._key[0]:

@@ -4,16 +4,23 @@
 from __future__ import annotations
 
 import time
+from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
-from rosglass.qml.element import DEFAULT_TIMEOUT, TopicElement, changed_enough
-from rosglass.qml.image_item import ImageItem
-from rosglass.qt import Property, QtCore, Signal, Slot, is_alive, optional
+from rosglass.qml.callbacks import Deferred
+from rosglass.qml.element import DEFAULT_TIMEOUT, changed_enough
+from rosglass.qml.image_look import LookElement
+from rosglass.qml.image_sinks import SURFACE_TYPE, Sink
+from rosglass.qml.log import plain_path
+from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive, optional
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from rosglass.comm.node import Node
-    from rosglass.qml.image_stream import Picture, SharedStream
+    from rosglass.qml.image_rendering import Look, Picture
+    from rosglass.qml.image_stream import SharedStream
     from rosglass.qml.runtime import Runtime
 
 __all__ = ["ImageTransportSubscription"]
@@ -32,8 +39,16 @@ _START: dict[str, Any] = {
 }
 
 
-class ImageTransportSubscription(TopicElement):
+class ImageTransportSubscription(LookElement):
     """Shows a camera. See ``docs/qml.md`` for every property."""
+
+    @QtCore.QEnum
+    class PlaybackState(IntEnum):
+        """Whether pictures follow each other; the numbers of Qt's MediaPlayer."""
+
+        StoppedState = 0
+        PlayingState = 1
+        PausedState = 2
 
     topicChanged = Signal()
     defaultTransportChanged = Signal()
@@ -51,27 +66,31 @@ class ImageTransportSubscription(TopicElement):
     droppedChanged = Signal()
     lostChanged = Signal()
     problemChanged = Signal()
+    playbackStateChanged = Signal()
+    #: A picture is in a file, whose absolute path is given.
+    snapshotSaved = Signal(str)
+    #: It is not, and why.
+    snapshotFailed = Signal(str)
 
-    _HOLDS = ("_frame", "_stream", "_have")
+    _HOLDS = ("_picture", "_stream", "_have")
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         super().__init__(parent, runtime)
         # Loaded before QML hands over its sink: what Qt gave Python as a plain QObject stays one.
-        self._multimedia = optional("QtMultimedia")
+        optional("QtMultimedia")
         self._preferred = "compressed"
         self._timeout = DEFAULT_TIMEOUT
-        self._sink: Any = None
+        self._paused = False
+        self._sink: Sink | None = None
         self._stream: SharedStream | None = None
         self._have: tuple[Node, str, str] | None = None
-        self._frame: Any = None
+        self._has_look: Look | None = None
+        self._picture: Picture | None = None
         self._looks: tuple[str, bool, bool] = ("", False, False)
-        self._shown_at = self._late = 0.0
         self._blank = True
         self._values: dict[str, Any] = dict(_START)
-        #: Whether it takes video frames; otherwise it takes images.
-        self.wants_video = True
 
     # Properties that QML sets.
 
@@ -82,6 +101,8 @@ class ImageTransportSubscription(TopicElement):
         if topic in {self._topic, self._resolved}:
             return
         self._topic, self._resolved = topic, ""
+        # What is paused would stay on the screen under another name.
+        self._clear_sink()
         self.topicChanged.emit()
         self._schedule()
 
@@ -95,34 +116,32 @@ class ImageTransportSubscription(TopicElement):
         if enabled != self._enabled:
             self._enabled = enabled
             self.enabledChanged.emit()
+            self.playbackStateChanged.emit()
             self._schedule()
 
     def _set_timeout(self, timeout: int) -> None:
         if timeout < 0:
-            self._refuse(f"ImageTransportSubscription {self._topic!r}: timeout {timeout} ms < 0")
+            self._refuse(f"{self._who}: timeout {timeout} ms < 0")
         elif timeout != self._timeout:
             self._timeout = timeout
             self.timeoutChanged.emit()
             self._judge()
 
     def _get_sink(self) -> QtCore.QObject | None:
-        return self._sink if is_alive(self._sink) else None
+        return self._sink.item if self._sink is not None and self._sink.is_alive else None
 
-    def _set_sink(self, sink: QtCore.QObject | None) -> None:
-        if sink is self._sink:
+    def _set_sink(self, item: QtCore.QObject | None) -> None:
+        if item is self._get_sink():
             return
-        video = self._multimedia is not None and isinstance(sink, self._multimedia.QVideoSink)
-        if sink is not None and not video and not isinstance(sink, ImageItem):
-            name = sink.metaObject().className()
-            self._refuse(
-                f"ImageTransportSubscription {self._topic!r}: videoSink must be a VideoOutput's "
-                f"videoSink or an ImageItem, got {name}"
-            )
+        try:
+            sink = None if item is None else Sink(item)
+        except Error as error:
+            self._refuse(f"{self._who}: {error}")
             return
         self._clear_sink()
-        self._sink, self.wants_video = sink, video
-        if sink is not None:
-            sink.destroyed.connect(self._schedule)
+        self._sink = sink
+        if item is not None:
+            item.destroyed.connect(self._schedule)
         self.videoSinkChanged.emit()
         # Another kind of display needs other frames: join the stream anew.
         self._leave()
@@ -136,6 +155,7 @@ class ImageTransportSubscription(TopicElement):
     enabled = Property(bool, lambda self: self._enabled, _set_enabled, notify=enabledChanged)
     timeout = Property(int, lambda self: self._timeout, _set_timeout, notify=timeoutChanged)
     videoSink = Property(QtCore.QObject, _get_sink, _set_sink, notify=videoSinkChanged)
+    videoSurface = Property(SURFACE_TYPE, _get_sink, _set_sink, notify=videoSinkChanged)
 
     # Properties that QML reads.
 
@@ -157,6 +177,77 @@ class ImageTransportSubscription(TopicElement):
     hasAlpha = Property(bool, lambda self: self._looks[1], notify=encodingChanged)
     isColor = Property(bool, lambda self: self._looks[2], notify=encodingChanged)
 
+    # Playing.
+
+    def _get_state(self) -> int:
+        if not self._enabled:
+            return int(self.PlaybackState.StoppedState)
+        paused = self.PlaybackState.PausedState
+        return int(paused if self._paused else self.PlaybackState.PlayingState)
+
+    playbackState = Property(int, _get_state, notify=playbackStateChanged)
+
+    @Slot()
+    def play(self) -> None:
+        """Receive pictures, after :meth:`pause` or :meth:`stop`."""
+        self._set_paused(False)
+        self._set_enabled(True)
+
+    @Slot()
+    def pause(self) -> None:
+        """Receive no more pictures and keep the last one on the screen, where it is stale."""
+        self._set_paused(True)
+
+    @Slot()
+    def stop(self) -> None:
+        """Receive no more pictures and take the last one off the screen."""
+        self._set_paused(False)
+        self._set_enabled(False)
+
+    def _set_paused(self, paused: bool) -> None:
+        if paused != self._paused:
+            self._paused = paused
+            self.playbackStateChanged.emit()
+            self._judge()
+            self._schedule()
+
+    @Slot(str, result=QJSValue)
+    def saveSnapshot(self, path: str) -> QJSValue:
+        """Write the picture that is shown into a file, away from the GUI thread.
+
+        Args:
+            path: The file, plain or as a ``file:`` URL; its ending tells its kind.
+
+        Returns:
+            A promise of its absolute path.
+        """
+        runtime, picture = self._find_runtime(), self._picture
+        if runtime is None:
+            return QJSValue()
+        promise = Deferred(runtime, f"{self._who}: saveSnapshot({path!r})")
+
+        def done(result: Path | Error) -> None:
+            if isinstance(result, Error):
+                promise.reject(str(result))
+            else:
+                promise.resolve(QJSValue(str(result)))
+            if is_alive(self):
+                failed = isinstance(result, Error)
+                (self.snapshotFailed if failed else self.snapshotSaved).emit(str(result))
+
+        if picture is None:
+            done(Error("no picture is shown"))
+            return promise.promise
+
+        def work() -> Path:
+            from rosglass.images import save  # noqa: PLC0415 - brings numpy
+
+            # The picture, not only its frame, is held until then: the memory may be the video's.
+            return save(picture.frame, plain_path(path))
+
+        runtime.session.background(work, done)
+        return promise.promise
+
     @Slot(result=int)
     def getPublisherCount(self) -> int:
         """Return how many publishers the transport in use has; 0 while not connected."""
@@ -171,68 +262,94 @@ class ImageTransportSubscription(TopicElement):
             return 0
 
     def _update(self) -> None:
-        if not is_alive(self._sink):
+        if self._sink is not None and not self._sink.is_alive:
             self._sink = None
         node = self.node
         resolved = self._resolve(self._topic)
         want = None
-        if node is not None and self._enabled and resolved and self._sink is not None:
+        if node is not None and self._enabled and not self._paused and resolved and self._sink:
             want = (node, resolved, self._preferred)
-        if want == self._have:
-            return
-        self._leave()
-        self._have = want
-        if want is None:
-            self._suspect = True
-            self._judge()
-            self._refresh()
-            return
-        if resolved != self._resolved:
-            self._resolved = resolved
-            self.topicChanged.emit()
-        self._join(*want)
+        if want != self._have:
+            self._leave()
+            self._have = want
+            if want is None:
+                self._suspect = True
+                self._judge()
+                self._refresh()
+            else:
+                if resolved != self._resolved:
+                    self._resolved = resolved
+                    self.topicChanged.emit()
+                self._join(*want)
+        elif self._stream is not None:
+            self._follow(self._stream)
+        if not (self._enabled or self._blank):
+            self._clear_sink()
 
     def _join(self, node: Node, topic: str, preferred: str) -> None:
         from rosglass.qml.image_stream import SharedStream as Stream  # noqa: PLC0415 - brings numpy
 
         session = self._session
         assert session is not None
+        look = self._best_look()
         try:
-            stream = Stream.join(session, node, topic, preferred, self)
+            stream = Stream.join(session, node, topic, preferred, look, self)
         except Error as error:
             self._say(str(error))
             return
-        self._say("")
-        self._stream = stream
+        self._stream, self._has_look = stream, look
         self._publishers = self._count_publishers()
         self._at_end["stream"] = lambda: stream.leave(self)
-        if stream.last is not None and not self._suspect:
-            self.show_picture(stream.last)
+        channel = stream.channel(self)
+        if channel is not None and channel.last is not None and not self._suspect:
+            self.show_picture(channel.last)
         self._refresh()
+
+    def _follow(self, stream: SharedStream) -> None:
+        """Have the pictures as the properties say now."""
+        look = self._best_look()
+        if look != self._has_look:
+            self._has_look = look
+            stream.change_look(self, look)
+
+    def _best_look(self) -> Look:
+        """Return what the properties ask for; what they asked for before, when that is wrong."""
+        from rosglass.qml.image_rendering import Look  # noqa: PLC0415 - brings numpy
+
+        assert self._sink is not None
+        video = self._sink.takes_video
+        try:
+            look = self._look(video)
+        except Error as error:
+            self._say(f"{self._who}: {error}")
+            before = self._has_look
+            return before if before is not None and before.video == video else Look(video)
+        self._say("")
+        return look
 
     def _leave(self) -> None:
         stream, self._stream = self._stream, None
         self._at_end.pop("stream", None)
         if stream is not None:
             stream.leave(self)
-            self._clear_sink()
+            if not self._paused:
+                self._clear_sink()
 
     def show_picture(self, picture: Picture) -> None:
         """Show a picture; called by the stream on the GUI thread."""
-        if not is_alive(self) or not is_alive(self._sink):
+        sink = self._sink
+        if not is_alive(self) or sink is None or not sink.is_alive or self._paused:
             return
-        if self._timeout and picture.late > self._timeout / 1000:
-            return  # what a silent link kept back would be taken off the screen at once
-        if self.wants_video:
-            if picture.video is None:
+        # What a silent link kept back would be taken off the screen at once.
+        if self._timeout and self._age(picture) > self._patience:
+            return
+        try:
+            if not sink.show(picture):
                 return
-            self._sink.setVideoFrame(picture.video)
-        else:
-            if picture.image is None:
-                return
-            self._sink.present(picture.image)
-        self._shown_at, self._late = time.monotonic(), picture.late
-        self._frame, self._blank, self._suspect = picture.frame, False, False
+        except Error as error:
+            self._say(str(error))
+            return
+        self._picture, self._blank, self._suspect = picture, False, False
         looks = (picture.frame.encoding, picture.frame.has_alpha, picture.frame.is_color)
         if looks != self._looks:
             self._looks = looks
@@ -247,26 +364,28 @@ class ImageTransportSubscription(TopicElement):
 
     def _clear_sink(self) -> None:
         """Take the picture off the screen."""
-        self._frame, self._blank = None, True
-        if not is_alive(self._sink):
-            return
-        if self.wants_video:
-            self._sink.setVideoFrame(self._multimedia.QVideoFrame())
-        else:
-            self._sink.present(None)
+        self._picture, self._blank = None, True
+        if self._sink is not None:
+            self._sink.clear()
 
     # Judging.
 
+    @property
+    def _patience(self) -> float:
+        """Seconds after which a picture is old."""
+        return (self._timeout or DEFAULT_TIMEOUT) / 1000 + self._interval
+
+    def _age(self, picture: Picture) -> float:
+        return time.monotonic() - picture.made + picture.late
+
     def _is_old(self) -> bool:
-        if self._frame is None:
-            return True
-        timeout = self._timeout or DEFAULT_TIMEOUT
-        return time.monotonic() - self._shown_at + self._late > timeout / 1000
+        picture = self._picture
+        return self._paused or picture is None or self._age(picture) > self._patience
 
     def _judge(self) -> None:
         super()._judge()
         # A picture that stays is the more dangerous the more it looks like a live one.
-        if self._timeout and not self._blank and self._is_old():
+        if self._timeout and not self._blank and not self._paused and self._is_old():
             self._clear_sink()
 
     def _stale_changed(self) -> None:
@@ -286,16 +405,17 @@ class ImageTransportSubscription(TopicElement):
         now = dict(_START)
         if shared is not None:
             network, processing, latency = shared.latencies
+            channel = shared.channel(self)
             now |= {
                 "subscribed": shared.stream.subscribed,
                 "transport": shared.stream.transport,
                 "dropped": shared.dropped,
                 "lost": shared.lost,
-                "problem": shared.stream.problem,
+                "problem": shared.stream.problem or (channel.problem if channel else ""),
             }
-            if not self._stale:
+            if channel is not None and not self._stale:
                 # How fast pictures came once says nothing about one that is not live.
-                now["framerate"] = shared.frame_rate
+                now["framerate"] = channel.frame_rate
                 now["networkLatency"] = network
                 now["processingLatency"] = processing
                 now["latency"] = latency

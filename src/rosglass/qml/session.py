@@ -12,6 +12,7 @@ from rosglass.comm.executor import Dispatcher
 from rosglass.comm.graph import ConnectionState, Status
 from rosglass.errors import ConnectionLostError, Error, InvalidNameError
 from rosglass.qml.executor import GuiExecutor
+from rosglass.qml.load_balancer import LoadBalancer
 from rosglass.qt import QtCore, Signal, is_alive
 
 if TYPE_CHECKING:
@@ -95,6 +96,8 @@ class Session(QtCore.QObject):
         self.node: Node | None = None
         self.name, self.namespace = "", ""
         self.streams: dict[Any, Any] = {}
+        #: When throttled streams fetch their pictures.
+        self.balancer = LoadBalancer()
         #: While true, QML's wish to shut down is ignored: its successor needs the node.
         self.holding = False
         self._url, self._forced_name, self._connect = url, name, connect

@@ -1,7 +1,9 @@
 """What only ``import Ros 1.0`` has."""
 
 from rosglass.qml.image_item import ImageItem
+from rosglass.qml.image_manager import ImageTransportManager
 from rosglass.qml.ros1.console import ConsoleLevels, InitOptions
+from rosglass.qml.ros1.image_transport_subscriber import ImageTransportSubscriber
 from rosglass.qml.ros1.ros import Ros
 from rosglass.qml.ros1.service import Service
 from rosglass.qml.ros1.subscriber import Subscriber
@@ -9,10 +11,15 @@ from rosglass.qml.ros1.subscriber import Subscriber
 __all__ = ["NATIVE", "TYPES"]
 
 #: Bases of the module's singletons (``imports/Ros/*.qml``), by their name in ``Ros.Native``.
-NATIVE = {"RosNative": Ros, "ServiceNative": Service}
+NATIVE = {
+    "RosNative": Ros,
+    "ServiceNative": Service,
+    "ImageTransportManagerNative": ImageTransportManager,
+}
 #: What QML can write, by name.
 TYPES = {
     "Subscriber": Subscriber,
+    "ImageTransportSubscriber": ImageTransportSubscriber,
     "ImageItem": ImageItem,
     "RosConsoleLevels": ConsoleLevels,
     "RosInitOptions": InitOptions,

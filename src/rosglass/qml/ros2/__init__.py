@@ -1,6 +1,7 @@
 """What only ``import Ros2 1.0`` has."""
 
 from rosglass.qml.image_item import ImageItem
+from rosglass.qml.image_manager import ImageTransportManager
 from rosglass.qml.image_subscription import ImageTransportSubscription
 from rosglass.qml.logger import LoggerLevel
 from rosglass.qml.ros2.ros2 import Ros2
@@ -9,7 +10,7 @@ from rosglass.qml.subscription import Subscription
 __all__ = ["NATIVE", "TYPES"]
 
 #: Bases of the module's singletons (``imports/Ros2/*.qml``), by their name in ``Ros2.Native``.
-NATIVE = {"Ros2Native": Ros2}
+NATIVE = {"Ros2Native": Ros2, "ImageTransportManagerNative": ImageTransportManager}
 #: What QML can write, by name.
 TYPES = {
     "Subscription": Subscription,

@@ -1,0 +1,132 @@
+"""From a received picture to what each kind of display takes, every step done once."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from rosglass.errors import Error
+from rosglass.images import DEPTH_ENCODINGS, DepthColors, View, convert
+from rosglass.qml.frames import IMAGE_FORMATS, VIDEO_FORMATS, VideoFrame, to_image
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from rosglass.comm.time import Time
+    from rosglass.images.frame import Frame, RawImage
+    from rosglass.qt import QtGui
+
+__all__ = ["Look", "Picture", "Renderer"]
+
+_WHOLE = View()
+#: Settings of colours whose automatic range is remembered; a slider makes many.
+_MOST_COLORS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How a viewer wants its pictures; viewers with equal looks get the same ones.
+
+    Attributes:
+        video: Whether it takes video frames; otherwise it takes images.
+        view: Which part, and how it is turned.
+        colors: Colour map, nearest and farthest depth for pictures of depths; None for greys.
+        interval: Seconds between two pictures, 0 for all of them.
+    """
+
+    video: bool = True
+    view: View = _WHOLE
+    colors: tuple[str, float | None, float | None] | None = None
+    interval: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A picture as it is handed to viewers.
+
+    Attributes:
+        frame: Its size, encoding and stamps; its planes may be the memory of `video`.
+        video: The ``QVideoFrame``; None when nobody wants one.
+        image: The ``QImage``; None when nobody wants one.
+        received: When it arrived.
+        late: Seconds that it was kept back on its way.
+        made: When it was ready, seconds of :func:`time.monotonic`.
+    """
+
+    frame: Frame
+    video: Any
+    image: QtGui.QImage | None
+    received: Time
+    late: float
+    made: float
+
+
+class Renderer:
+    """Makes the pictures of one stream; used by its thread only."""
+
+    def __init__(self) -> None:
+        #: The colours of depths follow the pictures: each setting has its own.
+        self._colors: dict[Any, DepthColors] = {}
+
+    def render(
+        self, image: RawImage, received: Time, late: float, looks: Iterable[Look]
+    ) -> tuple[dict[Look, Picture], dict[Look, str]]:
+        """Make the pictures that are wanted.
+
+        Args:
+            image: The picture as received.
+            received: When it arrived.
+            late: Seconds that it was kept back on its way.
+            looks: What is wanted.
+
+        Returns:
+            The pictures, and for looks that this one cannot be shown with, why.
+
+        Raises:
+            DecodeError: The picture contradicts itself.
+            UnsupportedError: It cannot be shown at all.
+        """
+        groups: dict[Any, dict[View, list[Look]]] = {}
+        for look in looks:
+            groups.setdefault(look.colors, {}).setdefault(look.view, []).append(look)
+        made: dict[Look, Picture] = {}
+        failed: dict[Look, str] = {}
+        for colors, views in groups.items():
+            kinds = {look.video for members in views.values() for look in members}
+            # What is shown as it is can be converted where the display wants it.
+            straight = VideoFrame() if kinds == {True} and [*views] == [_WHOLE] else None
+            frame = self._convert(image, received, colors, kinds, straight)
+            for view, members in views.items():
+                try:
+                    seen = view.apply(frame)
+                except Error as error:
+                    failed |= dict.fromkeys(members, str(error))
+                    continue
+                wanted = {look.video for look in members}
+                video = (straight or VideoFrame()).finish(seen) if True in wanted else None
+                painted = to_image(seen) if False in wanted else None
+                picture = Picture(seen, video, painted, received, late, time.monotonic())
+                made |= dict.fromkeys(members, picture)
+        return made, failed
+
+    def _convert(
+        self,
+        image: RawImage,
+        received: Time,
+        colors: Any,
+        kinds: set[bool],
+        straight: VideoFrame | None,
+    ) -> Frame:
+        allocate = None if straight is None else straight.allocate
+        if colors is not None and image.encoding in DEPTH_ENCODINGS:
+            painter = self._colors.get(colors)
+            if painter is None:
+                while len(self._colors) >= _MOST_COLORS:
+                    del self._colors[next(iter(self._colors))]
+                painter = self._colors[colors] = DepthColors(*colors)
+            return painter.convert(image, received, allocate)
+        accept = VIDEO_FORMATS if kinds == {True} else IMAGE_FORMATS
+        if len(kinds) == 2:
+            accept = IMAGE_FORMATS & VIDEO_FORMATS
+        return convert(image, accept, received, allocate)

@@ -1,0 +1,50 @@
+"""The element ``ImageTransportSubscriber`` of ``Ros 1.0``."""
+# ruff: noqa: N815 - the names of signals are QML's
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rosglass.errors import Error
+from rosglass.qml.dialect import Dialect
+from rosglass.qml.image_subscription import ImageTransportSubscription
+from rosglass.qml.ros1.namespaces import within
+from rosglass.qt import Property, QtCore, Signal
+
+if TYPE_CHECKING:
+    from rosglass.qml.runtime import Runtime
+
+__all__ = ["ImageTransportSubscriber"]
+
+
+class ImageTransportSubscriber(ImageTransportSubscription):
+    """Shows a camera; everything of ``Ros2``'s ImageTransportSubscription, and a namespace."""
+
+    DIALECT = Dialect.ROS1
+
+    nsChanged = Signal()
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        super().__init__(parent, runtime)
+        self._namespace = ""
+
+    def _get_namespace(self) -> str:
+        node = self.node
+        try:
+            return node.resolve(self._namespace) if node and self._namespace else self._namespace
+        except Error:
+            return self._namespace
+
+    def _set_namespace(self, namespace: str) -> None:
+        if namespace != self._namespace:
+            self._namespace, self._resolved = namespace, ""
+            self._clear_sink()
+            self.nsChanged.emit()
+            self._schedule()
+
+    def _resolve(self, topic: str) -> str:
+        return super()._resolve(within(self._namespace, topic))
+
+    ns = Property(str, _get_namespace, _set_namespace, notify=nsChanged)
