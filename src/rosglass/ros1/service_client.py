@@ -2,38 +2,23 @@
 
 from __future__ import annotations
 
-import copy
+import itertools
 import logging
-import threading
 import time
-from collections import deque
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import Call, QoS, ServiceClient
-from rosglass.comm.promise import check_timeout
-from rosglass.comm.readiness import Readiness
-from rosglass.comm.receiving import check_may_wait
-from rosglass.errors import (
-    ConversionError,
-    DecodeError,
-    Error,
-    NodeClosedError,
-    ServiceError,
-    ServiceUnavailableError,
-    TimeoutError,  # noqa: A004 - the field's own word
-    UnsupportedError,
-)
+from rosglass.comm.calling import CallingClient
+from rosglass.comm.client import untyped
+from rosglass.errors import Error, ServiceError
 from rosglass.ros1.core import Member
 from rosglass.ros1.service_finder import ServiceFinder
-from rosglass.ros1.service_link import Request, ServiceLink, check_size
+from rosglass.ros1.service_link import Request, ServiceLink
 from rosglass.ros1.service_probe import probe
 from rosglass.ros1.types import ANY
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from rosglass.comm import Executor, Handle
-    from rosglass.messages import Message, ServiceType
+    from rosglass.comm import Call, QoS
+    from rosglass.messages import Message, MessageType, ServiceType
     from rosglass.ros1.core import Core
     from rosglass.ros1.service_probe import Peer, Place
     from rosglass.ros1.services import Services
@@ -45,7 +30,7 @@ _log = logging.getLogger("rosglass.ros1")
 _MOST_LINKS = 64
 
 
-class Ros1ServiceClient(ServiceClient, Member):
+class Ros1ServiceClient(CallingClient[Request], Member):
     """A service client; made by :meth:`Ros1Node.create_service_client`.
 
     Except what users call, everything runs in the loop's thread, which owns the connections.
@@ -61,6 +46,8 @@ class Ros1ServiceClient(ServiceClient, Member):
             instead of a connection for each.
     """
 
+    _core: Core
+
     def __init__(
         self,
         core: Core,
@@ -70,22 +57,15 @@ class Ros1ServiceClient(ServiceClient, Member):
         qos: QoS,
         persistent: bool,
     ) -> None:
-        self.name, self.qos, self.persistent = name, qos, persistent
-        self._core, self._services = core, services
+        super().__init__(core, name)
+        self.qos, self.persistent, self._services = qos, persistent, services
         self._finder = ServiceFinder(core, services, name, wanted, self)
-        self._lock = threading.Lock()
-        self._requests: dict[Call, Request] = {}
-        self._count = 0
-        self._closed = False
+        self._numbers = itertools.count(1)
         self._waiters = 0
         #: The connection that is kept; who claims it for a request has the lock.
         self._kept: ServiceLink | None = None
-        #: Calls that wait; changed with the lock.
-        self._queue: deque[Request] = deque()
-        # What follows belongs to the loop's thread.
+        #: Belongs to the loop's thread.
         self._links: set[ServiceLink] = set()
-        self._warned = ""
-        self._readiness = Readiness(name, lambda: self.ready, self._check_open, core.dispatcher)
 
     # -- who is there ----------------------------------------------------------------------------
 
@@ -99,17 +79,12 @@ class Ros1ServiceClient(ServiceClient, Member):
         """Whether a server is there that understands the requests."""
         return self._finder.ready and not self._closed
 
-    @property
-    def problem(self) -> str:
-        """Why the service cannot be called, in words; empty when all is well."""
-        if self._closed:
-            return "the client is closed"
-        return self._finder.conflict() or ("" if self.ready else self._finder.absence())
+    def _conflicts(self) -> list[str]:
+        conflict = self._finder.conflict()
+        return [conflict] if conflict else []
 
-    @property
-    def pending(self) -> int:
-        """Calls that have not ended."""
-        return len(self._requests)
+    def _absence(self) -> str:
+        return self._finder.absence()
 
     def wait_for_server(self, timeout: float | None = None) -> bool:
         """Wait for a server; see :meth:`rosglass.comm.ServiceClient.wait_for_server`."""
@@ -118,84 +93,29 @@ class Ros1ServiceClient(ServiceClient, Member):
         try:
             if not self.ready:
                 self._core.loop.call(self._finder.look)
-            return self._readiness.wait(timeout)
+            return super().wait_for_server(timeout)
         finally:
             with self._lock:
                 self._waiters -= 1
 
-    def on_ready_change(
-        self, callback: Callable[[bool], None], executor: Executor | None = None
-    ) -> Handle:
-        """Call `callback` with :attr:`ready` whenever it changes."""
-        return self._readiness.add(callback, executor)
-
     # -- calling ---------------------------------------------------------------------------------
 
-    def call(
-        self, request: Message | dict[str, Any] | None = None, /, *, timeout: float | None = 10.0
-    ) -> Message:
-        """Call and wait; see :meth:`rosglass.comm.ServiceClient.call`."""
-        if self._services.serves_here(self.name):
-            raise UnsupportedError(
-                f"{self.name}: this callback would wait for itself: the server runs on the same "
-                "thread of this node; take call_async() here, or give the server an executor "
-                "of its own"
-            )
-        check_may_wait(self.name)
-        timeout = check_timeout(timeout, self.name)
-        entry = self._enter(request)
-        try:
-            self._begin(entry)
-            if timeout is not None:
-                try:
-                    return entry.call.result(timeout)
-                except TimeoutError:
-                    # Either the call's own end, or that of the waiting: then this is its end.
-                    self._expire(entry, timeout)
-            return entry.call.result()
-        except BaseException:
-            entry.call.cancel()  # Ctrl-C: nobody waits for the response any more
-            raise
+    def _answered_here(self) -> bool:
+        return self._services.serves_here(self.name)
 
-    def call_async(
-        self, request: Message | dict[str, Any] | None = None, /, *, timeout: float | None = 10.0
-    ) -> Call:
-        """Call and return at once; see :meth:`rosglass.comm.ServiceClient.call_async`."""
-        timeout = check_timeout(timeout, self.name)
-        entry = self._enter(request)
-        if timeout is not None:
-            entry.timer = self._core.timers.after(timeout, lambda: self._expire(entry, timeout))
-        self._begin(entry)
-        return entry.call
-
-    def _enter(self, value: Any) -> Request:
-        """Put a request into the queue."""
-        self._check_open()
+    def _encode(self, value: Any) -> tuple[ServiceType | None, Any]:
         kind = self.type
-        # Encoded, or copied, now: the caller may change it while it waits for the server.
-        if kind is not None:
-            taken = kind.request.encode(value)
-            check_size(taken, kind.request.name)
-        elif value is None or hasattr(value, "to_dict") or isinstance(value, dict):
-            taken = copy.deepcopy(value)
-        else:
-            raise ConversionError("", value, "a message or a dict of fields", self.name)
-        call = Call(
-            f"{self.name} has not answered, and the call goes on: no response",
-            self._core.dispatcher,
-            cancellable=True,
-        )
-        with self._lock:
-            closed = self._closed
-            self._count += 1
-            entry = Request(self._count, call, taken, kind, time.monotonic())
-            if not closed:
-                self._requests[call] = entry
-                self._queue.append(entry)
-        if closed:
-            self._check_open()
-        call.add_done_callback(lambda _: self._ended(entry))
-        return entry
+        return kind, untyped(value, self.name) if kind is None else Request.encoded(kind, value)
+
+    def _request(
+        self,
+        call: Call,
+        value: Any,
+        kind: ServiceType | None,
+        timeout: float | None,  # noqa: ARG002 - the call's own end is enough
+    ) -> Request:
+        number, now = next(self._numbers), time.monotonic()
+        return Request(call=call, value=value, type=kind, number=number, made=now)
 
     def _begin(self, entry: Request) -> None:
         """Send a request at once if a kept connection is idle; else let the loop do it."""
@@ -214,25 +134,7 @@ class Ros1ServiceClient(ServiceClient, Member):
                 return
         self._core.loop.call(self._advance)
 
-    def _expire(self, entry: Request, timeout: float) -> None:
-        """End a call whose time is over."""
-        if entry.call.done():
-            return
-        error: Error
-        if entry.sent is None:
-            error = ServiceUnavailableError(
-                f"{self.name} could not be called within {timeout:g} s: "
-                f"{self.problem or self._delay(entry)}; nothing was sent"
-            )
-        else:
-            error = TimeoutError(
-                f"{self.name} did not answer within {timeout:g} s: {self._finder.server} was sent "
-                f"the request {time.monotonic() - entry.sent:.1f} s ago, and may still carry it out"
-            )
-        entry.call.fail(error)
-
     def _delay(self, entry: Request) -> str:
-        """Say why a request was not sent although all is well."""
         if entry.began is not None:
             return "its server takes long to accept a connection"
         busy = len(self._links)
@@ -240,8 +142,14 @@ class Ros1ServiceClient(ServiceClient, Member):
             return f"{busy} earlier call{'s are' if busy > 1 else ' is'} not answered yet"
         return "its server appeared too late"
 
+    def _server_name(self) -> str:
+        return self._finder.server
+
+    def _decode(self, kind: MessageType, data: bytes | memoryview) -> Message:
+        kind.validate(data)
+        return kind.decode(data)
+
     def _ended(self, entry: Request) -> None:
-        """Clean up after a call; in any thread."""
         if entry.timer is not None:
             entry.timer.close()
         with self._lock:
@@ -283,7 +191,7 @@ class Ros1ServiceClient(ServiceClient, Member):
                 entry.began = time.monotonic()
                 if link is not None:
                     link.request, entry.link = entry, link
-            error = self._encode(entry, kind)
+            error = self._prepare(entry, kind)
             if error is not None or entry.call.done():
                 if link is not None:
                     link.request = entry.link = None
@@ -320,7 +228,7 @@ class Ros1ServiceClient(ServiceClient, Member):
         """Return whether a connection is one of this type with who offers the service now."""
         return link.kind is kind and self._finder.place in (None, link.place)
 
-    def _encode(self, entry: Request, kind: ServiceType) -> Error | None:
+    def _prepare(self, entry: Request, kind: ServiceType) -> Error | None:
         try:
             entry.encode(kind)
         except Error as error:
@@ -359,7 +267,7 @@ class Ros1ServiceClient(ServiceClient, Member):
         if entry is not None:
             entry.link = None
             if ok:
-                self._take(link, entry, data)
+                self._fulfil(entry.call, link.kind.response, data)
             else:
                 text = bytes(data).decode("utf-8", "replace").strip()
                 told = text or "its server reports a failure and does not say why"
@@ -399,22 +307,6 @@ class Ros1ServiceClient(ServiceClient, Member):
             self._queue.clear()
             self._queue.extend(waiting)
 
-    def _take(self, link: ServiceLink, entry: Request, data: bytes | memoryview) -> None:
-        response = link.kind.response
-        try:
-            response.validate(data)
-            message = response.decode(data)
-        except DecodeError as problem:
-            rubbish = ServiceError(
-                f"{self._finder.server} answered the call of {self.name} with bytes that are no "
-                f"{response.name}: {problem}; it was probably built from another definition "
-                "of the type: add that to the library"
-            )
-            rubbish.__cause__ = problem
-            entry.call.fail(rubbish)
-        else:
-            entry.call.fulfil(message)
-
     def _explain(self, entry: Request, link: ServiceLink) -> None:
         """End a call that was refused: most likely the server has another definition."""
 
@@ -452,10 +344,7 @@ class Ros1ServiceClient(ServiceClient, Member):
 
     def server_changed(self) -> None:
         """Tell what has changed."""
-        problem = self._finder.conflict()
-        if problem and problem != self._warned:
-            _log.warning("%s: %s", self.name, problem)
-        self._warned = problem
+        self._warn(_log)
         self._readiness.update()
 
     def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - time matters as well
@@ -464,21 +353,9 @@ class Ros1ServiceClient(ServiceClient, Member):
 
     # -- the end ---------------------------------------------------------------------------------
 
-    def close(self) -> None:
-        """End pending calls with NodeClosedError; safe to call twice."""
-        with self._lock:
-            if self._closed:
-                return
-            self._closed = True
-            entries = list(self._requests.values())
-        if self._core.forked:
-            return
-        for entry in entries:
-            entry.call.fail(NodeClosedError(f"the client of {self.name} was closed during a call"))
+    def _withdraw(self) -> None:
         self._finder.close()
         self._core.loop.call(self._end)
-        self._readiness.close()
-        self._core.remove(self)
 
     def _end(self) -> None:
         with self._lock:
@@ -486,8 +363,3 @@ class Ros1ServiceClient(ServiceClient, Member):
         for link in list(self._links):
             link.request = None
             link.end("")
-
-    def _check_open(self) -> None:
-        self._core.check_open()
-        if self._closed:
-            raise NodeClosedError(f"the client of {self.name} is closed; create another one")

@@ -11,6 +11,7 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
+from rosglass.comm.calling import CallRequest
 from rosglass.errors import ConnectionLostError, ConversionError
 from rosglass.interfaces import ros1_name
 from rosglass.ros1.connection import MAX_FRAME, Connection
@@ -18,57 +19,41 @@ from rosglass.ros1.io_loop import READ
 from rosglass.ros1.service_probe import Peer
 
 if TYPE_CHECKING:
-    from rosglass.comm import Call, Handle
     from rosglass.messages import ServiceType
     from rosglass.ros1.core import Core
     from rosglass.ros1.service_probe import Place
 
-__all__ = ["LinkOwner", "Request", "ServiceLink", "check_size"]
+__all__ = ["LinkOwner", "Request", "ServiceLink"]
 
 _length = struct.Struct("<I")
 
 
-@dataclass(eq=False)
-class Request:
+@dataclass(eq=False, kw_only=True)
+class Request(CallRequest):
     """A call's request.
 
     Attributes:
         number: Its place in the order of the calls.
-        call: What the caller holds.
-        value: The encoded request, or the value to encode while the type is not known.
-        type: The type it is encoded for.
         made: Monotonic time of the call.
-        timer: Ends the call when its time is over.
         began: Monotonic time at which a connection for it was begun, None while it waits.
-        sent: Monotonic time of sending, None before.
         link: The connection it is sent through.
         refused: Whether a server that was found before this call began has refused it.
     """
 
     number: int
-    call: Call
-    value: Any
-    type: ServiceType | None
     made: float
-    timer: Handle | None = None
     began: float | None = None
-    sent: float | None = None
     link: ServiceLink | None = None
     refused: bool = False
 
-    def encode(self, kind: ServiceType) -> bytes:
-        """Return its bytes for a type that may have been found only after the call.
-
-        Raises:
-            ConversionError: A value does not fit its field.
-        """
-        if self.type is not kind:
-            value = self.value
-            if self.type is not None:
-                value = self.type.request.decode(value).to_dict()
-            self.value, self.type = kind.request.encode(value), kind
-            check_size(self.value, kind.request.name)
-        return bytes(self.value)
+    @staticmethod
+    def encoded(kind: ServiceType, value: Any) -> bytes:
+        """Return the bytes of a request's value; raises ConversionError."""
+        data = kind.request.encode(value)
+        if len(data) > MAX_FRAME:
+            told = f"at most {MAX_FRAME} bytes, as ROS 1 takes no larger message"
+            raise ConversionError("", f"{len(data)} bytes", told, kind.request.name)
+        return data
 
     def loss(self, what: str, server: str, reason: str) -> ConnectionLostError:
         """Return the error that tells of its connection's end, after it was sent."""
@@ -178,10 +163,3 @@ class ServiceLink:
     def _on_end(self, reason: str) -> None:
         self.refusal = self.refusal or self._connection.header.get("error", "")
         self._owner.link_ended(self, reason)
-
-
-def check_size(data: bytes, name: str) -> None:
-    """Raise ConversionError for a message that is too large for ROS 1."""
-    if len(data) > MAX_FRAME:
-        told = f"at most {MAX_FRAME} bytes, as ROS 1 takes no larger message"
-        raise ConversionError("", f"{len(data)} bytes", told, name)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import logging
 import threading
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from rosglass.comm.calling import CallRequest
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rosglass.comm import Call, Handle
     from rosglass.messages import ServiceType
     from rosglass.ros2.middleware import Requester
 
@@ -19,42 +20,21 @@ __all__ = ["Link", "Request"]
 _log = logging.getLogger("rosglass.ros2")
 
 
-@dataclass(eq=False)
-class Request:
+@dataclass(eq=False, kw_only=True)
+class Request(CallRequest):
     """A call's request.
 
     Attributes:
-        call: What the caller holds.
-        value: The encoded request, or the value to encode while the type is not known.
-        type: The type it is encoded for.
         deadline: Monotonic time at which it is of no use any more, None for never.
-        timer: Ends the call then.
-        sent: Monotonic time of sending, None before.
         servers: Identities of the servers that were there when it was sent.
         alone: Since when none of them is there, or was; None while one is that may answer.
         link: Through which it was sent, and its number there.
-        private: Whether nobody else has the call, so that its end calls nobody.
     """
 
-    call: Call
-    value: Any
-    type: ServiceType | None
     deadline: float | None
-    timer: Handle | None = None
-    sent: float | None = None
     servers: frozenset[bytes | str] = frozenset()
     alone: float | None = None
     link: tuple[Link, int] | None = None
-    private: bool = False
-
-    def encode(self, kind: ServiceType) -> bytes:
-        """Return its bytes for a type that may have been found only after the call."""
-        if self.type is not kind:
-            value = self.value
-            if self.type is not None:
-                value = self.type.request.decode(value).to_dict()
-            self.value, self.type = kind.request.encode(value), kind
-        return bytes(self.value)
 
 
 class Link:

@@ -2,29 +2,15 @@
 
 from __future__ import annotations
 
-import copy
 import logging
-import threading
 import time
-from collections import deque
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import Call, EndpointKind, QoS, ServiceClient
-from rosglass.comm.promise import check_timeout
-from rosglass.comm.readiness import Readiness
-from rosglass.comm.receiving import check_may_wait
+from rosglass.comm import EndpointKind, QoS
+from rosglass.comm.calling import CallingClient
+from rosglass.comm.client import untyped
 from rosglass.comm.similar import similar
-from rosglass.errors import (
-    ConnectionLostError,
-    ConversionError,
-    DecodeError,
-    Error,
-    NodeClosedError,
-    ServiceError,
-    ServiceUnavailableError,
-    TimeoutError,  # noqa: A004 - the field's own word
-    UnsupportedError,
-)
+from rosglass.errors import ConnectionLostError, Error, ServiceError
 from rosglass.ros2.announced import (
     Announced,
     choose,
@@ -38,10 +24,10 @@ from rosglass.ros2.middleware import CALL_DROPPED, SERVER_LEFT
 from rosglass.ros2.requests import Link, Request
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
-    from rosglass.comm import EndpointInfo, Executor, Handle
-    from rosglass.messages import Message, ServiceType
+    from rosglass.comm import Call, EndpointInfo
+    from rosglass.messages import Message, MessageType, ServiceType
     from rosglass.ros2.core import Core
 
 __all__ = ["Ros2ServiceClient"]
@@ -54,7 +40,7 @@ _GRACE = 3.0
 _RETRY = 0.05
 
 
-class Ros2ServiceClient(ServiceClient, Member):
+class Ros2ServiceClient(CallingClient[Request], Member):
     """A service client; made by :meth:`Node.create_service_client`.
 
     Args:
@@ -67,6 +53,8 @@ class Ros2ServiceClient(ServiceClient, Member):
         quiet: Whether somebody else logs what is wrong.
     """
 
+    _core: Core
+
     def __init__(
         self,
         core: Core,
@@ -77,21 +65,17 @@ class Ros2ServiceClient(ServiceClient, Member):
         patient: bool = False,
         quiet: bool = False,
     ) -> None:
-        self.name, self.qos = name, qos or QoS.services()
-        self._core, self._patient, self._quiet = core, patient, quiet
+        super().__init__(core, name)
+        self.qos = qos or QoS.services()
+        self._patient, self._quiet = patient, quiet
         self._discovers = wanted is None
         given = None if wanted is None else core.types.service(wanted)
         fixed = wanted is not None and not isinstance(wanted, str)
         self._announced: Announced[ServiceType] = Announced(core, core.types.service, given, fixed)
         self.type = given
-        self._lock = threading.Lock()
         self._link: Link | None = None
-        self._requests: dict[Call, Request] = {}
-        self._queue: deque[Request] = deque()
         self._flushing = self._again = self._retrying = False
-        self._closed = False
-        self._choice = self._failure = self._warned = ""
-        self._readiness = Readiness(name, lambda: self.ready, self._check_open, core.dispatcher)
+        self._choice = self._failure = ""
         self._adopt(retry=True)
         if self._announced.type is not None:
             self._connect(self._announced.type)
@@ -110,16 +94,6 @@ class Ros2ServiceClient(ServiceClient, Member):
         return not (servers and not self._fitting(servers)) and link.requester.ready()
 
     @property
-    def problem(self) -> str:
-        """Why the service cannot be called, in words; empty when all is well."""
-        if self._closed:
-            return "the client is closed"
-        problems = self._conflicts(self._servers())
-        if not problems and not self.ready:
-            problems.append(self._absence())
-        return "; ".join(problems)
-
-    @property
     def trouble(self) -> str:
         """What its middleware has against servers that are there; empty when nothing."""
         link = self._link
@@ -129,60 +103,10 @@ class Ros2ServiceClient(ServiceClient, Member):
         """Return the identities of the servers that understand the requests."""
         return frozenset(map(identity, self._fitting(self._servers())))
 
-    @property
-    def pending(self) -> int:
-        """Calls that have not ended."""
-        return len(self._requests)
-
-    def wait_for_server(self, timeout: float | None = None) -> bool:
-        """Wait for a server; see :meth:`rosglass.comm.ServiceClient.wait_for_server`."""
-        return self._readiness.wait(timeout)
-
-    def on_ready_change(
-        self, callback: Callable[[bool], None], executor: Executor | None = None
-    ) -> Handle:
-        """Call `callback` with :attr:`ready` whenever it changes."""
-        return self._readiness.add(callback, executor)
-
     # -- calling ---------------------------------------------------------------------------------
 
-    def call(
-        self, request: Message | dict[str, Any] | None = None, /, *, timeout: float | None = 10.0
-    ) -> Message:
-        """Call and wait; see :meth:`rosglass.comm.ServiceClient.call`."""
-        if self._core.serves_here(self.name):
-            raise UnsupportedError(
-                f"{self.name}: this callback would wait for itself: the server runs on the same "
-                "thread of this node; take call_async() here, or give the server an executor "
-                "of its own"
-            )
-        check_may_wait(self.name)
-        timeout = check_timeout(timeout, self.name)
-        entry = self._enter(request, timeout)
-        entry.private = True
-        try:
-            self._flush()
-            if timeout is not None:
-                try:
-                    return entry.call.result(timeout)
-                except TimeoutError:
-                    # Either the call's own end, or that of the waiting: then this is its end.
-                    self._expire(entry, timeout)
-            return entry.call.result()
-        except BaseException:
-            entry.call.cancel()  # Ctrl-C: nobody waits for the response any more
-            raise
-
-    def call_async(
-        self, request: Message | dict[str, Any] | None = None, /, *, timeout: float | None = 10.0
-    ) -> Call:
-        """Call and return at once; see :meth:`rosglass.comm.ServiceClient.call_async`."""
-        timeout = check_timeout(timeout, self.name)
-        entry = self._enter(request, timeout)
-        if timeout is not None:
-            entry.timer = self._core.timers.after(timeout, lambda: self._expire(entry, timeout))
-        self._flush()
-        return entry.call
+    def _answered_here(self) -> bool:
+        return self._core.serves_here(self.name)
 
     def withdraw(self, call: Call) -> bool:
         """Cancel a call if its request was not sent yet; return whether that was so."""
@@ -193,33 +117,18 @@ class Ros2ServiceClient(ServiceClient, Member):
             self._queue.remove(entry)
         return call.cancel()
 
-    def _enter(self, value: Any, timeout: float | None) -> Request:
-        """Put a request into the queue."""
-        self._check_open()
+    def _encode(self, value: Any) -> tuple[ServiceType | None, Any]:
         kind = self._announced.type
-        # Encoded, or copied, now: the caller may change it while it waits for the server.
-        if kind is not None:
-            taken = kind.request.encode(value)
-        elif value is None or hasattr(value, "to_dict") or isinstance(value, dict):
-            taken = copy.deepcopy(value)
-        else:
-            raise ConversionError("", value, "a message or a dict of fields", self.name)
-        call = Call(
-            f"{self.name} has not answered, and the call goes on: no response",
-            self._core.dispatcher,
-            cancellable=True,
-        )
+        return kind, untyped(value, self.name) if kind is None else Request.encoded(kind, value)
+
+    def _request(
+        self, call: Call, value: Any, kind: ServiceType | None, timeout: float | None
+    ) -> Request:
         deadline = None if timeout is None else time.monotonic() + timeout
-        entry = Request(call, taken, kind, deadline)
-        with self._lock:
-            closed = self._closed
-            if not closed:
-                self._requests[call] = entry
-                self._queue.append(entry)
-        if closed:
-            self._check_open()
-        call.add_done_callback(lambda _: self._ended(entry))
-        return entry
+        return Request(call=call, value=value, type=kind, deadline=deadline)
+
+    def _begin(self, entry: Request) -> None:  # noqa: ARG002 - all that waits is sent
+        self._flush()
 
     def _flush(self) -> None:
         """Send what waits, in order, if a server is there."""
@@ -275,22 +184,15 @@ class Ros2ServiceClient(ServiceClient, Member):
         if data is None:
             call.fail(self._refusal(entry, error))
             return
-        response = link.type.response
-        try:
-            if response.fields:
-                response.validate(data)
-            message = response.decode(data)
-        except DecodeError as problem:
-            who = nodes_of(self._fitting(self._servers())) or "the server"
-            rubbish = ServiceError(
-                f"{who} answered the call of {self.name} with bytes that are no "
-                f"{response.name}: {problem}; it was probably built from another definition "
-                "of the type: add that to the library"
-            )
-            rubbish.__cause__ = problem
-            call.fail(rubbish)
-        else:
-            call.fulfil(message)
+        self._fulfil(call, link.type.response, data)
+
+    def _decode(self, kind: MessageType, data: bytes | memoryview) -> Message:
+        if kind.fields:
+            kind.validate(data)
+        return kind.decode(data)
+
+    def _server_name(self) -> str:
+        return nodes_of(self._fitting(self._servers())) or "its server"
 
     def _refusal(self, entry: Request, error: str) -> Error:
         gone = entry.servers and not entry.servers & self.server_ids()
@@ -306,23 +208,8 @@ class Ros2ServiceClient(ServiceClient, Member):
             f"({self._core.url}: {self._core.status()})"
         )
 
-    def _expire(self, entry: Request, timeout: float) -> None:
-        """End a call whose time is over."""
-        if entry.call.done():
-            return
-        error: Error
-        if entry.sent is None:
-            error = ServiceUnavailableError(
-                f"{self.name} could not be called within {timeout:g} s: "
-                f"{self.problem or 'its server appeared too late'}; nothing was sent"
-            )
-        else:
-            who = nodes_of(self._fitting(self._servers())) or "its server"
-            error = TimeoutError(
-                f"{self.name} did not answer within {timeout:g} s: {who} was sent the request "
-                f"{time.monotonic() - entry.sent:.1f} s ago, and may still carry it out"
-            )
-        entry.call.fail(error)
+    def _delay(self, entry: Request) -> str:  # noqa: ARG002 - nothing else holds one up
+        return "its server appeared too late"
 
     def _ended(self, entry: Request) -> None:
         if entry.timer is not None:
@@ -347,12 +234,8 @@ class Ros2ServiceClient(ServiceClient, Member):
                 self._failure = ""
             except Error as error:
                 self._failure = str(error)
-        servers = self._servers()
-        problem = "; ".join(self._conflicts(servers))
-        if problem and problem != self._warned and not self._quiet:
-            level = logging.INFO if self._announced.pending else logging.WARNING
-            _log.log(level, "%s: %s", self.name, problem)
-        self._warned = problem
+        if not self._quiet:
+            self._warn(_log, logging.INFO if self._announced.pending else logging.WARNING)
         self._readiness.update()
         if self._queue:
             self._flush()
@@ -422,11 +305,11 @@ class Ros2ServiceClient(ServiceClient, Member):
     def _fitting(self, servers: Sequence[EndpointInfo]) -> list[EndpointInfo]:
         return [server for server in servers if self._announced.fits(server)]
 
-    def _conflicts(self, servers: Sequence[EndpointInfo]) -> list[str]:
-        """Say what a person has to mend."""
+    def _conflicts(self) -> list[str]:
         problems = [self._choice, self._announced.failure, self._failure]
         problems = [text for text in problems if text]
         if not problems:
+            servers = self._servers()
             problems = mismatches(self._announced, servers, "offers", "it cannot be called")
             # The middleware knows better what becomes of several servers.
             others = rivals(self._fitting(servers), self.name)
@@ -434,7 +317,6 @@ class Ros2ServiceClient(ServiceClient, Member):
         return problems
 
     def _absence(self) -> str:
-        """Say why no server is there although nothing is wrong."""
         servers = self._fitting(self._servers())
         if servers:
             return f"{nodes_of(servers)} offers it, but is not linked yet"
@@ -453,25 +335,9 @@ class Ros2ServiceClient(ServiceClient, Member):
 
     # -- the end ---------------------------------------------------------------------------------
 
-    def close(self) -> None:
-        """End pending calls with NodeClosedError, and withdraw the client; safe to call twice."""
+    def _withdraw(self) -> None:
         with self._lock:
-            if self._closed:
-                return
-            self._closed = True
             link, self._link = self._link, None
-            entries = list(self._requests.values())
             self._queue.clear()
-        if self._core.forked:
-            return
-        for entry in entries:
-            entry.call.fail(NodeClosedError(f"the client of {self.name} was closed during a call"))
         if link is not None:
             link.requester.close()
-        self._readiness.close()
-        self._core.remove(self)
-
-    def _check_open(self) -> None:
-        self._core.check_open()
-        if self._closed:
-            raise NodeClosedError(f"the client of {self.name} is closed; create another one")
