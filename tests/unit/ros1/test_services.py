@@ -827,7 +827,7 @@ def test_requests_that_are_not_read_yet_wait_outside(connect, eventually):
     promise.set_result(None)
 
 
-def test_who_does_not_read_responses_gets_no_more_of_them(connect):
+def test_who_does_not_read_responses_gets_no_more_of_them(connect, eventually):
     robot = connect("robot")
     seen = []
 
@@ -844,6 +844,7 @@ def test_who_does_not_read_responses_gets_no_more_of_them(connect):
         persistent="1",
     )
     sock.sendall((struct.pack("<I", 1) + b"\1") * 20)
+    eventually(lambda: seen)
     time.sleep(0.5)
     assert len(seen) == 1
     for _ in range(20):
