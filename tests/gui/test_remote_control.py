@@ -93,15 +93,14 @@ def robot(url: str) -> Iterator[Robot]:
 
 @pytest.fixture
 def view(app: Any, url: str, wait: Any) -> Iterator[Any]:
-    from PySide6.QtCore import QUrl
-    from PySide6.QtQuick import QQuickView
+    from rosglass.qt import QtCore, QtQuick
 
     session = Session(url)
-    made = QQuickView()
-    made.setResizeMode(QQuickView.ResizeMode.SizeRootObjectToView)
+    made = QtQuick.QQuickView()
+    made.setResizeMode(QtQuick.QQuickView.ResizeMode.SizeRootObjectToView)
     install(made.engine(), session)
-    made.setSource(QUrl.fromLocalFile(str(EXAMPLE)))
-    assert made.status() is QQuickView.Status.Ready, [e.toString() for e in made.errors()]
+    made.setSource(QtCore.QUrl.fromLocalFile(str(EXAMPLE)))
+    assert made.status() == QtQuick.QQuickView.Status.Ready, [e.toString() for e in made.errors()]
     made.resize(400, 300)
     made.show()
     wait(lambda: session.state == "connected")
@@ -113,22 +112,22 @@ def view(app: Any, url: str, wait: Any) -> Iterator[Any]:
 
 
 def test_dragging_drives_and_letting_go_stops(robot: Robot, view: Any, wait: Any) -> None:
-    from PySide6.QtCore import QPoint, Qt
-    from PySide6.QtTest import QTest
+    from rosglass.qt import QtCore, optional
 
+    test, point, left = optional("QtTest").QTest, QtCore.QPoint, QtCore.Qt.MouseButton.LeftButton
     wait(lambda: robot.node.publishers("/cmd_vel"))
     wait(100)
-    QTest.mousePress(view, Qt.MouseButton.LeftButton, pos=QPoint(200, 240))
+    test.mousePress(view, left, pos=point(200, 240))
     wait(lambda: robot.commands)
-    QTest.mouseMove(view, QPoint(200, 195))
+    test.mouseMove(view, point(200, 195))
     wait(lambda: robot.commands[-1] == (0.75, 0.0))
     # Held still, it goes on telling the robot, which would otherwise stop by itself.
     count = len(robot.commands)
     wait(lambda: len(robot.commands) > count + 3)
-    QTest.mouseMove(view, QPoint(20, 290))
+    test.mouseMove(view, point(20, 290))
     wait(lambda: robot.commands[-1][1] == 1.0)
     assert -1.0 <= robot.commands[-1][0] < 0
-    QTest.mouseRelease(view, Qt.MouseButton.LeftButton, pos=QPoint(20, 290))
+    test.mouseRelease(view, left, pos=point(20, 290))
     wait(lambda: robot.commands[-1] == (0.0, 0.0))
     count = len(robot.commands)
     wait(200)
@@ -136,13 +135,13 @@ def test_dragging_drives_and_letting_go_stops(robot: Robot, view: Any, wait: Any
 
 
 def test_the_button_switches_the_lamp(robot: Robot, view: Any, wait: Any) -> None:
-    from PySide6.QtCore import QPoint, Qt
-    from PySide6.QtTest import QTest
+    from rosglass.qt import QtCore, optional
 
+    test, point, left = optional("QtTest").QTest, QtCore.QPoint, QtCore.Qt.MouseButton.LeftButton
     wait(lambda: robot.node.publishers("/flashlight"))
     wait(100)
     for expected in (True, False):
-        QTest.mouseClick(view, Qt.MouseButton.LeftButton, pos=QPoint(20, 290))
+        test.mouseClick(view, left, pos=point(20, 290))
         wait(lambda expected=expected: robot.lamp[-1:] == [expected])
 
 
@@ -165,10 +164,10 @@ def test_the_camera_is_on_the_screen(
 def test_a_robot_that_dies_shows_within_a_second_and_comes_back(
     url: str, view: Any, wait: Any
 ) -> None:
-    from PySide6.QtCore import QObject
+    from rosglass.qt import QtCore
 
     robot = Robot(url)
-    camera = view.rootObject().findChild(QObject, "camera") or next(
+    camera = view.rootObject().findChild(QtCore.QObject, "camera") or next(
         child
         for child in view.rootObject().children()
         if child.metaObject().className().startswith("ImageTransport")

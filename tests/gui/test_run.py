@@ -120,7 +120,8 @@ def test_screenshot(start: Any, file: Path, tmp_path: Path, screen: str, root: s
 
     text = GOOD
     if root == "window":
-        text = GOOD.replace("Rectangle", "Window").replace("200", "210")
+        text = "import QtQuick.Window 2.15\n" + GOOD.replace("Rectangle", "Window")
+        text = text.replace("200", "210")
     file.write_text(text)
     target = tmp_path / "shot.png"
     program = start("run", file, "--screenshot", target, "--after", "0.6", display=screen)

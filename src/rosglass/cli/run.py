@@ -178,7 +178,7 @@ def _show(
     from rosglass.qml.log import install_message_handler
     from rosglass.qml.runner import Runner, needs_widgets
     from rosglass.qml.session import Session
-    from rosglass.qt import QtCore, QtGui, optional
+    from rosglass.qt import QtCore, QtGui, optional, run_event_loop
 
     _format_log(verbose)
     connected = require_display()
@@ -208,7 +208,7 @@ def _show(
             QtCore.QTimer.singleShot(
                 round(after * 1000), lambda: app.exit(_save(runner, screenshot))
             )
-        code = 0 if signals else int(app.exec())
+        code = 0 if signals else run_event_loop(app)
         runner.close()
         session.close()
     return 128 + signals[0] if signals else code

@@ -5,7 +5,7 @@ files.
 """
 
 from rosglass.qml.executor import GuiExecutor
-from rosglass.qml.modules import IMPORT_PATH, install
+from rosglass.qml.modules import IMPORT_PATHS, install
 from rosglass.qml.session import Session
 
-__all__ = ["IMPORT_PATH", "GuiExecutor", "Session", "install"]
+__all__ = ["IMPORT_PATHS", "GuiExecutor", "Session", "install"]

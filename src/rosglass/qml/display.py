@@ -34,6 +34,9 @@ def require_display() -> Callable[[], None]:
             message says what to do.
     """
     wanted = os.environ.get("QT_QPA_PLATFORM", "").partition(":")[0].partition(";")[0]
+    if not QT6 and wanted == "offscreen" and not os.environ.get("DISPLAY"):
+        # Qt 5 would look for OpenGL on a display that is not there, and crash.
+        os.environ.setdefault("QT_QUICK_BACKEND", "software")
     if not sys.platform.startswith("linux") or wanted not in {"", "xcb", "wayland"}:
         return _nothing
     if _wayland_answers() and wanted != "xcb":

@@ -9,15 +9,18 @@ from typing import TYPE_CHECKING, Any
 from rosglass.errors import Error
 from rosglass.qml import ros1, ros2
 from rosglass.qml.runtime import Runtime, runtime_of
-from rosglass.qt import QtQml
+from rosglass.qt import QT6, QtQml
 
 if TYPE_CHECKING:
     from rosglass.qml.session import Session
 
-__all__ = ["IMPORT_PATH", "install", "register"]
+__all__ = ["IMPORT_PATHS", "install", "register"]
 
-#: The directory to put on a QML import path; the types also need :func:`register`.
-IMPORT_PATH = Path(__file__).with_name("imports")
+#: The directories to put on a QML import path: what all Qt versions share, and what is written
+#: differently for this one. The types also need :func:`register`.
+IMPORT_PATHS = tuple(
+    Path(__file__).with_name(name) for name in ("imports", "imports6" if QT6 else "imports5")
+)
 
 
 @cache
@@ -46,7 +49,8 @@ def install(engine: QtQml.QQmlEngine, session: Session | None = None) -> Session
         Error: The engine was given another session before.
     """
     register()
-    engine.addImportPath(str(IMPORT_PATH))
+    for path in IMPORT_PATHS:
+        engine.addImportPath(str(path))
     if session is None:
         found = runtime_of(engine)
         assert found is not None

@@ -29,6 +29,7 @@ __all__ = [
     "engine_of",
     "is_alive",
     "optional",
+    "run_event_loop",
     "send_deferred_deletes",
 ]
 
@@ -110,6 +111,11 @@ def optional(module: str) -> Any:
 def is_alive(item: QtCore.QObject | None) -> bool:
     """Return whether a QObject still exists on the C++ side."""
     return item is not None and bool(_shiboken.isValid(item))
+
+
+def run_event_loop(loop: QtCore.QCoreApplication | QtCore.QEventLoop) -> int:
+    """Run an event loop until it is told to exit; returns the exit code."""
+    return int(loop.exec() if QT6 else loop.exec_())
 
 
 def send_deferred_deletes() -> None:
