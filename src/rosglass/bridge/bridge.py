@@ -8,6 +8,7 @@ import time
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
+from rosglass.bridge.routes import Routes
 from rosglass.bridge.rules import Rules
 from rosglass.bridge.service_relay import ServiceRelay
 from rosglass.bridge.side import Side
@@ -42,8 +43,9 @@ class Bridge(Handle):
     subscribes to it; a service that is offered in one can be called in the other. Where one is
     ROS 1 and the other ROS 2, messages are translated. What the bridge publishes itself is never
     relayed back, nor is what another bridge between the same two worlds publishes: of several, one
-    relays a topic, and another takes over when it ends. They know each other by their nodes: give
-    both nodes one name, which begins with ``rosglass_bridge``.
+    relays a topic, and another takes over when it ends. They know each other by their nodes: both
+    have one base name, which nobody else has. Where bridges form a ring, the one that would take
+    something back to a world where it has been says so, and does not.
 
     Both nodes may lose their connections and find them again. The bridge does not close them.
 
@@ -64,7 +66,8 @@ class Bridge(Handle):
             messages are dropped and counted.
 
     Raises:
-        InvalidNameError: A name, or pattern, makes no sense, or nothing is to be relayed.
+        InvalidNameError: A name, or pattern, makes no sense, nothing is to be relayed, or the nodes
+            have two names.
         ConversionError: Another argument makes no sense.
         NodeClosedError: A node is closed.
     """
@@ -88,6 +91,11 @@ class Bridge(Handle):
                 raise ConversionError(name, node, "a node of rosglass.connect()", "Bridge")
         if node_a is node_b:
             raise ConversionError("node_b", node_b, "another node than node_a", "Bridge")
+        if node_a.name != node_b.name:
+            raise InvalidNameError(
+                f"both nodes of a bridge need one name, by which other bridges know them; these "
+                f"are {node_a.name} and {node_b.name}"
+            )
         if node_a.url == node_b.url:
             raise ConversionError("node_b", node_b.url, "another world than node_a's", "Bridge")
         check_timeout(timeout, "Bridge")
@@ -124,6 +132,8 @@ class Bridge(Handle):
             )
             self._tellers.append(teller)
         self._worker = Worker("bridge", self._follow, _PAUSE)
+        for side in self._sides:
+            side.routes = Routes(side.node, self._worker.wake)
         self._handles = []
         for side in self._sides:
             self._handles += [
@@ -161,6 +171,9 @@ class Bridge(Handle):
             relay.close()
         for teller in self._tellers:
             teller.close()
+        for side in self._sides:
+            if side.routes is not None:
+                side.routes.close()
 
     # -- on the worker's thread ------------------------------------------------------------------
 
@@ -171,8 +184,12 @@ class Bridge(Handle):
             for side in self._sides:
                 side.look()
             for side in self._sides:
+                side.listen()
+            for side in self._sides:
                 self._follow_topics(side)
                 self._follow_services(side)
+            for side in self._sides:
+                side.tell()
             self._tell()
         except NodeClosedError:
             return  # the node went first
@@ -192,6 +209,8 @@ class Bridge(Handle):
             if not wanted and relay is not None and not side.connected:
                 wanted = True  # who is there is not known: what works goes on
             wanted = self._settled("topic", key, wanted, relay is not None)
+            self._refuse("topic", key, other, side.ring(publishers))
+            side.bring(f"topic {other}", publishers)
             if self._stands_by(side, other, relay) or (relay is not None and relay.outdated):
                 wanted = False
             if not wanted:
@@ -214,9 +233,12 @@ class Bridge(Handle):
                 )
                 with self._lock:
                     self._relays[key] = relay
-            beside = side.beside(publishers)
+            sources = side.sources(publishers)
             relay.ignored = frozenset(
-                identity for end in beside for identity in (end.gid, end.node.full.encode())
+                identity
+                for end in publishers
+                if end not in sources
+                for identity in (end.gid, end.node.full.encode())
             )
             back = self._relays.get((side.other.number, other))
             relay.follow(1 if back is not None and back.subscribed else 0)
@@ -239,7 +261,9 @@ class Bridge(Handle):
                 continue
             key = side.number, name
             relay = self._callable.get(key)
-            servers = side.sources(side.node.service_servers(name))
+            offers = side.node.service_servers(name)
+            side.bring(f"service {other}", offers)
+            servers = side.sources(offers)
             wanted = bool(servers) or (relay is not None and not side.connected)
             wanted = self._settled("service", key, wanted, relay is not None)
             there = side.other.node.service_servers(other)
@@ -249,17 +273,11 @@ class Bridge(Handle):
             elif any(end.node < side.other.name for end in side.other.beside(there)):
                 wanted = False
             rivals = side.other.sources(there)
-            refusal = "service", *key
+            told = side.ring(offers)
             if wanted and rivals:
                 told = f"{rivals[0].node} offers it there already"
-                sign = "->" if side.number == 0 else "<-"
-                refused = RelayStatus("service", name, other, sign, problem=told)
-                with self._lock:
-                    self._refused[refusal] = refused
                 wanted = False
-            elif refusal in self._refused:
-                with self._lock:
-                    del self._refused[refusal]
+            self._refuse("service", key, other, told)
             if not wanted:
                 if relay is not None:
                     with self._lock:
@@ -274,6 +292,18 @@ class Bridge(Handle):
                 with self._lock:
                     self._callable[key] = relay
             relay.follow(self._worker.wake)
+
+    def _refuse(self, kind: str, key: tuple[int, str], other: str, problem: str) -> None:
+        """Take note of why something is not relayed; no problem: it is."""
+        refusal = kind, *key
+        if not problem and refusal not in self._refused:
+            return
+        with self._lock:
+            if problem:
+                sign = "->" if key[0] == 0 else "<-"
+                self._refused[refusal] = RelayStatus(kind, key[1], other, sign, problem=problem)
+            else:
+                del self._refused[refusal]
 
     def _settled(self, kind: str, key: tuple[int, str], wanted: bool, there: bool) -> bool:
         """Return whether something is wanted, or was until just now."""

@@ -22,7 +22,7 @@ _FURNITURE = re.compile(
     r"/parameter_events|/rosout_agg"
     r"|.*/(get_loggers|set_logger_level|describe_parameters|get_parameter_types|get_parameters"
     r"|list_parameters|set_parameters|set_parameters_atomically|get_type_description"
-    r"|get_logger_levels|set_logger_levels)"
+    r"|get_logger_levels|set_logger_levels|bridge_routes|rosglass_bridge[^/]*/statistics)"
 )
 
 

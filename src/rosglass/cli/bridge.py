@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from rosglass.cli.connecting import TIMEOUT, End, add_definitions_option, join, seconds, settle
 from rosglass.cli.output import Style, add_output_options, note, print_json, table
+from rosglass.cli.worlds import spelled
 from rosglass.errors import Error
 
 if TYPE_CHECKING:
@@ -156,7 +157,7 @@ def run(args: argparse.Namespace) -> int:
         ) as bridge:
             end = End()
             note(f"relaying between {first.url} and {second.url}; Ctrl-C ends it")
-            return _watch(args, bridge, end)
+            return _watch(args, bridge, end, (first, second))
 
 
 def _rules(args: argparse.Namespace) -> tuple[list[Rule], list[Rule]]:
@@ -196,8 +197,8 @@ def _list(
                     "name": one.name,
                     "other_name": one.other,
                     "direction": one.direction,
-                    "type": one.type,
-                    "other_type": one.other_type,
+                    "type": spelled((first, second)[one.direction == "<-"], one.type),
+                    "other_type": spelled((first, second)[one.direction == "->"], one.other_type),
                     "notes": list(one.notes),
                     "problem": one.problem,
                 }
@@ -208,8 +209,9 @@ def _list(
     style = Style(args)
     rows = []
     for one in found:
+        ends = (first, second) if one.direction == "->" else (second, first)
         names = (one.name, one.other) if one.direction == "->" else (one.other, one.name)
-        types = (one.type, one.other_type or "-")
+        types = (spelled(ends[0], one.type), spelled(ends[1], one.other_type or "-"))
         left, right = types if one.direction == "->" else types[::-1]
         rows.append((one.kind, names[0], left or "?", one.direction, names[1], right or "?"))
     for line, one in zip(table(rows) if rows else (), found, strict=True):
@@ -221,7 +223,7 @@ def _list(
     return 0
 
 
-def _watch(args: argparse.Namespace, bridge: Bridge, end: End) -> int:
+def _watch(args: argparse.Namespace, bridge: Bridge, end: End, nodes: tuple[Node, Node]) -> int:
     until = math.inf if args.duration is None else time.monotonic() + args.duration
     period = args.statistics or math.inf
     due = time.monotonic() + period
@@ -247,7 +249,8 @@ def _watch(args: argparse.Namespace, bridge: Bridge, end: End) -> int:
         print(status.line(), flush=True)
         for one in status.relays:
             sign = f"{one.name} {one.direction}" + (f" {one.other}" * (one.other != one.name))
-            print(f"  {one.count:8} {sign} [{one.type or '?'}]")
+            kind = spelled(nodes[one.direction == "<-"], one.type)
+            print(f"  {one.count:8} {sign} [{kind or '?'}]")
     return end.code
 
 

@@ -40,7 +40,7 @@ def test_it_relays_until_it_is_ended(master, router, connect, start_program, wai
     process.popen.send_signal(signal.SIGINT)
     assert process.popen.wait(30) == 130
     process.end()
-    assert any("/cli -> [std_msgs/msg/String]" in line for line in process.output)
+    assert any("/cli -> [std_msgs/String]" in line for line in process.output)
 
 
 def test_it_lists_what_maps(master, router, connect, wait_for):
