@@ -113,7 +113,8 @@ def test_a_recording_plays_to_rospy_as_it_was(recording, connect, rospy_peer, wa
     rospy_peer.call("subscribe", topic="/words", type=STRING)
     with open_bag(recording) as bag, Player(node, bag, delay=0, paused=True) as player:
         assert not player.problems
-        wait_for(lambda: rospy_peer.call("sources", topic="/words"))
+        # rospy counts connections that it is still making: the player's side tells.
+        wait_for(node.create_publisher("/words", STRING).subscription_count)
         player.resume()
         told = [rospy_peer.event("received") for _ in range(10)]
         # The map was sent before rospy asks for it.

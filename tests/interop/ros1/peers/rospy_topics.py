@@ -105,11 +105,6 @@ def do_time(peer):
     return rospy.get_time()
 
 
-def do_sources(peer, topic):
-    """Return how many publishers a subscription is connected to."""
-    return peer.kept["subscriber", topic].get_num_connections()
-
-
 def do_publish_own(peer, topic, type, text, value, latch=False):
     """Publish `value` in a type that only this node has; return its md5 sum."""
     kind = genpy.dynamic.generate_dynamic(type, text)[type]
