@@ -8,20 +8,21 @@ the plugins take without loss.
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.qos import Durability, History, QoS, Reliability
 from rosglass.errors import ConversionError
 from rosglass.qml.dialect import Dialect
-from rosglass.qml.js_values import Shown, integral, is_model, properties_of, shown, wide
+from rosglass.qml.js_values import Shown, integral, is_model, properties_of, roles_of, shown, wide
 from rosglass.qml.times import DECIMAL, from_milliseconds, known_parts, time_parts
 from rosglass.qt import QJSValue, QtCore, QtGui
 
 if TYPE_CHECKING:
-    from rosglass.messages.schema import Member, Schema
+    from rosglass.messages.schema import Member, Number, Schema
 
-__all__ = ["elements_from_js", "fields_from_js", "qos_from_js"]
+__all__ = ["elements_from_js", "fields_from_js", "qos_from_js", "typed_array"]
 
 _TYPED = {
     "Int8Array": "i1",
@@ -157,8 +158,9 @@ class _Conversion:
             return self._rows(value.toQObject(), member, path)
         constructor = value.property("constructor").property("name").toString()
         if member.number is not None and value.isObject():
-            if constructor in _TYPED:
-                return _typed_array(value, constructor, member)
+            numbers = typed_array(value)
+            if numbers is not None:
+                return _as_bools(numbers, member.number)
             if constructor == "ArrayBuffer":
                 return _buffer(value, member, path)
         if constructor == "DataView":
@@ -203,7 +205,7 @@ class _Conversion:
 
     def _rows(self, model: Any, member: Member, path: str) -> list[Any]:
         """Return the rows of an item model: its first role, or messages of its roles."""
-        roles = {number: bytes(name.data()).decode() for number, name in model.roleNames().items()}
+        roles = roles_of(model)
         struct = member.struct
         found: list[Any] = []
         count = model.rowCount()
@@ -212,10 +214,10 @@ class _Conversion:
         for row in range(count):
             index, here = model.index(row, 0), f"{path}[{row}]"
             if struct is None:
-                item = model.data(index, min(roles))
+                item = model.data(index, min(roles.values()))
                 found.append(self._python(item, member, here))
                 continue
-            items = {name: model.data(index, number) for number, name in roles.items()}
+            items = {name: model.data(index, number) for name, number in roles.items()}
             found.append(self._python_fields(items, struct, here))
         return found
 
@@ -316,16 +318,24 @@ def _default(member: Member) -> Any:
     return "" if member.number is None else member.number.python()
 
 
-def _typed_array(value: QJSValue, constructor: str, member: Member) -> Any:
+def typed_array(value: QJSValue) -> Any:
+    """Return a typed array's numbers as a numpy array; None when it is none."""
+    kind = _TYPED.get(value.property("constructor").property("name").toString())
+    if kind is None or not value.isObject():
+        return None
     import numpy as np  # noqa: PLC0415 - few programs send typed arrays
 
     data = bytes(value.property("buffer").toVariant().data())
     count, offset = value.property("length").toInt(), value.property("byteOffset").toInt()
-    found = np.frombuffer(data, np.dtype(_TYPED[constructor]), count, offset)
-    if member.number is not None and member.number.code == "?" and found.dtype.kind != "f":
-        # Bools are received as bytes.
-        return found.astype(bool) if ((found == 0) | (found == 1)).all() else found
-    return found
+    return np.frombuffer(data, np.dtype(kind), count, offset)
+
+
+def _as_bools(found: Any, number: Number) -> Any:
+    """Return the bools that bytes are: ``buffer()`` of a received array gives bytes."""
+    fits = (
+        number.code == "?" and found.dtype.kind != "f" and bool(((found == 0) | (found == 1)).all())
+    )
+    return found.astype(bool) if fits else found
 
 
 def _buffer(value: QJSValue, member: Member, path: str) -> Any:
@@ -339,14 +349,18 @@ def _buffer(value: QJSValue, member: Member, path: str) -> Any:
         raise ConversionError(path, Shown(f"an ArrayBuffer of {len(data)} bytes"), wanted)
     import numpy as np  # noqa: PLC0415 - few programs send buffers
 
-    found = np.frombuffer(data, np.dtype(member.number.dtype))
-    is_bool = member.number.code == "?" and bool((found <= 1).all())
-    return found.astype(bool) if is_bool else found
+    return _as_bools(np.frombuffer(data, np.dtype(member.number.dtype)), member.number)
 
 
 def _text(value: float) -> str:
     """Return a number or bool as JavaScript writes it."""
-    return QJSValue(value if isinstance(value, bool) else float(value)).toString()
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if not math.isfinite(value):
+        return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
+    if float(value).is_integer() and abs(value) < 1e21:
+        return str(int(value))
+    return repr(value).replace("e-0", "e-").replace("e+0", "e+")
 
 
 def _as_number(value: Any, code: str) -> Any:

@@ -10,7 +10,7 @@ from rosglass.qt import QJSValue, QtCore, QtQml
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-__all__ = ["Shown", "integral", "is_model", "properties_of", "shown", "wide"]
+__all__ = ["Shown", "integral", "is_model", "properties_of", "roles_of", "shown", "wide"]
 
 #: No 64-bit integer has more digits.
 _WHOLE = re.compile(r"-?0*[0-9]{1,20}\Z")
@@ -31,6 +31,12 @@ def _iterate(value: QJSValue) -> Iterator[str]:
 def is_model(value: QJSValue) -> bool:
     """Return whether it is an item model: a ListModel, or one of C++ or Python."""
     return value.isQObject() and isinstance(value.toQObject(), QtCore.QAbstractItemModel)
+
+
+def roles_of(model: Any) -> dict[str, int]:
+    """Return an item model's roles by name, in the order of their numbers."""
+    names = model.roleNames()
+    return {bytes(names[number].data()).decode(): number for number in sorted(names)}
 
 
 def wide(text: str) -> int | str:

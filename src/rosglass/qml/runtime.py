@@ -112,10 +112,13 @@ class Runtime(QtCore.QObject):
         engine = self.engine
         if engine is None or value is None:
             return QJSValue()
-        if isinstance(value, (bool, int, float, str)):
-            # An int overload would cut integers to 32 bits.
-            number = isinstance(value, int) and not isinstance(value, bool)
-            return QJSValue(float(value) if number else value)
+        if isinstance(value, str):
+            return QJSValue(value)
+        if isinstance(value, (bool, int, float)):
+            # QJSValue's own overloads cut numbers to 32 bits, and PySide2's to integers.
+            script: Any = engine.toScriptValue(value)
+            scalar: QJSValue = script
+            return scalar
         if isinstance(value, dict):
             made = engine.newObject()
             for key, inner in value.items():

@@ -224,10 +224,12 @@ class ServiceClient(Element):
     def shown(self, result: Message | Error) -> QJSValue:
         """Return what a callback is told."""
         runtime = self._runtime
-        if isinstance(result, Error) or runtime is None:
-            return QJSValue(False)
+        if runtime is None:
+            return QJSValue()
+        if isinstance(result, Error):
+            return runtime.value(False)
         if self._dialect is Dialect.ROS1 and not result.type.definition.fields:
-            return QJSValue(True)
+            return runtime.value(True)
         return runtime.message(result, self._dialect)
 
     # The client.

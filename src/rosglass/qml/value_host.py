@@ -37,7 +37,7 @@ class LongArrays(QtCore.QObject):
             value = values[place]
             if member.struct is not None:
                 if self._dialect is Dialect.ROS1 and is_duration(member.struct):
-                    return QJSValue(milliseconds(value))
+                    return self._runtime.value(milliseconds(value))
                 return self._runtime.message(value, self._dialect)
         except Error as error:
             self._runtime.throw(str(error))
@@ -45,7 +45,7 @@ class LongArrays(QtCore.QObject):
         if member.number is None:
             return QJSValue(str(value))
         if member.number.code == "?":
-            return QJSValue(bool(value))
+            return self._runtime.value(bool(value))
         whole = exact(int(value)) if member.number.low is not None else float(value)
         return self._runtime.value(whole)
 

@@ -6,7 +6,9 @@ from rosglass.qml.ros1.console import ConsoleLevels, InitOptions
 from rosglass.qml.ros1.image_transport_subscriber import ImageTransportSubscriber
 from rosglass.qml.ros1.ros import Ros
 from rosglass.qml.ros1.service import Service
+from rosglass.qml.ros1.service_server import RosServiceServer
 from rosglass.qml.ros1.subscriber import Subscriber
+from rosglass.qml.ros1.time import Time, WallTime
 
 __all__ = ["NATIVE", "TYPES"]
 
@@ -14,10 +16,13 @@ __all__ = ["NATIVE", "TYPES"]
 NATIVE = {
     "RosNative": Ros,
     "ServiceNative": Service,
+    "TimeNative": Time,
+    "WallTimeNative": WallTime,
     "ImageTransportManagerNative": ImageTransportManager,
 }
 #: What QML can write, by name.
 TYPES = {
+    "ServiceServer": RosServiceServer,
     "Subscriber": Subscriber,
     "ImageTransportSubscriber": ImageTransportSubscriber,
     "ImageItem": ImageItem,

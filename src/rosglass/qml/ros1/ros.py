@@ -7,18 +7,20 @@ import logging
 from typing import TYPE_CHECKING
 
 from rosglass.errors import Error, InvalidNameError
-from rosglass.qml.callbacks import Deferred, call_back
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.from_js import qos_from_js
+from rosglass.qml.graph import GraphSingleton
 from rosglass.qml.log import Caller, log_from_qml
-from rosglass.qml.message_waiting import wait_for_message
+from rosglass.qml.message_waiting import next_message
 from rosglass.qml.ros1.console import Console, InitOptions, short_logger
 from rosglass.qml.ros1.namespaces import within
 from rosglass.qml.ros1.package import Package
 from rosglass.qml.ros1.publisher import RosPublisher
+from rosglass.qml.ros1.service_server import RosServiceServer
 from rosglass.qml.ros1.subscriber import Subscriber
-from rosglass.qml.singleton import RosSingleton, full_type, is_list, strings
+from rosglass.qml.singleton import is_list, strings
 from rosglass.qml.subscription import DEFAULT_QOS
+from rosglass.qml.value_functions import ValueFunctions
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot
 
 if TYPE_CHECKING:
@@ -31,7 +33,7 @@ __all__ = ["Ros"]
 _OPTIONS = sum(InitOptions.Option)
 
 
-class Ros(RosSingleton):
+class Ros(ValueFunctions, GraphSingleton):
     """What QML calls ``Ros``; one per engine, all of a session sharing its node."""
 
     DIALECT = Dialect.ROS1
@@ -143,28 +145,31 @@ class Ros(RosSingleton):
         Arguments are topic, optional milliseconds (0: for ever) and function. Without a function,
         a promise of the message is returned.
         """
-        runtime = self._runtime
-        timed = first is not None and first.isNumber()
-        callback = second if timed else first
-        milliseconds = first.toNumber() if timed and first is not None else 0.0
-        deferred = Deferred(runtime, f"waiting for a message on {topic}")
-        if callback is None:
+        return next_message(Subscriber(None, self._runtime), self._runtime, topic, first, second)
 
-            def settle(message: QJSValue | None) -> None:
-                if message is None:
-                    deferred.reject(f"none came within {milliseconds:g} ms")
-                else:
-                    deferred.resolve(message)
+    # Services.
 
-            wait_for_message(runtime, Subscriber(None, runtime), topic, "", milliseconds, settle)
-            return deferred.promise
-        told = callback
+    @Slot(str, str, QJSValue, result=QtCore.QObject)
+    def advertiseService(
+        self, type_name: str, name: str, handler: QJSValue
+    ) -> QtCore.QObject | None:
+        """Offer a service for as long as JavaScript holds what is returned.
 
-        def tell(message: QJSValue | None) -> None:
-            call_back(runtime, told, QJSValue() if message is None else message)
-
-        wait_for_message(runtime, Subscriber(None, runtime), topic, "", milliseconds, tell)
-        return QJSValue()
+        Args:
+            type_name: Service type, ``pkg/Type``.
+            name: Service name.
+            handler: Told the request; returns the response, or a promise of it.
+        """
+        try:
+            self._check_topic(name)
+            if not handler.isCallable():
+                raise InvalidNameError("the handler is not a function")
+        except Error as error:
+            self._runtime.throw(f"Ros.advertiseService: {error}")
+            return None
+        server = RosServiceServer(None, self._runtime)
+        server.configure(name, type_name, handler)
+        return self._runtime.keep(server)
 
     def _check_topic(self, topic: str) -> None:
         from rosglass.ros1.names import expand  # noqa: PLC0415 - not needed at start-up
@@ -173,18 +178,11 @@ class Ros(RosSingleton):
 
     # The graph.
 
-    @Slot(result="QStringList")
-    @Slot(str, result="QStringList")
-    def queryTopics(self, datatype: str = "") -> list[str]:
-        """Return the topics in the graph, those of one type if given; empty before init."""
-        wanted = full_type(datatype)
-        return [name for name, types in self._topics().items() if not wanted or wanted in types]
-
     @Slot(result=QJSValue)
     def queryTopicInfo(self) -> QJSValue:
         """Return ``{name, datatype}`` of every topic."""
         infos = [
-            {"name": name, "datatype": _short_type(types[0] if types else "")}
+            {"name": name, "datatype": self._spell(types[0]) if types else ""}
             for name, types in self._topics().items()
         ]
         return self._runtime.value(infos)
@@ -192,13 +190,8 @@ class Ros(RosSingleton):
     @Slot(str, result=str)
     def queryTopicType(self, topic: str) -> str:
         """Return a topic's type; empty when nobody knows it."""
-        node = self._node("queryTopicType")
-        try:
-            types = self._topics().get(node.resolve(topic), []) if node is not None else []
-        except Error as error:
-            self._runtime.throw(f"Ros.queryTopicType: {error}")
-            return ""
-        return _short_type(types[0]) if types else ""
+        types = self._types("queryTopicType", topic, self._topics())
+        return types[0] if types else ""
 
     # Logging.
 
@@ -242,9 +235,3 @@ def _split(given: Sequence[QJSValue], usage: str) -> tuple[tuple[str, str, str],
         raise InvalidNameError(f"something is missing; write {usage}")
     namespace, type_name, topic = texts if count == 3 else ("", *texts)
     return (namespace, type_name, topic), list(given[count:])
-
-
-def _short_type(name: str) -> str:
-    """Return ``pkg/Type`` for ``pkg/msg/Type``."""
-    package, _, rest = name.partition("/")
-    return f"{package}/{rest.rpartition('/')[2]}" if rest else name

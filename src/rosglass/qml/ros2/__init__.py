@@ -1,10 +1,12 @@
 """What only ``import Ros2 1.0`` has."""
 
+from rosglass.qml.clock_types import ClockTypes
 from rosglass.qml.image_item import ImageItem
 from rosglass.qml.image_manager import ImageTransportManager
 from rosglass.qml.image_subscription import ImageTransportSubscription
 from rosglass.qml.logger import LoggerLevel
 from rosglass.qml.ros2.ros2 import Ros2
+from rosglass.qml.service_server import ServiceServer
 from rosglass.qml.subscription import Subscription
 
 __all__ = ["NATIVE", "TYPES"]
@@ -13,8 +15,10 @@ __all__ = ["NATIVE", "TYPES"]
 NATIVE = {"Ros2Native": Ros2, "ImageTransportManagerNative": ImageTransportManager}
 #: What QML can write, by name.
 TYPES = {
+    "ServiceServer": ServiceServer,
     "Subscription": Subscription,
     "ImageTransportSubscription": ImageTransportSubscription,
     "ImageItem": ImageItem,
     "Ros2LoggerLevel": LoggerLevel,
+    "Ros2ClockTypes": ClockTypes,
 }

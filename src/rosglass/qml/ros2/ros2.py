@@ -3,17 +3,21 @@
 
 from __future__ import annotations
 
-import logging
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rosglass.comm.qos import QoS
 from rosglass.comm.time import Time
 from rosglass.errors import Error, InvalidNameError
 from rosglass.qml.from_js import qos_from_js
+from rosglass.qml.graph import GraphSingleton
 from rosglass.qml.logger import Logger
+from rosglass.qml.message_waiting import next_message
 from rosglass.qml.publisher import Publisher
-from rosglass.qml.singleton import RosSingleton, full_type, is_list, strings
+from rosglass.qml.service_client import ServiceClient
+from rosglass.qml.service_server import ServiceServer
+from rosglass.qml.singleton import full_type, is_list, strings
 from rosglass.qml.subscription import DEFAULT_QOS, Subscription
+from rosglass.qml.value_functions import ValueFunctions
 from rosglass.qt import QJSValue, QtCore, Signal, Slot
 
 if TYPE_CHECKING:
@@ -22,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["Ros2"]
 
 
-class Ros2(RosSingleton):
+class Ros2(ValueFunctions, GraphSingleton):
     """What QML calls ``Ros2``; one per engine, all of a session sharing its node."""
 
     aboutToShutdown = Signal()
@@ -47,9 +51,8 @@ class Ros2(RosSingleton):
         args, options = (first, second) if is_list(first) else (None, first)
         try:
             namespace, domain = _read_options(options)
-            if args is not None:
-                name, namespace = _remap(strings(args), name, namespace)
-            self._session.init(name, namespace, domain)
+            told = strings(args) if args is not None else ()
+            self._session.init(name, namespace, domain, told)
         except Error as error:
             self._runtime.throw(f"Ros2.init: {error}")
 
@@ -152,6 +155,65 @@ class Ros2(RosSingleton):
         subscription.configure(topic, full_type(type_name), profile)
         return self._runtime.keep(subscription)
 
+    @Slot(str, result=QJSValue)
+    @Slot(str, QJSValue, result=QJSValue)
+    @Slot(str, QJSValue, QJSValue, result=QJSValue)
+    def waitForMessageAsync(
+        self, topic: str, first: QJSValue | None = None, second: QJSValue | None = None
+    ) -> QJSValue:
+        """Give the next message of a topic to a function, undefined when none came in time.
+
+        Arguments are topic, optional milliseconds (0: for ever) and function. Without a function,
+        a promise of the message is returned.
+        """
+        return next_message(Subscription(None, self._runtime), self._runtime, topic, first, second)
+
+    # Services.
+
+    @Slot(str, str, result=QtCore.QObject)
+    @Slot(str, str, QJSValue, result=QtCore.QObject)
+    def createServiceClient(
+        self, name: str, type_name: str, qos: QJSValue | None = None
+    ) -> QtCore.QObject | None:
+        """Return a client of a service; it lives as long as JavaScript holds it.
+
+        Args:
+            name: Service name.
+            type_name: Service type, ``pkg/srv/Type`` or ``pkg/Type``; empty takes the server's.
+            qos: Profile of requests and replies; the usual one when left out.
+        """
+        try:
+            self._check_topic(name)
+            profile = None if qos is None else qos_from_js(qos, QoS.services())
+        except Error as error:
+            self._runtime.throw(f"Ros2.createServiceClient: {error}")
+            return None
+        kind = full_type(type_name, "srv")
+        client = ServiceClient(self._runtime, name, kind, self.DIALECT, profile)
+        return self._runtime.keep(client)
+
+    @Slot(str, str, QJSValue, result=QtCore.QObject)
+    def createServiceServer(
+        self, name: str, type_name: str, handler: QJSValue
+    ) -> QtCore.QObject | None:
+        """Offer a service for as long as JavaScript holds what is returned.
+
+        Args:
+            name: Service name.
+            type_name: Service type, ``pkg/srv/Type`` or ``pkg/Type``.
+            handler: Told the request; returns the response, or a promise of it.
+        """
+        try:
+            self._check_topic(name)
+            if not handler.isCallable():
+                raise InvalidNameError("the handler is not a function")
+        except Error as error:
+            self._runtime.throw(f"Ros2.createServiceServer: {error}")
+            return None
+        server = ServiceServer(None, self._runtime)
+        server.configure(name, type_name, handler)
+        return self._runtime.keep(server)
+
     @Slot(str, result=bool)
     def isValidTopic(self, topic: str) -> bool:
         """Return whether a topic name follows ROS 2's rules."""
@@ -161,28 +223,7 @@ class Ros2(RosSingleton):
             return False
         return True
 
-    @Slot(str, result=QJSValue)
-    def createEmptyMessage(self, type_name: str) -> QJSValue:
-        """Return a message with every field at its default; undefined for unknown types."""
-        from rosglass.messages import MessageType, load  # noqa: PLC0415 - brings in the definitions
-
-        try:
-            kind = load(full_type(type_name), ros=2)
-            if not isinstance(kind, MessageType):
-                raise InvalidNameError(f"{type_name} is not a message type")
-            return self._runtime.message(kind.create())
-        except Error as error:
-            self._log(logging.WARNING, f"Ros2.createEmptyMessage: {error}")
-            return QJSValue()
-
     # The graph.
-
-    @Slot(result="QStringList")
-    @Slot(str, result="QStringList")
-    def queryTopics(self, datatype: str = "") -> list[str]:
-        """Return the topics in the graph, those of one type if given; empty before init."""
-        wanted = full_type(datatype)
-        return [name for name, types in self._topics().items() if not wanted or wanted in types]
 
     @Slot(result=QJSValue)
     def queryTopicInfo(self) -> QJSValue:
@@ -190,25 +231,11 @@ class Ros2(RosSingleton):
         infos = [{"name": name, "datatypes": types} for name, types in self._topics().items()]
         return self._runtime.value(infos)
 
-    @Slot(result=QJSValue)
-    def getTopicNamesAndTypes(self) -> QJSValue:
-        """Return an object from topic names to lists of types."""
-        return self._runtime.value(self._topics())
-
-    @Slot(str, result="QStringList")
-    def getTopicTypes(self, topic: str) -> list[str]:
-        """Return the types announced for a topic."""
-        node = self._node("getTopicTypes")
-        try:
-            return self._topics().get(node.resolve(topic), []) if node is not None else []
-        except Error as error:
-            self._runtime.throw(f"Ros2.getTopicTypes: {error}")
-            return []
-
     @Slot(str, result="QStringList")
     def queryTopicTypes(self, topic: str) -> list[str]:
         """Return the types announced for a topic; another name of getTopicTypes."""
-        return self.getTopicTypes(topic)
+        types: list[str] = self.getTopicTypes(topic)
+        return types
 
     def _check_topic(self, topic: str) -> None:
         from rosglass.ros2.names import expand  # noqa: PLC0415 - not needed at start-up
@@ -238,29 +265,3 @@ def _read_options(options: QJSValue | None) -> tuple[str, int]:
     if not domain.is_integer() or not -1 <= domain <= 232:
         raise InvalidNameError(f"the domain id must be 0 to 232, got {domain:g}")
     return namespace, int(domain)
-
-
-def _remap(args: list[str], name: str, namespace: str) -> tuple[str, str]:
-    """Apply ``--ros-args -r __node:=... -r __ns:=...``.
-
-    Syntax: ROS 2's design article "ROS Command Line Arguments".
-
-    Raises:
-        InvalidNameError: Another ROS argument is given, which this version does not know.
-    """
-    inside = False
-    rest: Any = iter(args)
-    for arg in rest:
-        if arg == "--ros-args":
-            inside = True
-        elif arg == "--":
-            inside = False
-        elif inside:
-            rule = next(rest, "") if arg in {"-r", "--remap"} else arg
-            key, separator, value = rule.partition(":=")
-            if not separator or key not in {"__node", "__name", "__ns"}:
-                raise InvalidNameError(
-                    f"ROS argument {rule!r} is not known; __node:= and __ns:= can be remapped"
-                )
-            name, namespace = (name, value) if key == "__ns" else (value, namespace)
-    return name, namespace
