@@ -42,7 +42,13 @@ class MemoryWorld:
         self.missing: set[str] = set()
         self.sequence = 0
 
-    def connect(self, url: str | None, name: str, namespace: str = "/") -> MemoryNode:
+    def connect(
+        self,
+        url: str | None,
+        name: str,
+        namespace: str = "/",
+        arguments: tuple[str, ...] = (),  # noqa: ARG002 - this world is told nothing
+    ) -> MemoryNode:
         node = MemoryNode(self, url or "memory://", name, namespace)
         self.nodes.append(node)
         return node

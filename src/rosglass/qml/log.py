@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "LEVELS",
+    "ROOT",
     "Caller",
     "LocationFormatter",
     "RateLimit",
@@ -30,7 +31,8 @@ LEVELS = {
     "error": logging.ERROR,
     "fatal": logging.CRITICAL,
 }
-_QML = "rosglass.qml"
+#: The logger of all that concerns QML.
+ROOT = "rosglass.qml"
 
 
 class Caller(NamedTuple):
@@ -60,7 +62,7 @@ def plain_path(url: str) -> str:
 
 def logger_name(name: str) -> str:
     """Return the Python logger of a QML logger; empty for the node's own."""
-    return f"{_QML}.{name}" if name else _QML
+    return f"{ROOT}.{name}" if name else ROOT
 
 
 def log_from_qml(name: str, level: int, message: str, caller: Caller) -> None:
@@ -108,9 +110,9 @@ class LocationFormatter(logging.Formatter):
 
     def format(self, record: logging.LogRecord) -> str:
         """Return the line for a record."""
-        if not record.name.startswith(_QML) or record.pathname.endswith(".py"):
+        if not record.name.startswith(ROOT) or record.pathname.endswith(".py"):
             return super().format(record)
-        name = record.name.removeprefix(_QML).lstrip(".")
+        name = record.name.removeprefix(ROOT).lstrip(".")
         logger = f" {name}" if name else ""
         place = f"{record.pathname}:{record.lineno}"
         return f"{place}: {record.levelname}{logger}: {record.getMessage()}"

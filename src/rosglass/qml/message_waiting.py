@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rosglass.comm.qos import QoS
+from rosglass.qml.callbacks import Deferred, call_back
 from rosglass.qt import QJSValue, QtCore, is_alive
 
 if TYPE_CHECKING:
@@ -13,7 +14,52 @@ if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime
     from rosglass.qml.subscription import Subscription
 
-__all__ = ["wait_for_message"]
+__all__ = ["next_message", "wait_for_message"]
+
+
+def next_message(
+    subscription: Subscription,
+    runtime: Runtime,
+    topic: str,
+    first: QJSValue | None,
+    second: QJSValue | None,
+) -> QJSValue:
+    """Do what ``waitForMessageAsync`` was asked for.
+
+    Args:
+        subscription: A new one, made for this.
+        runtime: The engine's runtime.
+        topic: Topic name.
+        first: Milliseconds, or the function.
+        second: The function after milliseconds.
+
+    Returns:
+        A promise of the message; undefined when there is a function.
+    """
+    timed = first is not None and first.isNumber()
+    callback = second if timed else first
+    milliseconds = first.toNumber() if timed and first is not None else 0.0
+    if callback is not None and callback.isCallable():
+
+        def tell(message: QJSValue | None) -> None:
+            call_back(runtime, callback, QJSValue() if message is None else message)
+
+        wait_for_message(runtime, subscription, topic, "", milliseconds, tell)
+        return QJSValue()
+    if callback is not None:
+        runtime.throw(f"waitForMessageAsync({topic!r}): the callback is not a function")
+        subscription.deleteLater()
+        return QJSValue()
+    deferred = Deferred(runtime, f"waiting for a message on {topic}")
+
+    def settle(message: QJSValue | None) -> None:
+        if message is None:
+            deferred.reject(f"none came within {milliseconds:g} ms")
+        else:
+            deferred.resolve(message)
+
+    wait_for_message(runtime, subscription, topic, "", milliseconds, settle)
+    return deferred.promise
 
 
 def wait_for_message(

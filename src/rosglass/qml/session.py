@@ -13,6 +13,7 @@ from rosglass.comm.graph import ConnectionState, Status
 from rosglass.errors import ConnectionLostError, Error, InvalidNameError
 from rosglass.qml.executor import GuiExecutor
 from rosglass.qml.load_balancer import LoadBalancer
+from rosglass.qml.rosout import QmlRosout
 from rosglass.qt import QtCore, Signal, is_alive
 
 if TYPE_CHECKING:
@@ -107,6 +108,7 @@ class Session(QtCore.QObject):
         self._generation = 0
         self._closed = False
         self._handles: list[Handle] = []
+        self._rosout: QmlRosout | None = None
         self._worker = Dispatcher("rosglass-qml")
         self._ticking = 0
         self._ticker = QtCore.QTimer(self)
@@ -356,6 +358,7 @@ class Session(QtCore.QObject):
             node.on_status_change(self._on_status, self.executor),
             node.on_graph_change(self.graph_changed.emit, self.executor),
         ]
+        self._rosout = QmlRosout(node)
         self._set_status(node.status())
         self.node_changed.emit()
 
@@ -364,6 +367,8 @@ class Session(QtCore.QObject):
         for handle in self._handles:
             handle.close()
         self._handles = []
+        if self._rosout is not None:
+            self._rosout.close()
         node, self.node = self.node, None
         if node is not None:
             self.node_changed.emit()

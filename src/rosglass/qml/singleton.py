@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 __all__ = ["RosSingleton", "full_type", "is_list", "strings"]
 
-_HIDDEN = "/_action/"
 _SHORT = re.compile(r"([A-Za-z]\w*)/([A-Za-z]\w*)\Z")
 
 
@@ -76,19 +75,6 @@ class RosSingleton(QtCore.QObject):
         if node is None:
             self._log(logging.DEBUG, f"{self.NAME}.{what}: there is no node yet")
         return node
-
-    # The graph.
-
-    def _topics(self) -> dict[str, list[str]]:
-        node = self._node("topics")
-        if node is None:
-            return {}
-        try:
-            found = node.topics()
-        except Error as error:
-            self._log(logging.WARNING, f"{self.NAME}: the topics cannot be listed: {error}")
-            return {}
-        return {name: types for name, types in sorted(found.items()) if _HIDDEN not in name}
 
     # The node.
 
