@@ -5,19 +5,15 @@ Protocol: ROS wiki, "actionlib/DetailedDescription".
 
 from __future__ import annotations
 
-import copy
 import logging
-import threading
 import time
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import ActionClient, Executor, Promise, Time
+from rosglass.comm import Promise, Time
+from rosglass.comm.goal_client import GoalClient
 from rosglass.comm.inorder import InOrder
 from rosglass.comm.promise import check_timeout
-from rosglass.comm.readiness import Readiness
-from rosglass.comm.similar import similar
 from rosglass.errors import (
-    ConversionError,
     DecodeError,
     DefinitionConflictError,
     Error,
@@ -41,9 +37,9 @@ from rosglass.ros1.core import Member
 from rosglass.ros1.master import call_node
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
-    from rosglass.comm import CancelAnswer, ClientGoal, GoalStatus, Handle, Sample
+    from rosglass.comm import CancelAnswer, ClientGoal, Executor, GoalStatus, Sample
     from rosglass.messages import ActionType, Message
     from rosglass.ros1.action_state import CommState
     from rosglass.ros1.core import Core
@@ -55,11 +51,13 @@ _log = logging.getLogger("rosglass.ros1")
 #: Seconds without a status message, of which there are five a second usually, after which the
 #: server is asked whether it is alive; and that it may take to answer.
 _SILENCE, _ANSWER = 5.0, 5.0
+#: Seconds that do not fit into a time stamp any more, and their year.
+_END_OF_TIME = 2**32, 2106
 #: Seconds after which a server has told of the goals that it knew when it was connected.
 _SETTLED = 1.0
 
 
-class Ros1ActionClient(ActionClient, Member):
+class Ros1ActionClient(GoalClient[Ros1ClientGoal], Member):
     """An action client; made by :meth:`Node.create_action_client`.
 
     Args:
@@ -74,11 +72,10 @@ class Ros1ActionClient(ActionClient, Member):
     """
 
     def __init__(self, core: Core, topics: Topics, name: str, wanted: ActionType | None) -> None:
-        self.name, self.core = name, core
+        super().__init__(core, name, _END_OF_TIME)
+        self.core = core
         self.jobs = InOrder()
-        self.type = None
         self._topics = topics
-        self._lock = threading.Lock()
         self._goals: dict[str, Ros1ClientGoal] = {}
         self._ends: ActionEnds | None = None
         self._discovery: ActionDiscovery | None = None
@@ -89,9 +86,7 @@ class Ros1ActionClient(ActionClient, Member):
         self._heard: dict[str, float] = {}
         self._asked: set[str] = set()
         self._sweeps = Sweeps(name)
-        self._closed = False
-        self._warned = self._garbage = ""
-        self._readiness = Readiness(name, lambda: self.ready, self._check_open, core.dispatcher)
+        self._garbage = ""
         if wanted is None:
             self._discovery = ActionDiscovery(core, topics, name)
         else:
@@ -100,11 +95,6 @@ class Ros1ActionClient(ActionClient, Member):
         core.wake()
 
     # -- who is there ----------------------------------------------------------------------------
-
-    @property
-    def closed(self) -> bool:
-        """Whether :meth:`close` was called, of the client or of its node."""
-        return self._closed or self.core.closed
 
     @property
     def ready(self) -> bool:
@@ -118,31 +108,6 @@ class Ros1ActionClient(ActionClient, Member):
     def server(self) -> str:
         """Full name of the node that goals are sent to; empty while none is there."""
         return "" if self._closed else self._server
-
-    @property
-    def problem(self) -> str:
-        """Why goals cannot be sent, in words; empty when all is well."""
-        if self._closed:
-            return "the client is closed"
-        problems = self._conflicts()
-        if not problems and not self.ready:
-            problems.append(self._absence())
-        return "; ".join(problems)
-
-    @property
-    def goals(self) -> Sequence[ClientGoal]:
-        """The goals of this client that have not ended, in order of sending."""
-        return tuple(self._live())
-
-    def wait_for_server(self, timeout: float | None = None) -> bool:
-        """Wait for a server; see :meth:`rosglass.comm.ActionClient.wait_for_server`."""
-        return self._readiness.wait(timeout)
-
-    def on_ready_change(
-        self, callback: Callable[[bool], None], executor: Executor | None = None
-    ) -> Handle:
-        """Call `callback` with :attr:`ready` whenever it changes."""
-        return self._readiness.add(callback, executor)
 
     # -- goals -----------------------------------------------------------------------------------
 
@@ -170,35 +135,19 @@ class Ros1ActionClient(ActionClient, Member):
             timeout: Seconds for the server to appear and to tell that it knows the goal; servers
                 may keep it waiting (PENDING) for as long as they like. None for ever.
         """
-        self._check_open()
-        timeout = check_timeout(timeout, self.name)
-        if executor is not None and not isinstance(executor, Executor):
-            raise ConversionError("executor", executor, "a rosglass.comm.Executor", self.name)
-        kind = self.type
-        if kind is not None:
-            value: Any = kind.goal.create(goal)
-        elif goal is None or hasattr(goal, "to_dict") or isinstance(goal, dict):
-            value = copy.deepcopy(goal)  # the caller may change it meanwhile
-        else:
-            raise ConversionError("", goal, "a message or a dict of fields", self.name)
-        now = self.core.clock.now()
-        id_text = new_id(self.core.name.full, now)
-        made = Ros1ClientGoal(self, id_text, now, value, timeout, typed=kind is not None)
-        if on_feedback is not None:
-            made.on_feedback(on_feedback, executor)
-        if on_status_change is not None:
-            made.on_status_change(on_status_change, executor)
+        made = self._new_goal(goal, timeout, executor, on_feedback, on_status_change, on_done)
         if on_comm_state_change is not None:
             made.on_comm_state_change(on_comm_state_change, executor)
-        if on_done is not None:
-            if not callable(on_done):
-                raise ConversionError("on_done", on_done, "something that can be called", self.name)
-            made.done.on_done(lambda _: on_done(made), executor)
         with self._lock:
             if not self._closed:
-                self._goals[id_text] = made
+                self._goals[made.id_text] = made
         self.jobs.add(lambda: self._begin(made))
         return made
+
+    def _make(self, goal: Any, timeout: float | None, *, typed: bool) -> Ros1ClientGoal:
+        now = self.core.clock.now()
+        id_text = new_id(self.core.name.full, now)
+        return Ros1ClientGoal(self, id_text, now, goal, timeout, typed=typed)
 
     def cancel_all(self, timeout: float | None = 10.0) -> Promise[CancelAnswer]:
         """Ask the server to cancel all its goals; returns at once."""
@@ -213,9 +162,7 @@ class Ros1ActionClient(ActionClient, Member):
         """
         self._check_open()
         timeout = check_timeout(timeout, self.name)
-        if not isinstance(time, Time) or not 0 < time.nanoseconds < 2**32 * 1_000_000_000:
-            told = "a rosglass.Time after 1970 and before 2106; cancel_all() cancels all goals"
-            raise ConversionError("time", time, told, self.name)
+        self._check_stamp(time)
         return self._sweep(time, timeout)
 
     def _sweep(self, until: Time | None, timeout: float | None) -> Promise[CancelAnswer]:
@@ -250,11 +197,6 @@ class Ros1ActionClient(ActionClient, Member):
         """Let a goal go that has ended."""
         with self._lock:
             self._goals.pop(goal.id_text, None)
-
-    def ended(self) -> NodeClosedError:
-        """Return the error of goals whose client was closed."""
-        told = f"the client of {self.name} was closed before the goal ended, which goes on"
-        return NodeClosedError(told)
 
     # -- jobs ------------------------------------------------------------------------------------
 
@@ -374,10 +316,6 @@ class Ros1ActionClient(ActionClient, Member):
                 if goal.server == server:
                     goal.lose_server(f"fell silent ({problem}) before")
 
-    def _live(self) -> list[Ros1ClientGoal]:
-        with self._lock:
-            return list(self._goals.values())
-
     # -- what comes, in the loop's thread --------------------------------------------------------
 
     def _on_status(self, sample: Sample) -> None:
@@ -411,10 +349,7 @@ class Ros1ActionClient(ActionClient, Member):
             return
         if self._discovery is not None:
             self._discover(self._discovery)
-        problem = "; ".join(self._conflicts())
-        if problem and problem != self._warned:
-            _log.warning("%s: %s", self.name, problem)
-        self._warned = problem
+        self._warn(_log)
         self.jobs.add(self._watch)
 
     def _discover(self, discovery: ActionDiscovery) -> None:
@@ -446,26 +381,20 @@ class Ros1ActionClient(ActionClient, Member):
             ends.close()
 
     def _conflicts(self) -> list[str]:
-        """Say what a person has to mend."""
         discovery, ends = self._discovery, self._ends
         if discovery is not None:
             return [discovery.problem] if discovery.problem else []
         return [] if ends is None else ends.troubles()
 
     def _absence(self) -> str:
-        """Say why no server is there although nothing is wrong."""
-        ends, graph = self._ends, self.core.graph
+        ends = self._ends
         connecting = "" if ends is None else ends.absence(self._heard)
         if connecting:
             return connecting
-        names = offered(graph)
-        kind = "" if self.type is None else f" [{self.type.name}]"
+        names = offered(self.core.graph)
         if self.name in names:
             return f"the server of {self.name} is not connected yet"
-        return (
-            f"no server offers the action {self.name}{kind} on {self.core.url} "
-            f"({self.core.status()}){similar(self.name, names)}"
-        )
+        return self._no_server(names)
 
     # -- the end ---------------------------------------------------------------------------------
 
@@ -490,8 +419,3 @@ class Ros1ActionClient(ActionClient, Member):
             goal.lose(self.ended())
         told = f"the client of {self.name} was closed before the server told that it cancels goals"
         self._sweeps.fail(NodeClosedError(told))
-
-    def _check_open(self) -> None:
-        self.core.check_open()
-        if self._closed:
-            raise NodeClosedError(f"the client of {self.name} is closed; create another one")

@@ -4,25 +4,23 @@ from __future__ import annotations
 
 import logging
 import time
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import (
     ActionResult,
     CancelAnswer,
-    ClientGoal,
     ConnectionState,
     GoalStatus,
     Listeners,
     Promise,
 )
 from rosglass.comm.promise import check_timeout
+from rosglass.comm.watched_goal import WatchedGoal
 from rosglass.errors import (
     ConnectionLostError,
-    ConversionError,
     Error,
     GoalRejectedError,
     NodeClosedError,
-    ServiceUnavailableError,
     TimeoutError,  # noqa: A004 - the field's own word
 )
 from rosglass.ros1.action_state import CommState, CommStateMachine, ServerState
@@ -36,13 +34,9 @@ if TYPE_CHECKING:
     from rosglass.ros1.action_client import Ros1ActionClient
     from rosglass.ros1.action_state import Step, TerminalState
 
-    _T = TypeVar("_T")
-
 __all__ = ["Ros1ClientGoal"]
 
 _log = logging.getLogger("rosglass.ros1")
-#: Feedback that waits for a slow callback.
-_DEPTH = 10
 #: Seconds that a goal's server may be away before the goal counts as lost.
 _GRACE = 5.0
 #: The same while this program itself is cut off, when nothing can be said of the server.
@@ -61,7 +55,7 @@ _CANCELED = (
 )
 
 
-class Ros1ClientGoal(ClientGoal):
+class Ros1ClientGoal(WatchedGoal):
     """A goal; made by :meth:`ActionClient.send_goal`.
 
     All that happens to it happens in jobs of its client that run one after the other: its state
@@ -92,31 +86,17 @@ class Ros1ClientGoal(ClientGoal):
         *,
         typed: bool,
     ) -> None:
-        self.id, self._id_text, self.stamp = id_text.encode(), id_text, created
-        self.goal: Message | None = goal if typed else None
+        self._id_text, self.stamp = id_text, created
+        super().__init__(id_text.encode(), goal, typed, client.name, client.core.dispatcher, _log)
         self.server, self.text = "", ""
-        self._given, self._timeout = goal, timeout
-        self._client = client
+        self._client, self._timeout = client, timeout
         self._machine = CommStateMachine()
-        self._told = GoalStatus.PENDING
-        self._feedback: Message | None = None
-        self._label = label = f"goal {id_text} of {client.name}"
-        dispatcher = client.core.dispatcher
-        self._acceptance: Promise[bool] = Promise(
-            f"{label} was neither accepted nor rejected", dispatcher, cancellable=False
-        )
-        self._done: Promise[ActionResult] = Promise(
-            f"{label} has not ended, and goes on: no result", dispatcher, cancellable=False
-        )
-        self._feedback_listeners: Listeners[Message] = Listeners(depth=_DEPTH, where=label)
-        self._status_listeners: Listeners[GoalStatus] = Listeners(where=label)
-        self._state_listeners: Listeners[CommState] = Listeners(where=label)
+        self._state_listeners: Listeners[CommState] = Listeners(where=self._label)
         self._cancels: list[Promise[CancelAnswer]] = []
-        self._patience: Handle | None = None
         #: What was sent, and during which of the client's connections with a server.
         self._sent: dict[str, Any] | None = None
         self._epoch = 0
-        self._known = self._slow = self._odd = False
+        self._known = self._odd = False
         self._alone: float | None = None
         self._absent: float | None = None
         self._asked, self._repeats = 0.0, 0
@@ -135,7 +115,7 @@ class Ros1ClientGoal(ClientGoal):
         PENDING until the server executes it, CANCELING once the server tells that it is about to
         end for that. Recalled and preempted goals are both CANCELED.
         """
-        return self._told
+        return super().status
 
     @property
     def comm_state(self) -> CommState:
@@ -155,45 +135,11 @@ class Ros1ClientGoal(ClientGoal):
         """
         return self.stamp if self._machine.executed else None
 
-    @property
-    def feedback(self) -> Message | None:
-        """The newest feedback; None before the first."""
-        return self._feedback
-
-    @property
-    def acceptance(self) -> Promise[bool]:
-        """The server's decision."""
-        return self._acceptance
-
-    @property
-    def done(self) -> Promise[ActionResult]:
-        """The end."""
-        return self._done
-
-    def on_feedback(
-        self, callback: Callable[[Message], None], executor: Executor | None = None
-    ) -> Handle:
-        """Call `callback` with each feedback from now on."""
-        return self._listen(self._feedback_listeners, callback, executor)
-
-    def on_status_change(
-        self, callback: Callable[[GoalStatus], None], executor: Executor | None = None
-    ) -> Handle:
-        """Call `callback` with each new status from now on."""
-        return self._listen(self._status_listeners, callback, executor)
-
     def on_comm_state_change(
         self, callback: Callable[[CommState], None], executor: Executor | None = None
     ) -> Handle:
         """Call `callback` with each new :attr:`comm_state` from now on, none left out."""
         return self._listen(self._state_listeners, callback, executor)
-
-    def _listen(
-        self, listeners: Listeners[_T], callback: Callable[[_T], None], executor: Executor | None
-    ) -> Handle:
-        if not callable(callback):
-            raise ConversionError("callback", callback, "something that can be called", self._label)
-        return listeners.add(callback, executor or self._client.core.dispatcher)
 
     def cancel(self, timeout: float | None = 10.0) -> Promise[CancelAnswer]:
         """Ask the server to cancel it; see :meth:`rosglass.comm.ClientGoal.cancel`.
@@ -221,7 +167,7 @@ class Ros1ClientGoal(ClientGoal):
         if self._client.closed:
             raise self._client.ended()
         if self._done.done():
-            raise Error(f"{self._label} has ended as {self._told.value}: send a new goal instead")
+            raise Error(f"{self._label} has ended as {self._status.value}: send a new goal instead")
         self._client.jobs.add(self._resend)
 
     def close(self) -> None:
@@ -298,16 +244,8 @@ class Ros1ClientGoal(ClientGoal):
 
     def hear_feedback(self, feedback: Message) -> None:
         """Take feedback for it."""
-        if self.over:
-            return
-        self._feedback = feedback
-        if not self._feedback_listeners.notify(feedback) and not self._slow:
-            self._slow = True
-            _log.warning(
-                "%s: feedback comes faster than a callback takes it: only the newest %d wait",
-                self._label,
-                _DEPTH,
-            )
+        if not self.over:
+            self._tell_feedback(feedback)
 
     def finish(self, said: ServerState, text: str, result: Message) -> None:
         """Take its result."""
@@ -385,9 +323,7 @@ class Ros1ClientGoal(ClientGoal):
             return
         client, seconds = self._client, self._timeout or 0.0
         if not self.sent:
-            why = client.problem or "its server appeared too late"
-            told = f"no goal could be sent to {client.name} within {seconds:g} s: {why}"
-            self.lose(ServiceUnavailableError(told))
+            self.lose(client.unsent(seconds))
             return
         client.ask_cancel(self._id_text)  # nothing is to run that nobody watches
         told = (
@@ -412,11 +348,16 @@ class Ros1ClientGoal(ClientGoal):
             self._ask_cancel()
             self._go(self._machine.cancel())
             if timeout is not None:
-                late = TimeoutError(
-                    f"{self._client.name} did not tell within {timeout:g} s that it cancels goal "
-                    f"{self._id_text}. It may cancel it all the same: watch the goal's status"
-                )
-                self._client.core.timers.after(timeout, lambda: _fail(answer, late))
+                timers = self._client.core.timers
+                timers.after(timeout, lambda: self._give_up_cancelling(answer, timeout))
+
+    def _give_up_cancelling(self, answer: Promise[CancelAnswer], timeout: float) -> None:
+        answer.fail(
+            TimeoutError(
+                f"{self._client.name} did not tell within {timeout:g} s that it cancels goal "
+                f"{self._id_text}. It may cancel it all the same: watch the goal's status"
+            )
+        )
 
     def _withdraw(self) -> None:
         """Let it end without having been sent."""
@@ -426,8 +367,7 @@ class Ros1ClientGoal(ClientGoal):
         if kind is not None:
             self._end(ActionResult(GoalStatus.CANCELED, kind.result.create()))
         else:
-            told = f"{self._label} was cancelled before any server told its type: no result"
-            self._end(ServiceUnavailableError(told))
+            self._end(self._without_result())
 
     def _ask_cancel(self) -> bool:
         self._asked = time.monotonic()
@@ -456,9 +396,8 @@ class Ros1ClientGoal(ClientGoal):
         """Tell what states it has gone through."""
         for state, status in steps:
             self._state_listeners.notify(state)
-            if status is not self._told:
-                self._told = status
-                self._status_listeners.notify(status)
+            if status is not self._status:
+                self._tell_status(status)
         if self._machine.executed:
             self._acceptance.fulfil(True)
         said = self._machine.heard
@@ -467,26 +406,9 @@ class Ros1ClientGoal(ClientGoal):
             for answer in cancels:
                 answer.fulfil(CancelAnswer((self.id,)) if said in _CANCELED else self._too_late())
 
-    def _too_late(self) -> CancelAnswer:
-        return CancelAnswer((), f"the goal has ended already: {self._told.value}")
-
     def _end(self, end: ActionResult | Error) -> None:
         self._client.forget(self)
-        if self._patience is not None:
-            self._patience.close()
         cancels, self._cancels = self._cancels, []
         for answer in cancels:
             answer.fulfil(self._too_late())
-        if isinstance(end, ActionResult):
-            self._acceptance.fulfil(False)  # unless it was accepted
-            self._done.fulfil(end)
-            return
-        if self._told in (GoalStatus.REJECTED, GoalStatus.CANCELED):
-            self._acceptance.fulfil(False)
-        else:
-            self._acceptance.fail(end)
-        self._done.fail(end)
-
-
-def _fail(answer: Promise[CancelAnswer], error: Error) -> None:
-    answer.fail(error)
+        self._tell_end(self._status, end)

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import copy
 import logging
-import threading
 import time
 import uuid
 from typing import TYPE_CHECKING, Any, cast
 
-from rosglass.comm import ActionClient, CancelAnswer, EndpointKind, Executor, Promise, Time
+from rosglass.comm import CancelAnswer, EndpointKind, Promise, Time
+from rosglass.comm.goal_client import GoalClient
 from rosglass.comm.promise import check_timeout
-from rosglass.comm.readiness import Readiness
-from rosglass.comm.similar import similar
 from rosglass.errors import (
     ConnectionLostError,
-    ConversionError,
     Error,
-    NodeClosedError,
     ServiceUnavailableError,
     TimeoutError,  # noqa: A004 - the field's own word
 )
@@ -28,9 +23,9 @@ from rosglass.ros2.client_goal import Ros2ClientGoal
 from rosglass.ros2.core import Member
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
-    from rosglass.comm import Call, ClientGoal, GoalStatus, Handle
+    from rosglass.comm import Call, ClientGoal, Executor, GoalStatus
     from rosglass.messages import ActionType, Message
     from rosglass.ros2.action_ends import GoalNews
     from rosglass.ros2.action_types import ActionTypes
@@ -39,9 +34,11 @@ if TYPE_CHECKING:
 __all__ = ["Ros2ActionClient"]
 
 _log = logging.getLogger("rosglass.ros2")
+#: Seconds that do not fit into a time stamp any more, and their year.
+_END_OF_TIME = 2**31, 2038
 
 
-class Ros2ActionClient(ActionClient, Member):
+class Ros2ActionClient(GoalClient[Ros2ClientGoal], Member):
     """An action client; made by :meth:`Node.create_action_client`.
 
     Args:
@@ -55,17 +52,13 @@ class Ros2ActionClient(ActionClient, Member):
     """
 
     def __init__(self, core: Core, name: str, wanted: ActionType | str | None) -> None:
-        self.name, self.core = name, core
+        super().__init__(core, name, _END_OF_TIME)
+        self.core = core
         self._version = ActionVersion(core, name, wanted)
-        self._lock = threading.Lock()
         self._goals: dict[bytes, Ros2ClientGoal] = {}
         self._ends: ActionEnds | None = None
         #: What is to be done once the type is known.
         self._held: list[Callable[[], None]] = []
-        self._closed = False
-        self._warned = ""
-        self._readiness = Readiness(name, lambda: self.ready, self._check_open, core.dispatcher)
-        self.type = None
         self._version.follow(retry=True)
         if self._version.types is not None:
             self._speak(self._version.types)
@@ -75,41 +68,10 @@ class Ros2ActionClient(ActionClient, Member):
     # -- who is there ----------------------------------------------------------------------------
 
     @property
-    def closed(self) -> bool:
-        """Whether :meth:`close` was called, of the client or of its node."""
-        return self._closed or self.core.closed
-
-    @property
     def ready(self) -> bool:
         """Whether a server is there that understands the goals."""
         ends = self._ends
         return ends is not None and not self._closed and all(end.ready for end in ends.services)
-
-    @property
-    def problem(self) -> str:
-        """Why goals cannot be sent, in words; empty when all is well."""
-        if self._closed:
-            return "the client is closed"
-        problems = self._conflicts()
-        if not problems and not self.ready:
-            problems.append(self._absence())
-        return "; ".join(problems)
-
-    @property
-    def goals(self) -> Sequence[ClientGoal]:
-        """The goals of this client that have not ended, in order of sending."""
-        with self._lock:
-            return tuple(self._goals.values())
-
-    def wait_for_server(self, timeout: float | None = None) -> bool:
-        """Wait for a server; see :meth:`rosglass.comm.ActionClient.wait_for_server`."""
-        return self._readiness.wait(timeout)
-
-    def on_ready_change(
-        self, callback: Callable[[bool], None], executor: Executor | None = None
-    ) -> Handle:
-        """Call `callback` with :attr:`ready` whenever it changes."""
-        return self._readiness.add(callback, executor)
 
     # -- goals -----------------------------------------------------------------------------------
 
@@ -125,42 +87,25 @@ class Ros2ActionClient(ActionClient, Member):
         timeout: float | None = 10.0,
     ) -> ClientGoal:
         """Send a goal; see :meth:`rosglass.comm.ActionClient.send_goal`."""
-        self._check_open()
-        timeout = check_timeout(timeout, self.name)
-        if executor is not None and not isinstance(executor, Executor):
-            raise ConversionError("executor", executor, "a rosglass.comm.Executor", self.name)
-        kind = self.type
-        if kind is not None:
-            value: Any = kind.goal.create(goal)
-        elif goal is None or hasattr(goal, "to_dict") or isinstance(goal, dict):
-            value = copy.deepcopy(goal)  # the caller may change it meanwhile
-        else:
-            raise ConversionError("", goal, "a message or a dict of fields", self.name)
-        made = Ros2ClientGoal(self, uuid.uuid4().bytes, value, timeout, typed=kind is not None)
-        if on_feedback is not None:
-            made.on_feedback(on_feedback, executor)
-        if on_status_change is not None:
-            made.on_status_change(on_status_change, executor)
-        if on_done is not None:
-            if not callable(on_done):
-                raise ConversionError("on_done", on_done, "something that can be called", self.name)
-            made.done.on_done(lambda _: on_done(made), executor)
+        made = self._new_goal(goal, timeout, executor, on_feedback, on_status_change, on_done)
         with self._lock:
             if not self._closed:
                 self._goals[made.id] = made
-        if kind is not None:
+        if made.goal is not None:
             made.send()
         else:
             made.hold()
             self._once_typed(made.begin)
         return made
 
+    def _make(self, goal: Any, timeout: float | None, *, typed: bool) -> Ros2ClientGoal:
+        return Ros2ClientGoal(self, uuid.uuid4().bytes, goal, timeout, typed=typed)
+
     def cancel_all(self, timeout: float | None = 10.0) -> Promise[CancelAnswer]:
         """Ask the server to cancel all its goals; returns at once."""
         self._check_open()
         timeout = check_timeout(timeout, self.name)
-        with self._lock:
-            waiting = [goal for goal in self._goals.values() if goal.accepted is None]
+        waiting = [goal for goal in self._live() if goal.accepted is None]
         for goal in waiting:
             goal.cancel(timeout)
         answer = self._answer()
@@ -171,9 +116,7 @@ class Ros2ActionClient(ActionClient, Member):
         """Ask the server to cancel all goals that it accepted at or before `time`."""
         self._check_open()
         timeout = check_timeout(timeout, self.name)
-        if not isinstance(time, Time) or not 0 < time.nanoseconds < 2**31 * 1_000_000_000:
-            told = "a rosglass.Time after 1970 and before 2038; cancel_all() cancels all goals"
-            raise ConversionError("time", time, told, self.name)
+        self._check_stamp(time)
         answer = self._answer()
         self.ask_cancel(NO_ID, time, answer, timeout)
         return answer
@@ -259,11 +202,6 @@ class Ros2ActionClient(ActionClient, Member):
         assert self.type is not None  # there are goals
         return self.type.result.create()
 
-    def ended(self) -> NodeClosedError:
-        """Return the error of goals whose client was closed."""
-        told = f"the client of {self.name} was closed before the goal ended, which goes on"
-        return NodeClosedError(told)
-
     def replaced(self) -> ConnectionLostError:
         """Return the error of goals whose server made way for one with another definition."""
         return ConnectionLostError(
@@ -306,15 +244,9 @@ class Ros2ActionClient(ActionClient, Member):
             return
         if self._version.follow(retry=idle) and self._version.types is not None:
             self._speak(self._version.types)
-        problem = "; ".join(self._conflicts())
-        if problem and problem != self._warned:
-            level = logging.INFO if self._version.pending else logging.WARNING
-            _log.log(level, "%s: %s", self.name, problem)
-        self._warned = problem
+        self._warn(_log, logging.INFO if self._version.pending else logging.WARNING)
         self._readiness.update()
-        with self._lock:
-            goals = list(self._goals.values())
-        for goal in goals:
+        for goal in self._live():
             goal.watch()
 
     def _speak(self, types: ActionTypes) -> None:
@@ -349,7 +281,6 @@ class Ros2ActionClient(ActionClient, Member):
         job()
 
     def _conflicts(self) -> list[str]:
-        """Say what a person has to mend."""
         problems = self._version.conflicts()
         ends = self._ends
         if not problems and ends is not None:
@@ -357,7 +288,6 @@ class Ros2ActionClient(ActionClient, Member):
         return list(dict.fromkeys(problems))
 
     def _absence(self) -> str:
-        """Say why no server is there although nothing is wrong."""
         ends = self._ends
         if ends is not None and any(end.server_ids() for end in ends.services):
             missing = ", ".join(end.name for end in ends.services if not end.ready)
@@ -368,11 +298,7 @@ class Ros2ActionClient(ActionClient, Member):
             for name in graph.actions()
             if graph.endpoints(EndpointKind.SERVICE_SERVER, part(name, SEND_GOAL))
         ]
-        kind = "" if self.type is None else f" [{self.type.name}]"
-        return (
-            f"no server offers the action {self.name}{kind} on {self.core.url} "
-            f"({self.core.status()}){similar(self.name, offered)}"
-        )
+        return self._no_server(offered)
 
     # -- the end ---------------------------------------------------------------------------------
 
@@ -399,8 +325,3 @@ class Ros2ActionClient(ActionClient, Member):
         self._check_open()
         assert self._ends is not None  # there is a type
         return self._ends
-
-    def _check_open(self) -> None:
-        self.core.check_open()
-        if self._closed:
-            raise NodeClosedError(f"the client of {self.name} is closed; create another one")

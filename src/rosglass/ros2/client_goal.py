@@ -6,23 +6,21 @@ import logging
 import time
 from collections import deque
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import (
     ActionResult,
     CancelAnswer,
-    ClientGoal,
     ConnectionState,
     GoalStatus,
-    Listeners,
     Promise,
     Time,
 )
 from rosglass.comm.inorder import InOrder
 from rosglass.comm.promise import check_timeout
+from rosglass.comm.watched_goal import FEEDBACK_DEPTH, WatchedGoal
 from rosglass.errors import (
     ConnectionLostError,
-    ConversionError,
     DecodeError,
     Error,
     GoalRejectedError,
@@ -35,18 +33,14 @@ from rosglass.ros2.action_types import STATUSES, stamp_of
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rosglass.comm import Call, Executor, Handle
+    from rosglass.comm import Call
     from rosglass.messages import Message, MessageType
     from rosglass.ros2.action_client import Ros2ActionClient
     from rosglass.ros2.service_client import Ros2ServiceClient
 
-    _T = TypeVar("_T")
-
 __all__ = ["Ros2ClientGoal"]
 
 _log = logging.getLogger("rosglass.ros2")
-#: Feedback that waits for the goal's acceptance, or for a slow callback.
-_DEPTH = 10
 #: Seconds that a goal's server may be out of the graph before the goal counts as lost.
 _GRACE = 5.0
 #: The same while this program itself is cut off, when nothing can be said of the server.
@@ -65,7 +59,7 @@ _RANK = {
 _END = 4
 
 
-class Ros2ClientGoal(ClientGoal):
+class Ros2ClientGoal(WatchedGoal):
     """A goal; made by :meth:`ActionClient.send_goal`.
 
     All that happens to it happens in jobs that run one after the other, whatever thread hears of
@@ -82,83 +76,29 @@ class Ros2ClientGoal(ClientGoal):
     def __init__(
         self, client: Ros2ActionClient, id: bytes, goal: Any, timeout: float | None, *, typed: bool
     ) -> None:
-        self.id = id
-        self.goal: Message | None = goal if typed else None
-        self._given = goal
+        super().__init__(id, goal, typed, client.name, client.core.dispatcher, _log)
         self._client = client
         self._timeout = timeout
         self._deadline = None if timeout is None else time.monotonic() + timeout
         self._jobs = InOrder()
-        self._status = GoalStatus.PENDING
         self._accepted: Time | None = None
-        self._feedback: Message | None = None
-        dispatcher = client.core.dispatcher
-        self._label = label = f"goal {self.id_text} of {client.name}"
-        self._acceptance: Promise[bool] = Promise(
-            f"{label} was neither accepted nor rejected", dispatcher, cancellable=False
-        )
-        self._done: Promise[ActionResult] = Promise(
-            f"{label} has not ended, and goes on: no result", dispatcher, cancellable=False
-        )
-        self._feedback_listeners: Listeners[Message] = Listeners(depth=_DEPTH, where=self._label)
-        self._status_listeners: Listeners[GoalStatus] = Listeners(where=self._label)
-        self._held: deque[Message] = deque(maxlen=_DEPTH)
+        #: Feedback that waits for the goal's acceptance.
+        self._held: deque[Message] = deque(maxlen=FEEDBACK_DEPTH)
         self._heard: tuple[GoalStatus, Time] | None = None
         self._cancels: list[tuple[Promise[CancelAnswer], float | None]] = []
         self._sending: Call | None = None
         self._asking: Call | None = None
-        self._patience: Handle | None = None
         self._servers: frozenset[bytes | str] = frozenset()
         self._strangers: frozenset[bytes | str] = frozenset()
         self._alone: float | None = None
         self._asked = 0.0
-        self._slow = False
 
     # -- what users see --------------------------------------------------------------------------
-
-    @property
-    def status(self) -> GoalStatus:
-        """What has become of it, as last heard."""
-        return self._status
 
     @property
     def accepted(self) -> Time | None:
         """When the server accepted it, by the server's clock; None before."""
         return self._accepted
-
-    @property
-    def feedback(self) -> Message | None:
-        """The newest feedback; None before the first."""
-        return self._feedback
-
-    @property
-    def acceptance(self) -> Promise[bool]:
-        """The server's decision."""
-        return self._acceptance
-
-    @property
-    def done(self) -> Promise[ActionResult]:
-        """The end."""
-        return self._done
-
-    def on_feedback(
-        self, callback: Callable[[Message], None], executor: Executor | None = None
-    ) -> Handle:
-        """Call `callback` with each feedback from now on."""
-        return self._listen(self._feedback_listeners, callback, executor)
-
-    def on_status_change(
-        self, callback: Callable[[GoalStatus], None], executor: Executor | None = None
-    ) -> Handle:
-        """Call `callback` with each new status from now on."""
-        return self._listen(self._status_listeners, callback, executor)
-
-    def _listen(
-        self, listeners: Listeners[_T], callback: Callable[[_T], None], executor: Executor | None
-    ) -> Handle:
-        if not callable(callback):
-            raise ConversionError("callback", callback, "something that can be called", self._label)
-        return listeners.add(callback, executor or self._client.core.dispatcher)
 
     def cancel(self, timeout: float | None = 10.0) -> Promise[CancelAnswer]:
         """Ask the server to cancel it; see :meth:`rosglass.comm.ClientGoal.cancel`."""
@@ -251,7 +191,7 @@ class Ros2ClientGoal(ClientGoal):
 
     def _give_up(self) -> None:
         if self.goal is None:
-            self._end(GoalStatus.LOST, self._explain(ServiceUnavailableError()))
+            self._end(GoalStatus.LOST, self._client.unsent(self._timeout))
 
     def _answered(self, call: Call) -> None:
         """Take the answer to the goal."""
@@ -277,10 +217,7 @@ class Ros2ClientGoal(ClientGoal):
     def _explain(self, error: BaseException) -> Error:
         name, seconds = self._client.name, self._timeout or 0.0
         if isinstance(error, ServiceUnavailableError):
-            why = self._client.problem or "its server appeared too late"
-            return ServiceUnavailableError(
-                f"no goal could be sent to {name} within {seconds:g} s: {why}"
-            )
+            return self._client.unsent(seconds)
         if isinstance(error, (TimeoutError, ConnectionLostError)):
             # It may have been accepted, or be yet: nothing is to run that nobody watches.
             self._client.ask_cancel(self.id, Time(), Promise(cancellable=False), 10.0)
@@ -334,30 +271,17 @@ class Ros2ClientGoal(ClientGoal):
         if self._alone is not None:
             self._alone, self._servers = None, self._client.servers()
 
-    def _tell_feedback(self, feedback: Message) -> None:
-        self._feedback = feedback
-        if not self._feedback_listeners.notify(feedback) and not self._slow:
-            self._slow = True
-            _log.warning(
-                "%s: feedback comes faster than a callback takes it: only the newest %d wait",
-                self._label,
-                _DEPTH,
-            )
-
     def _advance(self, status: GoalStatus) -> None:
         """Take a later status; what comes late itself is ignored."""
         if _RANK.get(status, _END) > _RANK.get(self._status, _END):
-            self._status = status
-            self._status_listeners.notify(status)
+            self._tell_status(status)
 
     def _cancel(self, answer: Promise[CancelAnswer], timeout: float | None) -> None:
         call = self._sending
         if not self._status.is_active:
-            told = f"the goal has ended already: {self._status.value}"
-            answer.fulfil(CancelAnswer((), told))
+            answer.fulfil(self._too_late())
         elif self.goal is None:
-            told = f"{self._label} was cancelled before any server told its type: no result"
-            self._end(GoalStatus.CANCELED, ServiceUnavailableError(told))
+            self._end(GoalStatus.CANCELED, self._without_result())
             answer.fulfil(CancelAnswer((self.id,)))
         elif self._status is not GoalStatus.PENDING:
             self._client.ask_cancel(self.id, Time(), answer, timeout)
@@ -368,11 +292,15 @@ class Ros2ClientGoal(ClientGoal):
             deadline = None if timeout is None else time.monotonic() + timeout
             self._cancels.append((answer, deadline))
             if timeout is not None:
-                late = TimeoutError(
-                    f"{self._label} could not be cancelled within {timeout:g} s: the server has "
-                    "neither accepted nor rejected it"
-                )
-                self._later(timeout, lambda: _fail(answer, late))
+                self._later(timeout, lambda: self._give_up_cancelling(answer, timeout))
+
+    def _give_up_cancelling(self, answer: Promise[CancelAnswer], timeout: float) -> None:
+        answer.fail(
+            TimeoutError(
+                f"{self._label} could not be cancelled within {timeout:g} s: the server has "
+                "neither accepted nor rejected it"
+            )
+        )
 
     def _watch(self) -> None:
         if self._status is GoalStatus.PENDING or self._done.done():
@@ -476,26 +404,12 @@ class Ros2ClientGoal(ClientGoal):
         self._advance(status)
         cancels, self._cancels = self._cancels, []
         for answer, _ in cancels:
-            answer.fulfil(CancelAnswer((), f"the goal has ended already: {self._status.value}"))
+            answer.fulfil(self._too_late())
         self._client.forget(self)
-        if self._patience is not None:
-            self._patience.close()
         asking, self._asking = self._asking, None
         if asking is not None:
             asking.cancel()
-        if isinstance(end, BaseException):
-            if status in (GoalStatus.REJECTED, GoalStatus.CANCELED):
-                self._acceptance.fulfil(False)
-            else:
-                self._acceptance.fail(end)
-            self._done.fail(end)
-        else:
-            self._acceptance.fulfil(False)  # unless it was accepted
-            self._done.fulfil(end)
+        self._tell_end(status, end)
 
     def _later(self, delay: float, job: Callable[[], None]) -> None:
         self._client.core.timers.after(delay, job)
-
-
-def _fail(answer: Promise[CancelAnswer], error: Error) -> None:
-    answer.fail(error)
