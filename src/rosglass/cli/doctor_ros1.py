@@ -214,7 +214,9 @@ def _nodes(node: Ros1Node, options: Ros1Options, timeout: float) -> Iterator[Fin
         yield Finding("error", "names", text, fix)
     if stale:
         text = f"{_several(stale)} no longer run, but the master still lists them"
-        yield Finding("warning", "nodes", text, "rosnode cleanup, on the robot, takes them off")
+        yield Finding(
+            "warning", "nodes", text, f"rosglass node cleanup --url {node.url} takes them off"
+        )
     well = len(places) - len(stale) - sum(map(len, unknown.values()))
     if well == len(places) and places:
         yield Finding("ok", "nodes", "all can be reached")

@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.cli.worlds import is_ros1, spelled
+from rosglass.comm import Durability, EndpointKind
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rosglass.comm import EndpointInfo, Node
 
-__all__ = ["Problem", "describe", "problems", "short"]
+__all__ = ["Problem", "describe", "problems", "short", "sources"]
 
 
 #: Best effort and volatile fits every publisher.
@@ -31,9 +32,13 @@ class Problem(NamedTuple):
 def describe(node: Node, end: EndpointInfo) -> dict[str, Any]:
     """Return an endpoint of the node's graph as JSON has it."""
     if is_ros1(node):
-        found = {"kind": end.kind.value, "name": end.name, "node": str(end.node),
+        found: dict[str, Any] = {"kind": end.kind.value, "name": end.name, "node": str(end.node),
                  "type": spelled(node, end.type)}  # fmt: skip
-        return found | ({"md5": end.type_hash} if end.type_hash else {})
+        if end.type_hash:
+            found["md5"] = end.type_hash
+        if end.type_hash and end.kind is EndpointKind.PUBLISHER:
+            found["latched"] = end.qos.durability is Durability.TRANSIENT_LOCAL
+        return found
     qos = end.qos
     return {
         "kind": end.kind.value,
@@ -58,10 +63,7 @@ def describe(node: Node, end: EndpointInfo) -> dict[str, Any]:
 
 def problems(ends: Sequence[EndpointInfo]) -> list[Problem]:
     """Say which of a topic's endpoints do not match each other, and why."""
-    from rosglass.comm import EndpointKind
-
     found = []
-    sources = [end for end in ends if end.kind is EndpointKind.PUBLISHER]
     sinks = [end for end in ends if end.kind is EndpointKind.SUBSCRIPTION]
     if len({end.type for end in ends}) > 1:
         told = "; ".join(f"{end.node} has {end.type}" for end in ends)
@@ -73,7 +75,7 @@ def problems(ends: Sequence[EndpointInfo]) -> list[Problem]:
             )
         )
     for sink in sinks:
-        for source in sources:
+        for source in sources(ends):
             conflict = sink.qos.incompatibility(source.qos)
             if conflict:
                 text = f"{sink.node} may get nothing from {source.node}: {conflict}"
@@ -85,8 +87,15 @@ def problems(ends: Sequence[EndpointInfo]) -> list[Problem]:
     return found
 
 
+def sources(ends: Sequence[EndpointInfo]) -> list[EndpointInfo]:
+    """Return those of a topic's endpoints that publish."""
+    return [end for end in ends if end.kind is EndpointKind.PUBLISHER]
+
+
 def short(value: object) -> str:
     """Return a value of :func:`describe` in one line."""
+    if value is True:
+        return "yes"
     if not isinstance(value, dict):
         return str(value)
     return ", ".join(f"{key} {inner}" for key, inner in value.items() if inner is not None)

@@ -5,15 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rosglass.cli.completion import complete
-from rosglass.cli.connecting import add_connection_options, add_definitions_option, connect, wait
+from rosglass.cli.connecting import add_connection_options, add_definitions_option, connect
 from rosglass.cli.output import Style, add_output_options, note, print_json, template
 from rosglass.cli.subcommands import Subcommands
-from rosglass.cli.worlds import is_ros1, names_ros1
+from rosglass.cli.worlds import names_ros1
 
 if TYPE_CHECKING:
     import argparse
 
-    from rosglass.comm import Node
     from rosglass.messages import ActionType, MessageType, ServiceType
 
 __all__ = ["configure", "run"]
@@ -139,31 +138,6 @@ def _find(args: argparse.Namespace) -> MessageType | ServiceType | ActionType:
             raise TypeNotFoundError(f"{error}; {where}") from error
     try:
         with connect(args) as node:
-            if is_ros1(node):
-                return _received(node, args.type, args.timeout)
             return node.fetch_type(args.type, timeout=args.timeout)
     except (TypeNotFoundError, UnsupportedError) as error:
         raise TypeNotFoundError(f"{args.type}: {error}. {hint}".rstrip(". ")) from error
-
-
-def _received(node: Node, name: str, timeout: float) -> MessageType:
-    """Return a type as a ROS 1 publisher sends it when it is subscribed to.
-
-    Raises:
-        TypeNotFoundError: Nobody publishes it, or nobody who does can be reached.
-    """
-    from rosglass.errors import TypeNotFoundError
-    from rosglass.interfaces import join_name
-    from rosglass.messages import OpaqueType
-
-    full = join_name(name)
-    topics = [t for t, types in node.topics().items() if full in types and node.publishers(t)]
-    if not topics:
-        raise TypeNotFoundError("no topic of that type is published, which would tell it")
-    subscriptions = [node.create_subscription(topic) for topic in topics]
-    found = wait(node, lambda: [s.type for s in subscriptions if s.type is not None], timeout)
-    for kind in found:
-        if kind.name == full and not isinstance(kind, OpaqueType):
-            return kind
-    problems = "; ".join(s.problem for s in subscriptions if s.problem)
-    raise TypeNotFoundError(problems or f"{', '.join(topics)}: its publishers do not answer")

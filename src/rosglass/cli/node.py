@@ -1,9 +1,10 @@
-"""``rosglass node``: look at nodes."""
+"""``rosglass node``: look at nodes; in ROS 1 also end them, and clean up after them."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rosglass.cli import node_ros1
 from rosglass.cli.completion import complete
 from rosglass.cli.connecting import add_connection_options, await_types, connect, find, settle
 from rosglass.cli.endpoints import describe
@@ -21,7 +22,8 @@ __all__ = ["configure", "run"]
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Declare what can be done with nodes."""
-    add = Subcommands(parser).add
+    commands = Subcommands(parser)
+    add = commands.add
     _finish(add("list", "list the nodes there are", _list))
     sub = add("info", "show what a node publishes, subscribes, offers and calls", _info)
     complete(sub.add_argument("node"), "nodes")
@@ -32,6 +34,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="show those of actions, too",
     )
     _finish(sub)
+    node_ros1.configure(commands)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rosglass.cli.output import note, print_json, to_yaml
+from rosglass.cli.worlds import as_ros1
 from rosglass.errors import Error, UnsupportedError
 
 if TYPE_CHECKING:
     import argparse
 
     from rosglass.comm import Node
-    from rosglass.ros1.node import Ros1Node
     from rosglass.ros1.parameter_server import ParameterServer
 
 __all__ = ["run"]
@@ -35,9 +35,9 @@ def run(what: str, node: Node, args: argparse.Namespace) -> int:
 
 
 def _server(node: Node) -> ParameterServer:
-    ros1: Any = node
-    made: Ros1Node = ros1
-    return made.parameter_server
+    ros1 = as_ros1(node)
+    assert ros1 is not None
+    return ros1.parameter_server
 
 
 def _name(args: argparse.Namespace, parameter: str | None) -> str:

@@ -19,13 +19,13 @@ from rosglass.cli.connecting import (
     telling,
     wait,
 )
-from rosglass.cli.endpoints import describe, problems, short
+from rosglass.cli.endpoints import describe, problems, short, sources
 from rosglass.cli.output import Style, add_output_options, note, print_json, template
 from rosglass.cli.subcommands import Subcommands
 from rosglass.cli.topic_echo import echo
 from rosglass.cli.topic_rates import measure
 from rosglass.cli.values import parse_fields, profile, split_type
-from rosglass.cli.worlds import is_hidden, is_ros1, spelled
+from rosglass.cli.worlds import as_ros1, is_hidden, spelled
 from rosglass.comm.similar import similar
 
 if TYPE_CHECKING:
@@ -35,6 +35,10 @@ if TYPE_CHECKING:
 
 __all__ = ["configure", "run"]
 
+#: What stands for a type that nobody has told.
+_UNKNOWN = "unknown"
+#: Seconds that ROS 1's publishers may take to tell what they publish.
+_ANSWER = 3.0
 #: Samples of which hz, bw and delay keep account.
 _WINDOW = 10_000
 
@@ -193,24 +197,32 @@ def _info(args: argparse.Namespace) -> int:
         )
         if not ends:
             return _unknown(node, topic)
+        ros1 = as_ros1(node)
+        if ros1 is not None:
+            told = ros1.ask_publishers(topic, min(args.timeout, _ANSWER))
+            ends = [*told, *node.subscriptions(topic)]
     if args.json:
         print_json({"topic": topic, "endpoints": [describe(node, end) for end in ends]})
         return 0
-    print(f"{style(topic, 'bold')} [{_types(node, {end.type for end in ends})}]")
+    kinds = _types(node, {end.type for end in ends})
+    unknown = "unknown (nobody publishes it)" if kinds == _UNKNOWN and not sources(ends) else kinds
+    print(f"{style(topic, 'bold')} [{unknown}]")
     for problem in problems(ends):
         print(style(f"  {problem.text}", "red"))
     for end in ends:
         print(f"  {end.kind.value} {style(end.node, 'cyan')}")
         # In ROS 1, a topic's type is one for all: it is above.
-        above = ("kind", "name", "node", *(("type",) if is_ros1(node) else ()))
+        above = ("kind", "name", "node", *(("type",) if ros1 else ()))
         for key, value in describe(node, end).items():
             if key not in above and value:
                 print(f"    {key}: {short(value)}")
+        if ros1 and end in sources(ends) and not end.type_hash:
+            print("    does not answer: its md5 sum, and whether it latches, is not known")
     return 0
 
 
 def _types(node: Node, names: Iterable[str]) -> str:
-    return ", ".join(sorted(spelled(node, name) for name in names))
+    return ", ".join(sorted(spelled(node, name) for name in names if name)) or _UNKNOWN
 
 
 def _publish(args: argparse.Namespace) -> int:

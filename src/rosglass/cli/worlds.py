@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import re
 from contextlib import suppress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import argparse
 
     from rosglass.comm import Node
+    from rosglass.ros1.node import Ros1Node
 
-__all__ = ["is_hidden", "is_ros1", "names_ros1", "spelled", "spelled_ros1"]
+__all__ = ["as_ros1", "is_hidden", "is_ros1", "names_ros1", "spelled", "spelled_ros1"]
 
 #: Names of types, but no parts of paths.
 _TYPE = re.compile(
@@ -22,6 +23,12 @@ _TYPE = re.compile(
 def is_ros1(node: Node) -> bool:
     """Return whether a node is in a ROS 1 graph."""
     return node.wire == "ros1"
+
+
+def as_ros1(node: Node) -> Ros1Node | None:
+    """Return a node that is in a ROS 1 graph as what it is; None when it is in none."""
+    found: Any = node
+    return found if is_ros1(node) else None
 
 
 def names_ros1(args: argparse.Namespace) -> bool:

@@ -261,6 +261,11 @@ class Ros1Node(CoreNode):
     # -- the node's names ------------------------------------------------------------------------
 
     @property
+    def master_uri(self) -> str:
+        """The master's API, such as ``http://robot:11311``."""
+        return self._core.master.uri
+
+    @property
     def address(self) -> str:
         """Host or address under which others reach this node."""
         return self._core.address[0]

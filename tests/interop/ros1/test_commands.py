@@ -91,7 +91,13 @@ def test_topic_list_and_info(run, master, monkeypatch):
     assert "/pose [geometry_msgs/PoseStamped]" in out.splitlines()
     assert "/cmd_vel [geometry_msgs/Twist]" in out.splitlines()
     code, out, _ = run("topic", "info", "/pose")
-    assert out == "/pose [geometry_msgs/PoseStamped]\n  publisher /robot\n"
+    assert out == (
+        "/pose [geometry_msgs/PoseStamped]\n  publisher /robot\n"
+        "    md5: d3812c3cbc69362b77dc0b19b345f8f5\n"
+    )
+    assert "    latched: yes\n" in run("topic", "info", "/map")[1]
+    code, out, _ = run("topic", "info", "/map", "--json")
+    assert json.loads(out)["endpoints"][0]["latched"] is True
     code, out, _ = run("topic", "info", "/cmd_vel", "--json")
     assert json.loads(out)["endpoints"] == [
         {"kind": "subscription", "name": "/cmd_vel", "node": "/robot",
@@ -313,7 +319,7 @@ def test_a_type_that_only_the_robot_has_is_shown(run, connect):
     assert f"secret_msgs/Bank, md5 {kind.md5}" in out
     assert "Vault[] inner" in out
     code, _, err = run("interface", "show", "secret_msgs/Nothing")
-    assert (code, "no topic of that type is published" in err) == (1, True)
+    assert (code, "nobody in the graph uses it" in err) == (1, True)
 
 
 def test_doctor_finds_nothing_wrong(run, master):
@@ -345,7 +351,7 @@ def test_doctor_finds_what_is_wrong(run, master, monkeypatch):
         code, out, _ = run("doctor")
         assert code == 0
         assert "/test no longer run" in out
-        assert "rosnode cleanup" in out
+        assert "rosglass node cleanup" in out
     finally:
         master.call("unregisterPublisher", "/gone", gone)
     # An address that exists nowhere near.

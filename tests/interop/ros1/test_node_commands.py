@@ -1,0 +1,141 @@
+"""``rosglass node ping``, ``kill`` and ``cleanup``, and what ``topic info`` cannot know."""
+
+from __future__ import annotations
+
+import io
+import json
+import signal
+import socket
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+
+@pytest.fixture(scope="module")
+def robot(start_rospy) -> Any:
+    """A rospy node that publishes."""
+    peer = start_rospy("robot")
+    peer.call("publish", topic="/word", type="std_msgs/String")
+    return peer
+
+
+@pytest.fixture
+def run(
+    robot: Any, master: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Iterator[Any]:
+    """Run a command in this process: its code, and what it printed, and where."""
+    from rosglass.cli import main
+
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    monkeypatch.setenv("ROSGLASS_URL", f"{master.url}?ip=127.0.0.1")
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        capsys.readouterr()
+        return main(arguments), *capsys.readouterr()
+
+    yield run
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+
+
+@pytest.fixture
+def free_port() -> int:
+    """A port that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def test_topic_info_says_what_it_cannot_know(run, master, connect, wait_for, free_port):
+    connect("listener").create_subscription("/never")
+    wait_for(lambda: ["/never", ["/listener"]] in master.call("getSystemState")[1])
+    code, out, _ = run("topic", "info", "/never")
+    assert (code, out.splitlines()[0]) == (0, "/never [unknown (nobody publishes it)]")
+    assert "/never [unknown]" in run("topic", "list", "-t")[1].splitlines()
+    gone = f"http://127.0.0.1:{free_port}/"
+    master.call("registerPublisher", "/stale", "std_msgs/String", gone, caller="/dead")
+    code, out, _ = run("topic", "info", "/stale")
+    assert "    does not answer: its md5 sum, and whether it latches, is not known" in out
+    master.call("unregisterPublisher", "/stale", gone, caller="/dead")
+
+
+def test_ping(run):
+    code, out, err = run("node", "ping", "robot", "-c", "1")
+    assert (code, err) == (0, "")
+    first, last = out.splitlines()
+    assert first.startswith("/robot answers at http://127.0.0.1:")
+    assert first.endswith(" ms")
+    assert last.startswith("1 of 1 answered, ")
+    code, out, _ = run("node", "ping", "/robot", "-c", "2", "--json")
+    assert [json.loads(line)["problem"] for line in out.splitlines()] == ["", ""]
+    code, _, err = run("node", "ping", "/robbot")
+    assert code == 1
+    assert "there is no node /robbot on http://127.0.0.1:" in err
+    assert "did you mean /robot?" in err
+
+
+def test_pinging_what_does_not_answer(run, master, free_port):
+    gone = f"http://127.0.0.1:{free_port}/"
+    master.call("registerPublisher", "/stale", "std_msgs/String", gone, caller="/dead")
+    code, out, err = run("node", "ping", "/dead", "-c", "1")
+    assert (code, out) == (1, "")
+    assert f"/dead: {gone} does not answer: Connection refused" in err
+    code, _, err = run("node", "kill", "/dead")
+    assert code == 1
+    assert "Connection refused; if it runs no more, rosglass node cleanup removes it" in err
+    master.call("unregisterPublisher", "/stale", gone, caller="/dead")
+
+
+def test_kill(run, start_rospy, connect, wait_for):
+    start_rospy("victim").call("publish", topic="/left", type="std_msgs/Empty")
+    ours = connect("ours")
+    ours.create_publisher("/ours/left", "std_msgs/Empty")
+    wait_for(lambda: "/ours/left" in ours.topics() and "/left" in ours.topics())
+    code, out, err = run("node", "kill", "/victim", "ours")
+    assert (code, out, err) == (0, "/victim has ended\n/ours has ended\n", "")
+    wait_for(lambda: ours.status().state.value == "closed")
+    code, out, err = run("node", "kill", "/victim", "--json")
+    assert (code, json.loads(out)) == (1, {"killed": [], "failed": ["/victim"]})
+    assert "there is no node /victim" in err
+
+
+def test_cleanup(run, master, monkeypatch, free_port):
+    api, service = f"http://127.0.0.1:{free_port}/", f"rosrpc://127.0.0.1:{free_port}"
+
+    def leave_behind():
+        master.call("registerPublisher", "/dead/a", "std_msgs/String", api, caller="/dead")
+        master.call("registerSubscriber", "/dead/b", "std_msgs/String", api, caller="/dead")
+        master.call("registerService", "/dead/c", service, api, caller="/dead")
+
+    def listed():
+        return any("/dead" in nodes for part in master.call("getSystemState") for _, nodes in part)
+
+    leave_behind()
+    for said in ("no\n", ""):
+        monkeypatch.setattr("sys.stdin", io.StringIO(said))
+        code, out, err = run("node", "cleanup")
+        assert (code, listed()) == (1, True)
+        assert out.startswith(f"/dead: {api} does not answer")
+        assert "/robot" not in out
+        assert "nothing was changed" in err
+    only_told = {"unreachable": ["/dead"], "removed": []}
+    assert json.loads(run("node", "cleanup", "--json")[1]) == only_told
+    monkeypatch.setattr("sys.stdin", io.StringIO("y\n"))
+    code, out, _ = run("node", "cleanup")
+    assert (code, out.splitlines()[-1]) == (0, f"{master.uri} has forgotten /dead")
+    assert not listed()
+    leave_behind()
+    code, out, _ = run("node", "cleanup", "--yes", "--json")
+    assert (code, json.loads(out)["removed"], listed()) == (0, ["/dead"], False)
+    code, _, err = run("node", "cleanup")
+    assert (code, "all nodes can be reached" in err) == (0, True)
+
+
+@pytest.mark.parametrize("what", [["ping", "/a"], ["kill", "/a"], ["cleanup"]])
+def test_what_ros_2_does_not_have_is_refused(run, what):
+    code, _, err = run("node", *what, "--url", "dds://?domain=7")
+    assert (code, err.count("\n")) == (1, 1)
+    assert f"rosglass node {what[0]} is for ROS 1: say --url ros1://robot:11311" in err
