@@ -79,6 +79,8 @@ class Core(NodeCore[Member]):
         types: Finds types.
         loop: Waits for all sockets.
         errands: Runs what waits for others.
+        lookups: Runs what calls of services wait for: they must not queue behind what topics wait
+            for.
         uri: The node's own API.
         address: Host and port where connections are accepted.
         services: Who takes a connection to a service, by its name; see :class:`Server`.
@@ -97,6 +99,7 @@ class Core(NodeCore[Member]):
         self.master = Master(options.master, name.full)
         self.graph, self.types = Graph(), Types(library, url)
         self.errands = Errands(f"{name.name} errands")
+        self.lookups = Errands(f"{name.name} lookups")
         self.address, self.uri = ("", 0), ""
         self._doors: list[Door] = []
         self._api: Slave | None = None
@@ -244,6 +247,7 @@ class Core(NodeCore[Member]):
         self._registrations.close()
         self._worker.close()
         self.errands.close()
+        self.lookups.close()
         for door in self._doors:
             self.loop.call(door.end)
         self.loop.close()

@@ -358,7 +358,6 @@ class Ros1Node(CoreNode):
         Safe to call twice, from any thread and from callbacks.
         """
         self._core.close()
-        self._services.close()
 
     # -- connections, in the loop's thread -------------------------------------------------------
 

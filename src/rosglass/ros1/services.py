@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from rosglass.comm import Dispatcher, EndpointKind, QoS
 from rosglass.comm.loop import LoopExecutor
 from rosglass.errors import ConversionError, ServiceError
-from rosglass.ros1.errands import Errands
 from rosglass.ros1.service_client import Ros1ServiceClient
 from rosglass.ros1.service_server import Ros1ServiceServer
 from rosglass.ros1.service_types import ServiceTypes
@@ -32,7 +31,7 @@ class Services:
         core: The node.
 
     Attributes:
-        errands: Runs lookups; calls must not queue behind what topics wait for.
+        errands: Runs lookups.
         types: What others' servers say of themselves.
     """
 
@@ -40,7 +39,7 @@ class Services:
         self._core = core
         self._lock = threading.Lock()
         self._servers: dict[str, Ros1ServiceServer] = {}
-        self.errands = Errands(f"{core.name.name} lookups")
+        self.errands = core.lookups
         self.types = ServiceTypes(core, self.errands)
 
     # -- making ----------------------------------------------------------------------------------
@@ -145,10 +144,6 @@ class Services:
             return own.type.name, own.type.md5
         peer = self.types.of(name)
         return ("", "") if peer is None else (peer.type, peer.md5)
-
-    def close(self) -> None:
-        """Look nothing up any more; the members are closed by the node."""
-        self.errands.close()
 
 
 def _profile(qos: QoS | None, name: str) -> QoS:

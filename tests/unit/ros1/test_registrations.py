@@ -185,6 +185,20 @@ def test_a_new_network_address_is_announced_and_the_node_lives_on(
         wait_for(lambda: node.status().state is ConnectionState.CLOSED)
 
 
+def test_a_node_that_somebody_else_closes_looks_nothing_up_any_more(
+    master: FakeMaster, node: Any
+) -> None:
+    master.offer("/add", 1)
+    wait_for(lambda: "/add" in node.services())
+    node._core.shut_down("/master", "[/panel] Reason: new node registered with same name")
+    wait_for(lambda: node.status().state is ConnectionState.CLOSED)
+    wait_for(lambda: "shutdown" not in [thread.name for thread in threading.enumerate()])
+    ran = threading.Event()
+    for errands in (node._core.errands, node._services.errands):
+        errands.run(ran.set)
+    assert not ran.wait(0.3)
+
+
 def test_the_graph_is_told_and_changes_are(master: FakeMaster, node: Ros1Node) -> None:
     changes: list[float] = []
     node.on_graph_change(lambda: changes.append(time.monotonic()))
