@@ -22,7 +22,7 @@ from rosglass.qt import QJSValue, QtCore, QtGui
 if TYPE_CHECKING:
     from rosglass.messages.schema import Member, Number, Schema
 
-__all__ = ["elements_from_js", "fields_from_js", "qos_from_js", "typed_array"]
+__all__ = ["elements_from_js", "fields_from_js", "qos_from_js", "scalar_from_python", "typed_array"]
 
 _TYPED = {
     "Int8Array": "i1",
@@ -83,6 +83,11 @@ def elements_from_js(values: QJSValue, kind: str) -> list[Any]:
 def _renamed_time(given: dict[str, Any], schema: Schema) -> dict[str, Any]:
     parts = known_parts(given, "", f"a time ({schema.name})")
     return dict(zip((member.name for member in schema.members), parts, strict=True))
+
+
+def scalar_from_python(value: Any, member: Member) -> Any:
+    """Return a number, text or bool of a view's editor for a single value, as ``Ros2 1.0`` does."""
+    return _Conversion(Dialect.ROS2)._scalar(value, member, in_array=False)
 
 
 class _Conversion:

@@ -5,6 +5,7 @@ from rosglass.qml.image_item import ImageItem
 from rosglass.qml.image_manager import ImageTransportManager
 from rosglass.qml.image_subscription import ImageTransportSubscription
 from rosglass.qml.logger import LoggerLevel
+from rosglass.qml.message_item_model import MessageItemModel
 from rosglass.qml.ros2.ros2 import Ros2
 from rosglass.qml.service_server import ServiceServer
 from rosglass.qml.subscription import Subscription
@@ -19,6 +20,7 @@ TYPES = {
     "Subscription": Subscription,
     "ImageTransportSubscription": ImageTransportSubscription,
     "ImageItem": ImageItem,
+    "MessageItemModel": MessageItemModel,
     "Ros2LoggerLevel": LoggerLevel,
     "Ros2ClockTypes": ClockTypes,
 }

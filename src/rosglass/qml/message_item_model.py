@@ -1,0 +1,322 @@
+"""``MessageItemModel``: a message as a tree that views show and edit."""
+# ruff: noqa: N802, N815 - the names of slots and signals are Qt's and QML's
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING, Any
+
+from rosglass.errors import ConversionError, Error, InvalidNameError
+from rosglass.qml.from_js import fields_from_js, scalar_from_python
+from rosglass.qml.js_values import integral
+from rosglass.qml.log import Caller, log_from_qml
+from rosglass.qml.message_tree import TreeItem, check_leaf, default_element, plain_tree
+from rosglass.qml.runtime import Runtime, runtime_of
+from rosglass.qml.to_js import exact
+from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot
+
+if TYPE_CHECKING:
+    from rosglass.messages import MessageType
+
+__all__ = ["MessageItemModel"]
+
+_DISPLAY = int(QtCore.Qt.ItemDataRole.DisplayRole)
+_EDIT = int(QtCore.Qt.ItemDataRole.EditRole)
+_TYPE, _INDEX, _ELEMENT = (int(QtCore.Qt.ItemDataRole.UserRole) + i for i in (1, 2, 3))
+_ROLES = {
+    _DISPLAY: b"display",
+    _EDIT: b"edit",
+    _TYPE: b"type",
+    _INDEX: b"treeIndex",
+    _ELEMENT: b"isArrayElement",
+}
+_NAME, _VALUE = 0, 1
+#: More rows inserted at once are a mistake that would freeze the screen.
+_MOST_ROWS = 100_000
+_Index = QtCore.QModelIndex | QtCore.QPersistentModelIndex
+
+
+class MessageItemModel(QtCore.QAbstractItemModel):
+    """The fields of a message as rows: column 0 their names, column 1 their values.
+
+    A message that is set keeps the rows that both have, so that views stay unfolded while messages
+    arrive.
+    """
+
+    messageChanged = Signal()
+    messageTypeChanged = Signal()
+    #: Somebody edited the message here.
+    modified = Signal()
+
+    def __init__(self, parent: QtCore.QObject | None = None) -> None:
+        super().__init__(parent)
+        self._type_name = ""
+        self._type: MessageType | None = None
+        self._root: TreeItem | None = None
+        self._items: dict[int, TreeItem] = {}
+        self._waiting: QJSValue | None = None
+        self._value: QJSValue | None = None
+
+    # Properties.
+
+    def _runtime(self) -> Runtime | None:
+        return runtime_of(self)
+
+    def _get_message(self) -> QJSValue:
+        runtime, root, kind = self._runtime(), self._root, self._type
+        if runtime is None or root is None or kind is None:
+            return QJSValue()
+        if self._value is None:
+            self._value = runtime.message(kind.create(root.value))
+        return self._value
+
+    def _set_message(self, value: QJSValue | None) -> None:
+        self._waiting = None
+        if value is None or value.isUndefined() or value.isNull():
+            self._clear()
+            return
+        try:
+            marked = value.property("#messageType")
+            name = marked.toString() if marked.isString() else self._type_name
+            if not name:
+                # The type may be set after the message.
+                self._waiting = value
+                return
+            kind = self._find(name)
+            fields = fields_from_js(value, kind.create()._schema__)
+            self._show(kind, plain_tree(kind.create(fields)))
+        except Error as error:
+            self._complain(f"the message is not shown: {error}")
+            return
+        if name != self._type_name:
+            self._type_name = name
+            self.messageTypeChanged.emit()
+        self.messageChanged.emit()
+
+    def _get_type(self) -> str:
+        return self._type_name
+
+    def _set_type(self, name: str) -> None:
+        if name == self._type_name:
+            return
+        self._type_name = name
+        waiting = self._waiting
+        self._clear()
+        self.messageTypeChanged.emit()
+        if waiting is not None:
+            self._set_message(waiting)
+
+    message = Property(QJSValue, _get_message, _set_message, notify=messageChanged)
+    messageType = Property(str, _get_type, _set_type, notify=messageTypeChanged)
+
+    def _find(self, name: str) -> MessageType:
+        from rosglass.messages import MessageType, load  # noqa: PLC0415 - brings in the definitions
+
+        if self._type is not None and name in {self._type.name, self._type_name}:
+            return self._type
+        kind = load(name, ros=2)
+        if not isinstance(kind, MessageType):
+            raise InvalidNameError(f"{name} is not a message type")
+        return kind
+
+    def _clear(self) -> None:
+        had = self._root is not None
+        self.beginResetModel()
+        self._root, self._type, self._value = None, None, None
+        self._items.clear()
+        self.endResetModel()
+        if had:
+            self.messageChanged.emit()
+
+    def _show(self, kind: MessageType, value: dict[str, Any]) -> None:
+        self._value = None
+        if self._root is not None and kind is self._type:
+            self._merge(self._root, value)
+            return
+        self.beginResetModel()
+        self._items.clear()
+        self._type = kind
+        self._root = TreeItem(None, 0, kind.create()._schema__, None, value)
+        self.endResetModel()
+
+    def _merge(self, item: TreeItem, value: Any) -> None:
+        """Take an item's new value over, and tell views what changed."""
+        index = self._index_of(item)
+        before, after = (len(item.value), len(value)) if item.is_array else (0, 0)
+        if after < before:
+            self.beginRemoveRows(index, after, before - 1)
+            self._forget(item.cut(after))
+            item.value = list(item.value)[:after]
+            self.endRemoveRows()
+        elif after > before:
+            self.beginInsertRows(index, before, after - 1)
+            item.value = [*item.value, *value[before:]]
+            self.endInsertRows()
+        for child in list(item.children.values()):
+            if not child.is_leaf:
+                self._merge(child, value[child.name])
+        item.value = value
+        if item.children:
+            last = item.count - 1
+            first = self.index(0, _VALUE, index)
+            self.dataChanged.emit(first, self.index(last, _VALUE, index))
+
+    # The tree, as views see it.
+
+    def _item(self, index: _Index | None) -> TreeItem | None:
+        if index is None or not index.isValid():
+            return self._root
+        return self._items.get(index.internalId())
+
+    def _index_of(self, item: TreeItem, column: int = 0) -> QtCore.QModelIndex:
+        if item.parent is None:
+            return QtCore.QModelIndex()
+        return self.createIndex(item.row, column, item.number)
+
+    def index(self, row: int, column: int, parent: _Index | None = None) -> QtCore.QModelIndex:
+        """Return the index of a child."""
+        item = self._item(parent)
+        inside = parent is None or not parent.isValid() or parent.column() == _NAME
+        if item is None or not inside or not 0 <= row < item.count or not 0 <= column <= 1:
+            return QtCore.QModelIndex()
+        child = item.child(row)
+        self._items[child.number] = child
+        return self.createIndex(row, column, child.number)
+
+    def parent(self, index: _Index | None = None) -> Any:
+        """Return the index of an item's parent; without an index, the object's parent."""
+        if index is None:
+            return super().parent()
+        item = self._items.get(index.internalId()) if index.isValid() else None
+        if item is None or item.parent is None:
+            return QtCore.QModelIndex()
+        return self._index_of(item.parent)
+
+    def rowCount(self, parent: _Index | None = None) -> int:
+        """Return how many fields or elements an item has."""
+        item = self._item(parent)
+        if item is None or (parent is not None and parent.isValid() and parent.column() != _NAME):
+            return 0
+        return item.count
+
+    def columnCount(self, parent: _Index | None = None) -> int:  # noqa: ARG002 - Qt's signature
+        """Return 2: names and values."""
+        return 2
+
+    def roleNames(self) -> dict[int, QtCore.QByteArray]:
+        """Return the names that delegates use."""
+        return {role: QtCore.QByteArray(name) for role, name in _ROLES.items()}
+
+    def headerData(self, section: int, orientation: Any, role: int = _DISPLAY) -> Any:
+        """Return the columns' titles."""
+        if orientation != QtCore.Qt.Orientation.Horizontal or role != _DISPLAY:
+            return None
+        return ("Name", "Value")[section] if section in {0, 1} else None
+
+    def data(self, index: _Index, role: int = _DISPLAY) -> Any:
+        """Return what a cell shows."""
+        item = self._item(index) if index.isValid() else None
+        if item is None:
+            return None
+        if role == _TYPE:
+            return item.type_name
+        if role == _INDEX:
+            return self._index_of(item)
+        if role == _ELEMENT:
+            return item.is_element
+        if role not in {_DISPLAY, _EDIT}:
+            return None
+        if index.column() == _NAME:
+            return item.name
+        if not item.is_leaf:
+            return None
+        value = item.value
+        return exact(value) if type(value) is int else value
+
+    def flags(self, index: _Index) -> Any:
+        """Return that leaves' values can be edited."""
+        item = self._item(index) if index.isValid() else None
+        if item is None:
+            return QtCore.Qt.ItemFlag.NoItemFlags
+        flags = QtCore.Qt.ItemFlag.ItemIsEnabled | QtCore.Qt.ItemFlag.ItemIsSelectable
+        if index.column() == _VALUE and item.is_leaf:
+            flags |= QtCore.Qt.ItemFlag.ItemIsEditable
+        return flags
+
+    # Editing.
+
+    def setData(self, index: _Index, value: Any, role: int = _EDIT) -> bool:
+        """Set a leaf; false, with the reason in the log, when the value does not fit."""
+        item = self._item(index) if index.isValid() else None
+        if item is None or not item.is_leaf or index.column() != _VALUE or role != _EDIT:
+            return False
+        try:
+            assert item.member is not None
+            found = value.toVariant() if isinstance(value, QJSValue) else value
+            item.set(check_leaf(item, scalar_from_python(found, item.member)))
+        except ConversionError as error:
+            self._complain(f"{item.path} was not changed: {error}")
+            return False
+        self.dataChanged.emit(index, index)
+        self._edited()
+        return True
+
+    @Slot("QVariant", "QVariant", result=bool)
+    @Slot("QVariant", "QVariant", "QVariant", result=bool)
+    def insertRows(self, row: Any, count: Any, parent: Any = None) -> bool:
+        """Insert default elements into an array; false where the type does not allow it."""
+        row, count = integral(row), integral(count)
+        item = self._array(parent, "insertRows", row, count)
+        if item is None or not 0 <= row <= item.count:
+            return False
+        bound = item.bound
+        if count > _MOST_ROWS or (bound is not None and item.count + count > bound):
+            most = _MOST_ROWS if bound is None else bound
+            self._complain(f"{item.path}: {item.count + count} elements are too many; {most} fit")
+            return False
+        self.beginInsertRows(self._index_of(item), row, row + count - 1)
+        item.insert(row, [default_element(item) for _ in range(count)])
+        self.endInsertRows()
+        self._edited()
+        return True
+
+    @Slot("QVariant", "QVariant", result=bool)
+    @Slot("QVariant", "QVariant", "QVariant", result=bool)
+    def removeRows(self, row: Any, count: Any, parent: Any = None) -> bool:
+        """Remove elements of an array; false where the type does not allow it."""
+        row, count = integral(row), integral(count)
+        item = self._array(parent, "removeRows", row, count)
+        if item is None or row < 0 or row + count > item.count:
+            return False
+        self.beginRemoveRows(self._index_of(item), row, row + count - 1)
+        self._forget(item.remove(row, count))
+        self.endRemoveRows()
+        self._edited()
+        return True
+
+    def _array(self, parent: Any, what: str, row: Any, count: Any) -> TreeItem | None:
+        """Return the array whose length may be changed; None, with a reason in the log."""
+        known = isinstance(parent, (QtCore.QModelIndex, QtCore.QPersistentModelIndex))
+        item = self._item(parent) if known else self._root
+        if type(row) is not int or type(count) is not int or count < 1 or item is None:
+            return None
+        if not item.is_array or item.is_fixed:
+            kind = "has a fixed length" if item.is_array else "is no array"
+            self._complain(f"{what}: {item.path or 'the message'} {kind}")
+            return None
+        return item
+
+    def _edited(self) -> None:
+        self._value = None
+        self.modified.emit()
+        self.messageChanged.emit()
+
+    def _forget(self, items: list[TreeItem]) -> None:
+        for item in items:
+            self._items.pop(item.number, None)
+            self._forget(list(item.children.values()))
+
+    def _complain(self, problem: str) -> None:
+        runtime = self._runtime()
+        caller = runtime.caller() if runtime is not None else Caller("<unknown>", 0, "")
+        log_from_qml("", logging.ERROR, f"MessageItemModel: {problem}", caller)
