@@ -195,6 +195,8 @@ class ParameterServer(Handle):
     ) -> list[str]:
         """Set what a file has, as ``rosparam load`` does; what else is there stays.
 
+        The node's own subscriptions are told once, when all is set.
+
         Args:
             path: A YAML file; ``_ns``, ``!degrees``, ``!radians``, ``deg()``, ``rad()`` count.
             namespace: Where to; the node's namespace unless given.
@@ -217,8 +219,13 @@ class ParameterServer(Handle):
                 wanted.update(self._leaves(place, {inner: value} if inner else value))
         except (ParameterError, InvalidNameError) as error:
             raise ParameterError(f"{os.fspath(path)}: {error}") from None
-        for full, wire in wanted.items():
-            self._change("setParam", full, wire, timeout=timeout)
+        sent = []
+        try:
+            for full, wire in wanted.items():
+                sent.append(full)
+                self._send("setParam", full, wire, timeout=timeout)
+        finally:
+            self._look_again(sent)
         return list(wanted)
 
     def save(
@@ -335,12 +342,18 @@ class ParameterServer(Handle):
         return similar(full, [*names, *sorted(spaces)])
 
     def _change(self, method: str, full: str, *arguments: Any, timeout: float) -> None:
+        self._send(method, full, *arguments, timeout=timeout)
+        self._look_again([full])
+
+    def _send(self, method: str, full: str, *arguments: Any, timeout: float) -> None:
         try:
             self._call(method, full, *arguments, timeout=timeout)
         except MasterError as error:
             raise ParameterError(f"parameter {full}: {error}") from error
-        # The master tells everybody but who made the change.
-        for watch in self._watches.touched(full):
+
+    def _look_again(self, names: list[str]) -> None:
+        """Read what is followed of these: the master tells everybody but who made the change."""
+        for watch in {watch for name in names for watch in self._watches.touched(name)}:
             watch.ask()
 
     def _call(self, method: str, *arguments: Any, timeout: float) -> Any:

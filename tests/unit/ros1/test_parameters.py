@@ -519,6 +519,18 @@ def test_files_are_loaded_whole_or_not_at_all(node, server, master, tmp_path):
     assert server.names() == before
 
 
+def test_who_follows_a_namespace_is_told_of_a_file_as_a_whole(server, tmp_path, eventually):
+    path = tmp_path / "many.yaml"
+    path.write_text("".join(f"p{number}: {number}\n" for number in range(50)))
+    told = []
+    server.set("/many/old", True)
+    with server.subscribe("/many", told.append):
+        eventually(lambda: told)
+        assert len(server.load(path, "/many")) == 50
+        eventually(lambda: len(told[-1]) == 51)
+    assert [len(value) for value in told] == [1, 51]
+
+
 def test_a_refusal_is_a_master_error_elsewhere(node, master):
     master.answers["getParamNames"] = lambda *_: [0, "broken", 0]
     with pytest.raises(MasterError, match="broken"):
