@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING, Protocol
 
-from rosglass.comm import EndpointKind, Handle, QoS
+from rosglass.comm import EndpointInfo, EndpointKind, Handle, QoS
 from rosglass.comm.complaints import Complaints
 from rosglass.errors import DecodeError
 from rosglass.ros2.action_types import (
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rosglass.messages import Message, MessageType
     from rosglass.ros2.action_types import ActionTypes
     from rosglass.ros2.core import Core
-    from rosglass.ros2.middleware import OnSample
+    from rosglass.ros2.middleware import OnSample, Reader
 
 __all__ = ["ActionEnds", "GoalNews"]
 
@@ -73,10 +73,8 @@ class ActionEnds(Handle):
         )
         self.services = (self.send_goal, self.cancel_goal, self.get_result)
         self._readers = [
-            core.middleware.create_reader(
-                core.name, part(name, topic), kind.name, kind.rihs01, _QOS, self._taker(topic, kind)
-            )
-            for topic, kind in ((FEEDBACK, types.feedback), (STATUS, types.status))
+            self._read(FEEDBACK, types.feedback),
+            self._read(STATUS, types.status),
         ]
 
     def flush(self) -> None:
@@ -88,6 +86,14 @@ class ActionEnds(Handle):
         """Listen and talk no longer; calls that have not ended fail."""
         for end in (*self.services, *self._readers):
             end.close()
+
+    def _read(self, topic: str, kind: MessageType) -> Reader:
+        """Listen to one of the action's topics."""
+        core, full = self._core, part(self._name, topic)
+        endpoint = EndpointInfo(
+            EndpointKind.SUBSCRIPTION, full, kind.name, core.name, _QOS, kind.rihs01
+        )
+        return core.middleware.create_reader(endpoint, self._taker(topic, kind))
 
     def _taker(self, topic: str, kind: MessageType) -> OnSample:
         """Return what takes a topic's samples from the middleware."""

@@ -15,7 +15,7 @@ from rosglass.comm import Handle
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from rosglass.comm import EndpointInfo, NodeName, QoS, Status
+    from rosglass.comm import EndpointInfo, NodeName, Status
     from rosglass.interfaces import Definition
     from rosglass.ros2.graph import Graph
 
@@ -250,21 +250,16 @@ class Middleware(ABC):
         """Show a node in the graph until the handle is closed."""
 
     @abstractmethod
-    def create_writer(
-        self, node: NodeName, topic: str, type_name: str, type_hash: str, qos: QoS
-    ) -> Writer:
-        """Announce a publisher and return its sending end."""
+    def create_writer(self, endpoint: EndpointInfo) -> Writer:
+        """Announce a publisher and return its sending end.
+
+        Args:
+            endpoint: What it is to be, without identity: that comes from here. A service's type is
+                called ``pkg/srv/Type``, or ``pkg/action/Type_SendGoal`` and the like.
+        """
 
     @abstractmethod
-    def create_reader(
-        self,
-        node: NodeName,
-        topic: str,
-        type_name: str,
-        type_hash: str,
-        qos: QoS,
-        on_sample: OnSample,
-    ) -> Reader:
+    def create_reader(self, endpoint: EndpointInfo, on_sample: OnSample) -> Reader:
         """Announce a subscription and hand what arrives to `on_sample`.
 
         Samples whose type has the same name but another hash are handed over too: whether they
@@ -272,37 +267,12 @@ class Middleware(ABC):
         """
 
     @abstractmethod
-    def create_requester(
-        self,
-        node: NodeName,
-        service: str,
-        type_name: str,
-        type_hash: str,
-        qos: QoS,
-        on_reply: OnReply,
-    ) -> Requester:
-        """Announce a service client and return its sending end.
-
-        Args:
-            node: The node it belongs to.
-            service: Absolute name.
-            type_name: ``pkg/srv/Type``, or an action's ``pkg/action/Type_SendGoal`` and the like.
-            type_hash: RIHS01 hash of the service's type.
-            qos: Profile of requests and replies.
-            on_reply: Takes the replies.
-        """
+    def create_requester(self, endpoint: EndpointInfo, on_reply: OnReply) -> Requester:
+        """Announce a service client, whose replies `on_reply` takes; return its sending end."""
 
     @abstractmethod
-    def create_replier(
-        self,
-        node: NodeName,
-        service: str,
-        type_name: str,
-        type_hash: str,
-        qos: QoS,
-        on_request: OnRequest,
-    ) -> Replier:
-        """Announce a service server; arguments as in :meth:`create_requester`."""
+    def create_replier(self, endpoint: EndpointInfo, on_request: OnRequest) -> Replier:
+        """Announce a service server, whose requests `on_request` takes."""
 
     def conflicts(self, endpoint: EndpointInfo) -> Mapping[str, str]:
         """Say what keeps a publisher or subscription from all of ours, besides its profile.

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import (
     DeadlineMissed,
+    EndpointInfo,
     EndpointKind,
     Liveliness,
     LivelinessLost,
@@ -32,7 +33,7 @@ from rosglass.ros2.matching import conflict_events, conflicts, words
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rosglass.comm import EndpointInfo, QoS
+    from rosglass.comm import QoS
     from rosglass.messages import Message, MessageType
     from rosglass.ros2.core import Core
 
@@ -65,7 +66,7 @@ class Ros2Publisher(Publisher, Member):
         self._sent_at = self._shown_at = self._lost_since = 0.0
         self.qos = qos.for_publisher([s.qos for s in self._subscriptions() if s.type == type.name])
         self._writer = core.middleware.create_writer(
-            core.name, topic, type.name, self._hash, self.qos
+            EndpointInfo(EndpointKind.PUBLISHER, topic, type.name, core.name, self.qos, self._hash)
         )
         # Only then sending costs a look at the clock.
         self._timed = self.qos.deadline is not None or self.qos.lease_duration is not None

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from rosglass.comm import (
     DeadlineMissed,
+    EndpointInfo,
     EndpointKind,
     LivelinessChanged,
     Matched,
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from collections.abc import Set as AbstractSet
 
-    from rosglass.comm import EndpointInfo, QoS, Subscription
+    from rosglass.comm import QoS, Subscription
     from rosglass.messages import MessageType
     from rosglass.ros2.core import Core
     from rosglass.ros2.middleware import OnSample, Reader
@@ -266,14 +267,15 @@ class Reading(Member, Source):
         """Receive samples of `message_type` from now on, instead of any before."""
         self.subscription.set_type(message_type)
         self._repeats.guarded = self._reader is not None
-        reader = self._core.middleware.create_reader(
-            self._core.name,
+        endpoint = EndpointInfo(
+            EndpointKind.SUBSCRIPTION,
             self._topic,
             message_type.name,
-            message_type.rihs01,
+            self._core.name,
             self.subscription.qos,
-            self._receiver(),
+            message_type.rihs01,
         )
+        reader = self._core.middleware.create_reader(endpoint, self._receiver())
         with self._lock:
             old, self._reader = self._reader, reader
             if self._closed:

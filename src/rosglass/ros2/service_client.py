@@ -6,7 +6,7 @@ import logging
 import time
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import EndpointKind, QoS
+from rosglass.comm import EndpointInfo, EndpointKind, QoS
 from rosglass.comm.calling import CallingClient
 from rosglass.comm.client import untyped
 from rosglass.comm.similar import similar
@@ -26,7 +26,7 @@ from rosglass.ros2.requests import Link, Request
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rosglass.comm import Call, EndpointInfo
+    from rosglass.comm import Call
     from rosglass.messages import Message, MessageType, ServiceType
     from rosglass.ros2.core import Core
 
@@ -254,10 +254,14 @@ class Ros2ServiceClient(CallingClient[Request], Member):
     def _connect(self, kind: ServiceType) -> None:
         """Speak `kind` from now on."""
         link = Link(kind, self._take)
-        link.requester = self._core.middleware.create_requester(
-            self._core.name, self.name, kind.name, self._announced.hash, self.qos, link.take
+        core, known = self._core, self._announced.hash
+        link.requester = core.middleware.create_requester(
+            EndpointInfo(
+                EndpointKind.SERVICE_CLIENT, self.name, kind.name, core.name, self.qos, known
+            ),
+            link.take,
         )
-        link.requester.changed, link.requester.quick = self._core.wake, link.quick
+        link.requester.changed, link.requester.quick = core.wake, link.quick
         with self._lock:
             old, self._link = self._link, link
             self.type = kind

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import Dispatcher, EndpointKind, LoopExecutor, QoS
+from rosglass.comm import Dispatcher, EndpointInfo, EndpointKind, LoopExecutor, QoS
 from rosglass.comm.answering import AnsweringServer
 from rosglass.errors import Error, NodeClosedError
 from rosglass.ros2.announced import Announced, mismatches, nodes_of
@@ -52,8 +52,9 @@ class Ros2ServiceServer(AnsweringServer[RequestId], Member):
         self.qos = qos or QoS.services()
         self._announced = Announced(core, core.types.service, self.type, fixed=True)
         self._warned = ""
+        kind, known = EndpointKind.SERVICE_SERVER, self._announced.hash
         self._replier = core.middleware.create_replier(
-            core.name, name, self.type.name, self._announced.hash, self.qos, self._on_request
+            EndpointInfo(kind, name, self.type.name, core.name, self.qos, known), self._on_request
         )
         # Others' executors may do anything.
         self._replier.quick = isinstance(self.executor, (Dispatcher, LoopExecutor))

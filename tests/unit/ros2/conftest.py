@@ -6,6 +6,7 @@ import itertools
 import queue
 import threading
 import time
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -20,6 +21,10 @@ if TYPE_CHECKING:
 
 SERVER, CLIENT = EndpointKind.SERVICE_SERVER, EndpointKind.SERVICE_CLIENT
 _gids = itertools.count(1)
+
+
+def _identified(endpoint: EndpointInfo) -> EndpointInfo:
+    return replace(endpoint, gid=next(_gids).to_bytes(16, "big"))
 
 
 class FakeNetwork:
@@ -250,52 +255,23 @@ class FakeMiddleware(Middleware):
         self.graph.put_node("own", node)
         return FakeReader("", "", "", None)
 
-    def create_writer(
-        self, node: NodeName, topic: str, type_name: str, type_hash: str, qos: QoS
-    ) -> Writer:
-        writer = FakeWriter(self, topic, type_name, type_hash, qos)
+    def create_writer(self, endpoint: EndpointInfo) -> Writer:
+        writer = FakeWriter(self, endpoint.name, endpoint.type, endpoint.type_hash, endpoint.qos)
         self.writers.append(writer)
         return writer
 
-    def create_reader(
-        self,
-        node: NodeName,
-        topic: str,
-        type_name: str,
-        type_hash: str,
-        qos: QoS,
-        on_sample: Any,
-    ) -> Handle:
-        reader = FakeReader(topic, type_name, type_hash, on_sample, qos)
+    def create_reader(self, endpoint: EndpointInfo, on_sample: Any) -> Handle:
+        name, kind = endpoint.name, endpoint.type
+        reader = FakeReader(name, kind, endpoint.type_hash, on_sample, endpoint.qos)
         self.readers.append(reader)
         return reader
 
-    def create_requester(
-        self,
-        node: NodeName,
-        service: str,
-        type_name: str,
-        type_hash: str,
-        qos: QoS,
-        on_reply: Any,
-    ) -> Requester:
-        gid = next(_gids).to_bytes(16, "big")
-        info = EndpointInfo(CLIENT, service, type_name, node, qos, type_hash, gid)
-        self.requesters.append(FakeRequester(self, info, on_reply))
+    def create_requester(self, endpoint: EndpointInfo, on_reply: Any) -> Requester:
+        self.requesters.append(FakeRequester(self, _identified(endpoint), on_reply))
         return self.requesters[-1]
 
-    def create_replier(
-        self,
-        node: NodeName,
-        service: str,
-        type_name: str,
-        type_hash: str,
-        qos: QoS,
-        on_request: Any,
-    ) -> Replier:
-        gid = next(_gids).to_bytes(16, "big")
-        info = EndpointInfo(SERVER, service, type_name, node, qos, type_hash, gid)
-        self.repliers.append(FakeReplier(self, info, on_request))
+    def create_replier(self, endpoint: EndpointInfo, on_request: Any) -> Replier:
+        self.repliers.append(FakeReplier(self, _identified(endpoint), on_request))
         return self.repliers[-1]
 
     def poll(self) -> None:

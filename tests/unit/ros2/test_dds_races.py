@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import rosglass
-from rosglass.comm import QoS
+from rosglass.comm import EndpointInfo, EndpointKind, QoS
 from rosglass.errors import NodeClosedError
 
 pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
@@ -202,7 +202,8 @@ def test_some_who_left_are_remembered(monkeypatch):
 def test_writing_after_the_end_is_told(node):
     """The memory that this takes went with the node."""
     middleware, name = node._core.middleware, node._core.name
-    writer = middleware.create_writer(name, "/t", "std_msgs/msg/String", "", QoS())
+    endpoint = EndpointInfo(EndpointKind.PUBLISHER, "/t", "std_msgs/msg/String", name)
+    writer = middleware.create_writer(endpoint)
     payload = b"\0\1\0\0\1\0\0\0\0"
     writer.write(payload)
     node.close()

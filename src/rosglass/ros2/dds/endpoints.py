@@ -27,7 +27,7 @@ from rosglass.ros2.names import mangle_type
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from rosglass.comm import NodeName, QoS
+    from rosglass.comm import EndpointInfo, QoS
     from rosglass.ros2.dds.participant import Participant
     from rosglass.ros2.middleware import OnSample
 
@@ -309,27 +309,19 @@ class SampleReader:
 class DdsWriter(Writer):
     """The sending end of a publisher."""
 
-    def __init__(
-        self,
-        participant: Participant,
-        node: NodeName,
-        topic: str,
-        type_name: str,
-        type_hash: str,
-        qos: QoS,
-    ) -> None:
+    def __init__(self, participant: Participant, endpoint: EndpointInfo) -> None:
         self._participant = participant
-        self._place = f"topic {topic}"
+        self._place = f"topic {endpoint.name}"
         self._writer = SampleWriter(
             participant,
-            topic_name(topic),
-            mangle_type(type_name),
-            qos,
-            format_user_data({"typehash": type_hash}),
+            topic_name(endpoint.name),
+            mangle_type(endpoint.type),
+            endpoint.qos,
+            format_user_data({"typehash": endpoint.type_hash}),
             self._place,
         )
         self.gid = self._writer.guid
-        participant.add_endpoint(node, self.gid, writer=True)
+        participant.add_endpoint(endpoint.node, self.gid, writer=True)
 
     def write(self, data: bytes | bytearray) -> None:
         """Send a payload; a reliable writer that keeps all waits for slow readers."""
@@ -353,30 +345,23 @@ class DdsReader(Reader):
     """The receiving end of a subscription."""
 
     def __init__(
-        self,
-        participant: Participant,
-        node: NodeName,
-        topic: str,
-        type_name: str,
-        type_hash: str,
-        qos: QoS,
-        on_sample: OnSample,
+        self, participant: Participant, endpoint: EndpointInfo, on_sample: OnSample
     ) -> None:
         self._participant, self._on_sample = participant, on_sample
         self._writers: dict[int, tuple[bytes, str]] = {}
         self._made = threading.Event()
         self._reader = SampleReader(
             participant,
-            topic_name(topic),
-            mangle_type(type_name),
-            qos,
-            format_user_data({"typehash": type_hash}),
-            f"topic {topic}",
+            topic_name(endpoint.name),
+            mangle_type(endpoint.type),
+            endpoint.qos,
+            format_user_data({"typehash": endpoint.type_hash}),
+            f"topic {endpoint.name}",
             self._hand_on,
         )
         self._made.set()
         self.gid = self._reader.guid
-        participant.add_endpoint(node, self.gid, writer=False)
+        participant.add_endpoint(endpoint.node, self.gid, writer=False)
 
     def set_eager(self, eager: bool) -> None:
         """Hand samples on as they come, or now and then."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rosglass.comm import ConnectionState, EndpointInfo, EndpointKind, Handle, Status
+from rosglass.comm import ConnectionState, EndpointKind, Handle, Status
 from rosglass.errors import NodeClosedError
 from rosglass.ros2.dds.discovery import DdsDiscovery
 from rosglass.ros2.dds.endpoints import DdsReader, DdsWriter
@@ -17,7 +18,7 @@ from rosglass.ros2.middleware import Middleware, Reader, Replier, Requester, Wri
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from rosglass.comm import NodeName, QoS
+    from rosglass.comm import EndpointInfo, NodeName
     from rosglass.interfaces import Definition
     from rosglass.ros2.dds.options import DdsOptions
     from rosglass.ros2.graph import Graph
@@ -69,64 +70,28 @@ class DdsMiddleware(Middleware):
         """Show a node in the graph until the handle is closed."""
         return _Announcement(self._joined(), node)
 
-    def create_writer(
-        self, node: NodeName, topic: str, type_name: str, type_hash: str, qos: QoS
-    ) -> Writer:
+    def create_writer(self, endpoint: EndpointInfo) -> Writer:
         """Create a DDS writer."""
-        writer = DdsWriter(self._joined(), node, topic, type_name, type_hash, qos)
-        kind = EndpointKind.PUBLISHER
-        self._show(EndpointInfo(kind, topic, type_name, node, qos, type_hash, writer.gid))
+        writer = DdsWriter(self._joined(), endpoint)
+        self._show(endpoint, writer.gid)
         return writer
 
-    def create_reader(
-        self,
-        node: NodeName,
-        topic: str,
-        type_name: str,
-        type_hash: str,
-        qos: QoS,
-        on_sample: OnSample,
-    ) -> Reader:
+    def create_reader(self, endpoint: EndpointInfo, on_sample: OnSample) -> Reader:
         """Create a DDS reader."""
-        reader = DdsReader(self._joined(), node, topic, type_name, type_hash, qos, on_sample)
-        kind = EndpointKind.SUBSCRIPTION
-        self._show(EndpointInfo(kind, topic, type_name, node, qos, type_hash, reader.gid))
+        reader = DdsReader(self._joined(), endpoint, on_sample)
+        self._show(endpoint, reader.gid)
         return reader
 
-    def create_requester(
-        self,
-        node: NodeName,
-        service: str,
-        type_name: str,
-        type_hash: str,
-        qos: QoS,
-        on_reply: OnReply,
-    ) -> Requester:
+    def create_requester(self, endpoint: EndpointInfo, on_reply: OnReply) -> Requester:
         """Create a service client's DDS writer and reader."""
-        participant = self._joined()
-        requester = DdsRequester(
-            participant, self._graph, node, service, type_name, type_hash, qos, on_reply
-        )
-        kind = EndpointKind.SERVICE_CLIENT
-        self._show(EndpointInfo(kind, service, type_name, node, qos, type_hash, requester.gid))
+        requester = DdsRequester(self._joined(), self._graph, endpoint, on_reply)
+        self._show(endpoint, requester.gid)
         return requester
 
-    def create_replier(
-        self,
-        node: NodeName,
-        service: str,
-        type_name: str,
-        type_hash: str,
-        qos: QoS,
-        on_request: OnRequest,
-    ) -> Replier:
+    def create_replier(self, endpoint: EndpointInfo, on_request: OnRequest) -> Replier:
         """Create a service server's DDS reader and writer."""
-        participant = self._joined()
-        replier = DdsReplier(
-            participant, self._graph, node, service, type_name, type_hash, qos, on_request
-        )
-        kind = EndpointKind.SERVICE_SERVER
-        self._show(EndpointInfo(kind, service, type_name, node, qos, type_hash, replier.gid))
+        replier = DdsReplier(self._joined(), self._graph, endpoint, on_request)
+        self._show(endpoint, replier.gid)
         return replier
 
     def conflicts(self, endpoint: EndpointInfo) -> Mapping[str, str]:
@@ -158,10 +123,10 @@ class DdsMiddleware(Middleware):
             participant.close()
         self._changed()
 
-    def _show(self, endpoint: EndpointInfo) -> None:
+    def _show(self, endpoint: EndpointInfo, gid: bytes) -> None:
         """Show an endpoint of ours in our graph at once; discovery hides it when it is gone."""
         if self._discovery is not None:
-            self._discovery.show(endpoint)
+            self._discovery.show(replace(endpoint, gid=gid))
 
     def _joined(self) -> Participant:
         if self._participant is None or self._closed:

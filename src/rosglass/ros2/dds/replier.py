@@ -29,7 +29,7 @@ from rosglass.ros2.dds.service_ends import (
 from rosglass.ros2.middleware import Replier, RequestId
 
 if TYPE_CHECKING:
-    from rosglass.comm import NodeName, QoS
+    from rosglass.comm import EndpointInfo
     from rosglass.ros2.dds.cyclone_builtin import Discovered
     from rosglass.ros2.dds.endpoints import Taken
     from rosglass.ros2.dds.participant import Participant
@@ -73,32 +73,17 @@ class DdsReplier(Replier):
         self,
         participant: Participant,
         graph: Graph,
-        node: NodeName,
-        service: str,
-        type_name: str,
-        type_hash: str,
-        qos: QoS,
+        endpoint: EndpointInfo,
         on_request: OnRequest,
     ) -> None:
-        self._service, self._on_request = service, on_request
+        self._service, self._on_request = endpoint.name, on_request
         #: Clients whose readers of replies are matched, as found out since the last change.
         self._hearing: set[bytes] = set()
         self._strangers = False
         #: Origins, by their identity, of requests left to the pump: none may overtake them.
         self._left: OrderedDict[int, Origin] = OrderedDict()
         self._leaving = threading.Lock()
-        self._ends = Ends(
-            participant,
-            graph,
-            node,
-            service,
-            type_name,
-            type_hash,
-            qos,
-            self._on_requests,
-            self._link,
-            server=True,
-        )
+        self._ends = Ends(participant, graph, endpoint, self._on_requests, self._link)
         self._pump = participant.pump
         self.gid = self._ends.reader.guid
         self._ends.origins.hasten(self._hasten)

@@ -36,7 +36,7 @@ from rosglass.ros2.dds.service_ends import (
 from rosglass.ros2.middleware import SERVER_LEFT, Requester
 
 if TYPE_CHECKING:
-    from rosglass.comm import NodeName, QoS
+    from rosglass.comm import EndpointInfo
     from rosglass.ros2.dds.cyclone_builtin import Discovered
     from rosglass.ros2.dds.endpoints import Taken
     from rosglass.ros2.dds.identity import Identity, Origin
@@ -62,14 +62,10 @@ class DdsRequester(Requester):
         self,
         participant: Participant,
         graph: Graph,
-        node: NodeName,
-        service: str,
-        type_name: str,
-        type_hash: str,
-        qos: QoS,
+        endpoint: EndpointInfo,
         on_reply: OnReply,
     ) -> None:
-        self._service, self._on_reply = service, on_reply
+        self._service, self._on_reply = endpoint.name, on_reply
         self._lock = threading.Lock()
         #: What rmw_cyclonedds takes an instance handle for: nobody else's may be the same.
         self._id = secrets.randbits(64)
@@ -87,18 +83,7 @@ class DdsRequester(Requester):
         #: When readers of requests that belong to no known server came, and when to look again.
         self._unlinked: dict[bytes, float] = {}
         self._recheck = math.inf
-        self._ends = Ends(
-            participant,
-            graph,
-            node,
-            service,
-            type_name,
-            type_hash,
-            qos,
-            self._on_replies,
-            self._link,
-            server=False,
-        )
+        self._ends = Ends(participant, graph, endpoint, self._on_replies, self._link)
         assert self._ends.writer is not None
         self._writer = self._ends.writer
         self.gid = self._writer.guid

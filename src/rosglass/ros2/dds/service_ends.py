@@ -33,7 +33,7 @@ from rosglass.ros2.names import mangle_type
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from rosglass.comm import EndpointInfo, NodeName, QoS
+    from rosglass.comm import EndpointInfo
     from rosglass.ros2.dds.identity import Origin
     from rosglass.ros2.dds.participant import Participant
     from rosglass.ros2.graph import Graph
@@ -172,14 +172,9 @@ class Ends:
     Args:
         participant: Who they belong to.
         graph: Where peers' names are looked up.
-        node: The node they belong to.
-        service: Absolute name.
-        type_name: The service's type.
-        type_hash: Its RIHS01 hash.
-        qos: Profile of requests and replies.
+        endpoint: The client or server.
         on_taken: Takes what the reader receives, from :meth:`start` on.
         on_matched: Called, on the participant's pump mostly, when peers came, went or settled.
-        server: Whether they are a server's.
 
     Attributes:
         reader: Receives the other side's.
@@ -195,18 +190,13 @@ class Ends:
         self,
         participant: Participant,
         graph: Graph,
-        node: NodeName,
-        service: str,
-        type_name: str,
-        type_hash: str,
-        qos: QoS,
+        endpoint: EndpointInfo,
         on_taken: Callable[[list[Taken]], None],
         on_matched: Callable[[], None],
-        *,
-        server: bool,
     ) -> None:
-        self._participant, self._graph, self._node = participant, graph, node
-        self._service, self._place = service, f"service {service}"
+        self._participant, self._graph, self._node = participant, graph, endpoint.node
+        self._service, self._place = endpoint.name, f"service {endpoint.name}"
+        self._server = server = endpoint.kind is EndpointKind.SERVICE_SERVER
         self._kind = EndpointKind.SERVICE_CLIENT if server else EndpointKind.SERVICE_SERVER
         self._on_taken, self._on_matched = on_taken, on_matched
         self._started = threading.Event()
@@ -215,13 +205,15 @@ class Ends:
         self._looking, self._probing = threading.Lock(), threading.Lock()
         self._probe: list[int] = []
         self.closed = False
-        requests = f"rq{service}Request", mangle_type(f"{type_name}_Request")
-        replies = f"rr{service}Reply", mangle_type(f"{type_name}_Response")
+        requests = f"rq{endpoint.name}Request", mangle_type(f"{endpoint.type}_Request")
+        replies = f"rr{endpoint.name}Reply", mangle_type(f"{endpoint.type}_Response")
         self._received, self._sent = (requests, replies) if server else (replies, requests)
         what = "serviceid" if server else "clientid"
-        self._user_data = format_user_data({what: _new_id(participant.guid), "typehash": type_hash})
-        self.depth = max(qos.depth, _DEPTH)
-        self._qos = replace(qos, depth=self.depth)
+        self._user_data = format_user_data(
+            {what: _new_id(participant.guid), "typehash": endpoint.type_hash}
+        )
+        self.depth = max(endpoint.qos.depth, _DEPTH)
+        self._qos = replace(endpoint.qos, depth=self.depth)
         self.outbox = Outbox(self._wake, in_order=not server)
         self.writer: SampleWriter | None = None
         self.readers: Matched | None = None
@@ -240,9 +232,8 @@ class Ends:
         self.writers = Matched(
             self.reader.entity, cyclone.matched_publications, cyclone_builtin.matched_publication
         )
-        participant.add_endpoint(node, self.reader.guid, writer=False)
+        participant.add_endpoint(self._node, self.reader.guid, writer=False)
         _here[participant.guid[:PREFIX]] += 1
-        self._server = server
         if not server or self._synced():
             try:
                 self._open()

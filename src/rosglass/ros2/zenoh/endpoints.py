@@ -29,7 +29,7 @@ from rosglass.ros2.zenoh.keys import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from rosglass.comm import EndpointInfo, QoS, Status
+    from rosglass.comm import EndpointInfo, Status
     from rosglass.ros2.zenoh.local import Places
     from rosglass.ros2.zenoh.options import ZenohOptions
     from rosglass.ros2.zenoh.reader import ZenohReader
@@ -177,28 +177,25 @@ class ZenohWriter(Declaration, Writer):
         owner: Owner,
         options: ZenohOptions,
         token: str,
-        topic: str,
-        type_name: str,
-        type_hash: str,
-        qos: QoS,
+        endpoint: EndpointInfo,
         shared: SharedMemory | None,
         readers: Places[ZenohReader],
     ) -> None:
         super().__init__(owner, token)
-        self._readers, self._place = readers, (topic, type_name)
-        self._options, self._topic, self._qos = options, topic, qos
-        self._type_name, self._type_hash = type_name, type_hash
+        self._options, self._topic, self._qos = options, endpoint.name, endpoint.qos
+        self._type_name, self._type_hash = endpoint.type, endpoint.type_hash
+        self._readers, self._place = readers, (self._topic, self._type_name)
         self.gid = gid_of(token)
         self._numbers = itertools.count(1)
         self._session: zenoh.Session | None = None
-        self._hashes = {HUMBLE_HASH if options.humble else type_hash or HUMBLE_HASH}
+        self._hashes = {HUMBLE_HASH if options.humble else self._type_hash or HUMBLE_HASH}
         self._publishers: tuple[Any, ...] = ()
         self._writing: list[int] = []
         self._abandoned = False
         self._quiet = threading.Condition(self._lock)
         # Kept for keys that are declared later: late subscriptions are owed the last samples.
-        self._latched = qos.durability is Durability.TRANSIENT_LOCAL
-        self._history: deque[tuple[bytes | bytearray, bytes]] = deque(maxlen=qos.depth)
+        self._latched = self._qos.durability is Durability.TRANSIENT_LOCAL
+        self._history: deque[tuple[bytes | bytearray, bytes]] = deque(maxlen=self._qos.depth)
         self._joining, self._joined = threading.Lock(), bytearray()
         # What is kept for late subscriptions would fill the shared memory for good.
         self._shared = None if self._latched else shared

@@ -19,7 +19,6 @@ from rosglass.comm import (
     EndpointKind,
     Handle,
     NodeName,
-    QoS,
     Status,
 )
 from rosglass.errors import ConnectionLostError, NodeClosedError
@@ -159,79 +158,37 @@ class ZenohMiddleware(Middleware):
         key = Token(self._options.domain, self._id, "0", "0", node).key()
         return self._add(Announcement(self, key))
 
-    def create_writer(
-        self, node: NodeName, topic: str, type_name: str, type_hash: str, qos: QoS
-    ) -> Writer:
+    def create_writer(self, endpoint: EndpointInfo) -> Writer:
         """Declare a publisher and its token."""
-        kind = EndpointKind.PUBLISHER
-        token = self._token(node, EndpointInfo(kind, topic, type_name, node, qos, type_hash))
         writer = ZenohWriter(
-            self,
-            self._options,
-            token,
-            topic,
-            type_name,
-            type_hash,
-            qos,
-            self._shared,
-            self._readers,
+            self, self._options, self._token(endpoint), endpoint, self._shared, self._readers
         )
         self._add(writer)
         return writer
 
-    def create_reader(
-        self,
-        node: NodeName,
-        topic: str,
-        type_name: str,
-        type_hash: str,
-        qos: QoS,
-        on_sample: OnSample,
-    ) -> Reader:
+    def create_reader(self, endpoint: EndpointInfo, on_sample: OnSample) -> Reader:
         """Declare a subscriber to every definition of the type, and its token."""
-        kind = EndpointKind.SUBSCRIPTION
-        token = self._token(node, EndpointInfo(kind, topic, type_name, node, qos, type_hash))
-        key = topic_key(self._options.domain, topic, type_name, "*")
-        place = topic, type_name
-        graph = self._opened_graph()
+        token, graph = self._token(endpoint), self._opened_graph()
+        key = topic_key(self._options.domain, endpoint.name, endpoint.type, "*")
+        place = endpoint.name, endpoint.type
         reader = ZenohReader(
-            self, token, place, key, qos, on_sample, self._drain, self._readers, graph
+            self, token, place, key, endpoint.qos, on_sample, self._drain, self._readers, graph
         )
         self._add(reader)
         return reader
 
-    def create_requester(
-        self,
-        node: NodeName,
-        service: str,
-        type_name: str,
-        type_hash: str,
-        qos: QoS,
-        on_reply: OnReply,
-    ) -> Requester:
+    def create_requester(self, endpoint: EndpointInfo, on_reply: OnReply) -> Requester:
         """Declare a client's token, and queriers that follow its servers."""
-        kind = EndpointKind.SERVICE_CLIENT
-        token = self._token(node, EndpointInfo(kind, service, type_name, node, qos, type_hash))
-        graph = self._opened_graph()
-        wanted = Service(self._options, service, type_name, type_hash)
+        token, graph = self._token(endpoint), self._opened_graph()
+        wanted = Service(self._options, endpoint)
         requester = ZenohRequester(self, token, wanted, graph, on_reply, self._servers)
         self._add(requester)
         return requester
 
-    def create_replier(
-        self,
-        node: NodeName,
-        service: str,
-        type_name: str,
-        type_hash: str,
-        qos: QoS,
-        on_request: OnRequest,
-    ) -> Replier:
+    def create_replier(self, endpoint: EndpointInfo, on_request: OnRequest) -> Replier:
         """Declare a server's queryables, and its token."""
-        kind = EndpointKind.SERVICE_SERVER
-        token = self._token(node, EndpointInfo(kind, service, type_name, node, qos, type_hash))
-        graph = self._opened_graph()
-        offered = Service(self._options, service, type_name, type_hash)
+        token, graph = self._token(endpoint), self._opened_graph()
+        offered = Service(self._options, endpoint)
         replier = ZenohReplier(self, token, offered, graph, on_request, self._servers)
         self._add(replier)
         return replier
@@ -281,13 +238,13 @@ class ZenohMiddleware(Middleware):
         """Have declarations polled soon; for declarations."""
         self._changed()
 
-    def _token(self, node: NodeName, endpoint: EndpointInfo) -> str:
+    def _token(self, endpoint: EndpointInfo) -> str:
         with self._lock:
             again = len(self._used_numbers) > _RESERVE
             number = self._used_numbers.popleft() if again else str(next(self._numbers))
         if self._options.humble:
             endpoint = replace(endpoint, type_hash="")
-        return Token(self._options.domain, self._id, "0", number, node, endpoint).key()
+        return Token(self._options.domain, self._id, "0", number, endpoint.node, endpoint).key()
 
     def _add(self, declaration: Declaration) -> Declaration:
         with self._lock:

@@ -27,9 +27,7 @@ class Service:
 
     Args:
         options: Of the session.
-        name: Absolute name.
-        type: Its type's name.
-        hash: The type's RIHS01 hash.
+        endpoint: The end.
 
     Attributes:
         place: Name and type.
@@ -37,13 +35,13 @@ class Service:
             no definition; the same is meant.
     """
 
-    def __init__(self, options: ZenohOptions, name: str, type: str, hash: str) -> None:
-        self.name, self.type, self.hash = name, type, hash
-        self.place = name, type
-        names = [hash or HUMBLE_HASH, HUMBLE_HASH]
+    def __init__(self, options: ZenohOptions, endpoint: EndpointInfo) -> None:
+        self.name, self.type, self.hash = endpoint.name, endpoint.type, endpoint.type_hash
+        self.place = self.name, self.type
+        names = [self.hash or HUMBLE_HASH, HUMBLE_HASH]
         if options.humble:
             names.reverse()
-        self.keys = {known: topic_key(options.domain, name, type, known) for known in names}
+        self.keys = {known: topic_key(options.domain, *self.place, known) for known in names}
 
     def problem(self, endpoints: Sequence[EndpointInfo], effect: str) -> str:
         """Say which endpoints mean something else by this name, and to what effect."""
