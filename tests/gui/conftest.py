@@ -166,8 +166,8 @@ class RealWorld:
         return rosglass.connect(url or self.url, name, namespace)
 
 
-@pytest.fixture(params=["zenoh", "ros1"])
-def url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
+@pytest.fixture(scope="module", params=["zenoh", "ros1"])
+def url(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """Where a robot and its operator meet: a Zenoh router, or a ROS 1 master."""
     if request.param == "zenoh":
         from rosglass.ros2.zenoh.router import Router
@@ -180,9 +180,10 @@ def url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    env = {"PATH": "/usr/bin:/bin", "HOME": str(tmp_path), "ROS_HOME": str(tmp_path)}
+    home = tmp_path_factory.mktemp("master")
+    env = {"PATH": "/usr/bin:/bin", "HOME": str(home), "ROS_HOME": str(home)}
     command = ["/usr/bin/rosmaster", "--core", "-p", str(port)]
-    with (tmp_path / "rosmaster").open("wb") as output:
+    with (home / "output").open("wb") as output:
         master = subprocess.Popen(command, env=env, stdout=output, stderr=output)
         yield f"ros1://127.0.0.1:{port}?ip=127.0.0.1"
         master.kill()

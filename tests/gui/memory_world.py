@@ -47,7 +47,7 @@ class MemoryWorld:
         url: str | None,
         name: str,
         namespace: str = "/",
-        arguments: tuple[str, ...] = (),  # noqa: ARG002 - this world is told nothing
+        arguments: tuple[str, ...] = (),
     ) -> MemoryNode:
         node = MemoryNode(self, url or "memory://", name, namespace)
         self.nodes.append(node)

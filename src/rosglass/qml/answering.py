@@ -1,6 +1,5 @@
 """Answers from JavaScript: given at once, by a promise, or by calling a function later."""
 
-
 from __future__ import annotations
 
 from concurrent.futures import Future
@@ -100,8 +99,40 @@ class Answers:
         answer.property("then").callWithInstance(answer, functions)
         return future
 
+    def later(self, queue: list[Callable[[], None]], ask: Callable[[], Any]) -> Future[Any]:
+        """Return the future of what `ask` will return, or raise, when the queue's job runs."""
+        future: Future[Any] = Future()
+        self._pending.add(future)
+        future.add_done_callback(self._pending.discard)
+
+        def run() -> None:
+            if future.done():
+                return
+            try:
+                answer = ask()
+            except Error as error:
+                future.set_exception(error)
+                return
+            if isinstance(answer, Future):
+                answer.add_done_callback(lambda done: _pass_on(done, future))
+            else:
+                future.set_result(answer)
+
+        queue.append(run)
+        return future
+
     def give_up(self) -> None:
         """Fail every answer that has not come: who was asked is gone."""
         for future in list(self._pending):
             if not future.done():
                 future.set_exception(Error(f"{self._what} was closed before it answered"))
+
+
+def _pass_on(done: Future[Any], future: Future[Any]) -> None:
+    if future.done():
+        return
+    error = done.exception()
+    if error is None:
+        future.set_result(done.result())
+    else:
+        future.set_exception(error)

@@ -28,7 +28,11 @@ class QmlRosout(logging.Handler):
     def __init__(self, node: Node) -> None:
         super().__init__()
         self._node = node
-        logging.getLogger(ROOT).addHandler(self)
+        logger = logging.getLogger(ROOT)
+        if logger.level == logging.NOTSET:
+            # ROS's own level; Python's would keep what interfaces log from the robot.
+            logger.setLevel(logging.INFO)
+        logger.addHandler(self)
 
     def emit(self, record: logging.LogRecord) -> None:
         """Hand on a record."""

@@ -13,6 +13,8 @@ from rosglass.qml.singleton import full_type
 from rosglass.qt import Property, QJSValue, QtCore, Signal, is_alive
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rosglass.comm.node import Node
     from rosglass.comm.service import ServiceServer as Server
     from rosglass.messages import Message
@@ -40,6 +42,8 @@ class ServiceServer(Element):
         self._enabled = True
         self._server: Server | None = None
         self._answers: Answers | None = None
+        #: Requests that came before the server was there.
+        self._early: list[Callable[[], None]] = []
         self._have: tuple[Node, str, str] | None = None
         self._retry = QtCore.QTimer(self)
         self._retry.setSingleShot(True)
@@ -113,6 +117,9 @@ class ServiceServer(Element):
                     self._retry.start(RETRY)
             else:
                 self._server = result
+                early, self._early = self._early, []
+                for answer in early:
+                    answer()
                 self._at_end["server"] = lambda: session.background(result.close)
                 self._say(result.problem)
                 self.readyChanged.emit()
@@ -125,9 +132,16 @@ class ServiceServer(Element):
         )
 
     def _on_request(self, request: Message) -> Any:
-        runtime, server, answers = self._runtime, self._server, self._answers
-        if not is_alive(self) or runtime is None or server is None or answers is None:
+        if not is_alive(self) or self._answers is None:
             raise ServiceError("the interface that offered this service is gone")
+        if self._server is not None:
+            return self._answer(request, self._server, self._answers)
+        # Somebody waited for the service, and was quicker than the news that it is offered.
+        return self._answers.later(self._early, lambda: self._on_request(request))
+
+    def _answer(self, request: Message, server: Server, answers: Answers) -> Any:
+        runtime = self._runtime
+        assert runtime is not None
         kind = server.type.response
 
         def take(value: QJSValue) -> Any:
@@ -144,6 +158,7 @@ class ServiceServer(Element):
     def _withdraw(self) -> None:
         self._retry.stop()
         answers, self._answers = self._answers, None
+        self._early = []
         if answers is not None:
             answers.give_up()
         server, self._server = self._server, None

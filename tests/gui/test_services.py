@@ -1,0 +1,185 @@
+"""Service clients and servers in QML, and what interfaces log, on real middleware."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from rosglass.errors import Error
+
+if TYPE_CHECKING:
+    from conftest import Bench
+
+
+def test_a_client(live: Bench, wait: Any) -> None:
+    live.robot.create_service_server(
+        "/lamp", "std_srvs/srv/SetBool", lambda request: {"message": f"{request.data}"}
+    )
+    root: Any = live.load("""
+        QtObject {
+            property var client: Ros2.createServiceClient("/lamp", "std_srvs/srv/SetBool")
+            property string called
+            property string promised
+            property string refused
+            function shown() {
+                return [client.name, client.type, client.ready, client.pendingRequests,
+                        client.connectionTimeout].join()
+            }
+            function send() {
+                client.sendRequestAsync({data: true}, function (r) { called = r.message })
+                client.call({data: false}).then(function (r) { promised = r.message })
+                try { client.sendRequestAsync({data: "x"}, function () {}) }
+                catch (error) { refused = String(error) }
+            }
+        }
+    """)
+    wait(lambda: ",true,0,10000" in root.shown())
+    assert root.shown().startswith("/lamp,std_srvs/srv/SetBool")
+    root.send()
+    wait(lambda: (root.property("called"), root.property("promised")) == ("True", "False"))
+    assert "data: expected" in root.property("refused")
+    assert root.shown().endswith(",true,0,10000")
+
+
+def test_requests_wait_for_a_server(live: Bench, wait: Any) -> None:
+    root: Any = live.load("""
+        QtObject {
+            property var client: Ros2.createServiceClient("/late", "std_srvs/Trigger")
+            property string answer
+            Component.onCompleted:
+                client.sendRequestAsync({}, function (r) { answer = r.message })
+        }
+    """)
+    wait(300)
+    live.robot.create_service_server(
+        "/late", "std_srvs/srv/Trigger", lambda request: {"message": "here"}
+    )
+    wait(lambda: root.property("answer") == "here")
+
+
+def test_no_server(live: Bench, wait: Any, caplog: Any) -> None:
+    root: Any = live.load("""
+        QtObject {
+            property var client: Ros2.createServiceClient("/none", "std_srvs/Trigger")
+            property var called
+            property string rejected
+            Component.onCompleted: {
+                client.connectionTimeout = 300
+                client.sendRequestAsync({}, function (r) { called = r })
+                client.call().catch(function (e) { rejected = e.message })
+            }
+        }
+    """)
+    wait(lambda: root.property("called") is False and root.property("rejected"))
+    assert "/none" in root.property("rejected")
+    assert "no server" in caplog.text
+
+
+def test_the_robot_loses_its_server(live: Bench, wait: Any) -> None:
+    server = live.robot.create_service_server("/add", "std_srvs/srv/Trigger", lambda request: None)
+    root: Any = live.load(
+        'QtObject { property var c: Ros2.createServiceClient("/add", "std_srvs/Trigger"); '
+        "function ready() { return c.ready } }"
+    )
+    wait(root.ready)
+    server.close()
+    wait(lambda: not root.ready())
+
+
+@pytest.mark.parametrize(
+    ("handler", "message"),
+    [
+        ("function (r) { return {success: r.data, message: 'at once'} }", "at once"),
+        (
+            "function (r) { return new Promise(function (ok) { ok({message: 'promised'}) }) }",
+            "promised",
+        ),
+        ("function (r, respond) { Qt.callLater(respond, {message: 'later'}) }", "later"),
+        ("function (r, respond) { respond({message: 'directly'}) }", "directly"),
+        ("function () { }", ""),
+    ],
+)
+def test_a_server(live: Bench, wait: Any, handler: str, message: str) -> None:
+    live.load(f"""
+        QtObject {{
+            property ServiceServer server: ServiceServer {{
+                name: "/lamp"; serviceType: "std_srvs/SetBool"; handler: {handler}
+            }}
+        }}
+    """)
+    client = live.robot.create_service_client("/lamp", "std_srvs/srv/SetBool")
+    call = client.call_async({"data": True}, timeout=20)
+    wait(call.done)
+    assert call.result().message == message
+
+
+@pytest.mark.parametrize(
+    ("handler", "reason"),
+    [
+        ("function (r) { throw new Error('no power') }", "no power"),
+        ("function (r) { return {sucess: true} }", "sucess"),
+        ("function (r) { return false }", "returned false"),
+        ("function (r) { return new Promise(function (a, reject) { reject('no bulb') }) }", "bulb"),
+    ],
+)
+def test_failing_handlers(live: Bench, wait: Any, handler: str, reason: str, caplog: Any) -> None:
+    """They are logged; over ROS 1 the caller is told, over ROS 2 nobody can be."""
+    root: Any = live.load(f"""
+        QtObject {{
+            property var server: Ros2.createServiceServer("/lamp", "std_srvs/SetBool", {handler})
+        }}
+    """)
+    client = live.robot.create_service_client("/lamp", "std_srvs/srv/SetBool")
+    call = client.call_async({"data": True}, timeout=20)
+    if live.session.url.startswith("ros1"):
+        wait(call.done)
+        with pytest.raises(Error, match=reason):
+            call.result()
+    else:
+        wait(lambda: reason in caplog.text)
+    assert root is not None
+
+
+def test_misused_makers_throw(live: Bench) -> None:
+    for script in (
+        'Ros2.createServiceServer("/x", "std_srvs/Trigger", 5)',
+        'Ros2.createServiceServer("no good", "std_srvs/Trigger", function () {})',
+        'Ros2.createServiceClient("no good", "std_srvs/Trigger")',
+        'Ros2.createServiceClient("/x", "std_srvs/Trigger").sendRequestAsync({}, 5)',
+        'Ros2.waitForMessageAsync("/x", 100, 5)',
+    ):
+        text = live.run(f"try {{ {script} }} catch (e) {{ return String(e) }}; return ''")
+        assert text.startswith("Error:"), script
+
+
+def test_the_graph(live: Bench, wait: Any) -> None:
+    live.robot.create_service_server("/reset", "std_srvs/srv/Empty", lambda request: None)
+    live.robot.create_publisher("/mode", "std_msgs/msg/String")
+    wait(lambda: live.run('return Ros2.queryServices("std_srvs/Empty")') == ["/reset"])
+    wait(lambda: live.run('return Ros2.getPublishersInfo("/mode").length') == 1)
+    info = live.run('return Ros2.getPublishersInfo("/mode")[0]')
+    assert (info["node"], info["type"]) == ("/robot", "std_msgs/msg/String")
+    assert "/robot" in live.run("return Ros2.queryNodes()")
+    assert live.run('return Ros2.getServiceTypes("/reset")') == ["std_srvs/srv/Empty"]
+    assert live.run("return Ros2.getServiceNamesAndTypes()")["/reset"] == ["std_srvs/srv/Empty"]
+    wait(lambda: live.run('return Ros2.getNodeInfo("/robot").publishers')[0]["name"] == "/mode")
+    live.module = "Ros 1.0"
+    assert live.run('return Ros.getServiceTypes("/reset")') == ["std_srvs/Empty"]
+    assert live.run('return Ros.queryTopicType("/mode")') == "std_msgs/String"
+
+
+def test_logs_are_followed_on_rosout(live: Bench, wait: Any) -> None:
+    heard: list[Any] = []
+    live.robot.create_subscription("/rosout", None, heard.append)
+    live.run('Ros2.getLogger("arm")')
+    wait(
+        lambda: (
+            live.run('Ros2.info("ready to go"); return 1')
+            and any(m.msg == "ready to go" for m in heard)
+        )
+    )
+    found = next(m for m in heard if m.msg == "ready to go")
+    assert found.name.strip("/").endswith("ui")
+    assert found.file.endswith(".qml")
+    assert found.line > 0
