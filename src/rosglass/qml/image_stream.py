@@ -65,7 +65,7 @@ class Channel:
     def take(self, now: float) -> None:
         """Count a picture, so that the mean rate stays within what is wanted."""
         interval = self.look.interval
-        self._due = max(self._due, now - interval) + interval
+        self._due = (self._due if now - self._due < interval else now) + interval
 
     def show(self, picture: Picture) -> None:
         """Show a picture to all viewers."""
@@ -223,26 +223,32 @@ class SharedStream(QtCore.QObject):
             self._fetch()
 
     def _wanted(self) -> bool:
-        """Return whether a picture that has come is wanted; in any thread."""
+        """Return whether a picture that has come is wanted; in the middleware's thread."""
+        if self._due():
+            return True
+        self._rest_if_possible()
+        return False
+
+    def _due(self) -> list[Channel]:
+        """Return the channels that want a picture now."""
         now = time.monotonic()
-        return any(channel.is_due(now) for channel in self._channels)
+        # Turns need not fall on the moment when a picture is wanted.
+        early = self._interval / 2 if self._asked is not None else 0.0
+        return [channel for channel in self._channels if channel.is_due(now + early)]
 
     # Turns.
 
-    def _may_rest(self) -> bool:
-        """Return whether pictures are to be fetched one by one; in the stream's thread."""
-        stream, now = self.stream, time.monotonic()
+    def _rest_if_possible(self) -> None:
+        """Receive nothing until the next turn, when pictures can be fetched one by one."""
+        stream = self.stream
         self._period = stream.period or self._period
-        if self._asked is None:
-            self._price *= _FORGETTING
-        else:
-            self._price, self._asked = now - self._asked, None
         if not (self._interval and self._period and self._session.balancer.enabled):
-            return False
+            return
         # Between the key frames of a video, a picture that is fetched alone cannot be decoded.
-        if stream.video:
-            return False
-        return self._interval > _HYSTERESIS * max(self._period, self._price)
+        if stream.video or self._interval <= _HYSTERESIS * max(self._period, self._price):
+            return
+        stream.rest()
+        self._session.executor.post(self._plan)
 
     def _plan(self) -> None:
         """Wait for the next turn; on the GUI thread."""
@@ -263,8 +269,7 @@ class SharedStream(QtCore.QObject):
 
     def _render(self, image: RawImage, sample: Sample) -> None:
         """Make the pictures that are wanted; in the stream's thread."""
-        now = time.monotonic()
-        channels = [channel for channel in self._channels if channel.is_due(now)]
+        now, channels = time.monotonic(), self._due()
         repeated = image.stamp is not None and image.stamp == self._last_stamp
         # A publisher that repeats its last picture to whoever comes has sent nothing new.
         if not channels or (repeated and self._interval):
@@ -281,9 +286,11 @@ class SharedStream(QtCore.QObject):
             self._hand_over(_Pending(pictures, sample.received, image.stamp))
         if failed:
             self._session.executor.post(self._tell)
-        if self._may_rest():
-            self.stream.rest()
-            self._session.executor.post(self._plan)
+        if self._asked is None:
+            self._price *= _FORGETTING
+        else:
+            self._price, self._asked = now - self._asked, None
+        self._rest_if_possible()
 
     def _hand_over(self, pending: _Pending) -> None:
         with self._lock:

@@ -9,6 +9,8 @@ __all__ = ["LoadBalancer"]
 
 #: How far the times of others are looked at, in numbers of their turns.
 _MOST_TURNS = 64
+#: By how many seconds a turn is put off at most: pictures that come later would count as old.
+_MOST_DELAY = 1.0
 
 
 class LoadBalancer:
@@ -38,10 +40,10 @@ class LoadBalancer:
             wanted = max(before[0] + interval, now)
             shortest = min([interval, *(other for _, other in self._turns.values())])
             apart = shortest / (4 * (len(self._turns) + 1))
-            taken = self._taken(wanted - apart, wanted + interval / 2)
-            due = wanted
+            due, latest = wanted, wanted + min(interval / 2, _MOST_DELAY)
+            taken = self._taken(wanted - apart, latest + apart)
             if taken and min(abs(time - wanted) for time in taken) < apart:
-                due = _widest(taken, wanted, wanted + interval / 2)
+                due = _widest(taken, wanted, latest)
         self._turns[stream] = (due, interval)
         return due
 
