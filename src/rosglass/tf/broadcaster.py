@@ -5,8 +5,9 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING, Any
 
+from rosglass.comm import ConnectionState
 from rosglass.comm.node import Handle
-from rosglass.errors import InvalidArgumentException
+from rosglass.errors import InvalidArgumentException, NodeClosedError
 from rosglass.tf.topics import DEPTH, TYPE, is_ros1, qos_of, topic_of
 from rosglass.tf.transform import Transform
 
@@ -14,31 +15,12 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from rosglass.comm.node import Node
+    from rosglass.comm.publisher import Publisher
 
 __all__ = ["StaticTransformBroadcaster", "TransformBroadcaster"]
 
 
-class _Broadcaster(Handle):
-    _static = False
-
-    def __init__(self, node: Node, namespace: str, depth: int) -> None:
-        self._ros = 1 if is_ros1(node) else 2
-        topic = topic_of(node, namespace, self._static)
-        self.publisher = node.create_publisher(topic, TYPE, qos_of(self._static, depth))
-
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__} on {self.publisher.topic}>"
-
-    def close(self) -> None:
-        """Send no more; safe to call twice."""
-        self.publisher.close()
-
-    def _publish(self, transforms: Iterable[Transform]) -> None:
-        told: list[dict[str, Any]] = [transform.to_dict(self._ros) for transform in transforms]
-        self.publisher.publish(transforms=told)
-
-
-class TransformBroadcaster(_Broadcaster):
+class TransformBroadcaster(Handle):
     """Publishes transforms that change with time, on ``/tf``.
 
     Args:
@@ -54,7 +36,16 @@ class TransformBroadcaster(_Broadcaster):
     """
 
     def __init__(self, node: Node, namespace: str = "/") -> None:
-        super().__init__(node, namespace, DEPTH)
+        self._ros = 1 if is_ros1(node) else 2
+        topic = topic_of(node, namespace, static=False)
+        self.publisher = node.create_publisher(topic, TYPE, qos_of(False, DEPTH))
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} on {self.publisher.topic}>"
+
+    def close(self) -> None:
+        """Send no more; safe to call twice."""
+        self.publisher.close()
 
     def send_transform(self, transforms: Transform | Iterable[Transform]) -> None:
         """Publish a transform, or several in one message.
@@ -64,13 +55,51 @@ class TransformBroadcaster(_Broadcaster):
             ConversionError: A stamp does not fit into the message.
             NodeClosedError: The broadcaster is closed.
         """
-        self._publish(_checked(transforms))
+        _publish(self.publisher, _checked(transforms), self._ros)
 
 
-class StaticTransformBroadcaster(_Broadcaster):
+class _Statics:
+    """What the broadcasters of one node have sent on a ``tf_static``, and their one publisher.
+
+    Of a node that publishes several latched messages on a topic, ROS 1's subscribers may keep the
+    last one only.
+
+    Args:
+        node: Who publishes.
+        topic: Absolute topic name.
+    """
+
+    def __init__(self, node: Node, topic: str) -> None:
+        self.publisher = node.create_publisher(topic, TYPE, qos_of(True, 1))
+        self._ros = 1 if is_ros1(node) else 2
+        self._lock = threading.Lock()
+        self._sent: dict[str, Transform] = {}
+        #: How many broadcasters use it.
+        self.users = 0
+
+    def send(self, transforms: Iterable[Transform]) -> None:
+        new = {transform.child_frame_id: transform for transform in transforms}
+        # Two threads must not overtake each other: the last message counts.
+        with self._lock:
+            known = {**self._sent, **new}
+            _publish(self.publisher, known.values(), self._ros)
+            self._sent = known
+
+
+_shared_lock = threading.Lock()
+
+
+def _shared(node: Node) -> dict[str, _Statics]:
+    """Return what a node's broadcasters share, by topic; kept in the node, to go with it."""
+    found: dict[str, _Statics] = vars(node).setdefault("_static_transforms", {})
+    return found
+
+
+class StaticTransformBroadcaster(Handle):
     """Publishes transforms that never change, latched on ``/tf_static``.
 
-    All that were sent are kept and sent together, so that who comes later gets every one.
+    All that were sent are kept and sent together, so that who comes later gets every one: also
+    those of the node's other broadcasters of this kind, with which it shares the publisher.
 
     Args:
         node: Who publishes.
@@ -87,21 +116,48 @@ class StaticTransformBroadcaster(_Broadcaster):
     _static = True
 
     def __init__(self, node: Node, namespace: str = "/") -> None:
-        super().__init__(node, namespace, 1)
-        self._lock = threading.Lock()
-        self._sent: dict[str, Transform] = {}
+        topic = topic_of(node, namespace, static=True)
+        with _shared_lock:
+            topics = _shared(node)
+            if topic not in topics or node.status().state is ConnectionState.CLOSED:
+                topics[topic] = _Statics(node, topic)
+            self._statics = topics[topic]
+            self._statics.users += 1
+        self._topics, self._closed = topics, False
+        self.publisher = self._statics.publisher
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} on {self.publisher.topic}>"
+
+    def close(self) -> None:
+        """Send no more; safe to call twice.
+
+        What was sent can be had as long as another of the node's broadcasters is open.
+        """
+        with _shared_lock:
+            if self._closed:
+                return
+            self._closed = True
+            self._statics.users -= 1
+            last = not self._statics.users
+            if last and self._topics.get(self.publisher.topic) is self._statics:
+                del self._topics[self.publisher.topic]
+        if last:
+            self.publisher.close()
 
     def send_transform(self, transforms: Transform | Iterable[Transform]) -> None:
         """Publish a transform, or several; one of a frame that was sent before takes its place.
 
         Errors as for :meth:`TransformBroadcaster.send_transform`.
         """
-        new = {transform.child_frame_id: transform for transform in _checked(transforms)}
-        # Two threads must not overtake each other: the last message counts.
-        with self._lock:
-            known = {**self._sent, **new}
-            self._publish(known.values())
-            self._sent = known
+        checked = _checked(transforms)
+        if self._closed:
+            raise NodeClosedError(f"{self!r} is closed; make another one")
+        self._statics.send(checked)
+
+
+def _publish(publisher: Publisher, transforms: Iterable[Transform], ros: int) -> None:
+    publisher.publish(transforms=[transform.to_dict(ros) for transform in transforms])
 
 
 def _checked(transforms: Transform | Iterable[Transform]) -> list[Transform]:

@@ -77,6 +77,22 @@ def test_a_robot_that_listens(connect: Any, rospy_peer: Any, wait_for: Any) -> N
     assert value["value"]["transform"]["translation"]["y"] == pytest.approx(4)
 
 
+def test_several_broadcasters_are_heard_by_who_comes_late(
+    connect: Any, start_rospy: Any, wait_for: Any
+) -> None:
+    node = connect("several")
+    first, second = StaticTransformBroadcaster(node), StaticTransformBroadcaster(node)
+    first.send_transform(place("base", "left", 1.0))
+    second.send_transform(place("base", "right", 2.0))
+    found = start_rospy("late").call("tf_lookup", target="right", source="left")
+    assert found["transform"]["translation"]["y"] == pytest.approx(1)
+    reader = connect("late_too")
+    for _ in range(2):
+        # The second one shares the connection with the first.
+        buffer = TransformListener(reader).buffer
+        buffer.wait_for_transform("right", "left", timeout=30)
+
+
 def test_the_old_message_and_a_namespace(connect: Any, rospy_peer: Any, wait_for: Any) -> None:
     node = connect("cockpit")
     first = TransformListener(node)

@@ -8,7 +8,16 @@ from typing import Any
 import pytest
 
 import rosglass
-from rosglass.comm import IMMEDIATE, Clock, QoS, Sample, Subscription, Time
+from rosglass.comm import (
+    IMMEDIATE,
+    Clock,
+    ConnectionState,
+    QoS,
+    Sample,
+    Status,
+    Subscription,
+    Time,
+)
 from rosglass.comm.qos import Durability
 from rosglass.errors import InvalidArgumentException, InvalidNameError, NodeClosedError
 from rosglass.tf import (
@@ -35,6 +44,11 @@ class Node:
         self.known: list[Any] = []
         self.asked = 0
         self.refused = ""
+        self.state = ConnectionState.CONNECTED
+        self.closed: list[str] = []
+
+    def status(self) -> Status:
+        return Status(self.state, "")
 
     def resolve(self, name: str) -> str:
         return name if name.startswith("/") else f"/own/{name}"
@@ -49,11 +63,13 @@ class Node:
         return made
 
     def create_publisher(self, topic: str, type: str, qos: QoS) -> Any:
+        if self.state is ConnectionState.CLOSED:
+            raise NodeClosedError("closed")
         self.profiles[topic] = qos
         send = lambda **fields: self.sent.append(  # noqa: E731
             (topic, self.type.encode(fields, wire=self.wire))
         )
-        return SimpleNamespace(topic=topic, publish=send, close=lambda: None)
+        return SimpleNamespace(topic=topic, publish=send, close=lambda: self.closed.append(topic))
 
     def publishers(self, topic: str) -> list[Any]:
         self.asked += 1
@@ -89,6 +105,36 @@ def test_sent_and_received(ros: int) -> None:
     assert node.profiles["/tf_static"].durability is Durability.TRANSIENT_LOCAL
     assert node.profiles["/tf"].durability is Durability.VOLATILE
     assert tree["arm"].authority == ("/robot" if ros == 1 else UNKNOWN_PUBLISHER)
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+def test_several_broadcasters_of_a_node_tell_all_together(ros: int) -> None:
+    node: Any = Node(ros)
+    first, second = StaticTransformBroadcaster(node), StaticTransformBroadcaster(node)
+    elsewhere = StaticTransformBroadcaster(node, "/other")
+    assert first.publisher is second.publisher is not elsewhere.publisher
+    first.send_transform(place("camera"))
+    second.send_transform([place("lidar"), place("camera", 9)])
+    elsewhere.send_transform(place("arm"))
+    # Who comes late gets the last message only.
+    listener = TransformListener(node)
+    node.deliver(1)
+    tree = listener.buffer.tree()
+    assert sorted(tree) == ["camera", "lidar", "map"]
+    first.close()
+    first.close()
+    assert node.closed == []
+    with pytest.raises(NodeClosedError):
+        first.send_transform(place("camera"))
+    second.send_transform(place("sonar"))
+    node.deliver(3)
+    assert sorted(listener.buffer.tree()) == ["camera", "lidar", "map", "sonar"]
+    second.close()
+    assert node.closed == ["/tf_static"]
+    assert StaticTransformBroadcaster(node).publisher is not second.publisher
+    node.state = ConnectionState.CLOSED
+    with pytest.raises(NodeClosedError):
+        StaticTransformBroadcaster(node)
 
 
 def test_the_name_of_a_publisher_is_asked_for_once() -> None:
