@@ -50,6 +50,8 @@ class PublisherLink:
         header: What the publisher said of itself; empty before it is connected.
         name: The publishing node's full name, or its URI as long as that is not known.
         problem: Why it is not connected; empty when it is, or about to be.
+        lost: Whether the problem is only that the connection has ended, as when a publisher leaves,
+            of which the master tells in a moment.
         latched: The last message of a publisher that latches.
         epoch: Which master, of those that were started one after the other, named it last.
         ended: Whether it is forgotten.
@@ -58,7 +60,7 @@ class PublisherLink:
     def __init__(self, intake: Intake, uri: str, epoch: int) -> None:
         self.intake, self.uri, self.name, self.epoch = intake, uri, uri, epoch
         self.header: dict[str, str] = {}
-        self.problem = ""
+        self.problem, self.lost = "", False
         self.latched: Received | None = None
         self.ended = False
         self._core = intake.core
@@ -191,7 +193,7 @@ class PublisherLink:
             self._connect(addresses)
             return
         what = "was lost" if was_connected else "cannot be received from"
-        self.problem = f"{self.name} {what}: {reason}; trying again"
+        self.problem, self.lost = f"{self.name} {what}: {reason}; trying again", was_connected
         self.intake.part(self)
         if not self.ended:
             self._core.loop.after(self._delay, self._begin)

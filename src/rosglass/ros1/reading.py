@@ -245,14 +245,14 @@ class Reading(Source):
             return
         links = self.intake.links()
         matching = self._matching()
-        problems = [link.problem for link in links if link.problem]
-        problems += self._refused.copy().values()
-        problems += self._remarks.copy().values()
+        problems = [*self._refused.copy().values(), *self._remarks.copy().values()]
+        grave = bool(problems) or any(link.problem and not link.lost for link in links)
+        problems = [link.problem for link in links if link.problem] + problems
         there = matching or self._core.graph.endpoints(_PUBLISHER, self.intake.topic)
         absence = self._absence.follow(there)
         # What comes needs no master, and who leaves is no mistake of anybody's.
         told = problems if matching else problems + absence
-        level = logging.WARNING if problems else logging.INFO
+        level = logging.WARNING if grave else logging.INFO
         self.subscription.set_problem("; ".join(dict.fromkeys(told)), level)
         self.subscription.events.matched.update(matching, Matched)
         self._watch_deadline(bool(matching))

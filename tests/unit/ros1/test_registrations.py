@@ -317,3 +317,30 @@ def test_a_node_on_the_ports_of_one_that_is_seen_off_stays_registered(
     wait_for(lambda: "rosglass farewells" not in [one.name for one in threading.enumerate()])
     wait_for(lambda: master.publishers.get("/a", {}).get("/same") == known)
     second.close()
+
+
+def test_who_leaves_in_good_order_is_no_warning_and_who_dies_is(
+    master: FakeMaster, node: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    node.create_action_server("/go", "actionlib/Test", lambda goal: None)
+    word = node.create_subscription("/word", "std_msgs/String")
+    desk = connected(master, "desk")
+    client = desk.create_action_client("/go", "actionlib/Test")
+    publisher = desk.create_publisher("/word", "std_msgs/String")
+    assert client.wait_for_server(30)
+    wait_for(publisher.subscription_count)
+    caplog.set_level(logging.INFO, "rosglass.comm")
+    client.close()
+    publisher.close()
+    for topic in ("/go/goal", "/go/cancel", "/word"):
+        wait_for(lambda topic=topic: f"{topic}: nobody" in caplog.text, lambda: caplog.text)  # type: ignore[misc]
+    assert [r.getMessage() for r in caplog.records if r.levelno >= logging.WARNING] == []
+    # Nobody unregisters for those who are killed.
+    other = connected(master, "other")
+    publisher = other.create_publisher("/word", "std_msgs/String")
+    wait_for(lambda: "/other" in master.publishers.get("/word", {}))
+    wait_for(publisher.subscription_count)
+    master.answers["unregisterPublisher"] = lambda *_: [1, "", 0]
+    other.close()
+    wait_for(lambda: "cannot be received from" in word.problem, lambda: word.problem)
+    assert any(r.levelno == logging.WARNING and "/word" in r.getMessage() for r in caplog.records)
