@@ -8,40 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from values import convert, show
 
 import rosglass
 from rosglass.comm import Time
 from rosglass.errors import ConversionError
-
-
-def show(bench: Any, type_name: str, value: dict, script: str) -> Any:
-    """Return what a script makes of a message called `m`."""
-    from rosglass.qml.runtime import runtime_of
-
-    kind = rosglass.load(type_name)
-    message = kind.decode(kind.encode(value))
-    runtime = runtime_of(bench.engine)
-    function = bench.engine.evaluate(f"(function(m) {{ return JSON.stringify({script}) }})")
-    result = function.call([runtime.message(message)])
-    assert not result.isError(), result.toString()
-    import json
-
-    return None if result.isUndefined() else json.loads(result.toString())
-
-
-def convert(bench: Any, type_name: str, script: str) -> dict:
-    """Return the message that a JavaScript expression makes, as a dict."""
-    from rosglass.messages.schema import schema_of
-    from rosglass.qml.from_js import fields_from_js
-
-    # Qt.vector3d() and its like need QtQuick.
-    bench.load("Item {}", "import QtQuick 2.15")
-    kind = rosglass.load(type_name)
-    value = bench.engine.evaluate(f"({script})")
-    assert not value.isError(), value.toString()
-    fields = fields_from_js(value, schema_of(kind.definition))
-    return kind.decode(kind.encode(fields)).to_dict()
-
 
 POSE = {
     "header": {"stamp": {"sec": 12, "nanosec": 345_678_901}, "frame_id": "map ü"},

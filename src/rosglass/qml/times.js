@@ -18,8 +18,9 @@
     }
 
     function fail(value, wanted) {
-        let shown = String(value)
-        if (shown === "[object Object]") shown = JSON.stringify(value)
+        // A time's own toString() would come back here.
+        const plain = value !== null && typeof value === "object" && !(value instanceof Date)
+        const shown = plain ? JSON.stringify(value) : String(value)
         throw new TypeError("expected " + wanted + ", got " + shown)
     }
 
