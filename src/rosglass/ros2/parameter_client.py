@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-import time
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +12,10 @@ from rosglass.comm import (
     ParameterType,
     SetResult,
 )
-from rosglass.comm.promise import check_timeout
-from rosglass.errors import NodeClosedError, ParameterError
+from rosglass.comm.deadline import Deadline
+from rosglass.errors import ParameterError
 from rosglass.ros2 import parameter_files
+from rosglass.ros2.other_node import OtherNode
 from rosglass.ros2.parameter_services import (
     EVENT_TYPE,
     EVENTS,
@@ -43,15 +42,13 @@ if TYPE_CHECKING:
         Node,
         ParameterEvent,
         ParameterValue,
-        ServiceClient,
-        Subscription,
     )
     from rosglass.messages import Message
 
 __all__ = ["Ros2ParameterClient"]
 
 
-class Ros2ParameterClient(ParameterClient):
+class Ros2ParameterClient(OtherNode, ParameterClient):
     """A client of another node's parameters; made by :meth:`Node.create_parameter_client`.
 
     Args:
@@ -60,35 +57,19 @@ class Ros2ParameterClient(ParameterClient):
     """
 
     def __init__(self, owner: Node, node: str) -> None:
-        self.node = node
-        self._owner = owner
-        self._lock = threading.Lock()
-        self._clients: dict[str, ServiceClient] = {}
-        self._watches: list[Subscription] = []
-        self._closed = False
-        # At once, so that it finds its server while the caller still prepares its question.
-        self._client("get_parameters")
-
-    @property
-    def ready(self) -> bool:
-        """Whether the node is there and serves its parameters."""
-        return not self._closed and self._client("get_parameters").ready
-
-    def wait_for_server(self, timeout: float | None = None) -> bool:
-        """Wait for the node; return whether it is there."""
-        return self._client("get_parameters").wait_for_server(timeout)
+        super().__init__(owner, node, SERVICES, "get_parameters", SERVICES_QOS)
 
     def names(
         self, prefixes: Iterable[str] = (), depth: int = 0, *, timeout: float | None = 10.0
     ) -> list[str]:
         """Return the names of its parameters, sorted; see the base class."""
-        return self._names(prefixes, depth, _Deadline(timeout, self.node))
+        return self._names(prefixes, depth, Deadline(timeout, self.node))
 
     def get(
         self, names: Iterable[str] | None = None, *, timeout: float | None = 10.0
     ) -> dict[str, ParameterValue]:
         """Return the values of parameters, of all without `names`; see the base class."""
-        deadline = _Deadline(timeout, self.node)
+        deadline = Deadline(timeout, self.node)
         messages = self._ask("get_parameters", "values", names, deadline)
         found: dict[str, ParameterValue] = {}
         for name, message in messages.items():
@@ -100,7 +81,7 @@ class Ros2ParameterClient(ParameterClient):
         self, names: Iterable[str] | None = None, *, timeout: float | None = 10.0
     ) -> dict[str, ParameterDescriptor]:
         """Return what is known about parameters, about all without `names`; see the base class."""
-        deadline = _Deadline(timeout, self.node)
+        deadline = Deadline(timeout, self.node)
         messages = self._ask("describe_parameters", "descriptors", names, deadline)
         return {
             name: ParameterDescriptor(name)
@@ -113,7 +94,7 @@ class Ros2ParameterClient(ParameterClient):
         self, values: Mapping[str, ParameterValue], *, timeout: float | None = 10.0
     ) -> dict[str, SetResult]:
         """Set parameters one by one; see the base class."""
-        deadline = _Deadline(timeout, self.node)
+        deadline = Deadline(timeout, self.node)
         parameters = self._parameters(values, deadline)
         if not parameters:
             return {}
@@ -127,7 +108,7 @@ class Ros2ParameterClient(ParameterClient):
         self, values: Mapping[str, ParameterValue], *, timeout: float | None = 10.0
     ) -> SetResult:
         """Set parameters, all or none; see the base class."""
-        deadline = _Deadline(timeout, self.node)
+        deadline = Deadline(timeout, self.node)
         parameters = self._parameters(values, deadline)
         response = self._call("set_parameters_atomically", {"parameters": parameters}, deadline)
         return SetResult(bool(response.result.successful), response.result.reason)
@@ -144,16 +125,11 @@ class Ros2ParameterClient(ParameterClient):
             if message.node == self.node:
                 callback(event_from_message(message))
 
-        watch = self._owner.create_subscription(
-            EVENTS, EVENT_TYPE, receive, EVENTS_QOS, executor=executor
-        )
-        with self._lock:
-            self._watches = [*(w for w in self._watches if not w.closed), watch]
-        return watch
+        return self._watch(EVENTS, EVENT_TYPE, receive, EVENTS_QOS, executor)
 
     def load(self, path: str | PathLike[str], *, timeout: float | None = 10.0) -> list[str]:
         """Set the parameters that a file has for the node; see the base class."""
-        deadline = _Deadline(timeout, self.node)
+        deadline = Deadline(timeout, self.node)
         given = parameter_files.read(path).for_node(self.node)
         values = {name: value for name, value in given.items() if value is not None}
         if not values:
@@ -177,40 +153,13 @@ class Ros2ParameterClient(ParameterClient):
         """Write the node's parameters to a file that can be loaded; see the base class."""
         parameter_files.write(path, {self.node: self.get(timeout=timeout)})
 
-    def close(self) -> None:
-        """Ask and watch no more; calls that wait end with NodeClosedError. Safe to call twice."""
-        with self._lock:
-            self._closed = True
-            made = [*self._clients.values(), *self._watches]
-            self._clients, self._watches = {}, []
-        for handle in made:
-            handle.close()
-
-    def _check_open(self) -> None:
-        if self._closed:
-            raise NodeClosedError(f"{self!r} is closed; create another one")
-
-    def _client(self, service: str) -> ServiceClient:
-        with self._lock:
-            self._check_open()
-            client = self._clients.get(service)
-            if client is None:
-                client = self._owner.create_service_client(
-                    f"{self.node}/{service}", SERVICES[service], SERVICES_QOS
-                )
-                self._clients[service] = client
-            return client
-
-    def _call(self, service: str, request: dict[str, Any], deadline: _Deadline) -> Message:
-        return self._client(service).call(request, timeout=deadline.left())
-
-    def _names(self, prefixes: Iterable[str], depth: int, deadline: _Deadline) -> list[str]:
+    def _names(self, prefixes: Iterable[str], depth: int, deadline: Deadline) -> list[str]:
         wanted = _texts(prefixes, "prefixes", self.node)
         request = {"prefixes": wanted, "depth": depth}
         return sorted(self._call("list_parameters", request, deadline).result.names)
 
     def _ask(
-        self, service: str, field: str, names: Iterable[str] | None, deadline: _Deadline
+        self, service: str, field: str, names: Iterable[str] | None, deadline: Deadline
     ) -> dict[str, Message | None]:
         """Return what a service says of each name, None for parameters that are not declared."""
         if names is None:
@@ -232,7 +181,7 @@ class Ros2ParameterClient(ParameterClient):
         return dict.fromkeys(wanted) | dict(zip(known, found, strict=True))
 
     def _parameters(
-        self, values: Mapping[str, ParameterValue], deadline: _Deadline
+        self, values: Mapping[str, ParameterValue], deadline: Deadline
     ) -> list[dict[str, Any]]:
         check_values(values, self.node)
         empty = [check_name(name) for name, value in values.items() if _is_empty(value)]
@@ -243,7 +192,7 @@ class Ros2ParameterClient(ParameterClient):
             for name, value in values.items()
         ]
 
-    def _types(self, names: list[str], deadline: _Deadline) -> dict[str, ParameterType]:
+    def _types(self, names: list[str], deadline: Deadline) -> dict[str, ParameterType]:
         """Return the types of parameters that are to become empty lists."""
         response = self._call("get_parameter_types", {"names": names}, deadline)
         found = [int(number) for number in response.types]
@@ -258,17 +207,6 @@ class Ros2ParameterClient(ParameterClient):
         return ParameterError(
             f"{self.node}/{service} answers with {got} results for {asked} parameters"
         )
-
-
-class _Deadline:
-    def __init__(self, timeout: float | None, where: str) -> None:
-        timeout = check_timeout(timeout, where)
-        self._end = None if timeout is None else time.monotonic() + timeout
-
-    def left(self) -> float | None:
-        """Return the seconds that are left, None when there is no end."""
-        # Rounded: people read it when the time is over.
-        return None if self._end is None else max(0.0, round(self._end - time.monotonic(), 2))
 
 
 def _texts(given: object, what: str, node: str) -> list[str]:
