@@ -124,7 +124,7 @@ class Element(QtCore.QObject):
     @Slot()
     def _on_node(self) -> None:
         """There is a node now, or none any more, which must not be used a moment longer."""
-        if self.node is None:
+        if self._session is None or self._session.node is None:
             self._settle()
         else:
             self._schedule()

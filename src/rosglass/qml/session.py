@@ -97,6 +97,8 @@ class Session(QtCore.QObject):
         self.node: Node | None = None
         self.name, self.namespace = "", ""
         self.streams: dict[Any, Any] = {}
+        #: What elements share, other than pictures, by what it is.
+        self.shared: dict[Any, Any] = {}
         #: When throttled streams fetch their pictures.
         self.balancer = LoadBalancer()
         #: While true, QML's wish to shut down is ignored: its successor needs the node.

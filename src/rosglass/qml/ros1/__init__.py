@@ -2,6 +2,7 @@
 
 from rosglass.qml.image_item import ImageItem
 from rosglass.qml.image_manager import ImageTransportManager
+from rosglass.qml.parameter import Parameter
 from rosglass.qml.ros1.console import ConsoleLevels, InitOptions
 from rosglass.qml.ros1.image_transport_subscriber import ImageTransportSubscriber
 from rosglass.qml.ros1.ros import Ros
@@ -22,6 +23,7 @@ NATIVE = {
 }
 #: What QML can write, by name.
 TYPES = {
+    "Parameter": Parameter,
     "ServiceServer": RosServiceServer,
     "Subscriber": Subscriber,
     "ImageTransportSubscriber": ImageTransportSubscriber,

@@ -6,6 +6,7 @@ from rosglass.qml.image_manager import ImageTransportManager
 from rosglass.qml.image_subscription import ImageTransportSubscription
 from rosglass.qml.logger import LoggerLevel
 from rosglass.qml.message_item_model import MessageItemModel
+from rosglass.qml.parameter import Parameter
 from rosglass.qml.ros2.ros2 import Ros2
 from rosglass.qml.service_server import ServiceServer
 from rosglass.qml.subscription import Subscription
@@ -16,6 +17,7 @@ __all__ = ["NATIVE", "TYPES"]
 NATIVE = {"Ros2Native": Ros2, "ImageTransportManagerNative": ImageTransportManager}
 #: What QML can write, by name.
 TYPES = {
+    "Parameter": Parameter,
     "ServiceServer": ServiceServer,
     "Subscription": Subscription,
     "ImageTransportSubscription": ImageTransportSubscription,

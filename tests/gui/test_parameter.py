@@ -1,0 +1,89 @@
+"""The element Parameter on a robot's node."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from rosglass.comm.parameters import ParameterDescriptor, Range
+
+if TYPE_CHECKING:
+    from conftest import Bench
+
+QML = """
+    QtObject {
+        property Parameter p: Parameter { nodeName: "/robot"; name: "speed" }
+        property string refused
+        property Connections c: Connections {
+            target: p; function onRejected(reason) { refused = reason }
+        }
+        function shown() { return JSON.stringify(p.value) }
+        function info() {
+            return [p.ready, p.pending, p.type, p.description, p.readOnly, p.minimum,
+                    p.maximum, p.problem].join()
+        }
+        function set(value) { p.value = value }
+    }
+"""
+
+#: Parameters of ROS 1 have no descriptions, and refuse nothing.
+ROS2 = pytest.mark.parametrize("url", ["zenoh"], indirect=True, scope="module")
+
+
+@pytest.fixture
+def ros2(live: Bench) -> Bench:
+    descriptor = ParameterDescriptor(description="Highest speed", range=Range(0.0, 2.0))
+    live.robot.parameters.declare("speed", 1.5, descriptor)
+    return live
+
+
+def test_reading_and_setting(live: Bench, wait: Any) -> None:
+    live.robot.parameters.declare("speed", 1.5)
+    root: Any = live.load(QML)
+    wait(lambda: root.shown() == "1.5")
+    root.set(1)
+    wait(lambda: live.robot.parameters.get("speed") == 1.0)
+    wait(lambda: root.shown() == "1")
+    live.robot.parameters.set({"speed": 0.25})
+    wait(lambda: root.shown() == "0.25")
+
+
+@ROS2
+def test_what_is_known(ros2: Bench, wait: Any) -> None:
+    root: Any = ros2.load(QML)
+    wait(lambda: root.info().startswith("true,false,double"))
+    assert root.info() == "true,false,double,Highest speed,false,0,2,"
+
+
+@ROS2
+def test_refusals_are_told(ros2: Bench, wait: Any, caplog: Any) -> None:
+    root: Any = ros2.load(QML)
+    wait(lambda: root.shown() == "1.5")
+    root.set(99)
+    wait(lambda: root.property("refused"))
+    assert root.shown() == "1.5"
+    assert "speed" in caplog.text
+    root.set("fast")
+    wait(lambda: not root.info().startswith("true,true"))
+    assert ros2.robot.parameters.get("speed") == 1.5
+
+
+def test_a_node_that_comes_and_goes(live: Bench, wait: Any) -> None:
+    root: Any = live.load(QML.replace("/robot", "/arm"))
+    wait(300)
+    assert root.shown() is None or root.shown() in {"undefined", ""}
+    arm = live.world.connect(None, "arm")
+    arm.parameters.declare("speed", 3)
+    wait(lambda: root.shown() == "3")
+    root.set(4)
+    wait(lambda: arm.parameters.get("speed") == 4)
+    arm.close()
+    if not live.session.url.startswith("ros1"):
+        wait(lambda: root.info().startswith("false"))
+
+
+def test_setting_too_early_is_told(bench: Any, caplog: Any) -> None:
+    root: Any = bench.load(QML)
+    root.set(1)
+    assert "nothing was set" in caplog.text
