@@ -260,3 +260,17 @@ def test_empty_messages(bench: Any, caplog: Any) -> None:
 def test_presets(bench: Any, call: str, expected: list) -> None:
     script = f"const q = Ros2.{call}(); return [q.reliability, q.durability, q.depth()]"
     assert bench.run(script) == expected
+
+
+def test_packages_of_install_spaces(bench: Any, tmp_path: Any, monkeypatch: Any) -> None:
+    listed = tmp_path / "share/ament_index/resource_index/packages"
+    listed.mkdir(parents=True)
+    (listed / "arm_ui").touch()
+    monkeypatch.setenv("AMENT_PREFIX_PATH", f"/nowhere:{tmp_path}")
+    shown = bench.run("""
+        const a = AmentIndex
+        return [a.getPackages(), a.getPackagePrefix("arm_ui"),
+                a.getPackageShareDirectory("arm_ui"), a.getPackageShareDirectory("leg"),
+                a.getPackagePrefix("../packages")]
+    """)
+    assert shown == [["arm_ui"], str(tmp_path), f"{tmp_path}/share/arm_ui", "", ""]

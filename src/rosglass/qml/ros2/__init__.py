@@ -7,6 +7,7 @@ from rosglass.qml.image_subscription import ImageTransportSubscription
 from rosglass.qml.logger import LoggerLevel
 from rosglass.qml.message_item_model import MessageItemModel
 from rosglass.qml.parameter import Parameter
+from rosglass.qml.ros2.ament_index import AmentIndex
 from rosglass.qml.ros2.ros2 import Ros2
 from rosglass.qml.service_server import ServiceServer
 from rosglass.qml.subscription import Subscription
@@ -14,7 +15,11 @@ from rosglass.qml.subscription import Subscription
 __all__ = ["NATIVE", "TYPES"]
 
 #: Bases of the module's singletons (``imports/Ros2/*.qml``), by their name in ``Ros2.Native``.
-NATIVE = {"Ros2Native": Ros2, "ImageTransportManagerNative": ImageTransportManager}
+NATIVE = {
+    "AmentIndexNative": AmentIndex,
+    "Ros2Native": Ros2,
+    "ImageTransportManagerNative": ImageTransportManager,
+}
 #: What QML can write, by name.
 TYPES = {
     "Parameter": Parameter,
