@@ -37,12 +37,8 @@ class AmentIndex(QtCore.QObject):
     @Slot(result="QStringList")
     def getPackages(self) -> list[str]:
         """Return the names of all packages, sorted."""
-        names: set[str] = set()
-        for prefix in _prefixes():
-            try:
-                names.update(entry.name for entry in os.scandir(Path(prefix, _LIST)))
-            except OSError:
-                continue
+        lists = [path for prefix in _prefixes() if (path := Path(prefix, _LIST)).is_dir()]
+        names = {entry.name for path in lists for entry in path.iterdir()}
         return sorted(name for name in names if not name.startswith("."))
 
 
