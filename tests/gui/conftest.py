@@ -35,10 +35,13 @@ QT5 = os.environ.get("ROSGLASS_QT") == "pyside2"
 
 
 @pytest.fixture(scope="session")
-def platform(request: pytest.FixtureRequest) -> dict[str, str]:
+def platform(request: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """The environment in which Qt draws without anybody's screen."""
     if not QT5:
         return {"QT_QPA_PLATFORM": "offscreen"}
+    if "XDG_RUNTIME_DIR" not in os.environ:
+        # Qt 5 warns that it is missing, as it is where nobody is logged in.
+        os.environ["XDG_RUNTIME_DIR"] = str(tmp_path_factory.mktemp("runtime"))
     # Offscreen, Qt 5 needs OpenGL of a display as well, and gives no pictures without it.
     display = request.getfixturevalue("screen")
     return {"QT_QPA_PLATFORM": "xcb", "DISPLAY": display, "QT_QUICK_BACKEND": "software"}

@@ -153,7 +153,7 @@ def test_the_camera_is_on_the_screen(
 
     shot = tmp_path / "shot.png"
     program = start(
-        "run", EXAMPLE, "--url", url, "--screenshot", shot, "--after", 2.5, display=screen
+        "run", EXAMPLE, "--url", url, "--screenshot", shot, "--after", 5, display=screen
     )
     assert program.end(30) == 0, program.text
     picture = cv2.imread(str(shot))

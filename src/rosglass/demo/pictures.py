@@ -19,7 +19,7 @@ import numpy as np
 from rosglass.comm import Dispatcher, QoS
 from rosglass.errors import Error
 from rosglass.qml.element import TopicElement
-from rosglass.qt import Property, QtCore, QtGui, QtQml, QtQuick, Signal, Slot, engine_of
+from rosglass.qt import Property, QtCore, QtGui, QtQml, QtQuick, Signal, Slot
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -163,8 +163,8 @@ class _Picture(TopicElement):
             self._suspect = True
             self._judge()
             return
-        engine = engine_of(self)
-        if self._provider is None and engine is not None:
+        engine = QtQml.qjsEngine(self)
+        if self._provider is None and isinstance(engine, QtQml.QQmlEngine):
             self._provider = _Provider()
             engine.addImageProvider(self._name, self._provider)
         try:

@@ -12,7 +12,7 @@ from rosglass.qml.log import Caller, plain_path
 from rosglass.qml.session import Session
 from rosglass.qml.to_js import describe, reader, to_json
 from rosglass.qml.value_host import Host, LongArrays
-from rosglass.qt import QJSValue, QtCore, QtQml, engine_of, is_alive
+from rosglass.qt import QJSValue, QtCore, QtQml, is_alive
 
 if TYPE_CHECKING:
     from rosglass.comm.qos import QoS
@@ -61,6 +61,7 @@ class Runtime(QtCore.QObject):
     def __init__(self, engine: QtQml.QQmlEngine, session: Session) -> None:
         super().__init__(engine)
         self.setObjectName(_NAME)
+        engine.rootContext().setContextProperty(_NAME, self)
         self.session = session
         self._engine = engine
         self._shapes: dict[tuple[Schema, Dialect], QJSValue] = {}
@@ -231,15 +232,17 @@ class Runtime(QtCore.QObject):
 
 
 def runtime_of(item: QtCore.QObject) -> Runtime | None:
-    """Return the runtime of the engine an object lives in; None when it lives in none.
+    """Return the runtime of the engine an object lives in; None when it lives in none of ours.
 
-    An engine that was given no session gets the application's own.
+    An engine, given itself, that has none yet gets the application's own session.
     """
-    engine = item if isinstance(item, QtQml.QQmlEngine) else engine_of(item)
-    if engine is None:
-        return None
-    found = engine.findChild(Runtime, _NAME)
-    return found if isinstance(found, Runtime) else Runtime(engine, Session.default())
+    if isinstance(item, QtQml.QQmlEngine):
+        child = item.findChild(Runtime, _NAME)
+        return child if isinstance(child, Runtime) else Runtime(item, Session.default())
+    context = QtQml.QQmlEngine.contextForObject(item)
+    # PySide2 takes the context for the owner of an engine that it gives, and ends it likewise.
+    found = context.contextProperty(_NAME) if context is not None else None
+    return found if isinstance(found, Runtime) else None
 
 
 def _evaluate(engine: QtQml.QQmlEngine, script: str, file: str = "") -> QJSValue:

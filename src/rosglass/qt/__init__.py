@@ -26,7 +26,6 @@ __all__ = [
     "Signal",
     "Slot",
     "choose_binding",
-    "engine_of",
     "is_alive",
     "optional",
     "run_event_loop",
@@ -121,12 +120,3 @@ def run_event_loop(loop: QtCore.QCoreApplication | QtCore.QEventLoop) -> int:
 def send_deferred_deletes() -> None:
     """Carry out every ``deleteLater()`` now; they otherwise wait for the event loop."""
     QtCore.QCoreApplication.sendPostedEvents(None, int(QtCore.QEvent.Type.DeferredDelete))
-
-
-def engine_of(item: QtCore.QObject) -> QtQml.QQmlEngine | None:
-    """Return the QML engine an object lives in; None when it was never seen by QML."""
-    if QT6:
-        engine = QtQml.qjsEngine(item)
-        return engine if isinstance(engine, QtQml.QQmlEngine) else None
-    context = QtQml.QQmlEngine.contextForObject(item)
-    return context.engine() if context is not None else None
