@@ -26,7 +26,7 @@ __all__ = ["Io"]
 #: Larger files are no settings, and would freeze the screen.
 _LARGEST = 64 << 20
 #: Anchors and aliases make small files large (``&a [*b, *b]``).
-_MOST_VALUES, _DEEPEST = 1_000_000, 100
+_MOST_VALUES, _DEEPEST = 200_000, 100
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*)://")
 _DATE = re.compile(
     r"[0-9]{4}-[0-9]{2}-[0-9]{2}"
@@ -159,6 +159,17 @@ def _yaml() -> tuple[Any, Any]:
 
     class Loader(safe):  # type: ignore[misc]
         yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012 - PyYAML's
+
+        def construct_mapping(self, node: Any, deep: bool = False) -> Any:
+            # PyYAML lets the last of two equal keys win.
+            keys = [key.value for key, _ in node.value if key.tag != "tag:yaml.org,2002:merge"]
+            for key in keys:
+                if isinstance(key, str) and keys.count(key) > 1:
+                    place = node.start_mark
+                    raise yaml.constructor.ConstructorError(
+                        None, None, f"the key {key!r} occurs twice", place
+                    )
+            return super().construct_mapping(node, deep)
 
     class Dumper(yaml.SafeDumper):
         yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012 - PyYAML's

@@ -1,0 +1,171 @@
+"""YAML files read and written by interfaces."""
+
+from __future__ import annotations
+
+import json
+import logging
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def read(bench: Any, path: Any, then: str = "v", module: str = "Ros2") -> Any:
+    bench.module = f"{module} 1.0"
+    return bench.run(f"const v = {module}.io.readYaml({json.dumps(str(path))}); return {then}")
+
+
+def write(bench: Any, path: Any, value: str, module: str = "Ros2") -> Any:
+    bench.module = f"{module} 1.0"
+    imports = "import QtQuick 2.15"
+    return bench.run(f"return {module}.io.writeYaml({json.dumps(str(path))}, {value})", imports)
+
+
+@pytest.mark.parametrize("module", ["Ros", "Ros2"])
+@pytest.mark.parametrize(
+    "value",
+    [
+        "{a: 1, b: -2.5, c: [true, false, 'x', {d: [[1], []]}], e: {}}",
+        "'42'",
+        "['yes', 'null', '1e5', '2026-01-01', '~', '', ' x ', 'a: b', 'ü\\nz', '0x1F', '-']",
+        "9007199254740991",
+        "'9007199254740993'",
+        "1e300",
+        "-0.1",
+        "[]",
+        "{'1': 2, 'true': 3}",
+        "{type: 'time', label: 'mine'}",
+        "{sec: 1}",
+    ],
+)
+def test_values_come_back(bench: Any, tmp_path: Path, module: str, value: str) -> None:
+    file = tmp_path / "a.yaml"
+    assert write(bench, file, value, module) is True
+    expected = bench.run(f"return {value}")
+    assert read(bench, file, module=module) == expected
+    assert read(bench, file.as_uri(), module=module) == expected
+
+
+def test_dates_and_numbers_that_json_lacks_come_back(bench: Any, tmp_path: Path) -> None:
+    file = tmp_path / "a.yaml"
+    assert write(bench, file, "{d: new Date(1234567), n: NaN, i: -Infinity, u: null}") is True
+    then = "[v.d instanceof Date, v.d.getTime(), isNaN(v.n), v.i === -Infinity, v.u === undefined]"
+    assert read(bench, file, then) == [True, 1234567, True, True, True]
+
+
+def test_times_come_back(bench: Any, tmp_path: Path) -> None:
+    file = tmp_path / "a.yaml"
+    assert write(bench, file, "{t: Ros2.time(5, 6), d: Ros2.duration(-1.5)}") is True
+    assert "type: time" in file.read_text()
+    assert read(bench, file, "[v.t.nanosec, v.t.seconds(), v.d.toJSDuration()]") == [
+        6,
+        5.000000006,
+        -1500,
+    ]
+    assert write(bench, file, "{t: Time.create(5, 6)}", "Ros") is True
+    assert file.read_text() == "t:\n  sec: 5\n  nsec: 6\n"
+    assert read(bench, file, "v.t.toSec()", "Ros") == 5.000000006
+
+
+def test_messages_models_and_objects_are_written(bench: Any, tmp_path: Path) -> None:
+    file = tmp_path / "a.yaml"
+    root = bench.load(
+        f"""Item {{
+        property var model: ListModel {{ id: list
+            ListElement {{ name: "a"; on: true }} ListElement {{ name: "b"; on: false }} }}
+        property QtObject bag: QtObject {{ property int x: 1; property var y: [2] }}
+        function go() {{
+            const m = Ros2.createEmptyMessage("sensor_msgs/msg/JointState")
+            m.position = new Float32Array([1, 2.5])
+            m.name = Array.from({{length: 40}}, (_, i) => "j" + i)
+            return Ros2.io.writeYaml("{file}", {{m: m, list: list, bag: bag, u: Qt.point(1, 2)}})
+        }} }}""",
+        "import QtQuick 2.15",
+    )
+    assert root.go() is True
+    shown = read(bench, file)
+    assert shown["m"]["position"] == [1, 2.5]
+    assert shown["m"]["name"][39] == "j39"
+    assert shown["list"] == [{"name": "a", "on": True}, {"name": "b", "on": False}]
+    assert shown["bag"] == {"x": 1, "y": [2]}
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("a: !!str 42", {"a": "42"}),
+        ("a: 0x1F", {"a": 31}),
+        ("a: 12:30", {"a": "12:30"}),
+        ("a: 18446744073709551615", {"a": str(2**64 - 1)}),
+        ("a: yes", {"a": True}),
+        ("- &x {b: 1}\n- *x", [{"b": 1}, {"b": 1}]),
+        ("<<: {a: 1}\nb: 2", {"a": 1, "b": 2}),
+        ("2: a\ntrue: b", {"2": "a", "true": "b"}),
+        ("", None),
+    ],
+)
+def test_files_of_others_are_read(bench: Any, tmp_path: Path, text: str, expected: Any) -> None:
+    file = tmp_path / "a.yaml"
+    file.write_text(text)
+    assert read(bench, file) == expected
+
+
+def test_relative_paths_start_at_the_working_directory(
+    bench: Any, tmp_path: Path, monkeypatch: Any
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert write(bench, "a.yaml", "5") is True
+    assert read(bench, "a.yaml") == 5
+    assert [file.name for file in tmp_path.iterdir() if file.is_file()] == ["a.yaml"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a: [1",
+        "a: 1\na: 2",
+        "a: !!python/object/apply:os.system ['true']",
+        "a: !unknown 1",
+        "\x00",
+        "a: &a [*a]",
+        # Nine levels of ten aliases each: a billion values.
+        "a0: &a0 [x]\n" + "".join(f"a{i}: &a{i} [{f'*a{i - 1}, ' * 10}]\n" for i in range(1, 10)),
+        "[" * 5000,
+    ],
+)
+def test_files_that_make_no_sense_are_refused(
+    bench: Any, tmp_path: Path, caplog: Any, text: str
+) -> None:
+    file = tmp_path / "a.yaml"
+    file.write_text(text)
+    assert read(bench, file) is False
+    assert caplog.records[-1].levelno == logging.ERROR
+    assert caplog.records[-1].getMessage().startswith("Ros2.io.readYaml: ")
+
+
+@pytest.mark.parametrize(
+    "path", ["/nope/a.yaml", "http://x/a.yaml", "qrc:///a", "file://host/a", "", "/tmp", "a\x00b"]
+)
+def test_other_places_are_refused(bench: Any, caplog: Any, path: str) -> None:
+    assert read(bench, path) is False
+    assert write(bench, path, "1") is False
+    texts = [r.getMessage() for r in caplog.records if r.levelno == logging.ERROR]
+    assert [text[:18] for text in texts] == ["Ros2.io.readYaml: ", "Ros2.io.writeYaml:"]
+
+
+@pytest.mark.parametrize(
+    "value", ["function() {}", "{a: [() => 1]}", "(() => { const a = {}; a.a = a; return a })()"]
+)
+def test_what_cannot_be_written_leaves_the_file_alone(
+    bench: Any, tmp_path: Path, value: str
+) -> None:
+    file = tmp_path / "a.yaml"
+    file.write_text("before: 1\n")
+    assert write(bench, file, value) is False
+    assert file.read_text() == "before: 1\n"
+
+
+def test_wrong_arguments_throw_or_are_refused(bench: Any) -> None:
+    assert bench.run("return [Ros2.io.readYaml(5), Ros2.io.readYaml({})]") == [False, False]
