@@ -5,19 +5,16 @@ Protocol: ROS wiki, "actionlib/DetailedDescription".
 
 from __future__ import annotations
 
-import inspect
 import logging
-import threading
 import time
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import IMMEDIATE, ActionServer, QoS, Subscription
+from rosglass.comm import IMMEDIATE, QoS, Subscription
 from rosglass.comm.flags import check_flag
-from rosglass.comm.goal_runner import GoalRunner
+from rosglass.comm.goal_server import GoalServer
 from rosglass.comm.inorder import InOrder
-from rosglass.comm.loop import LoopExecutor, executor_for
-from rosglass.errors import ConversionError, DecodeError, MasterError, NodeClosedError
+from rosglass.errors import DecodeError, MasterError, NodeClosedError
 from rosglass.ros1.action_state import ServerState
 from rosglass.ros1.action_types import (
     CANCEL,
@@ -59,7 +56,7 @@ _TICK = 1.0
 _REPLACED = "Another goal was received, which takes its place"
 
 
-class Ros1ActionServer(ActionServer, Member):
+class Ros1ActionServer(GoalServer, Member):
     """An action server; made by :meth:`Node.create_action_server`.
 
     The parameters of actionlib's servers hold for it, too: ``actionlib_status_frequency`` (searched
@@ -93,23 +90,14 @@ class Ros1ActionServer(ActionServer, Member):
         executor: Executor | None,
         simple: bool,
     ) -> None:
-        self.name, self.type = name, type
-        chosen = executor_for(execute, executor, core.dispatcher, name)
-        for word, callback in (("accept", accept), ("cancel", cancel)):
-            plain = callable(callback) and not inspect.iscoroutinefunction(callback)
-            if callback is not None and not plain:
-                raise ConversionError(word, callback, "a plain function, or None", name)
+        super().__init__(core, name, type, execute, accept, cancel, executor, _log, self._ran)
         self._simple = check_flag(simple, "simple", name)
-        self._core, self._accept, self._cancel, self._decider = core, accept, cancel, chosen
-        given = executor is not None or isinstance(chosen, LoopExecutor)
-        self._runner = GoalRunner(name, execute, chosen if given else None, _log, self._ran)
-        self._lock = threading.Lock()
+        self._core = core
         self._list = GoalList(_KEEP)
         #: With `simple`: the goal that is executed, and the one that waits for its end.
         self._current: Ros1ServerGoal | None = None
         self._next: Ros1ServerGoal | None = None
         self._frequency = _FREQUENCY
-        self._closed = False
         self._publishing = InOrder()
         types = ActionTypes.of(type, core.types)
         self._publishers: dict[str, Ros1Publisher] = {}
@@ -132,11 +120,6 @@ class Ros1ActionServer(ActionServer, Member):
         self._tick()
 
     # -- what users see --------------------------------------------------------------------------
-
-    @property
-    def closed(self) -> bool:
-        """Whether :meth:`close` was called."""
-        return self._closed
 
     @property
     def goals(self) -> Sequence[ServerGoal]:
@@ -192,10 +175,7 @@ class Ros1ActionServer(ActionServer, Member):
 
     def send_feedback(self, entry: GoalEntry, feedback: Any, fields: dict[str, Any]) -> None:
         """Publish feedback of a goal; raises ConversionError."""
-        if feedback is not None and fields:
-            told = "either feedback or keyword fields, not both"
-            raise ConversionError("", fields, told, self.type.feedback.name)
-        made = self.type.feedback.create(fields if feedback is None else feedback)
+        made = self._make_feedback(feedback, fields)
         with self._lock:
             status = entry.status()
         self._publishers[FEEDBACK].publish(
@@ -288,20 +268,7 @@ class Ros1ActionServer(ActionServer, Member):
             self._decider.post(lambda: self._decide(entry))
 
     def _decide(self, entry: GoalEntry) -> None:
-        assert self._accept is not None
-        decision: Any = False
-        try:
-            decision = self._accept(entry.asked)
-        except Exception:
-            _log.exception("%s: accept failed; rejecting goal %s", self.name, entry.id)
-        if decision is not True and decision is not False:
-            _log.error(
-                "%s: accept returned %.80r instead of True or False; rejecting goal %s",
-                self.name,
-                decision,
-                entry.id,
-            )
-        self._take(entry, decision is True)
+        self._take(entry, self._accepts(entry.asked, entry.id))
 
     def _take(self, entry: GoalEntry, accepted: bool) -> None:
         if not accepted:
@@ -390,27 +357,10 @@ class Ros1ActionServer(ActionServer, Member):
             return
 
         def decide() -> None:
-            self._cancel_all([each for each in chosen if each.goal is None or self._allows(each)])
+            allowed = [one for one in chosen if one.goal is None or self._allows(one.goal)]
+            self._cancel_all(allowed)
 
         self._decider.post(decide)
-
-    def _allows(self, entry: GoalEntry) -> bool:
-        """Return whether a goal may be cancelled; a callback that fails must not hold up a stop."""
-        assert self._cancel is not None
-        assert entry.goal is not None
-        try:
-            decision: Any = self._cancel(entry.goal)
-        except Exception:
-            _log.exception("%s: cancel failed; cancelling goal %s", self.name, entry.id)
-            return True
-        if decision is not True and decision is not False:
-            _log.error(
-                "%s: cancel returned %.80r instead of True or False; cancelling goal %s",
-                self.name,
-                decision,
-                entry.id,
-            )
-        return decision is not False
 
     def _cancel_all(self, entries: Sequence[GoalEntry]) -> None:
         waiting = []

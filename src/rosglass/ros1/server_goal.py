@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import threading
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import GoalStatus, ServerGoal
-from rosglass.errors import ConversionError, Error, NodeClosedError
+from rosglass.comm import GoalStatus
+from rosglass.comm.goal_server import ExecutedGoal
+from rosglass.errors import ConversionError
 from rosglass.ros1.action_state import ServerState
 
 if TYPE_CHECKING:
+    import threading
+
     from rosglass.messages import Message
     from rosglass.ros1.action_server import Ros1ActionServer
     from rosglass.ros1.goal_list import GoalEntry
@@ -37,7 +39,7 @@ _UNBEGUN = {ServerState.PREEMPTED: ServerState.RECALLED, ServerState.ABORTED: Se
 _WAITING = (ServerState.PENDING, ServerState.RECALLING)
 
 
-class Ros1ServerGoal(ServerGoal):
+class Ros1ServerGoal(ExecutedGoal):
     """A goal; made by an action server when it accepts one.
 
     Args:
@@ -49,12 +51,14 @@ class Ros1ServerGoal(ServerGoal):
         client_id: Its id in text, as its client made it.
     """
 
+    _server: Ros1ActionServer
+
     def __init__(self, server: Ros1ActionServer, entry: GoalEntry, lock: threading.Lock) -> None:
+        super().__init__(server)
         self.id, self.client_id = entry.id.encode(), entry.id
         self.goal: Message = entry.asked
         self.accepted = entry.stamp
-        self._server, self._entry, self._lock = server, entry, lock
-        self._stop = threading.Event()
+        self._entry, self._lock = entry, lock
         self._replaced = self._started = False
 
     @property
@@ -80,11 +84,7 @@ class Ros1ServerGoal(ServerGoal):
 
         That is so, too, once a newer goal waits for its place (``simple=True``).
         """
-        return self._stop.is_set()
-
-    def wait_for_cancel(self, timeout: float) -> bool:
-        """Sleep up to `timeout` seconds; return early, with True, when it should end."""
-        return self._stop.wait(timeout)
+        return super().is_cancel_requested
 
     def publish_feedback(
         self, feedback: Message | dict[str, Any] | None = None, /, **fields: Any
@@ -164,10 +164,7 @@ class Ros1ServerGoal(ServerGoal):
         made = self._server.make_result(result)
         with self._lock:
             if status is GoalStatus.CANCELED and not self._may_be_canceled():
-                raise Error(
-                    f"nobody asked to cancel goal {self.id_text} of {self._server.name}; end it "
-                    "with abort() instead"
-                )
+                raise self._not_asked()
             ended = self._settle(status, text)
         if ended:
             self._server.publish_result(self._entry, made)
@@ -188,9 +185,3 @@ class Ros1ServerGoal(ServerGoal):
         self._server.note_end(self._entry)
         self._stop.set()
         return True
-
-    def _over(self, what: str) -> Error:
-        where = f"goal {self.id_text} of {self._server.name}"
-        if self._server.closed:
-            return NodeClosedError(f"{where} was aborted when its server closed: {what}")
-        return Error(f"{where} has ended as {self.status.value} already: {what}")

@@ -5,7 +5,6 @@ Behaviour: http://design.ros2.org/articles/actions.html and ``rcl_action``'s ``a
 
 from __future__ import annotations
 
-import inspect
 import logging
 import math
 import threading
@@ -14,11 +13,10 @@ from concurrent.futures import Future
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import ActionServer, Dispatcher, EndpointKind, Time
-from rosglass.comm.goal_runner import GoalRunner
+from rosglass.comm import Dispatcher, EndpointKind, Time
+from rosglass.comm.goal_server import GoalServer
 from rosglass.comm.inorder import InOrder
-from rosglass.comm.loop import LoopExecutor, executor_for
-from rosglass.errors import ConversionError, NodeClosedError
+from rosglass.errors import NodeClosedError
 from rosglass.ros2.action_types import (
     CANCEL_GOAL,
     CODES,
@@ -60,7 +58,7 @@ _ASKING = 1.0
 _NONE, _REJECTED, _UNKNOWN, _TERMINATED = range(4)
 
 
-class Ros2ActionServer(ActionServer, Member):
+class Ros2ActionServer(GoalServer, Member):
     """An action server; made by :meth:`Node.create_action_server`.
 
     Args:
@@ -85,21 +83,12 @@ class Ros2ActionServer(ActionServer, Member):
         cancel: Callable[[ServerGoal], bool] | None = None,
         executor: Executor | None = None,
     ) -> None:
-        self.name, self.type = name, core.types.action(type)
-        chosen = executor_for(execute, executor, core.dispatcher, name)
-        for word, callback in (("accept", accept), ("cancel", cancel)):
-            plain = callable(callback) and not inspect.iscoroutinefunction(callback)
-            if callback is not None and not plain:
-                raise ConversionError(word, callback, "a plain function, or None", name)
-        self._core, self._accept, self._cancel = core, accept, cancel
-        self._decider = chosen
-        given = executor is not None or isinstance(chosen, LoopExecutor)
-        self._runner = GoalRunner(name, execute, chosen if given else None, _log)
+        kind = core.types.action(type)
+        super().__init__(core, name, kind, execute, accept, cancel, executor, _log)
+        self._core = core
         self._types = types = ActionTypes.of(self.type, core.types)
-        self._lock = threading.Lock()
         self._goals: dict[bytes, Ros2ServerGoal] = {}
         self._deciding: set[bytes] = set()
-        self._closed = False
         self._publishing = InOrder()
         #: Runs the protocol: neither the middleware's threads nor users' callbacks hold it up.
         self._desk = Dispatcher(f"{name} goals")
@@ -114,11 +103,6 @@ class Ros2ActionServer(ActionServer, Member):
             )
         ]
         core.add(self)
-
-    @property
-    def closed(self) -> bool:
-        """Whether :meth:`close` was called."""
-        return self._closed
 
     @property
     def goals(self) -> Sequence[ServerGoal]:
@@ -191,11 +175,7 @@ class Ros2ActionServer(ActionServer, Member):
 
     def send_feedback(self, goal: Ros2ServerGoal, feedback: Any, fields: dict[str, Any]) -> None:
         """Publish feedback of a goal; raises ConversionError."""
-        if feedback is not None and fields:
-            told = "either feedback or keyword fields, not both"
-            raise ConversionError("", fields, told, self.type.feedback.name)
-        value = fields if feedback is None else feedback
-        made = self.type.feedback.create(value)
+        made = self._make_feedback(feedback, fields)
         self._feedback.publish({"goal_id": {"uuid": goal.id}, "feedback": made})
 
     def publish_status(self) -> None:
@@ -232,21 +212,9 @@ class Ros2ActionServer(ActionServer, Member):
         return answer
 
     def _decide(self, goal_id: bytes, goal: Message, answer: Future[Any]) -> None:
-        assert self._accept is not None
-        decision: Any = False
-        try:
-            decision = self._accept(goal)
-        except Exception:
-            _log.exception("%s: accept failed; rejecting goal %s", self.name, goal_id.hex())
-        if decision is not True and decision is not False:
-            _log.error(
-                "%s: accept returned %.80r instead of True or False; rejecting goal %s",
-                self.name,
-                decision,
-                goal_id.hex(),
-            )
+        accepted = self._accepts(goal, goal_id.hex())
         # Back on the desk, so that what follows waits for no other callback.
-        self._desk.post(lambda: self._take(goal_id, goal, answer, decision is True))
+        self._desk.post(lambda: self._take(goal_id, goal, answer, accepted))
 
     def _take(self, goal_id: bytes, wanted: Message, answer: Future[Any], accepted: bool) -> None:
         stamp = self._core.clock.now()
@@ -281,23 +249,6 @@ class Ros2ActionServer(ActionServer, Member):
 
         self._decider.post(decide)
         return answer
-
-    def _allows(self, goal: Ros2ServerGoal) -> bool:
-        """Return whether a goal may be cancelled; a callback that fails must not hold up a stop."""
-        assert self._cancel is not None
-        try:
-            decision: Any = self._cancel(goal)
-        except Exception:
-            _log.exception("%s: cancel failed; cancelling goal %s", self.name, goal.id_text)
-            return True
-        if decision is not True and decision is not False:
-            _log.error(
-                "%s: cancel returned %.80r instead of True or False; cancelling goal %s",
-                self.name,
-                decision,
-                goal.id_text,
-            )
-        return decision is not False
 
     def _cancel_all(self, goals: Sequence[Ros2ServerGoal], code: int) -> dict[str, Any]:
         """Cancel goals; returns the answer to the request."""

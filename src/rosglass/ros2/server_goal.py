@@ -6,8 +6,8 @@ import threading
 import time
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import GoalStatus, ServerGoal
-from rosglass.errors import Error, NodeClosedError
+from rosglass.comm import GoalStatus
+from rosglass.comm.goal_server import ExecutedGoal
 from rosglass.ros2.action_types import CODES
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ __all__ = ["Ros2ServerGoal"]
 _MAX_WAITING = 1000
 
 
-class Ros2ServerGoal(ServerGoal):
+class Ros2ServerGoal(ExecutedGoal):
     """A goal; made by an action server when it accepts one.
 
     Args:
@@ -33,12 +33,13 @@ class Ros2ServerGoal(ServerGoal):
         accepted: When it was accepted.
     """
 
+    _server: Ros2ActionServer
+
     def __init__(self, server: Ros2ActionServer, id: bytes, goal: Message, accepted: Time) -> None:
+        super().__init__(server)
         self.id, self.goal, self.accepted = id, goal, accepted
-        self._server = server
         self._lock = threading.Lock()
         self._status = GoalStatus.ACCEPTED
-        self._stop = threading.Event()
         self._response: Message | None = None
         self._waiting: list[Future[Any]] = []
         #: Monotonic time of its acceptance, and whether anybody asked for the result since.
@@ -50,15 +51,6 @@ class Ros2ServerGoal(ServerGoal):
     def status(self) -> GoalStatus:
         """What has become of it."""
         return self._status
-
-    @property
-    def is_cancel_requested(self) -> bool:
-        """Whether it should end soon: with :meth:`canceled`, or because the server closes."""
-        return self._stop.is_set()
-
-    def wait_for_cancel(self, timeout: float) -> bool:
-        """Sleep up to `timeout` seconds; return early, with True, when it should end."""
-        return self._stop.wait(timeout)
 
     def publish_feedback(
         self, feedback: Message | dict[str, Any] | None = None, /, **fields: Any
@@ -138,10 +130,7 @@ class Ros2ServerGoal(ServerGoal):
         with self._lock:
             if self._status.is_active:
                 if status is GoalStatus.CANCELED and self._status is not GoalStatus.CANCELING:
-                    raise Error(
-                        f"nobody asked to cancel goal {self.id_text} of {self._server.name}; end "
-                        "it with abort() instead"
-                    )
+                    raise self._not_asked()
                 waiting = self._settle(status, made)
             elif strict:
                 raise self._over(f"it cannot end as {status.value}")
@@ -178,9 +167,3 @@ class Ros2ServerGoal(ServerGoal):
         for future in waiting:
             if self._response is not None and future.set_running_or_notify_cancel():
                 future.set_result(self._response)
-
-    def _over(self, what: str) -> Error:
-        where = f"goal {self.id_text} of {self._server.name}"
-        if self._server.closed:
-            return NodeClosedError(f"{where} was aborted when its server closed: {what}")
-        return Error(f"{where} has ended as {self._status.value} already: {what}")
