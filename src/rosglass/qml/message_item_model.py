@@ -277,6 +277,7 @@ class MessageItemModel(QtCore.QAbstractItemModel):
         self.beginInsertRows(self._index_of(item), row, row + count - 1)
         item.insert(row, [default_element(item) for _ in range(count)])
         self.endInsertRows()
+        self._renumbered(item, row + count)
         self._edited()
         return True
 
@@ -291,6 +292,7 @@ class MessageItemModel(QtCore.QAbstractItemModel):
         self.beginRemoveRows(self._index_of(item), row, row + count - 1)
         self._forget(item.remove(row, count))
         self.endRemoveRows()
+        self._renumbered(item, row)
         self._edited()
         return True
 
@@ -305,6 +307,13 @@ class MessageItemModel(QtCore.QAbstractItemModel):
             self._complain(f"{what}: {item.path or 'the message'} {kind}")
             return None
         return item
+
+    def _renumbered(self, item: TreeItem, row: int) -> None:
+        """Tell views that elements have other indices, which is what their names are."""
+        if row < item.count:
+            index = self._index_of(item)
+            first, last = self.index(row, _NAME, index), self.index(item.count - 1, _NAME, index)
+            self.dataChanged.emit(first, last)
 
     def _edited(self) -> None:
         self._value = None
