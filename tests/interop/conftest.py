@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import json
+import os
 import queue
 import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
 
 def wait_for(
@@ -125,3 +127,42 @@ def start(start_program: Callable[..., Process]) -> Callable[..., Process]:
         return start_program(sys.executable, "-W", "ignore", *arguments, env=env)
 
     return start
+
+
+@pytest.fixture(scope="session")
+def on_two_machines() -> Callable[..., dict[str, Any]]:
+    """Run a script in a network namespace of its own; return what it printed last, as JSON.
+
+    Skips the test where namespaces are not permitted; fails it when the script fails. The script
+    can import ``two_machines``.
+    """
+
+    def on_two_machines(
+        script: Path, *arguments: str, env: Mapping[str, str] | None = None, timeout: float = 60.0
+    ) -> dict[str, Any]:
+        places = (str(Path(__file__).parent), os.environ.get("PYTHONPATH", ""))
+        done = subprocess.run(
+            [*_private_network(), sys.executable, "-W", "ignore", str(script), *arguments],
+            capture_output=True,
+            text=True,
+            timeout=timeout,
+            check=False,
+            env={**os.environ, **(env or {}), "PYTHONPATH": os.pathsep.join(filter(None, places))},
+        )
+        assert done.returncode == 0, done.stderr
+        seen: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+        return seen
+
+    return on_two_machines
+
+
+def _private_network() -> list[str]:
+    """Return how to run something as root of a network namespace of its own."""
+    for kind in ("-n", "-rn"):
+        command = ["unshare", kind, "sh", "-c", "ip link set lo up && unshare -n true"]
+        try:
+            if not subprocess.run(command, capture_output=True, check=False).returncode:
+                return ["unshare", kind]
+        except FileNotFoundError:
+            break
+    pytest.skip("network namespaces (unshare, ip) are not permitted here")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import json
 import os
 import random
 import signal
@@ -67,30 +66,8 @@ def memory() -> int:
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
-def private_network() -> list[str]:
-    """Return how to run something as root of a network namespace of its own."""
-    for kind in ("-n", "-rn"):
-        command = ["unshare", kind, "sh", "-c", "ip link set lo up && unshare -n true"]
-        try:
-            if not subprocess.run(command, capture_output=True, check=False).returncode:
-                return ["unshare", kind]
-        except FileNotFoundError:
-            break
-    pytest.skip("network namespaces (unshare, ip) are not permitted here")
-
-
-def test_a_cable_that_is_unplugged_for_ten_seconds_over_dds():
-    script = str(PEERS / "two_machines_dds.py")
-    done = subprocess.run(
-        [*private_network(), sys.executable, "-W", "ignore", script, "10"],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-        env=os.environ | {"CYCLONEDDS_URI": SHORT_LEASE},
-    )
-    assert done.returncode == 0, done.stderr
-    seen = json.loads(done.stdout.splitlines()[-1])
+def test_a_cable_that_is_unplugged_for_ten_seconds_over_dds(on_two_machines):
+    seen = on_two_machines(PEERS / "two_machines_dds.py", "10", env={"CYCLONEDDS_URI": SHORT_LEASE})
     assert seen["lost"] < 5, "the operator is told when the lease has ended"
     assert seen["states"] == ["LOST", "CONNECTED"]
     meanwhile = seen["meanwhile"]

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import gc
-import json
 import logging
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -51,30 +49,8 @@ def start_router(start, free_port):
     return start_router
 
 
-def private_network():
-    """Return how to run something as root of a network namespace of its own, None if forbidden."""
-    for kind in ("-n", "-rn"):
-        command = ["unshare", kind, "sh", "-c", "ip link set lo up && unshare -n true"]
-        if not subprocess.run(command, capture_output=True, check=False).returncode:
-            return ["unshare", kind]
-    return None
-
-
-@pytest.mark.skipif(not shutil.which("unshare"), reason="needs Linux with util-linux and iproute2")
-def test_a_cable_that_is_unplugged_for_ten_seconds():
-    within = private_network()
-    if within is None:
-        pytest.skip("network namespaces are not permitted here")
-    script = str(HERE / "peers" / "two_machines.py")
-    done = subprocess.run(
-        [*within, sys.executable, "-W", "ignore", script, "10"],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    seen = json.loads(done.stdout.splitlines()[-1])
+def test_a_cable_that_is_unplugged_for_ten_seconds(on_two_machines):
+    seen = on_two_machines(HERE / "peers" / "two_machines_zenoh.py", "10")
     assert seen["lost"] < 5, "the operator is told soon"
     assert seen["states"] == ["LOST", "LOST", "CONNECTED"], "silent, then given up, then back"
     assert seen["call"].startswith("ConnectionLostError"), "nobody waits for what cannot come"

@@ -6,11 +6,11 @@ The cable is unplugged for so long. Prints what the operator sees.
 
 from __future__ import annotations
 
-import subprocess
 import sys
 import time
 
 from summary import tell
+from two_machines import Cable
 
 import rosglass
 from rosglass.comm import IMMEDIATE
@@ -37,25 +37,8 @@ while True:
 """
 
 
-def run(command: str) -> None:
-    subprocess.run(command.split(), check=True)
-
-
-# The robot's machine lives as long as this process, which holds its namespace.
-machine = subprocess.Popen(["unshare", "-n", "cat"], stdin=subprocess.PIPE)
-time.sleep(0.3)
-there = f"nsenter -t {machine.pid} -n"
-run("ip link set lo up")
-run(f"{there} ip link set lo up")
-run(f"ip link add cable type veth peer name cable netns {machine.pid}")
-run("ip addr add 10.77.0.1/24 dev cable")
-run(f"{there} ip addr add 10.77.0.2/24 dev cable")
-run("ip link set cable up")
-run(f"{there} ip link set cable up")
-robot = subprocess.Popen([*there.split(), sys.executable, "-c", ROBOT], stdout=subprocess.PIPE)
-assert robot.stdout is not None
-try:
-    assert robot.stdout.readline() == b"ready\n"
+with Cable() as cable:
+    cable.start(sys.executable, "-c", ROBOT, ready="ready")
     node = rosglass.connect("dds://", "operator")
     began = time.monotonic()
 
@@ -79,7 +62,7 @@ try:
     while not (maps and got):
         time.sleep(0.01)
     states.clear()
-    run("ip link set cable down")
+    cable.unplug()
     unplugged = now()
     call = client.call_async({"a": 3, "b": 4}, timeout=20)
     time.sleep(float(sys.argv[1]) - 0.2)
@@ -91,7 +74,7 @@ try:
         "ready": client.ready,
     }
     time.sleep(0.2)
-    run("ip link set cable up")
+    cable.plug()
     plugged = now()
     while got[-1][0] < plugged + 1 and now() < plugged + 15:
         time.sleep(0.05)
@@ -112,6 +95,3 @@ try:
         status=str(node.status()),
     )
     node.close()
-finally:
-    robot.kill()
-    machine.kill()

@@ -1,17 +1,17 @@
 """A robot and an operator on two machines, in two network namespaces that a cable connects.
 
-``two_machines.py SECONDS``, to be run as root of a network namespace, which is the operator's. The
-cable is unplugged for so long. Prints what the operator sees.
+``two_machines_zenoh.py SECONDS``, to be run as root of a network namespace, which is the
+operator's. The cable is unplugged for so long. Prints what the operator sees.
 """
 
 from __future__ import annotations
 
 import itertools
-import subprocess
 import sys
 import time
 
 from summary import tell
+from two_machines import THERE, Cable
 
 import rosglass
 from rosglass.comm import IMMEDIATE
@@ -36,26 +36,9 @@ while True:
 """
 
 
-def run(command: str) -> None:
-    subprocess.run(command.split(), check=True)
-
-
-# The robot's machine lives as long as this process, which holds its namespace.
-machine = subprocess.Popen(["unshare", "-n", "cat"], stdin=subprocess.PIPE)
-time.sleep(0.3)
-there = f"nsenter -t {machine.pid} -n"
-run("ip link set lo up")
-run(f"{there} ip link set lo up")
-run(f"ip link add cable type veth peer name cable netns {machine.pid}")
-run("ip addr add 10.77.0.1/24 dev cable")
-run(f"{there} ip addr add 10.77.0.2/24 dev cable")
-run("ip link set cable up")
-run(f"{there} ip link set cable up")
-robot = subprocess.Popen([*there.split(), sys.executable, "-c", ROBOT], stdout=subprocess.PIPE)
-assert robot.stdout is not None
-try:
-    assert robot.stdout.readline() == b"ready\n"
-    node = rosglass.connect("zenoh://10.77.0.2", "operator")
+with Cable() as cable:
+    cable.start(sys.executable, "-c", ROBOT, ready="ready")
+    node = rosglass.connect(f"zenoh://{THERE}", "operator")
     began = time.monotonic()
     states: list[tuple[float, str]] = []
     node.on_status_change(
@@ -77,11 +60,11 @@ try:
     before = client.call({"a": 1, "b": 2}).sum
     time.sleep(1)
     states.clear()
-    run("ip link set cable down")
+    cable.unplug()
     unplugged = time.monotonic() - began
     call = client.call_async({"a": 3, "b": 4}, timeout=20)
     time.sleep(float(sys.argv[1]))
-    run("ip link set cable up")
+    cable.plug()
     plugged = time.monotonic() - began
     while got[-1][0] < plugged + 1 and time.monotonic() - began < plugged + 10:
         time.sleep(0.05)
@@ -100,6 +83,3 @@ try:
         status=str(node.status()),
     )
     node.close()
-finally:
-    robot.kill()
-    machine.kill()
