@@ -120,7 +120,7 @@ def test_elements_can_be_edited_inserted_and_removed(bench: Any) -> None:
         const names = at([1], 0), positions = at([2], 0)
         const done = [setData(at([1, 1], 1), 'z'), setData(at([2, 0], 1), 7),
                       insertRows(1, 2, positions), removeRows(0, 1, names)]
-        const {name, position} = message
+        const {{name, position}} = message
         return [done, edits, log, name, position, data(at([1, 0], 0), 0), renamed]"""
     done, edits, log, names, positions, index, renamed = run(bench, script)
     assert renamed == [3, 3, 0, 0]
@@ -233,7 +233,7 @@ def test_it_shows_what_a_subscription_receives(running: Any, wait: Any) -> None:
     from rosglass.comm import QoS
 
     publisher = running.robot.create_publisher("/point", "geometry_msgs/msg/Point", QoS())
-    wait(lambda: root.subscribed())
+    wait(root.subscribed)
     publisher.publish({"x": 4.5})
     wait(lambda: root.shown() == 4.5)
 
