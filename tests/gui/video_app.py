@@ -11,7 +11,7 @@ import os
 import sys
 import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 os.environ["QSG_RENDER_LOOP"] = "basic"
 os.environ["QT_LOGGING_RULES"] = "qt.multimedia.*=false"
@@ -19,12 +19,13 @@ os.environ["QT_LOGGING_RULES"] = "qt.multimedia.*=false"
 import cv2
 import numpy as np
 from memory_world import MemoryWorld
-from PySide6.QtCore import QObject, QUrl
-from PySide6.QtGui import QGuiApplication
-from PySide6.QtQuick import QQuickView
 
 from rosglass.comm import Time
 from rosglass.qml import Session, install
+from rosglass.qt import QtCore, QtGui, QtQml, QtQuick
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 QUARTERS = [(220, 30, 30), (30, 200, 40), (40, 50, 230), (230, 220, 60)]
 
@@ -71,18 +72,20 @@ def message(encoding: str) -> dict[str, Any]:
 
 def main() -> None:
     file, encodings = Path(sys.argv[1]), sys.argv[2:]
-    app = QGuiApplication([])
+    app = QtGui.QGuiApplication([])
     world = MemoryWorld()
     camera = world.connect(None, "robot").create_publisher("/cam", "sensor_msgs/msg/Image")
     session = Session(connect=world.connect)
-    view = QQuickView()
-    view.setResizeMode(QQuickView.ResizeMode.SizeRootObjectToView)
-    install(view.engine(), session)
-    view.setSource(QUrl.fromLocalFile(str(file)))
-    assert view.status() is QQuickView.Status.Ready, [e.toString() for e in view.errors()]
+    # PySide2 forgets an engine that a view has made itself.
+    engine = QtQml.QQmlEngine()
+    view = QtQuick.QQuickView(engine, None)
+    view.setResizeMode(QtQuick.QQuickView.ResizeMode.SizeRootObjectToView)
+    install(engine, session)
+    view.setSource(QtCore.QUrl.fromLocalFile(str(file)))
+    assert view.status() is QtQuick.QQuickView.Status.Ready, [e.toString() for e in view.errors()]
     view.resize(320, 240)
     view.show()
-    sub = view.rootObject().findChild(QObject, "camera")
+    sub = view.rootObject().findChild(QtCore.QObject, "camera")
 
     def turn(seconds: float) -> None:
         until = time.monotonic() + seconds
@@ -90,16 +93,22 @@ def main() -> None:
             app.processEvents()
             time.sleep(0.002)
 
-    while not sub.property("subscribed"):
-        turn(0.05)
+    def until(condition: Callable[[], bool]) -> None:
+        end = time.monotonic() + 30
+        while not condition():
+            assert time.monotonic() < end, sub.property("problem")
+            turn(0.05)
+        turn(0.2)
+
+    until(lambda: sub.property("subscribed"))
     for encoding in encodings:
         camera.publish(message(encoding))
-        turn(0.2)
+        until(lambda encoding=encoding: sub.property("encoding") == encoding)
         shot = view.grabWindow()
         places = [(80, 60), (240, 60), (80, 180), (240, 180)]
         seen = [shot.pixelColor(x, y).getRgb()[:3] for x, y in places]
         print(json.dumps({"encoding": encoding, "seen": seen}), flush=True)
-    turn(0.8)
+    until(lambda: sub.property("stale"))
     blank = view.grabWindow().pixelColor(80, 60).getRgb()[:3]
     print(json.dumps({"encoding": "timeout", "seen": [blank] * 4}), flush=True)
     view.close()
