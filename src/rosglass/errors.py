@@ -6,6 +6,7 @@ Messages follow one pattern: what happened, where (topic, field path, file and l
 from __future__ import annotations
 
 import builtins
+import re
 
 __all__ = [
     "BagError",
@@ -40,8 +41,35 @@ __all__ = [
 ]
 
 
+#: Characters of one word, and of one line, that a message shows: it is read by people, and may be
+#: about a value of any size.
+_MOST_IN_WORD, _MOST_IN_LINE = 300, 4000
+_LONG_WORD = re.compile(rf"\S{{{_MOST_IN_WORD + 1},}}")
+_LONG_LINE = re.compile(rf".{{{_MOST_IN_LINE + 1},}}")
+
+
+def _shortened(text: str) -> str:
+    """Return a message with the beginnings only of words and lines that are very long."""
+    if len(text) <= _MOST_IN_WORD:
+        return text
+    text = _LONG_WORD.sub(lambda found: _cut(found[0], 200), text)
+    return _LONG_LINE.sub(lambda found: _cut(found[0], 2000), text)
+
+
+def _cut(text: str, kept: int) -> str:
+    return f"{text[:kept]}... ({len(text)} characters)"
+
+
 class Error(Exception):
-    """Base of every error raised by rosglass."""
+    """Base of every error raised by rosglass.
+
+    Args:
+        args: The message; of words and lines that no person would read, it keeps the beginning and
+            tells the length.
+    """
+
+    def __init__(self, *args: object) -> None:
+        super().__init__(*(_shortened(arg) if isinstance(arg, str) else arg for arg in args))
 
 
 class DefinitionError(Error):
