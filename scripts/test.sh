@@ -17,8 +17,9 @@ scripts/check_wheel.sh
 # Most tests wait for others most of the time: three side by side, each file in one process.
 # Once more what failed: with other programs, machines under load can. Each is listed at the end.
 side_by_side=(-n 3 --dist loadfile --reruns 1 --rerun-show-tracebacks)
-say "tests on Debian's own Python ($(.venv-system/bin/python -V))"
-scripts/private_network.sh .venv-system/bin/python -m pytest -q "${side_by_side[@]}" tests/unit "$@"
+say "tests on Debian's own Python and Qt 5 ($(.venv-system/bin/python -V))"
+scripts/private_network.sh .venv-system/bin/python -m pytest -q "${side_by_side[@]}" \
+  tests/unit tests/gui "$@"
 say "tests, standalone ($(.venv/bin/python -V))"
 # Coverage slows tight loops tenfold: what compares every type ran above, without it.
 scripts/private_network.sh .venv/bin/python -m pytest -q "${side_by_side[@]}" -m "not exhaustive" \

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import socket
-import subprocess
 import threading
 import time
 from pathlib import Path
@@ -15,7 +13,6 @@ import pytest
 import rosglass
 from rosglass.comm import QoS, Time
 from rosglass.qml import Session, install
-from rosglass.ros2.zenoh.router import Router
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -60,28 +57,6 @@ class Robot:
         self._ended.set()
         self._thread.join()
         self.node.close()
-
-
-@pytest.fixture(params=["zenoh", "ros1"])
-def url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
-    """Where a robot and its operator meet: a router, or a master."""
-    if request.param == "zenoh":
-        with Router("tcp/127.0.0.1:0") as router:
-            yield router.url
-        return
-    if not Path("/usr/bin/rosmaster").exists():
-        pytest.skip("ROS 1 is not installed: sudo apt-get install python3-rosmaster")
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    env = {"PATH": "/usr/bin:/bin", "HOME": str(tmp_path), "ROS_HOME": str(tmp_path)}
-    command = ["/usr/bin/rosmaster", "--core", "-p", str(port)]
-    output = (tmp_path / "rosmaster").open("wb")
-    master = subprocess.Popen(command, env=env, stdout=output, stderr=output)
-    yield f"ros1://127.0.0.1:{port}?ip=127.0.0.1"
-    master.kill()
-    master.wait()
-    output.close()
 
 
 @pytest.fixture
