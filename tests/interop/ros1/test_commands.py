@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import signal
-import subprocess
-import sys
 import time
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
 
 import pytest
 
 import rosglass
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 TWIST = "geometry_msgs/Twist"
 
@@ -40,49 +35,19 @@ def robot(start_rospy, master) -> Any:
 
 
 @pytest.fixture
-def run(
-    robot: Any, master: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Iterator[Any]:
-    """Run a command in this process, which is quicker: its code, what it printed, and where."""
-    from rosglass.cli import main
-
-    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+def run(robot: Any, master: Any, monkeypatch: pytest.MonkeyPatch, run_command: Any) -> Any:
+    """Run a command of somebody who has set up his shell for the robot."""
     for name in ("ROSGLASS_URL", "ROS_DISTRO", "ROS_DOMAIN_ID", "RMW_IMPLEMENTATION"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("ROS_IP", "127.0.0.1")
     monkeypatch.setenv("ROS_MASTER_URI", master.uri)
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        capsys.readouterr()
-        try:
-            code = main(arguments)
-        except SystemExit as error:
-            code = int(error.code or 0)
-        return code, *capsys.readouterr()
-
-    yield run
-    for number, handler in handlers.items():
-        signal.signal(number, handler)
+    return run_command
 
 
 @pytest.fixture
-def start_command(master: Any) -> Iterator[Any]:
-    """Start a command as a process of its own, as somebody does who presses Ctrl-C."""
-    started = []
-
-    def start_command(*arguments: str) -> subprocess.Popen[str]:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "rosglass", *arguments],
-            env=os.environ | {"ROSGLASS_URL": f"{master.url}?ip=127.0.0.1"},
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        )  # fmt: skip
-        started.append(process)
-        return process
-
-    yield start_command
-    for process in started:
-        process.kill()
-        process.communicate()
+def start_command(master: Any, start_command_at: Any) -> Any:
+    """Start a command as a process of its own."""
+    return partial(start_command_at, f"{master.url}?ip=127.0.0.1")
 
 
 def test_topic_list_and_info(run, master, monkeypatch):

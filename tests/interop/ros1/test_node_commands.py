@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import io
 import json
-import signal
 import socket
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 
 @pytest.fixture(scope="module")
@@ -23,22 +19,10 @@ def robot(start_rospy) -> Any:
 
 
 @pytest.fixture
-def run(
-    robot: Any, master: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Iterator[Any]:
-    """Run a command in this process: its code, and what it printed, and where."""
-    from rosglass.cli import main
-
-    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+def run(robot: Any, master: Any, monkeypatch: pytest.MonkeyPatch, run_command: Any) -> Any:
+    """Run a command that looks at the robot."""
     monkeypatch.setenv("ROSGLASS_URL", f"{master.url}?ip=127.0.0.1")
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        capsys.readouterr()
-        return main(arguments), *capsys.readouterr()
-
-    yield run
-    for number, handler in handlers.items():
-        signal.signal(number, handler)
+    return run_command
 
 
 @pytest.fixture

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
-import subprocess
-import sys
 import threading
 import time
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -16,7 +14,6 @@ import pytest
 from rosglass.comm import QoS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
 
     from rosglass.comm import Node, ServerGoal
@@ -80,47 +77,21 @@ def robot(request: pytest.FixtureRequest) -> Any:
 
 
 @pytest.fixture
-def run(
-    robot: Node, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Iterator[Any]:
-    """Run a command in this process, which is quicker: its code, what it printed, and where."""
-    from rosglass.cli import main
+def run(robot: Node, monkeypatch: pytest.MonkeyPatch, run_command: Any) -> Any:
+    """Run a command that looks at the robot, in an environment with more in it."""
 
-    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-
-    def run(*arguments: str, **env: str) -> tuple[int, str, str]:
+    def run(*arguments: str, **env: str) -> Any:
         for name, value in ({"ROSGLASS_URL": robot.url} | env).items():
             monkeypatch.setenv(name, value)
-        capsys.readouterr()
-        try:
-            code = main(arguments)
-        except SystemExit as error:
-            code = int(error.code or 0)
-        return code, *capsys.readouterr()
+        return run_command(*arguments)
 
-    yield run
-    for number, handler in handlers.items():
-        signal.signal(number, handler)
+    return run
 
 
 @pytest.fixture
-def start_command(robot: Node) -> Iterator[Any]:
-    """Start a command as a process of its own, as somebody does who presses Ctrl-C."""
-    started = []
-
-    def start_command(*arguments: str) -> subprocess.Popen[str]:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "rosglass", *arguments],
-            env=os.environ | {"ROSGLASS_URL": robot.url},
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        )  # fmt: skip
-        started.append(process)
-        return process
-
-    yield start_command
-    for process in started:
-        process.kill()
-        process.communicate()
+def start_command(robot: Node, start_command_at: Any) -> Any:
+    """Start a command as a process of its own."""
+    return partial(start_command_at, robot.url)
 
 
 @BOTH

@@ -337,6 +337,18 @@ def connect(network: FakeNetwork) -> Iterator[Callable[..., Ros2Node]]:
 
 
 @pytest.fixture
+def robot(connect: Callable[..., Ros2Node]) -> Ros2Node:
+    """Another node."""
+    return connect("robot")
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Look ten times a second for what has no event."""
+    monkeypatch.setattr("rosglass.comm.core._POLL", 0.1)
+
+
+@pytest.fixture
 def node(middleware: FakeMiddleware) -> Iterator[Ros2Node]:
     made = Ros2Node(middleware, "fake://", "cockpit", "/arm")
     yield made

@@ -23,6 +23,8 @@ from rosglass.ros2 import Ros2Node
 from rosglass.ros2.action_server import _cancelable
 from rosglass.ros2.middleware import SERVER_LEFT
 
+pytestmark = pytest.mark.usefixtures("quick")
+
 SERVER, PUBLISHER = EndpointKind.SERVICE_SERVER, EndpointKind.PUBLISHER
 FIB = "example_interfaces/action/Fibonacci"
 OTHER_HASH = "RIHS01_" + "0" * 64
@@ -40,17 +42,6 @@ def fibonacci(goal):
         sequence = [*sequence[:97], sequence[-1] + 1]
         goal.publish_feedback(sequence=sequence)
     return {"sequence": sequence}
-
-
-@pytest.fixture(autouse=True)
-def quick(monkeypatch):
-    """Look ten times a second for what has no event."""
-    monkeypatch.setattr("rosglass.comm.core._POLL", 0.1)
-
-
-@pytest.fixture
-def robot(connect):
-    return connect("robot")
 
 
 @pytest.fixture

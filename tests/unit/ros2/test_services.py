@@ -24,6 +24,8 @@ from rosglass.ros2 import Ros2Node
 from rosglass.ros2.middleware import CALL_DROPPED, SERVER_LEFT, RequestId
 from rosglass.ros2.service_client import Ros2ServiceClient
 
+pytestmark = pytest.mark.usefixtures("quick")
+
 SERVER, CLIENT = EndpointKind.SERVICE_SERVER, EndpointKind.SERVICE_CLIENT
 ADD, TRIGGER, SET = (
     "example_interfaces/srv/AddTwoInts",
@@ -35,17 +37,6 @@ OTHER_HASH = "RIHS01_" + "0" * 64
 
 def add(request):
     return {"sum": request.a + request.b}
-
-
-@pytest.fixture(autouse=True)
-def quick(monkeypatch):
-    """Look ten times a second for what has no event."""
-    monkeypatch.setattr("rosglass.comm.core._POLL", 0.1)
-
-
-@pytest.fixture
-def robot(connect):
-    return connect("robot")
 
 
 @pytest.fixture
