@@ -187,6 +187,8 @@ class Intake(Member):
 
     def follow(self, moved: bool, idle: bool) -> None:
         """Let the subscriptions tell what has changed."""
+        for link in self.links():
+            link.listen()
         for reading in self.readings:
             reading.follow(moved, idle)
         if idle:

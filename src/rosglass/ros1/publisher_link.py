@@ -7,6 +7,7 @@ import socket
 import time
 from typing import TYPE_CHECKING
 
+from rosglass.comm.silence import Silence
 from rosglass.errors import ConnectionLostError, ConversionError, MasterError
 from rosglass.ros1.connection import Connection
 from rosglass.ros1.master import reason_of
@@ -67,6 +68,7 @@ class PublisherLink:
         self._connection: Connection | None = None
         self._addresses: list[tuple[str, int]] = []
         self._latches = False
+        self._silence, self._count = Silence(), 0
         self._delay = _RETRY
         self._measured_at, self._measured, self._rate = time.monotonic(), 0, 0.0
         self._begin()
@@ -75,6 +77,17 @@ class PublisherLink:
     def connected(self) -> bool:
         """Whether messages can come."""
         return bool(self.header)
+
+    @property
+    def silence(self) -> str:
+        """What is strange about nothing coming from it; empty when nothing is."""
+        return self._silence.problem
+
+    def listen(self) -> None:
+        """Look whether it has fallen silent; on the node's own thread."""
+        # Latched messages come once; and what this node sends is missed by nobody.
+        if self.connected and not self._latches and self.uri not in self._core.uris:
+            self._silence.follow(self.name, self._count, time.monotonic())
 
     @property
     def info(self) -> str:
@@ -157,11 +170,15 @@ class PublisherLink:
         self.header, self.problem, self._delay, self._addresses = header, "", _RETRY, []
         self.name = header.get("callerid", "") or self.uri
         self._latches = header.get("latching") == "1"
+        self._silence, self._count = Silence(), 0
         self._measured_at, self._measured, self._rate = time.monotonic(), 0, 0.0
         self.intake.greet(self)
 
     def _on_frames(self, frames: list[Received], _: int) -> None:
         received = time.time_ns()
+        self._count += len(frames)
+        if self._silence.problem:
+            self._core.wake()  # it is none any more
         if self._latches:
             self.latched = frames[-1]
         try:

@@ -248,6 +248,7 @@ class Reading(Source):
         problems = [*self._refused.copy().values(), *self._remarks.copy().values()]
         grave = bool(problems) or any(link.problem and not link.lost for link in links)
         problems = [link.problem for link in links if link.problem] + problems
+        problems += [link.silence for link in links if link.silence and link in self._accepted]
         there = matching or self._core.graph.endpoints(_PUBLISHER, self.intake.topic)
         absence = self._absence.follow(there)
         # What comes needs no master, and who leaves is no mistake of anybody's.

@@ -1,0 +1,74 @@
+"""Noticing that who has sent regularly does so no more."""
+
+from __future__ import annotations
+
+import pytest
+
+from rosglass.comm.silence import Silence
+
+
+def look(silence: Silence, counts: list[int], start: float = 0.0) -> list[str]:
+    """Look once a second; return the problem after each look."""
+    problems = []
+    for number, count in enumerate(counts):
+        silence.follow("/robot", count, start + number)
+        problems.append(silence.problem)
+    return problems
+
+
+def regular(rate: int, looks: int = 20) -> list[int]:
+    return [rate * number for number in range(looks)]
+
+
+def test_who_sends_regularly_is_missed_after_a_second():
+    counts = regular(30)
+    problems = look(Silence(), [*counts, counts[-1], counts[-1]])
+    assert problems[:-2] == [""] * len(counts)
+    assert "nothing has come from /robot since " in problems[-2]
+    assert "(it sent 30 per second before); is it frozen, or cut off?" in problems[-2]
+    assert problems[-1] == problems[-2]  # or it would be told again and again
+
+
+def test_who_sends_slowly_is_missed_after_five_of_its_intervals():
+    counts = regular(1)
+    problems = look(Silence(), [*counts, *[counts[-1]] * 6])
+    assert problems[len(counts) : -2] == [""] * 4
+    assert "(it sent 1 per second before)" in problems[-2]
+
+
+def test_the_next_message_ends_it_at_once():
+    silence, counts = Silence(), regular(30)
+    look(silence, [*counts, counts[-1], counts[-1]])
+    assert silence.problem
+    silence.follow("/robot", counts[-1] + 1, len(counts) + 1.01)
+    assert not silence.problem
+
+
+def test_who_was_missed_has_to_be_regular_anew():
+    silence, counts = Silence(), regular(30)
+    look(silence, [*counts, counts[-1], counts[-1]])
+    assert not any(look(silence, [counts[-1] + 1] * 60, 100.0))
+
+
+@pytest.mark.parametrize(
+    "counts",
+    [
+        [1] * 60,
+        [0] * 60,
+        [number // 3 for number in range(60)] + [20] * 60,
+        regular(30, 8) + [210] * 60,
+        [0, 2, 40, 41, 90, 92, 100, 170, 171, 200, 206, 290, 291, 330, 333, *[333] * 60],
+    ],
+    ids=["one message", "none", "every three seconds", "for some seconds", "now and then"],
+)
+def test_nobody_else_is_missed(counts):
+    assert not any(look(Silence(), counts))
+
+
+def test_looks_in_quick_succession_count_as_one():
+    silence = Silence()
+    for number in range(200):
+        silence.follow("/robot", number, number / 100)
+    silence.follow("/robot", 200, 60.0)
+    silence.follow("/robot", 200, 120.0)
+    assert not silence.problem

@@ -1,0 +1,50 @@
+"""A publisher that stays connected and sends no more."""
+
+from __future__ import annotations
+
+import threading
+
+from rosglass.comm import Durability, QoS, silence
+
+LATCHED = QoS(depth=1, durability=Durability.TRANSIENT_LOCAL)
+
+
+def test_a_publisher_that_falls_silent_is_a_problem_until_its_next_message(
+    connect, eventually, monkeypatch
+):
+    monkeypatch.setattr(silence, "_LOOKS", 2)  # takes ten seconds else
+    robot, cockpit = connect("robot"), connect("cockpit")
+    publisher = robot.create_publisher("/odom", "std_msgs/Int32")
+    told = []
+    subscription = cockpit.create_subscription("/odom", "std_msgs/Int32", lambda _: None)
+    subscription.on_problem_change(told.append)
+    frozen = threading.Event()
+
+    def publish():
+        while not frozen.wait(0.02):
+            publisher.publish({"data": 1})
+
+    sending = threading.Thread(target=publish, daemon=True)
+    sending.start()
+    (link,) = eventually(cockpit._topics._intakes["/odom"].links)
+    eventually(lambda: link._silence._regular >= silence._LOOKS)
+    frozen.set()
+    sending.join()
+    problem = eventually(lambda: subscription.problem)
+    assert problem.startswith("nothing has come from /robot since ")
+    assert subscription.publisher_count() == 1
+    publisher.publish({"data": 2})
+    eventually(lambda: not subscription.problem)
+    eventually(lambda: told[-2:] == [problem, ""])
+
+
+def test_a_latched_message_is_not_missed(connect, eventually, monkeypatch):
+    monkeypatch.setattr(silence, "_LOOKS", 0)
+    robot, cockpit = connect("robot"), connect("cockpit")
+    robot.create_publisher("/map", "std_msgs/Int32", LATCHED).publish({"data": 1})
+    subscription = cockpit.create_subscription("/map", "std_msgs/Int32")
+    assert eventually(subscription.take_latest)
+    (link,) = cockpit._topics._intakes["/map"].links()
+    for _ in range(3):
+        link.listen()
+    assert not link.silence
