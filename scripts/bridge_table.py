@@ -11,9 +11,13 @@ from __future__ import annotations
 import sys
 from collections import defaultdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rosglass.errors import Error
 from rosglass.interfaces import Counterparts, Definition, Library, ServiceDefinition, ros1_name
+
+if TYPE_CHECKING:
+    from rosglass.interfaces.definition import InterfaceDefinition
 
 PAGE = Path(__file__).parents[1] / "docs" / "bridge.md"
 BEGIN, END = "<!-- table: types -->\n", "<!-- end -->\n"
@@ -26,6 +30,7 @@ def table() -> str:
     same: dict[str, list[str]] = defaultdict(list)
     own: dict[str, list[str]] = defaultdict(list)
     rows = []
+    other: InterfaceDefinition
     for name in library.names(1):
         try:
             source = library.definition(name, ros=1)
@@ -42,7 +47,8 @@ def table() -> str:
             found = counterparts.service(source)
             other = found[0]
         else:
-            continue
+            other = counterparts.action(source)[0]
+            base = f"{base} (action)"
         if other.source.provider.startswith("derived"):
             own[package].append(base)
         elif other.name != name or lost or added:

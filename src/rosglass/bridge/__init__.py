@@ -1,4 +1,4 @@
-"""Relaying topics and services between two worlds, ROS 1 and ROS 2 among them."""
+"""Relaying topics, services and actions between two worlds, ROS 1 and ROS 2 among them."""
 
 from rosglass.bridge.bridge import Bridge
 from rosglass.bridge.rules import Direction, Rule

@@ -1,4 +1,4 @@
-"""Relaying topics and services between two worlds."""
+"""Relaying topics, services and actions between two worlds."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import time
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
+from rosglass.bridge.action_relay import ActionRelay
 from rosglass.bridge.routes import Routes
 from rosglass.bridge.rules import Rules
 from rosglass.bridge.service_relay import ServiceRelay
@@ -16,10 +17,11 @@ from rosglass.bridge.status import BridgeStatus, RelayStatus
 from rosglass.bridge.topic_relay import TopicRelay
 from rosglass.comm import IMMEDIATE, ConnectionState, Handle, Node, QoS, Worker
 from rosglass.comm.promise import check_timeout
+from rosglass.comm.similar import similar
 from rosglass.errors import ConversionError, Error, InvalidNameError, NodeClosedError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Collection, Iterable, Mapping
 
     from rosglass.bridge.rules import Rule
     from rosglass.comm import Publisher
@@ -34,18 +36,20 @@ _GONE = 3.0
 #: Seconds between two words about itself.
 _TELL = 5.0
 _STRING = "std_msgs/msg/String"
+#: The topics of an action in ROS 1.
+_PARTS = ("goal", "cancel", "status", "result", "feedback")
 
 
 class Bridge(Handle):
-    """Relays topics and services between two worlds, until it is closed.
+    """Relays topics, services and actions between two worlds, until it is closed.
 
     What is published in one world is published in the other as well, as long as somebody there
-    subscribes to it; a service that is offered in one can be called in the other. Where one is
-    ROS 1 and the other ROS 2, messages are translated. What the bridge publishes itself is never
-    relayed back, nor is what another bridge between the same two worlds publishes: of several, one
-    relays a topic, and another takes over when it ends. They know each other by their nodes: both
-    have one base name, which nobody else has. Where bridges form a ring, the one that would take
-    something back to a world where it has been says so, and does not.
+    subscribes to it; a service, or action, that is offered in one can be used in the other. Where
+    one is ROS 1 and the other ROS 2, messages are translated. What the bridge publishes itself is
+    never relayed back, nor is what another bridge between the same two worlds publishes: of
+    several, one relays a topic, and another takes over when it ends. They know each other by their
+    nodes: both have one base name, which nobody else has. Where bridges form a ring, the one that
+    would take something back to a world where it has been says so, and does not.
 
     Both nodes may lose their connections and find them again. The bridge does not close them.
 
@@ -56,12 +60,14 @@ class Bridge(Handle):
             the first world to the second), ``/cmd_vel<-``, ``/scan:=/front/scan`` (called
             otherwise in the second world), patterns such as ``/camera/*``, ``*`` for all.
         services: The same for services; ``->`` is for those offered in the first world.
-        exclude: Regular expression; topics and services that match as a whole are left out.
-        types: Types of topics, or services, that nobody publishes, or tells the type of, yet. Such
+        actions: The same for actions. Their topics in ROS 1 are not relayed by themselves then.
+        exclude: Regular expression; what matches as a whole is left out.
+        types: Types of topics, services or actions that nobody publishes, or tells the type of,
+            yet. Such
             a topic is relayed from the beginning, so that not even its first message is missed.
         qos: Profile at both ends of each topic; None for what fits.
         keep: Whether to subscribe to topics even while nobody in the other world does.
-        timeout: Seconds that servers have to answer.
+        timeout: Seconds that servers have to answer, and to accept goals.
         memory: Bytes of each topic that may wait while the other world is slow; beyond, the oldest
             messages are dropped and counted.
 
@@ -78,6 +84,7 @@ class Bridge(Handle):
         node_b: Node,
         topics: Iterable[str | Rule] = (),
         services: Iterable[str | Rule] = (),
+        actions: Iterable[str | Rule] = (),
         *,
         exclude: str = "",
         types: Mapping[str, str] | None = None,
@@ -101,15 +108,18 @@ class Bridge(Handle):
         check_timeout(timeout, "Bridge")
         if isinstance(memory, bool) or not isinstance(memory, int) or memory < 1:
             raise ConversionError("memory", memory, "a number of bytes", "Bridge")
-        self._topics, self._services = Rules(topics, exclude), Rules(services, exclude)
-        if not (self._topics or self._services):
+        self._topics = Rules(topics, exclude)
+        #: By kind: what has servers.
+        self._offers = {"action": Rules(actions, exclude), "service": Rules(services, exclude)}
+        every = (self._topics, *self._offers.values())
+        if not any(every):
             raise InvalidNameError('nothing is to be relayed; name topics, or "*" for all')
         self._types = {_absolute(name): kind for name, kind in (types or {}).items()}
         unknown = [
             name
             for name in self._types
             if not any(rules.other_name(0, name) or rules.other_name(1, name)
-                       for rules in (self._topics, self._services))
+                       for rules in every)
         ]  # fmt: skip
         if unknown:
             raise InvalidNameError(f"a type is given for {unknown[0]}, which is not relayed")
@@ -118,10 +128,12 @@ class Bridge(Handle):
         self._sides[0].other, self._sides[1].other = self._sides[1], self._sides[0]
         self._lock = threading.Lock()
         self._relays: dict[tuple[int, str], TopicRelay] = {}
-        self._callable: dict[tuple[int, str], ServiceRelay] = {}
+        #: By kind, world and name.
+        self._callable: dict[tuple[str, int, str], ServiceRelay | ActionRelay] = {}
         self._missed: dict[tuple[str, int, str], float] = {}
         #: What cannot be relayed at all, by kind, world and name.
         self._refused: dict[tuple[str, int, str], RelayStatus] = {}
+        self._missing: set[tuple[str, int, str]] = set()
         self._tellers: list[Publisher] = []
         self._told_at = 0.0
         self._closed = False
@@ -187,9 +199,14 @@ class Bridge(Handle):
                 side.listen()
             for side in self._sides:
                 self._follow_topics(side)
-                self._follow_services(side)
+                for kind in self._offers:
+                    self._follow_servers(side, kind)
             for side in self._sides:
                 side.tell()
+            self._miss("topic", self._topics, self._relays)
+            for kind, rules in self._offers.items():
+                there = {key[1:] for key in self._callable if key[0] == kind}
+                self._miss(kind, rules, there)
             self._tell()
         except NodeClosedError:
             return  # the node went first
@@ -197,7 +214,8 @@ class Bridge(Handle):
     def _follow_topics(self, side: Side) -> None:
         names = {*side.node.topics(), *self._topics.named(side.number)}
         names |= {name for number, name in self._relays if number == side.number}
-        for name in sorted(names):
+        parts = self._parts_of_actions(side)
+        for name in sorted(names - parts):
             other = self._topics.other_name(side.number, name)
             if not other:
                 continue
@@ -250,23 +268,37 @@ class Bridge(Handle):
             return bool(beside) or not side.other.known
         return any(end.node < side.other.name for end in beside)
 
-    def _follow_services(self, side: Side) -> None:
-        if not self._services:
+    def _parts_of_actions(self, side: Side) -> set[str]:
+        """Return the topics of actions that are relayed as such."""
+        rules = self._offers["action"]
+        if not rules or side.node.wire != "ros1":
+            return set()
+        # In a world of ROS 1, they have the names that they have in the other.
+        names = {name for name in side.offered("action") if rules.other_name(side.number, name)}
+        for name in side.other.offered("action"):
+            names.add(rules.other_name(side.other.number, name))
+        return {f"{name}/{part}" for name in names - {""} for part in _PARTS}
+
+    def _follow_servers(self, side: Side, kind: str) -> None:
+        rules = self._offers[kind]
+        if not rules:
             return
-        names = {*side.services(), *self._services.named(side.number)}
-        names |= {name for number, name in self._callable if number == side.number}
+        names = {*side.offered(kind), *rules.named(side.number)}
+        names |= {
+            name for what, number, name in self._callable if (what, number) == (kind, side.number)
+        }
         for name in sorted(names):
-            other = self._services.other_name(side.number, name)
+            other = rules.other_name(side.number, name)
             if not other:
                 continue
-            key = side.number, name
-            relay = self._callable.get(key)
-            offers = side.node.service_servers(name)
-            side.bring(f"service {other}", offers)
+            key, offer = (side.number, name), (kind, side.number, name)
+            relay = self._callable.get(offer)
+            offers = side.servers(kind, name)
+            side.bring(side.other.key(kind, other), offers)
             servers = side.sources(offers)
             wanted = bool(servers) or (relay is not None and not side.connected)
-            wanted = self._settled("service", key, wanted, relay is not None)
-            there = side.other.node.service_servers(other)
+            wanted = self._settled(kind, key, wanted, relay is not None)
+            there = side.other.servers(kind, other)
             if relay is None and (side.other.beside(there) or not side.other.known):
                 # In ROS 1 whoever offers a service last is called: nobody must be pushed aside.
                 wanted = False
@@ -277,21 +309,46 @@ class Bridge(Handle):
             if wanted and rivals:
                 told = f"{rivals[0].node} offers it there already"
                 wanted = False
-            self._refuse("service", key, other, told)
+            self._refuse(kind, key, other, told)
             if not wanted:
                 if relay is not None:
                     with self._lock:
-                        del self._callable[key]
+                        del self._callable[offer]
                     relay.close()
                 continue
             if relay is None:
-                kind = self._type_of(side, name, other)
-                relay = ServiceRelay(
-                    side, side.other, name, other, kind=kind, timeout=self._timeout
-                )
+                make = ActionRelay if kind == "action" else ServiceRelay
+                type_name = self._type_of(side, name, other)
+                relay = make(side, side.other, name, other, kind=type_name, timeout=self._timeout)
                 with self._lock:
-                    self._callable[key] = relay
+                    self._callable[offer] = relay
             relay.follow(self._worker.wake)
+
+    def _miss(self, kind: str, rules: Rules, there: Collection[tuple[int, str]]) -> None:
+        """Take note of what was asked for by its name, and is nowhere; and what may be meant."""
+        if not all(side.known for side in self._sides):
+            return
+        for rule in rules.rules:
+            names = (rule.name, rule.other)
+            places = [(side, names[side.number]) for side in self._sides]
+            asked = [place for place in places if rule.applies(place[0].number)]
+            missing = not rule.is_pattern and not any(
+                side.servers(kind, name) or (side.number, name) in there for side, name in asked
+            )
+            guess = ""
+            if missing:
+                known = {
+                    n for side, _ in asked for n in side.offered(kind) if side.servers(kind, n)
+                }
+                guess = similar(asked[0][1], sorted(known))
+            told = f"nobody {'publishes' if kind == 'topic' else 'offers'} it{guess}"
+            key = asked[0][0].number, asked[0][1]
+            if missing:
+                self._missing.add((kind, *key))
+                self._refuse(kind, key, names[1 - key[0]], told)
+            elif (kind, *key) in self._missing:
+                self._missing.discard((kind, *key))
+                self._refuse(kind, key, names[1 - key[0]], "")
 
     def _refuse(self, kind: str, key: tuple[int, str], other: str, problem: str) -> None:
         """Take note of why something is not relayed; no problem: it is."""

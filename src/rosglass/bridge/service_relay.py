@@ -76,6 +76,7 @@ class ServiceRelay:
         offered = kind
         if self._source.node.wire != self._target.node.wire:
             self._translation = ServiceTranslation(kind)
+            self._target.teach(self._translation)
             offered = self._translation.type
         self._type = kind
         self._server = self._target.node.create_service_server(

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING
 from rosglass.bridge.routes import TOPIC
 from rosglass.comm import ConnectionState, NodeName
 from rosglass.errors import UnsupportedError
+from rosglass.messages import default_library
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from rosglass.bridge.routes import Routes
     from rosglass.comm import EndpointInfo, Node
+    from rosglass.messages import ActionTranslation, ServiceTranslation, Translation
 
 __all__ = ["BRIDGE_NAME", "Side"]
 
@@ -150,9 +152,33 @@ class Side:
         """Return those of bridges beside us."""
         return [e for e in endpoints if self.is_beside(e.node)]
 
-    def services(self) -> dict[str, list[str]]:
-        """Return every service with its types, as far as they are known."""
+    def teach(self, translation: Translation | ServiceTranslation | ActionTranslation) -> None:
+        """Let our node describe a type that was derived to those who ask: nobody else can."""
+        if translation.derived and self.node.wire == "cdr":
+            default_library().add_version(translation.type.definition)
+
+    def offered(self, kind: str) -> dict[str, list[str]]:
+        """Return every topic, service or action with its types, as far as they are known."""
+        if kind == "topic":
+            return self.node.topics()
         try:
-            return self.node.services()
+            return self.node.actions() if kind == "action" else self.node.services()
         except UnsupportedError:
             return {}
+
+    def servers(self, kind: str, name: str) -> list[EndpointInfo]:
+        """Return who publishes a topic, or offers a service or an action, whoever that is."""
+        if kind == "topic":
+            return self.node.publishers(name)
+        if kind == "service":
+            return self.node.service_servers(name)
+        if self.node.wire == "ros1":
+            return self.node.publishers(f"{name}/result")
+        return self.node.service_servers(f"{name}/_action/send_goal")
+
+    def key(self, kind: str, name: str) -> str:
+        """Return the name under which routes of what servers offer are told."""
+        if kind == "action":
+            ros1 = self.node.wire == "ros1"
+            return f"topic {name}/result" if ros1 else f"service {name}/_action/send_goal"
+        return f"service {name}"

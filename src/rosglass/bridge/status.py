@@ -9,19 +9,19 @@ __all__ = ["BridgeStatus", "RelayStatus"]
 
 @dataclass(frozen=True, slots=True)
 class RelayStatus:
-    """How a topic, or a service, is relayed one way.
+    """How a topic, a service or an action is relayed one way.
 
     Attributes:
-        kind: ``topic`` or ``service``.
+        kind: ``topic``, ``service`` or ``action``.
         name: Its name where it comes from: where the topic is published, the service offered.
         other: Its name in the other world.
         direction: ``->`` when it comes from the first world, ``<-`` from the second.
         type: Its type where it comes from; empty while it is not known.
         other_type: Its type in the other world; empty while it is not known.
-        count: Messages sent on, or calls answered.
+        count: Messages sent on, calls answered, or goals whose end was told.
         size: Bytes of these messages.
         dropped: Messages that made room for newer ones, because the other world is slow.
-        refused: Messages, or calls, that failed.
+        refused: Messages, calls or goals that failed.
         notes: What gets lost or is added on the way, in words.
         problem: Why it is not relayed, or only in part, in words; empty when all is well.
     """
@@ -59,13 +59,20 @@ class BridgeStatus:
 
     def line(self) -> str:
         """Return a line for people."""
-        topics = {(r.name, r.direction) for r in self.relays if r.kind == "topic"}
-        services = {(r.name, r.direction) for r in self.relays if r.kind == "service"}
+        well = [r for r in self.relays if r.type or not r.problem]
+        topics, services, actions = (
+            {(r.name, r.direction) for r in well if r.kind == kind}
+            for kind in ("topic", "service", "action")
+        )
         dropped, refused = (sum(getattr(r, a) for r in self.relays) for a in ("dropped", "refused"))
-        told = f"{_many(len(topics), 'topic')}, {_many(len(services), 'service')}: "
+        told = f"{_many(len(topics), 'topic')}, {_many(len(services), 'service')}"
+        told += f", {_many(len(actions), 'action')}: " if actions else ": "
         told += f"{_many(sum(r.count for r in self.relays if r.kind == 'topic'), 'message')}, "
         told += f"{sum(r.size for r in self.relays) / 1e6:.1f} MB, "
         told += _many(sum(r.count for r in self.relays if r.kind == "service"), "call")
+        if actions:
+            goals = sum(r.count for r in self.relays if r.kind == "action")
+            told += f", {_many(goals, 'goal')}"
         if dropped:
             told += f", {dropped} DROPPED"
         if refused:

@@ -7,18 +7,26 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from rosglass.bridge.action_relay import action_notes
 from rosglass.bridge.rules import Rules
 from rosglass.bridge.service_relay import notes as service_notes
 from rosglass.bridge.side import Side
 from rosglass.bridge.topic_relay import notes
 from rosglass.errors import Error, UnsupportedError
-from rosglass.messages import MessageType, OpaqueType, ServiceTranslation, Translation
+from rosglass.messages import (
+    ActionTranslation,
+    ActionType,
+    MessageType,
+    OpaqueType,
+    ServiceTranslation,
+    Translation,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from rosglass.bridge.rules import Rule
-    from rosglass.comm import Node, ServiceClient, Subscription
+    from rosglass.comm import ActionClient, Node, ServiceClient, Subscription
     from rosglass.messages import ServiceType
 
 __all__ = ["SurveyEntry", "survey"]
@@ -26,10 +34,10 @@ __all__ = ["SurveyEntry", "survey"]
 
 @dataclass(frozen=True, slots=True)
 class SurveyEntry:
-    """A topic or service that is there, and what becomes of it.
+    """A topic, service or action that is there, and what becomes of it.
 
     Attributes:
-        kind: ``topic`` or ``service``.
+        kind: ``topic``, ``service`` or ``action``.
         name: Its name where it is published, or offered.
         other: Its name in the other world.
         direction: ``->`` from the first world to the second, ``<-`` the other way.
@@ -54,6 +62,7 @@ def survey(
     node_b: Node,
     topics: Iterable[str | Rule] = ("*",),
     services: Iterable[str | Rule] = ("*",),
+    actions: Iterable[str | Rule] = ("*",),
     *,
     exclude: str = "",
     timeout: float = 3.0,
@@ -66,19 +75,30 @@ def survey(
     sides[0].other, sides[1].other = sides[1], sides[0]
     for side in sides:
         side.look()
-    rules = {"topic": Rules(topics, exclude), "service": Rules(services, exclude)}
+    rules = {
+        "topic": Rules(topics, exclude),
+        "service": Rules(services, exclude),
+        "action": Rules(actions, exclude),
+    }
     with ExitStack() as stack:
-        asked: list[tuple[str, Side, str, str, Subscription | ServiceClient]] = []
+        asked: list[tuple[str, Side, str, str, Subscription | ServiceClient | ActionClient]] = []
         for side in sides:
             for name in sorted(side.node.topics()):
                 other = rules["topic"].other_name(side.number, name)
                 if other and side.sources(side.node.publishers(name)):
                     asked.append(("topic", side, name, other, _listen(side, name, stack)))
-            for name in sorted(side.services() if rules["service"] else ()):
-                other = rules["service"].other_name(side.number, name)
-                if other and side.sources(side.node.service_servers(name)):
-                    client = stack.enter_context(side.node.create_service_client(name))
-                    asked.append(("service", side, name, other, client))
+            for kind in ("service", "action"):
+                for name in sorted(side.offered(kind) if rules[kind] else ()):
+                    other = rules[kind].other_name(side.number, name)
+                    if other and side.sources(side.servers(kind, name)):
+                        make: Callable[[str], ServiceClient | ActionClient] = (
+                            side.node.create_service_client
+                            if kind == "service"
+                            else side.node.create_action_client
+                        )
+                        client = make(name)
+                        stack.callback(client.close)
+                        asked.append((kind, side, name, other, client))
         deadline = time.monotonic() + timeout
         while any(one[4].type is None for one in asked) and time.monotonic() < deadline:
             time.sleep(0.05)
@@ -92,7 +112,11 @@ def _listen(side: Side, name: str, stack: ExitStack) -> Subscription:
 
 
 def _entry(
-    kind: str, side: Side, name: str, other: str, end: Subscription | ServiceClient
+    kind: str,
+    side: Side,
+    name: str,
+    other: str,
+    end: Subscription | ServiceClient | ActionClient,
 ) -> SurveyEntry:
     sign = "->" if side.number == 0 else "<-"
     found = end.type
@@ -100,7 +124,7 @@ def _entry(
         told = ""
         with suppress(Error):
             told = end.problem
-        known = side.node.topics() if kind == "topic" else side.services()
+        known = side.offered(kind)
         problem = told or "its type is not known, and nobody tells it"
         return SurveyEntry(kind, name, other, sign, ", ".join(known.get(name, [])), problem=problem)
     if side.node.wire == side.other.node.wire:
@@ -112,11 +136,14 @@ def _entry(
     return SurveyEntry(kind, name, other, sign, found.name, other_type, told_notes)
 
 
-def _translated(kind: MessageType | ServiceType) -> tuple[str, tuple[str, ...]]:
+def _translated(kind: MessageType | ServiceType | ActionType) -> tuple[str, tuple[str, ...]]:
     if isinstance(kind, OpaqueType):
         raise UnsupportedError(f"its type {kind.name} cannot be translated: {kind.reason}")
     if isinstance(kind, MessageType):
         made = Translation(kind)
         return made.type.name, notes(made)
+    if isinstance(kind, ActionType):
+        action = ActionTranslation(kind)
+        return action.type.name, action_notes(action)
     service = ServiceTranslation(kind)
     return service.type.name, service_notes(service)

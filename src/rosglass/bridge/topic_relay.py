@@ -198,6 +198,7 @@ class TopicRelay:
             return
         try:
             self._translation = Translation(kind, self._in_use(kind.ros))
+            self._target.teach(self._translation)
         except Error as error:
             self._hopeless = True
             self._complain(str(error))

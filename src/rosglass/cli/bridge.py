@@ -1,4 +1,4 @@
-"""``rosglass bridge``: relay topics and services between two worlds."""
+"""``rosglass bridge``: relay topics, services and actions between two worlds."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import secrets
 import shutil
 import sys
 import time
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rosglass.cli.connecting import TIMEOUT, End, add_definitions_option, join, seconds, settle
@@ -49,10 +50,17 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="the same for a service; 'NAME->' is one that the first world offers",
     )
     parser.add_argument(
+        "--action",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="the same for an action: goals, feedback, results, and requests to cancel",
+    )
+    parser.add_argument(
         "-a",
         "--all",
         action="store_true",
-        help="relay all topics and services, hidden ones and those of every node excepted",
+        help="relay all topics, services and actions, hidden ones and those of every node excepted",
     )
     parser.add_argument(
         "-x",
@@ -132,8 +140,10 @@ def run(args: argparse.Namespace) -> int:
     from rosglass.bridge.side import BRIDGE_NAME
     from rosglass.comm import QoS
 
-    topics, services = _rules(args)
+    rules = _rules(args)
     qos = QoS.preset(args.qos) if args.qos else None
+    for _, kind in args.type:
+        _check_known(kind)
     name = args.node_name or f"{BRIDGE_NAME}_{secrets.token_hex(4)}"
     if not args.verbose:
         # What is wrong is told here, once.
@@ -143,12 +153,11 @@ def run(args: argparse.Namespace) -> int:
         join(args.second, name, args.timeout) as second,
     ):
         if args.list:
-            return _list(args, first, second, topics, services)
+            return _list(args, first, second, rules)
         with Bridge(
             first,
             second,
-            topics,
-            services,
+            *rules,
             exclude=args.exclude,
             types=dict(args.type),
             qos=qos,
@@ -160,17 +169,32 @@ def run(args: argparse.Namespace) -> int:
             return _watch(args, bridge, end, (first, second))
 
 
-def _rules(args: argparse.Namespace) -> tuple[list[Rule], list[Rule]]:
+def _check_known(kind: str) -> None:
+    """Raise TypeNotFoundError when no ROS's definition of a type is known here."""
+    from rosglass.errors import TypeNotFoundError
+    from rosglass.messages import load
+
+    with suppress(TypeNotFoundError):
+        load(kind, 1)
+        return
+    load(kind, 2)
+
+
+def _rules(args: argparse.Namespace) -> list[list[Rule]]:
+    """Return the rules for topics, services and actions."""
     from rosglass.bridge import Direction, Rule
 
-    if args.all and (args.topic or args.service):
+    named = (args.topic, args.service, args.action)
+    if args.all and any(named):
         raise Error("--all and names exclude each other; write --topic '*' or --service '*'")
-    if not (args.all or args.topic or args.service):
+    if not (args.all or any(named)):
         if not args.list:
-            raise Error("nothing is to be relayed: name it by --topic or --service, or use --all")
+            raise Error(
+                "nothing is to be relayed: name it by --topic, --service or --action, or use --all"
+            )
         args.all = True
     found = []
-    for given in (["*"], ["*"]) if args.all else (args.topic, args.service):
+    for given in (["*"],) * 3 if args.all else named:
         rules = [Rule.parse(text) for text in given]
         if args.one_way:
             rules = [
@@ -178,17 +202,15 @@ def _rules(args: argparse.Namespace) -> tuple[list[Rule], list[Rule]]:
                 for r in rules
             ]
         found.append(rules)
-    return found[0], found[1]
+    return found
 
 
-def _list(
-    args: argparse.Namespace, first: Node, second: Node, topics: list[Rule], services: list[Rule]
-) -> int:
+def _list(args: argparse.Namespace, first: Node, second: Node, rules: list[list[Rule]]) -> int:
     from rosglass.bridge import survey
 
     settle(first)
     settle(second)
-    found = survey(first, second, topics, services, exclude=args.exclude)
+    found = survey(first, second, *rules, exclude=args.exclude)
     if args.json:
         print_json(
             [

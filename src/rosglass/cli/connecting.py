@@ -125,12 +125,14 @@ def connect(args: argparse.Namespace, *, patient: bool = False) -> Node:
 def join(url: str, name: str, timeout: float) -> Node:
     """Join the graph at `url`, and wait until somebody answers; for commands that know it.
 
+    In ROS 2, the node tells others the types that it knows: they may be known nowhere else there.
+
     Raises:
         Error: As for :func:`connect`.
     """
     import rosglass
 
-    node = rosglass.connect(url, name=name, own_services=False)
+    node = rosglass.connect(url, name=name, own_services=not url.lower().startswith("ros1:"))
     try:
         _wait_for_connection(node, timeout, patient=True)
     except BaseException:

@@ -35,7 +35,7 @@ COMMANDS = {
     "interface": ("rosglass.cli.interface", "look at types of messages, services and actions"),
     "record": ("rosglass.cli.record", "record topics into an MCAP file or a ROS 1 bag"),
     "play": ("rosglass.cli.play", "play a recording: MCAP, ROS 2 bag or ROS 1 bag"),
-    "bridge": ("rosglass.cli.bridge", "relay topics and services between two worlds"),
+    "bridge": ("rosglass.cli.bridge", "relay topics, services and actions between two worlds"),
     "doctor": ("rosglass.cli.doctor", "find what keeps this machine and the robot apart"),
     "router": ("rosglass.cli.router", "run a Zenoh router for ROS 2 (rmw_zenoh)"),
     "completion": ("rosglass.cli.completion_command", "let Tab complete commands and names"),

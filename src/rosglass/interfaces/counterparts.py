@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from rosglass.errors import Error, UnsupportedError
 from rosglass.interfaces.definition import (
+    ActionDefinition,
     ArrayKind,
     Constant,
     Definition,
@@ -169,6 +170,37 @@ class Counterparts:
         assert first is not None
         assert second is not None
         return found, first, second
+
+    def action(
+        self, source: ActionDefinition, *wanted: ActionDefinition
+    ) -> tuple[ActionDefinition, Pair, Pair, Pair]:
+        """Return an action's counterpart, and how goals, results and feedback correspond.
+
+        Arguments and errors as in :meth:`message`.
+        """
+        parts = source.goal, source.result, source.feedback
+        for candidate in (*wanted, *self._candidates(source.name, source.ros)):
+            if isinstance(candidate, ActionDefinition):
+                others = candidate.goal, candidate.result, candidate.feedback
+                pairs = [_match(one, two) for one, two in zip(parts, others, strict=True)]
+                first, second, third = pairs
+                if first is not None and second is not None and third is not None:
+                    return candidate, first, second, third
+        ros = 3 - source.ros
+        base = f"{source.name}_" if ros == 2 else source.name.replace("/action/", "/msg/")
+        goal, result, feedback = (
+            replace(self._derived(part), name=f"{base}{word}")
+            for part, word in zip(parts, ("Goal", "Result", "Feedback"), strict=True)
+        )
+        text = f"{goal.text}---\n{result.text}---\n{feedback.text}"
+        found = ActionDefinition(source.name, ros, goal, result, feedback, text, goal.source)
+        first, second, third = (
+            _match(one, two) for one, two in zip(parts, (goal, result, feedback), strict=True)
+        )
+        assert first is not None
+        assert second is not None
+        assert third is not None
+        return found, first, second, third
 
     def _candidates(self, name: str, ros: int) -> Iterator[InterfaceDefinition]:
         for other in _names(name, ros):

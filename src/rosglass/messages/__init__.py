@@ -4,10 +4,11 @@ from rosglass.messages.loading import ActionType, ServiceType, default_library, 
 from rosglass.messages.message import Message, type_of
 from rosglass.messages.opaque import OpaqueType
 from rosglass.messages.sequences import MessageSequence
-from rosglass.messages.translation import ServiceTranslation, Translation
+from rosglass.messages.translation import ActionTranslation, ServiceTranslation, Translation
 from rosglass.messages.types import Constants, MessageType
 
 __all__ = [
+    "ActionTranslation",
     "ActionType",
     "Constants",
     "Message",

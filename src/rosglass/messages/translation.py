@@ -14,7 +14,7 @@ from rosglass.errors import ConversionError
 from rosglass.interfaces import Counterparts
 from rosglass.interfaces.definition import ArrayKind
 from rosglass.messages.codec import codec_of
-from rosglass.messages.loading import ServiceType, default_library
+from rosglass.messages.loading import ActionType, ServiceType, default_library
 from rosglass.messages.message import plain_class
 from rosglass.messages.sequences import MessageSequence
 from rosglass.messages.types import MessageType
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     _Convert = Callable[[Any], Any]
 
-__all__ = ["ServiceTranslation", "Translation"]
+__all__ = ["ActionTranslation", "ServiceTranslation", "Translation"]
 
 _WIRES = {1: "ros1", 2: "cdr"}
 #: ``Header.seq`` of the messages that we make for ROS 1; publishers there number them as they like.
@@ -171,6 +171,35 @@ class ServiceTranslation:
         self.derived = found.source.provider.startswith("derived from ")
         self.request = _of_pair(self.type.request, request, source.definition.request)
         self.response = _of_pair(source.response, response, found.response)
+
+
+class ActionTranslation:
+    """Turns the goals, results and feedback of an action into those of the other ROS.
+
+    Args:
+        source: The action's type where it is offered, of either ROS.
+        library: Where the other ROS's types are looked up; None for the shared library.
+
+    Attributes:
+        source: As given.
+        type: The type in the other ROS, where goals are sent.
+        derived: Whether it was derived; see :class:`Translation`.
+        goal: From what is sent there to what the server takes.
+        result: From the server's results to what is told there.
+        feedback: The same for feedback.
+
+    Raises:
+        UnsupportedError: There can be no such type; says why.
+    """
+
+    def __init__(self, source: ActionType, library: Library | None = None) -> None:
+        known = default_library() if library is None else library
+        found, goal, result, feedback = Counterparts(known).action(source.definition)
+        self.source, self.type = source, ActionType(found)
+        self.derived = found.source.provider.startswith("derived from ")
+        self.goal = _of_pair(self.type.goal, goal, source.definition.goal)
+        self.result = _of_pair(source.result, result, found.result)
+        self.feedback = _of_pair(source.feedback, feedback, found.feedback)
 
 
 def _of_pair(source: MessageType, pair: Pair, target: Definition) -> Translation:

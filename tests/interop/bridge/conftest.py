@@ -49,9 +49,9 @@ def connect(master: Any, router: Router) -> Iterator[Callable[..., Node]]:
     """Connect to a world: ``connect("ros1", name)`` or ``connect("ros2", name)``."""
     nodes: list[Node] = []
 
-    def connect(world: str, name: str, url: str = "") -> Node:
+    def connect(world: str, name: str, url: str = "", *, described: bool = False) -> Node:
         usual = f"{master.url}?ip=127.0.0.1" if world == "ros1" else router.url
-        node = rosglass.connect(url or usual, name, own_services=False)
+        node = rosglass.connect(url or usual, name, own_services=described)
         nodes.append(node)
         return node
 
@@ -67,7 +67,8 @@ def bridge(connect: Callable[..., Node]) -> Iterator[Callable[..., Bridge]]:
 
     def bridge(*arguments: Any, urls: tuple[str, str] = ("", ""), **more: Any) -> Bridge:
         name = f"rosglass_bridge_{secrets.token_hex(4)}"
-        nodes = connect("ros1", name, urls[0]), connect("ros2", name, urls[1])
+        second = connect("ros2", name, urls[1], described=not urls[1].startswith("ros1"))
+        nodes = connect("ros1", name, urls[0]), second
         made.append(Bridge(*nodes, *arguments, **more))
         return made[-1]
 

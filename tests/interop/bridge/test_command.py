@@ -67,11 +67,23 @@ def test_it_lists_what_maps(master, router, connect, wait_for):
         (("--all", "--topic", "/a"), "exclude each other"),
         (("--topic", "/a b"), "no name of a topic"),
         (("--topic", "/a", "--qos", "best"), "no QoS preset"),
+        (("--topic", "/a", "--type", "/a:=nowhere_msgs/Thing"), "nowhere_msgs"),
     ],
 )
 def test_nonsense(arguments, told):
     done = run("ros1://127.0.0.1", "zenoh://127.0.0.1", *arguments, status=1)
     assert told in done.stderr
+
+
+def test_what_is_nowhere_is_told(master, router, connect, start_program, wait_for):
+    two = connect("ros2", "two")
+    two.create_publisher("/odometry", STRING)
+    command = (*COMMAND, f"{master.url}?ip=127.0.0.1", router.url, "--topic", "/odometri")
+    process = start_program(*command, env=dict(os.environ))
+    told = "/odometri ->: nobody publishes it; did you mean /odometry?"
+    wait_for(lambda: any(told in line for line in process.output))
+    two.create_publisher("/odometri", STRING)
+    wait_for(lambda: any("/odometri ->: well again" in line for line in process.output))
 
 
 def test_nobody_answers(router, free_port):
