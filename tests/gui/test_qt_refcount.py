@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 
 import pytest
@@ -56,3 +57,19 @@ def test_choice(loaded: set, wanted: str, binding: str) -> None:
 def test_a_second_qt_is_refused(loaded: set, wanted: str, reason: str) -> None:
     with pytest.raises(UnsupportedError, match=reason):
         choose_binding(frozenset(loaded), wanted)
+
+
+def test_a_missing_qt5_is_told_with_its_packages() -> None:
+    script = """import os, sys
+sys.modules["PySide2"] = None
+os.environ["ROSGLASS_QT"] = "pyside2"
+from rosglass.errors import UnsupportedError
+try:
+    import rosglass.qt
+except UnsupportedError as error:
+    print(error)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert "apt install python3-pyside2.qtquick" in done.stdout

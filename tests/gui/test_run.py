@@ -131,6 +131,22 @@ def test_screenshot(start: Any, file: Path, tmp_path: Path, screen: str, root: s
     assert picture[50, 50].tolist() == [0x60, 0x40, 0x20]
 
 
+def test_offscreen_without_any_display(start: Any, file: Path, tmp_path: Path) -> None:
+    from rosglass.qt import QT6
+
+    file.write_text(GOOD)
+    target = tmp_path / "shot.png"
+    command = ("run", file, "--screenshot", target, "--after", "0.1")
+    program = start(*command, display=None, QT_QPA_PLATFORM="offscreen")
+    if QT6:
+        assert program.end() == 0, program.text
+        assert target.exists()
+    else:
+        # Qt 5 has no pictures there, and would crash where it looks for OpenGL.
+        assert program.end() == 1
+        assert "use a virtual screen: xvfb-run" in program.text
+
+
 def test_a_screenshot_that_cannot_be_written(start: Any, file: Path, tmp_path: Path) -> None:
     file.write_text(GOOD)
     program = start("run", file, "--screenshot", tmp_path / "no" / "x.png", "--after", "0.1")

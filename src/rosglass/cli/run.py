@@ -216,9 +216,14 @@ def _show(
 
 def _save(runner: Runner, target: Path) -> int:
     try:
+        if runner.window is None:
+            raise UnsupportedError("the interface has no window to take a picture of")
         image = runner.grab()
         if image.isNull():
-            raise UnsupportedError("the interface has no window to take a picture of")
+            raise UnsupportedError(
+                "Qt gave no picture of the window, as Qt 5 does offscreen; use a virtual screen: "
+                "xvfb-run -s '-screen 0 1280x800x24' rosglass run ..."
+            )
         if not image.save(str(target)):
             raise UnsupportedError(
                 f"the picture could not be written to {target}; "

@@ -34,6 +34,11 @@ __all__ = [
 
 #: Binding -> major version of its Qt. PyQt is never chosen, but tells which Qt is loaded.
 _QT_OF = {"PySide6": 6, "PyQt6": 6, "PySide2": 5, "PyQt5": 5}
+_INSTALL_QT5 = (
+    "Qt 5 comes with the system's own Python; on Debian and Ubuntu: sudo apt install "
+    "python3-pyside2.qtquick python3-pyside2.qtmultimedia qml-module-qtquick-controls2 "
+    "qml-module-qtquick-layouts qml-module-qtquick-window2 qml-module-qtmultimedia"
+)
 
 
 def choose_binding(loaded: frozenset[str], wanted: str = "") -> str:
@@ -83,16 +88,29 @@ BINDING = choose_binding(_loaded, os.environ.get("ROSGLASS_QT", ""))
 #: Whether this is Qt 6.
 QT6 = _QT_OF[BINDING] == 6
 
-_refuse_broken_binding(BINDING, tuple(import_module(BINDING).__version_info__[:3]))
+
+def _load(module: str = "") -> Any:
+    """Import a module that every installation of the binding must have.
+
+    Raises:
+        UnsupportedError: PySide2 lacks it; which package brings PySide6 is for the caller to say.
+    """
+    try:
+        return import_module(f"{BINDING}.{module}" if module else BINDING)
+    except ModuleNotFoundError as error:
+        if QT6:
+            raise
+        raise UnsupportedError(f"{error}; {_INSTALL_QT5}") from None
+
+
+_refuse_broken_binding(BINDING, tuple(_load().__version_info__[:3]))
 
 if TYPE_CHECKING:
     import shiboken6 as _shiboken
     from PySide6 import QtCore, QtGui, QtQml, QtQuick
 else:
-    QtCore = import_module(f"{BINDING}.QtCore")
-    QtGui = import_module(f"{BINDING}.QtGui")
-    QtQml = import_module(f"{BINDING}.QtQml")
-    QtQuick = import_module(f"{BINDING}.QtQuick")
+    QtCore, QtGui = _load("QtCore"), _load("QtGui")
+    QtQml, QtQuick = _load("QtQml"), _load("QtQuick")
     _shiboken = import_module("shiboken6" if QT6 else "shiboken2")
 
 Signal, Slot, Property = QtCore.Signal, QtCore.Slot, QtCore.Property
