@@ -10,11 +10,15 @@ from rosglass.qml.ros1.service import Service
 from rosglass.qml.ros1.service_server import RosServiceServer
 from rosglass.qml.ros1.subscriber import Subscriber
 from rosglass.qml.ros1.time import Time, WallTime
+from rosglass.qml.tf_broadcaster import RosTfBroadcaster
+from rosglass.qml.tf_buffer import RosTfBuffer, RosTfTransformListener
+from rosglass.qml.tf_transform import RosTfTransform
 
 __all__ = ["NATIVE", "TYPES"]
 
 #: Bases of the module's singletons (``imports/Ros/*.qml``), by their name in ``Ros.Native``.
 NATIVE = {
+    "TfTransformListenerNative": RosTfTransformListener,
     "RosNative": Ros,
     "ServiceNative": Service,
     "TimeNative": Time,
@@ -23,6 +27,9 @@ NATIVE = {
 }
 #: What QML can write, by name.
 TYPES = {
+    "TfBroadcaster": RosTfBroadcaster,
+    "TfBuffer": RosTfBuffer,
+    "TfTransform": RosTfTransform,
     "Parameter": Parameter,
     "ServiceServer": RosServiceServer,
     "Subscriber": Subscriber,

@@ -11,17 +11,24 @@ from rosglass.qml.ros2.ament_index import AmentIndex
 from rosglass.qml.ros2.ros2 import Ros2
 from rosglass.qml.service_server import ServiceServer
 from rosglass.qml.subscription import Subscription
+from rosglass.qml.tf_broadcaster import TfBroadcaster
+from rosglass.qml.tf_buffer import TfBuffer, TfTransformListener
+from rosglass.qml.tf_transform import TfTransform
 
 __all__ = ["NATIVE", "TYPES"]
 
 #: Bases of the module's singletons (``imports/Ros2/*.qml``), by their name in ``Ros2.Native``.
 NATIVE = {
+    "TfTransformListenerNative": TfTransformListener,
     "AmentIndexNative": AmentIndex,
     "Ros2Native": Ros2,
     "ImageTransportManagerNative": ImageTransportManager,
 }
 #: What QML can write, by name.
 TYPES = {
+    "TfBroadcaster": TfBroadcaster,
+    "TfBuffer": TfBuffer,
+    "TfTransform": TfTransform,
     "Parameter": Parameter,
     "ServiceServer": ServiceServer,
     "Subscription": Subscription,

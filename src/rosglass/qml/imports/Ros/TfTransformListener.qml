@@ -1,0 +1,4 @@
+pragma Singleton
+import Ros.Native 1.0
+
+TfTransformListenerNative {}

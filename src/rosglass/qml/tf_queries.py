@@ -1,0 +1,282 @@
+"""What ``TfTransformListener`` and ``TfBuffer`` are asked: transforms, and the tree of frames."""
+# ruff: noqa: N802 - the names of slots are QML's
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from rosglass.comm.time import Time
+from rosglass.errors import ConversionError, Error, TransformException
+from rosglass.qml.element import Element
+from rosglass.qml.log import log_from_qml
+from rosglass.qml.times import time_from_js
+from rosglass.qml.waiting import wait_for
+from rosglass.qt import QJSValue, Slot
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from rosglass.comm.promise import Promise
+    from rosglass.qml.runtime import Runtime
+    from rosglass.qml.tf_link import TfLink
+    from rosglass.tf import FrameInfo, Transform, TransformBuffer
+
+__all__ = ["TfQueries", "shown_transform"]
+
+_USAGE = "(target, source, time, timeout) or (target, time, source, time, fixedFrame, timeout)"
+
+
+class TfQueries(Element):
+    """Looks up transforms in a buffer that is filled from the session's node."""
+
+    _link: TfLink | None = None
+
+    @property
+    def buffer(self) -> TransformBuffer | None:
+        """The transforms; None while there is no node."""
+        if self._link is None:
+            # Who asks right after mentioning it need not wait for the event loop.
+            self._settle()
+        return self._link.buffer if self._link is not None else None
+
+    # Transforms.
+
+    @Slot(QJSValue, QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, QJSValue, QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, QJSValue, QJSValue, QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, QJSValue, QJSValue, QJSValue, QJSValue, result=QJSValue)
+    def canTransform(self, *given: QJSValue) -> QJSValue:
+        """Return true when a transform can be looked up, otherwise why not, as a text.
+
+        Arguments are those of :meth:`lookUpTransform`.
+        """
+        result = self._look_up("canTransform", given)
+        if isinstance(result, _Missing):
+            return QJSValue(result.why)
+        return QJSValue(not isinstance(result, str))
+
+    @Slot(QJSValue, QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, QJSValue, QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, QJSValue, QJSValue, QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, QJSValue, QJSValue, QJSValue, QJSValue, result=QJSValue)
+    def lookUpTransform(self, *given: QJSValue) -> QJSValue:
+        """Return where a frame is, seen from another.
+
+        Arguments are target and source frame, and optionally the time (newest when left out) and
+        milliseconds to wait; or target frame, its time, source frame, its time, a frame that does
+        not move in between, and optionally milliseconds to wait. The interface lives on while it
+        waits.
+
+        Returns:
+            A ``geometry_msgs/TransformStamped`` with ``valid``; when that is false, also with
+            ``exception`` and ``message``.
+        """
+        runtime = self._find_runtime()
+        result = self._look_up("lookUpTransform", given)
+        if runtime is None or isinstance(result, str):
+            return QJSValue()
+        if isinstance(result, _Missing):
+            return shown_transform(runtime, result.frames, result.exception, result.why, self)
+        return shown_transform(runtime, result, "", "", self)
+
+    def _look_up(self, what: str, given: Sequence[QJSValue]) -> Transform | _Missing | str:
+        """Return the transform, or what is missing, or an empty text after a thrown error."""
+        runtime = self._find_runtime()
+        if runtime is None:
+            return ""
+        try:
+            query = _Query(given)
+        except Error as error:
+            runtime.throw(f"{what}: {error}")
+            return ""
+        buffer = self.buffer
+        if buffer is None:
+            return _Missing(query.frames, "Uninitialized", "there is no node yet")
+        try:
+            if not query.timeout:
+                return query.look_up(buffer)
+            promise = query.promise(buffer)
+            session = runtime.session
+
+            def begin(end: Callable[[], None]) -> None:
+                promise.on_done(lambda _: end(), session.executor)
+
+            wait_for(session, begin)
+            promise.cancel()
+            return promise.result(0)
+        except TransformException as error:
+            return _Missing(query.frames, type(error).__name__, str(error))
+        except Exception as error:
+            return _Missing(query.frames, "TransformException", str(error) or "given up")
+
+    # The tree.
+
+    @Slot(str, result=str)
+    def getFrameAuthority(self, frame: str) -> str:
+        """Return the node that publishes a frame; empty when there is no such frame."""
+        info = self._frame(frame)
+        return (
+            "" if info is None else info.authority or ("unknown_publisher" if info.parent else "")
+        )
+
+    @Slot(str, result=QJSValue)
+    def getFrame(self, frame: str) -> QJSValue:
+        """Return what is known of a frame; undefined when there is no such frame."""
+        buffer, info, runtime = self.buffer, self._frame(frame), self._find_runtime()
+        if buffer is None or info is None or runtime is None:
+            return QJSValue()
+        return runtime.value(_described(buffer, info))
+
+    @Slot(result=QJSValue)
+    def getAllFrames(self) -> QJSValue:
+        """Return what is known of every frame."""
+        buffer, runtime = self.buffer, self._find_runtime()
+        if buffer is None or runtime is None:
+            return QJSValue()
+        tree = buffer.tree()
+        return runtime.value([_described(buffer, tree[name]) for name in sorted(tree)])
+
+    @Slot(str, result=float)
+    def getTransformAge(self, frame: str) -> float:
+        """Return the seconds since a frame's newest transform, by its stamp; -1 when unknown."""
+        info, node = self._frame(frame), self.node
+        if info is None or node is None or info.static:
+            return -1.0
+        age = info.age(node.now())
+        return -1.0 if age is None else age.seconds
+
+    @Slot(str, str, result="QStringList")
+    def getChain(self, target: str, source: str) -> list[str]:
+        """Return the frames from source to target, both included; empty when nothing joins them."""
+        buffer = self.buffer
+        try:
+            return [] if buffer is None else buffer.tree().chain(target, source)
+        except TransformException:
+            return []
+
+    def _frame(self, name: str) -> FrameInfo | None:
+        buffer = self.buffer
+        return None if buffer is None else buffer.frame(name)
+
+    def _warn(self, text: str) -> None:
+        runtime = self._find_runtime()
+        if runtime is not None:
+            log_from_qml("", logging.WARNING, text, runtime.caller())
+
+
+class _Missing:
+    """A transform that cannot be had, and why: tf2's exception and its text."""
+
+    def __init__(self, frames: Transform, exception: str, why: str) -> None:
+        self.frames, self.exception, self.why = frames, exception, why
+
+
+class _Query:
+    """The arguments of a lookup.
+
+    Raises:
+        ConversionError: They are not what they should be.
+    """
+
+    def __init__(self, given: Sequence[QJSValue]) -> None:
+        from rosglass.tf import Transform  # noqa: PLC0415 - not needed at start-up
+
+        self.full = len(given) > 4
+        places = (0, 2, 4) if self.full else (0, 1)
+        if not all(given[place].isString() for place in places):
+            raise ConversionError("", "other arguments", _USAGE)
+        self.target, self.source, *fixed = (given[place].toString() for place in places)
+        self.fixed = fixed[0] if fixed else ""
+        when = [
+            _time(given[place]) for place in ((1, 3) if self.full else (2,)) if place < len(given)
+        ]
+        self.target_time = when[0] if self.full else Time()
+        self.time = when[-1] if when else Time()
+        last = 5 if self.full else 3
+        milliseconds = given[last].toNumber() if len(given) > last else 0.0
+        if not milliseconds >= 0:
+            raise ConversionError("timeout", milliseconds, "milliseconds from 0 on")
+        #: Seconds to wait.
+        self.timeout = milliseconds / 1000
+        #: The frames that are asked for.
+        self.frames = Transform(frame_id=self.target, child_frame_id=self.source)
+
+    def look_up(self, buffer: TransformBuffer) -> Transform:
+        """Return the transform, or raise one of tf2's exceptions."""
+        if self.full:
+            return buffer.lookup_transform_full(
+                self.target, self.target_time, self.source, self.time, self.fixed
+            )
+        return buffer.lookup_transform(self.target, self.source, self.time)
+
+    def promise(self, buffer: TransformBuffer) -> Promise[Transform]:
+        """Return the promise of the transform within the time."""
+        if self.full:
+            return buffer.lookup_transform_full_async(
+                self.target,
+                self.target_time,
+                self.source,
+                self.time,
+                self.fixed,
+                timeout=self.timeout,
+            )
+        return buffer.lookup_transform_async(
+            self.target, self.source, self.time, timeout=self.timeout
+        )
+
+
+def _time(value: QJSValue) -> Time:
+    """Return a time; zero, which means the newest, for an invalid Date, undefined and null."""
+    if value.isUndefined() or value.isNull():
+        return Time()
+    if value.isDate() and value.property("getTime").callWithInstance(value).toString() == "NaN":
+        return Time()
+    return time_from_js(value)
+
+
+def shown_transform(
+    runtime: Runtime, transform: Transform, exception: str, why: str, element: Element
+) -> QJSValue:
+    """Return a transform as QML gets it.
+
+    Args:
+        runtime: The engine's runtime.
+        transform: The transform; of one that is not valid, only its frames count.
+        exception: Name of tf2's exception; empty for a valid transform.
+        why: Its text.
+        element: Whose habits are followed.
+    """
+    from rosglass.messages import load  # noqa: PLC0415 - brings in the definitions
+
+    kind: Any = load("geometry_msgs/msg/TransformStamped", ros=2)
+    value = runtime.message(kind.create(transform.to_dict(2)), element.DIALECT)
+    value.setProperty("valid", QJSValue(not exception))
+    if exception:
+        value.setProperty("exception", QJSValue(exception))
+        value.setProperty("message", QJSValue(why))
+    return value
+
+
+def _described(buffer: TransformBuffer, info: FrameInfo) -> dict[str, Any]:
+    from rosglass.tf import Transform  # noqa: PLC0415 - loaded by now
+
+    placed = Transform()
+    if info.parent:
+        try:
+            placed = buffer.lookup_transform(info.parent, info.name)
+        except TransformException:
+            placed = replace(placed)
+    return {
+        "frameId": info.name,
+        "parentId": info.parent,
+        "authority": info.authority,
+        "translation": dict(zip("xyz", placed.translation, strict=True)),
+        "rotation": dict(zip("xyzw", placed.rotation, strict=True)),
+        "isStatic": info.static,
+        "children": sorted(buffer.tree().children(info.name)),
+        "frequency": info.rate,
+    }

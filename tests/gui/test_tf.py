@@ -1,0 +1,275 @@
+"""Transforms in QML: followed, looked up and sent, on real middleware."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from rosglass.comm import Time
+from rosglass.tf import StaticTransformBroadcaster, Transform, TransformBroadcaster
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from conftest import Bench
+
+FOLLOWING = """
+    QtObject {
+        property TfTransform tf: TfTransform { sourceFrame: "base"; targetFrame: "map" }
+        property var order: []
+        property Connections c: Connections {
+            target: tf
+            function onMessageChanged() { order.push("message " + tf.valid) }
+            function onValidChanged() { order.push("valid " + tf.message.valid) }
+        }
+        function x() { return tf.translation.x }
+        function w() { return tf.rotation.w }
+        function shown() {
+            return [tf.valid, tf.stale, tf.rate, tf.enabled, tf.active, tf.message.exception].join()
+        }
+        function told() { return order.join() }
+    }
+"""
+
+
+class Robot:
+    """Moves along x by a millimetre each 20 ms, with a laser 0.5 m ahead of its centre."""
+
+    def __init__(self, node: Any) -> None:
+        self.node = node
+        self._moving, self._static = TransformBroadcaster(node), StaticTransformBroadcaster(node)
+        self._static.send_transform(
+            Transform((0.5, 0.0, 0.0), frame_id="base", child_frame_id="laser")
+        )
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._move)
+        self._thread.start()
+
+    def _move(self) -> None:
+        x = 1.0
+        while not self._ended.wait(0.02):
+            x += 0.001
+            place = Transform(
+                (x, 0.0, 0.0), stamp=Time.now(), frame_id="map", child_frame_id="base"
+            )
+            self._moving.send_transform(place)
+
+    def close(self) -> None:
+        self._ended.set()
+        self._thread.join()
+        self._moving.close()
+        self._static.close()
+
+
+@pytest.fixture
+def robot(live: Bench) -> Iterator[Robot]:
+    made = Robot(live.robot)
+    yield made
+    made.close()
+
+
+@pytest.mark.parametrize("module", ["Ros2 1.0", "Ros 1.0"])
+def test_following(live: Bench, robot: Robot, module: str, wait: Any) -> None:
+    live.module = module
+    root: Any = live.load(FOLLOWING)
+    assert root.shown() == "false,true,62.5,true,true,Uninitialized"
+    assert root.w() == 1
+    wait(lambda: root.shown().startswith("true,false"))
+    # Who asks when told that it is valid must not see the old message.
+    assert root.told().startswith("message true,valid true") or "valid true" in root.told()
+    before = root.x()
+    assert before > 1
+    wait(lambda: root.x() > before)
+    robot.close()
+    wait(lambda: root.shown().startswith("true,true"))
+
+
+def test_static_transforms_stay_fresh(live: Bench, robot: Robot, wait: Any) -> None:
+    root: Any = live.load("""
+        QtObject {
+            property TfTransform tf: TfTransform {
+                sourceFrame: "laser"; targetFrame: "base"; timeout: 200
+            }
+            function shown() { return [tf.valid, tf.stale, tf.age, tf.translation.x].join() }
+        }
+    """)
+    wait(lambda: root.shown() == "true,false,-1,0.5")
+    wait(500)
+    assert root.shown() == "true,false,-1,0.5"
+
+
+def test_enabled_frames_and_rate(live: Bench, robot: Robot, wait: Any) -> None:
+    root: Any = live.load("""
+        QtObject {
+            property int n: 0
+            property TfTransform tf: TfTransform {
+                sourceFrame: "base"; targetFrame: "map"; rate: 5; onMessageChanged: n += 1
+            }
+            function valid() { return tf.valid }
+            function disable() { tf.enabled = false }
+            function enable() { tf.enabled = true }
+            function other() { tf.sourceFrame = "nothing" }
+            function exception() { return tf.message.exception }
+        }
+    """)
+    wait(root.valid)
+    before = root.property("n")
+    wait(1000)
+    assert root.property("n") - before <= 8
+    root.disable()
+    wait(50)
+    before = root.property("n")
+    wait(300)
+    assert root.property("n") == before
+    root.other()
+    root.enable()
+    wait(lambda: root.exception() == "LookupException")
+    assert not root.valid()
+
+
+def test_lookups(live: Bench, robot: Robot, wait: Any) -> None:
+    live.run("TfTransformListener.initialize()")
+    wait(lambda: live.run('return TfTransformListener.canTransform("map", "laser")') is True)
+    found = live.run('return TfTransformListener.lookUpTransform("map", "laser")')
+    assert found["valid"] is True
+    assert found["transform"]["translation"]["x"] > 1.5
+    assert (found["header"]["frame_id"], found["child_frame_id"]) == ("map", "laser")
+    why = live.run('return TfTransformListener.canTransform("map", "moon")')
+    assert "moon" in why
+    missing = live.run('return TfTransformListener.lookUpTransform("map", "moon")')
+    assert (missing["valid"], missing["exception"]) == (False, "LookupException")
+    assert "moon" in missing["message"]
+    wait(300)
+    full = live.run("""
+        const then = new Date(Date.now() - 100)
+        return TfTransformListener.lookUpTransform("base", then, "base", Ros2.now(), "map", 5000)
+    """)
+    assert full["valid"] is True, full
+    assert 0 < full["transform"]["translation"]["x"] < 0.2
+
+
+def test_waiting_for_a_transform(live: Bench, wait: Any) -> None:
+    live.run("TfTransformListener.initialize()")
+    broadcaster = StaticTransformBroadcaster(live.robot)
+    place = Transform((2.0, 0.0, 0.0), frame_id="base", child_frame_id="arm")
+    timer = threading.Timer(0.5, lambda: broadcaster.send_transform(place))
+    timer.start()
+    found = live.run('return TfTransformListener.lookUpTransform("base", "arm", 0, 20000)')
+    assert found["transform"]["translation"]["x"] == 2
+    late = live.run('return TfTransformListener.lookUpTransform("base", "leg", 0, 50)')
+    assert (late["valid"], late["exception"]) == (False, "TimeoutException")
+    timer.join()
+
+
+def test_the_tree(live: Bench, robot: Robot, wait: Any) -> None:
+    live.run("TfTransformListener.initialize()")
+    wait(lambda: live.run('return TfTransformListener.canTransform("map", "laser")') is True)
+    frame = live.run('return TfTransformListener.getFrame("laser")')
+    assert frame | {"frequency": 0} == {
+        "frameId": "laser",
+        "parentId": "base",
+        "authority": "/robot",
+        "translation": {"x": 0.5, "y": 0, "z": 0},
+        "rotation": {"x": 0, "y": 0, "z": 0, "w": 1},
+        "isStatic": True,
+        "children": [],
+        "frequency": 0,
+    }
+    shown = live.run("""
+        const l = TfTransformListener
+        return [l.getAllFrames().map(f => f.frameId), l.getFrameAuthority("base"),
+                l.getFrameAuthority("moon"), l.getTransformAge("map"), l.getTransformAge("laser"),
+                l.getChain("map", "laser"), l.getFrame("moon") === undefined]
+    """)
+    assert shown == [
+        ["base", "laser", "map"], "/robot", "", -1, -1, ["laser", "base", "map"], True
+    ]  # fmt: skip
+    age = live.run('return TfTransformListener.getTransformAge("base")')
+    assert 0 <= age < 20
+
+
+def test_namespaces_are_apart(live: Bench, robot: Robot, wait: Any) -> None:
+    other = StaticTransformBroadcaster(live.robot, "/arm")
+    other.send_transform(Transform((3.0, 0.0, 0.0), frame_id="root", child_frame_id="tip"))
+    root: Any = live.load("""
+        QtObject {
+            property Component buffers: Component { TfBuffer { ns: "/arm/" } }
+            property TfBuffer b: buffers.createObject(null)
+            property TfTransform tf: TfTransform {
+                sourceFrame: "tip"; targetFrame: "root"; Component.onCompleted: buffer = b
+            }
+            function shown() { return [b.ns, tf.valid, tf.translation.x].join() }
+            function other() { return b.canTransform("map", "base") }
+            function wrong() { b.ns = "no good"; return b.ns }
+            function drop() { b.destroy() }
+            function exception() { return tf.message.exception }
+        }
+    """)
+    wait(lambda: root.shown() == "/arm,true,3")
+    assert root.other() is not True
+    assert root.wrong() == "/arm"
+    root.drop()
+    wait(lambda: root.exception() == "Uninitialized")
+
+
+def test_changes_are_told(live: Bench, robot: Robot, wait: Any) -> None:
+    root: Any = live.load("""
+        QtObject {
+            property int transforms: 0
+            property int frames: 0
+            property Connections c: Connections {
+                target: TfTransformListener
+                function onTransformChanged() { transforms += 1 }
+                function onFramesChanged() { frames += 1 }
+            }
+        }
+    """)
+    wait(lambda: root.property("transforms") > 3 and root.property("frames") > 0)
+
+
+@pytest.mark.parametrize("static", ["true", "false"])
+def test_broadcasting(live: Bench, static: str, wait: Any) -> None:
+    live.load(
+        f"""
+        QtObject {{
+            property TfBroadcaster b: TfBroadcaster {{
+                frameId: "map"; childFrameId: "goal"; isStatic: {static}
+                translation: Qt.vector3d(1, 2, 3); rotation: Qt.quaternion(0, 0, 0, 1)
+            }}
+        }}
+    """,
+        "import QtQuick 2.15",
+    )
+    from rosglass.tf import TransformListener
+
+    listener = TransformListener(live.robot)
+    promise = listener.buffer.lookup_transform_async("map", "goal")
+    wait(promise.done)
+    found = promise.result()
+    assert (found.translation, found.rotation) == ((1.0, 2.0, 3.0), (0.0, 0.0, 1.0, 0.0))
+    listener.close()
+
+
+def test_misuse_is_told(live: Bench, caplog: Any) -> None:
+    for script in (
+        "TfTransformListener.canTransform(1, 2)",
+        'TfTransformListener.lookUpTransform("a", "b", "noon")',
+        'TfTransformListener.lookUpTransform("a", "b", 0, -1)',
+    ):
+        text = live.run(f"try {{ {script} }} catch (e) {{ return String(e) }}; return ''")
+        assert text.startswith("Error:"), script
+    root: Any = live.load("""
+        QtObject {
+            property TfTransform tf: TfTransform { }
+            property TfBroadcaster b: TfBroadcaster { }
+            Component.onCompleted: {
+                tf.rate = NaN; tf.timeout = -1; b.rate = -1; b.rotation = "none"
+            }
+            function rate() { return tf.rate }
+        }
+    """)
+    assert root.rate() == 62.5
+    for word in ("rate nan", "timeout -1", "rate -1", "rotation"):
+        assert word in caplog.text
