@@ -31,6 +31,9 @@ class Silence:
         self._looked = self._came = 0.0
         self._count = self._regular = 0
         self._rate = 0.0
+        #: What had come at the last look, and in how many seconds: judged only when more comes, as
+        #: the last messages before a silence fill but a part of the time.
+        self._newest = (0, 0.0)
 
     def follow(self, name: str, count: int, now: float) -> None:
         """Take note of how much has come.
@@ -42,13 +45,14 @@ class Silence:
         """
         passed = now - self._looked
         if count > self._count and self.problem:
-            self.problem, self._regular = "", 0
+            self.problem, self._regular, self._newest = "", 0, (0, 0.0)
         elif passed < _LOOK:
             return
         elif count > self._count:
-            self._take(count - self._count, passed)
+            self._judge(*self._newest)
+            self._newest = (count - self._count, passed)
         elif self._regular < _LOOKS:
-            self._regular = 0
+            self._regular, self._newest = 0, (0, 0.0)
         elif not self.problem and now - self._came >= max(_SECONDS, _INTERVALS / self._rate):
             # No age: the text would be another one, and told again, every second.
             since = time.strftime("%H:%M:%S", time.localtime(time.time() - (now - self._came)))
@@ -60,7 +64,10 @@ class Silence:
             self._came = now
         self._looked, self._count = now, count
 
-    def _take(self, came: int, passed: float) -> None:
+    def _judge(self, came: int, passed: float) -> None:
+        """Take note of what came between two looks."""
+        if not came:
+            return
         usual = self._rate * passed
         if self._regular and not usual / 2 - 1 <= came <= 2 * usual + 1:
             self._regular = 0

@@ -29,6 +29,14 @@ def test_who_sends_regularly_is_missed_after_a_second():
     assert problems[-1] == problems[-2]  # or it would be told again and again
 
 
+@pytest.mark.parametrize("last", [1, 7, 29])
+def test_who_falls_silent_between_two_looks_is_missed(last):
+    counts = regular(30)
+    end = counts[-1] + last
+    problems = look(Silence(), [*counts, end, end, end])
+    assert "(it sent 30 per second before)" in problems[-1]
+
+
 def test_who_sends_slowly_is_missed_after_five_of_its_intervals():
     counts = regular(1)
     problems = look(Silence(), [*counts, *[counts[-1]] * 6])
