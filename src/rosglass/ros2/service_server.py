@@ -52,6 +52,8 @@ class Ros2ServiceServer(AnsweringServer[RequestId], Member):
         self.qos = qos or QoS.services()
         self._announced = Announced(core, core.types.service, self.type, fixed=True)
         self._warned = ""
+        #: Requests that come before what answers them is there; None from then on.
+        self._early: list[tuple[RequestId, bytes | memoryview]] | None = []
         kind, known = EndpointKind.SERVICE_SERVER, self._announced.hash
         self._replier = core.middleware.create_replier(
             EndpointInfo(kind, name, self.type.name, core.name, self.qos, known), self._on_request
@@ -59,6 +61,10 @@ class Ros2ServiceServer(AnsweringServer[RequestId], Member):
         # Others' executors may do anything.
         self._replier.quick = isinstance(self.executor, (Dispatcher, LoopExecutor))
         core.add(self)
+        with self._lock:
+            early, self._early = self._early or [], None
+        for request, data in early:
+            self._on_request(request, data)
         core.wake()
 
     @property
@@ -100,6 +106,11 @@ class Ros2ServiceServer(AnsweringServer[RequestId], Member):
     # -- answering -------------------------------------------------------------------------------
 
     def _on_request(self, request: RequestId, data: bytes | memoryview) -> None:
+        with self._lock:
+            if self._early is not None:
+                # The buffer is the middleware's, and ends with this call.
+                self._early.append((request, bytes(data)))
+                return
         try:
             self._take(request, data)
         except Exception:

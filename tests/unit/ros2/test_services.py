@@ -705,6 +705,21 @@ def test_rubbish_is_named_once_per_client_and_disturbs_nobody(robot, client, cap
     assert len(replier.failures) == 206
 
 
+def test_a_request_may_come_while_the_server_is_made(robot, monkeypatch):
+    """A client that waits for a service may be quicker than who offers it."""
+    create = robot.fake.create_replier
+    data = rosglass.load(ADD).request.encode({"a": 1, "b": 2})
+
+    def hasty(endpoint, on_request):
+        replier = create(endpoint, on_request)
+        replier.receive(RequestId(b"w" * 16, 1), memoryview(data))
+        return replier
+
+    monkeypatch.setattr(robot.fake, "create_replier", hasty)
+    robot.create_service_server("/add", ADD, add, executor=rosglass.comm.IMMEDIATE)
+    assert [request.sequence for request, _ in robot.fake.repliers[0].replies] == [1]
+
+
 def test_a_client_gone_wild_cannot_fill_the_memory(robot, middleware, client, caplog):
     release = threading.Event()
     robot.create_service_server("/add", ADD, lambda _: release.wait(30) and None)
