@@ -10,8 +10,9 @@ import pytest
 
 from rosglass.comm import ConnectionState
 from rosglass.errors import ConnectionLostError, Error, UnsupportedError
-from rosglass.qml import Session, install
-from rosglass.qt import QtQml
+from rosglass.qml import IMPORT_PATHS, Session, install
+from rosglass.qml.modules import register
+from rosglass.qt import QtCore, QtQml
 
 LOG = """QtObject {
     id: root
@@ -29,6 +30,30 @@ LOG = """QtObject {
 
 def log(root: Any) -> list:
     return root.property("log").toVariant()
+
+
+def test_an_engine_that_was_not_prepared_says_what_to_do(
+    app: Any, tmp_path: Any, wait: Any, caplog: Any
+) -> None:
+    register()
+    engine = QtQml.QQmlEngine()
+    for path in IMPORT_PATHS:
+        engine.addImportPath(str(path))
+    file = tmp_path / "Main.qml"
+    file.write_text(
+        """import QtQml 2.15
+        import Ros2 1.0
+        QtObject {
+            property QtObject sub: Subscription { topic: "/x" }
+            property string error
+            Component.onCompleted: try { Ros2.init("ui") } catch (e) { error = String(e) }
+        }"""
+    )
+    component = QtQml.QQmlComponent(engine, QtCore.QUrl.fromLocalFile(str(file)))
+    root = component.create()
+    assert "Ros2 cannot be used yet: call rosglass.qml.install(engine)" in root.property("error")
+    wait(lambda: "rosglass.qml.install" in root.property("sub").property("problem"))
+    assert "Ros2 cannot be used yet" in caplog.text
 
 
 def test_before_init(bench: Any) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 from rosglass.errors import Error
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.log import Caller, RateLimit, log_from_qml
-from rosglass.qml.runtime import runtime_of
+from rosglass.qml.runtime import UNPREPARED, runtime_of
 from rosglass.qt import QtCore, Slot, is_alive
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ class Element(QtCore.QObject):
     def _find_session(self) -> bool:
         runtime = self._find_runtime()
         if runtime is None:
-            self._say("this object belongs to no QML engine")
+            self._say(f"{type(self).__name__} cannot be used yet: {UNPREPARED}")
             return False
         session = self._session = runtime.session
         at_end = self._at_end

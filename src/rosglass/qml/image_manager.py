@@ -5,8 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rosglass.errors import Error
-from rosglass.qml.runtime import runtime_of
+from rosglass.qml.runtime import own_runtime
 from rosglass.qt import Property, QtCore, Signal, Slot
 
 if TYPE_CHECKING:
@@ -22,10 +21,7 @@ class ImageTransportManager(QtCore.QObject):
 
     @property
     def _balancer(self) -> LoadBalancer:
-        runtime = runtime_of(self)
-        if runtime is None:
-            raise Error("ImageTransportManager belongs to no QML engine")
-        return runtime.session.balancer
+        return own_runtime(self).session.balancer
 
     def _is_enabled(self) -> bool:
         return self._balancer.enabled

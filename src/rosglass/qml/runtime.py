@@ -21,11 +21,13 @@ if TYPE_CHECKING:
     from rosglass.messages.schema import Schema
     from rosglass.qml.to_js import LongArray
 
-__all__ = ["Runtime", "runtime_of"]
+__all__ = ["UNPREPARED", "Runtime", "own_runtime", "runtime_of"]
 
 _log = logging.getLogger("rosglass.qml")
 _FOLDER = Path(__file__).parent
 _NAME = "rosglass.runtime"
+#: What to say to an object in an engine that has no runtime.
+UNPREPARED = "call rosglass.qml.install(engine) before the QML engine loads anything"
 #: Bytes of long arrays handed to JavaScript after which it is asked to collect its garbage: it
 #: does not see how much memory its small objects hold on our side.
 _GARBAGE = 64 << 20
@@ -243,6 +245,18 @@ def runtime_of(item: QtCore.QObject) -> Runtime | None:
     # PySide2 takes the context for the owner of an engine that it gives, and ends it likewise.
     found = context.contextProperty(_NAME) if context is not None else None
     return found if isinstance(found, Runtime) else None
+
+
+def own_runtime(item: QtCore.QObject) -> Runtime:
+    """Return the runtime of the engine that made an object.
+
+    Raises:
+        Error: The engine has none.
+    """
+    runtime = runtime_of(item)
+    if runtime is None:
+        raise Error(f"{type(item).__name__} cannot be used yet: {UNPREPARED}")
+    return runtime
 
 
 def _evaluate(engine: QtQml.QQmlEngine, script: str, file: str = "") -> QJSValue:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 from rosglass.errors import Error
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.log import log_from_qml
-from rosglass.qml.runtime import Runtime, runtime_of
+from rosglass.qml.runtime import Runtime, own_runtime
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["RosSingleton", "full_type", "is_list", "strings"]
 
+_log = logging.getLogger("rosglass.qml")
 _SHORT = re.compile(r"([A-Za-z]\w*)/([A-Za-z]\w*)\Z")
 
 
@@ -46,16 +47,16 @@ class RosSingleton(QtCore.QObject):
     @Slot()
     def _bind(self) -> None:
         if is_alive(self):
-            _ = self._runtime
+            try:
+                _ = self._runtime
+            except Error as error:
+                _log.error("%s", error)
 
     @property
     def _runtime(self) -> Runtime:
         if self._bound is None:
-            runtime = runtime_of(self)
-            if runtime is None:
-                raise Error(f"{self.NAME} belongs to no QML engine")
-            self._bound = runtime
-            self._listen(runtime.session)
+            self._bound = own_runtime(self)
+            self._listen(self._bound.session)
         return self._bound
 
     def _listen(self, session: Session) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rosglass.errors import Error
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.log import log_from_qml
-from rosglass.qml.runtime import runtime_of
+from rosglass.qml.runtime import own_runtime
 from rosglass.qml.service_client import ServiceClient
 from rosglass.qml.singleton import full_type
 from rosglass.qml.waiting import wait_for
@@ -77,10 +77,7 @@ class Service(QtCore.QObject):
         client.sendRequestAsync(QJSValue() if request is None else request, callback)
 
     def _runtime(self) -> Runtime:
-        runtime = runtime_of(self)
-        if runtime is None:
-            raise Error("Service belongs to no QML engine")
-        return runtime
+        return own_runtime(self)
 
     def _client(self, runtime: Runtime, service: str, type_name: str) -> ServiceClient:
         # Made once: finding a server may take longer than calling it.

@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 from rosglass.comm.time import Time as Moment
-from rosglass.errors import Error, UnsupportedError
+from rosglass.errors import UnsupportedError
 from rosglass.qml.dialect import Dialect
-from rosglass.qml.runtime import Runtime, runtime_of
+from rosglass.qml.runtime import Runtime, own_runtime
 from rosglass.qt import QJSValue, QtCore, Slot
 
 __all__ = ["Time", "WallTime"]
@@ -17,10 +17,7 @@ class WallTime(QtCore.QObject):
 
     @property
     def _runtime(self) -> Runtime:
-        runtime = runtime_of(self)
-        if runtime is None:
-            raise Error(f"{type(self).__name__} belongs to no QML engine")
-        return runtime
+        return own_runtime(self)
 
     @Slot(result=QJSValue)
     def now(self) -> QJSValue:
