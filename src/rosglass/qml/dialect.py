@@ -10,6 +10,12 @@ if TYPE_CHECKING:
 
 __all__ = ["Dialect"]
 
+#: ROS 1's primitives that are messages in ROS 2.
+_PRIMITIVE_TIMES = {
+    "time": "builtin_interfaces/msg/Time",
+    "duration": "builtin_interfaces/msg/Duration",
+}
+
 
 class Dialect(Enum):
     """The QML module that an interface imports; the robot may speak either ROS all the same.
@@ -33,6 +39,8 @@ class Dialect(Enum):
 
     def type_name(self, name: str) -> str:
         """Return a full type name as the module writes it."""
+        if name in _PRIMITIVE_TIMES:
+            return name if self is Dialect.ROS1 else _PRIMITIVE_TIMES[name]
         if self is Dialect.ROS2:
             return name
         package, _, rest = name.partition("/")

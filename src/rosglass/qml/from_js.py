@@ -183,10 +183,10 @@ class _Conversion:
         source = value.property("#source")
         if source.isQObject():
             # A received array on its way back, untouched: no need to fetch it into JavaScript.
-            held: Any = source.toQObject()
-            theirs, values = held.arrays[value.property("#index").toInt()]
-            if theirs.struct is member.struct:
-                return values
+            arrays: Any = getattr(source.toQObject(), "arrays", [])
+            index = value.property("#index").toInt()
+            if 0 <= index < len(arrays) and arrays[index][0].struct is member.struct:
+                return arrays[index][1]
         if value.property("#index").isNumber():
             value = value.property("toArray").callWithInstance(value)
         length = _length(value, path)
@@ -219,7 +219,7 @@ class _Conversion:
         for row in range(count):
             index, here = model.index(row, 0), f"{path}[{row}]"
             if struct is None:
-                item = model.data(index, min(roles.values()))
+                item = model.data(index, min(roles.values(), default=0))
                 found.append(self._python(item, member, here))
                 continue
             items = {name: model.data(index, number) for name, number in roles.items()}
@@ -258,7 +258,7 @@ class _Conversion:
             if struct.is_time:
                 return _renamed_time(value, struct)
             return self._python_fields(value, struct, path)
-        if isinstance(value, QtCore.QDateTime):
+        if isinstance(value, QtCore.QDateTime) and value.isValid():
             value = value.toMSecsSinceEpoch()
         if struct.is_time and isinstance(value, (int, float)):
             parts = from_milliseconds(value, path)
@@ -304,7 +304,7 @@ def _no_message(value: QJSValue, schema: Schema, path: str) -> ConversionError:
 
 def _length(value: QJSValue, path: str) -> int:
     count = value.property("length").toNumber()
-    if count > _LONGEST:
+    if not 0 <= count <= _LONGEST:
         raise ConversionError(
             path, Shown(f"{count:.0f}"), f"an array of at most {_LONGEST} elements"
         )
@@ -330,9 +330,13 @@ def typed_array(value: QJSValue) -> Any:
         return None
     import numpy as np  # noqa: PLC0415 - few programs send typed arrays
 
-    data = bytes(value.property("buffer").toVariant().data())
+    held = value.property("buffer").toVariant()
+    data = bytes(held.data()) if isinstance(held, QtCore.QByteArray) else b""
     count, offset = value.property("length").toInt(), value.property("byteOffset").toInt()
-    return np.frombuffer(data, np.dtype(kind), count, offset)
+    kind_of = np.dtype(kind)
+    # Anybody can write {constructor: {name: "Int8Array"}}.
+    fits = count >= 0 and offset >= 0 and offset + count * kind_of.itemsize <= len(data)
+    return np.frombuffer(data[offset:], kind_of, count) if fits else None
 
 
 def _as_bools(found: Any, number: Number) -> Any:
@@ -346,7 +350,10 @@ def _as_bools(found: Any, number: Number) -> Any:
 def _buffer(value: QJSValue, member: Member, path: str) -> Any:
     """Return an ArrayBuffer's elements: what ``buffer()`` of a received array gives."""
     assert member.number is not None
-    data, size = bytes(value.toVariant().data()), member.number.size
+    held = value.toVariant()
+    if not isinstance(held, QtCore.QByteArray):
+        raise ConversionError(path, shown(value), f"an array ({member.field.type})")
+    data, size = bytes(held.data()), member.number.size
     if size == 1 and member.number.low is not None:
         return data
     if len(data) % size:

@@ -198,7 +198,8 @@ def check_leaf(item: TreeItem, value: Any) -> Any:
     owner = parent.parent if item.is_element else parent
     assert owner is not None
     assert owner.schema is not None
-    if owner.schema.is_time and not is_duration(owner.schema) and item.row == 0 and value < 0:
+    is_seconds = owner.schema.is_time and not is_duration(owner.schema) and item.row == 0
+    if is_seconds and isinstance(value, (int, float)) and value < 0:
         raise ConversionError(item.path, value, "seconds from 0 on")
     given = [value] * (member.fixed_count or 1) if item.is_element else value
     try:

@@ -119,7 +119,8 @@ class Runtime(QtCore.QObject):
             return QJSValue(value)
         if isinstance(value, (bool, int, float)):
             # QJSValue's own overloads cut numbers to 32 bits, and PySide2's to integers.
-            script: Any = engine.toScriptValue(value)
+            plain = value if isinstance(value, bool) else float(value)
+            script: Any = engine.toScriptValue(plain)
             scalar: QJSValue = script
             return scalar
         if isinstance(value, dict):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from rosglass.errors import Error
+from rosglass.errors import ConversionError, Error
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.from_js import elements_from_js
 from rosglass.qml.times import number_from_text
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 __all__ = ["Host", "LongArrays"]
 
 _NS = 1_000_000_000
+#: Nanoseconds of as many seconds as a double counts exactly.
+_LONGEST = 2**53 * _NS
 
 
 class LongArrays(QtCore.QObject):
@@ -32,6 +34,8 @@ class LongArrays(QtCore.QObject):
     @Slot(int, int, result=QJSValue)
     def at(self, index: int, place: int) -> QJSValue:
         """Return one element of an array."""
+        if not 0 <= index < len(self.arrays) or not 0 <= place < len(self.arrays[index][1]):
+            return QJSValue()
         member, values = self.arrays[index]
         try:
             value = values[place]
@@ -52,6 +56,8 @@ class LongArrays(QtCore.QObject):
     @Slot(int, result="QVariant")
     def buffer(self, index: int) -> QtCore.QByteArray | None:
         """Return a numeric array's bytes in this machine's byte order, otherwise None."""
+        if not 0 <= index < len(self.arrays):
+            return None
         member, values = self.arrays[index]
         if member.number is None:
             return None
@@ -79,6 +85,8 @@ class Host(QtCore.QObject):
     @Slot(int, result=QJSValue)
     def empty(self, number: int) -> QJSValue:
         """Return a message of a type with every field at its default."""
+        if not 0 <= number < len(self._types):
+            return QJSValue()
         schema, dialect = self._types[number]
         return self._runtime.message(schema.type.create(), dialect)
 
@@ -98,6 +106,8 @@ class Host(QtCore.QObject):
         """
         try:
             found = number_from_text(text) * _NS / 10**digits
+            if abs(found) > _LONGEST:
+                raise ConversionError("", text, "a time that JavaScript can hold")
         except Error as error:
             self._runtime.throw(str(error))
             return QJSValue()

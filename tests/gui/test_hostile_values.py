@@ -1,0 +1,78 @@
+"""Values made to confuse: none may crash, hang, or get through."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from values import convert, show
+
+from rosglass.errors import ConversionError
+
+SCAN, HEADER = "sensor_msgs/msg/LaserScan", "std_msgs/msg/Header"
+
+
+@pytest.mark.parametrize(
+    ("type_name", "script"),
+    [
+        (SCAN, "{ranges: {constructor: {name: 'Float32Array'}, length: 5}}"),
+        (SCAN, "{ranges: {constructor: {name: 'ArrayBuffer'}}}"),
+        (
+            SCAN,
+            "{ranges: {constructor: {name: 'Int8Array'}, buffer: new ArrayBuffer(2), length: 9}}",
+        ),
+        (SCAN, "{ranges: {'#index': 3}}"),
+        (SCAN, "{ranges: {'#index': 3, toArray: () => 5}}"),
+        (SCAN, "{ranges: {'#index': 3, toArray: () => { throw new Error('no') }}}"),
+        (SCAN, "{ranges: Object.assign([null], {'#source': 5, '#index': 9})}"),
+        (SCAN, "{ranges: new Map([[0, 1]])}"),
+        (SCAN, "{ranges: new Set([1])}"),
+        (SCAN, "{ranges: Symbol.iterator}"),
+        (SCAN, "{ranges: [[1]]}"),
+        (SCAN, "{ranges: [{}]}"),
+        (HEADER, "{stamp: {nanoseconds: 'x'}}"),
+        (HEADER, "{stamp: {nanoseconds: 1.5}}"),
+        (HEADER, "{stamp: {sec: {}}}"),
+        (HEADER, "{stamp: {'#kind': 'time', toString: 5, valueOf: 5, x: 1}}"),
+        (HEADER, "{stamp: {sec: 1, get nanosec() { return '5' }}}"),
+        (HEADER, "(() => { const a = {}; a.stamp = a; return a })()"),
+        (HEADER, "{frame_id: {toString: () => 'map'}}"),
+        (HEADER, "{__proto__: {frame_id: 5}, frame_id: []}"),
+    ],
+)
+def test_disguises_are_refused(bench: Any, type_name: str, script: str) -> None:
+    with pytest.raises(ConversionError):
+        convert(bench, type_name, script, module=1)
+
+
+def test_a_foreign_source_gives_nothing(bench: Any) -> None:
+    bench.load("Item {}", "import QtQuick 2.15")
+    script = """(() => { const s = m.ranges['#source']
+        return [s.at(9, 0) === undefined, s.at(0, -1) === undefined, s.at(0, 999) === undefined,
+                !s.buffer(7), !s.buffer(-1)] })()"""
+    shown = show(bench, SCAN, {"ranges": [1.0] * 100}, script)
+    assert shown == [True] * 5
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "Ros2.constants(undefined)",
+        "Ros2.documentation({})",
+        "Ros2.time(() => 1)",
+        "Ros2.time({sec: 1e300})",
+        "Ros2.time({sec: '1'})",
+        "Ros2.time(1e300)",
+        "Ros2.time('1e999')",
+        "Ros2.time('9'.repeat(100))",
+        "Ros2.duration(new Map())",
+        "Ros2.duration(1, 0.5)",
+        "Ros2.duration(1).add({get sec() { throw new Error('no') }})",
+        "Ros2.duration(1).multiply({})",
+        "Ros2.duration(1).seconds.call(5).toFixed(1000)",
+        "Ros2.duration.call(null, null)",
+    ],
+)
+def test_functions_throw_what_javascript_can_catch(bench: Any, call: str) -> None:
+    script = f"try {{ {call} }} catch (e) {{ return String(e).includes('Error') }}"
+    assert bench.run(script) is True
