@@ -1,18 +1,22 @@
 """Measure how long a camera picture takes from the robot's process to pixels on the X server.
 
-    python benchmarks/camera_latency.py [--seconds N] [--ui listing|cockpit|both] [--transport raw]
+    python benchmarks/camera_latency.py [--seconds N] [--rounds N] [--only NAME ...]
 
-A router, the simulated robot (640x480 at 30 Hz) and an interface run as processes of their own;
-the interface draws on Xvfb with software OpenGL. The robot paints the moment of publishing and the
-picture's number into each picture, as a line of black and white squares. This program asks the X
-server about a thousand times a second for the pixels of that line: the first time a new number is
-there, the picture has arrived, whatever software believes. A figure can be too high by one such
-interval (printed), never too low.
+A router, a camera at 30 Hz and an interface run as processes of their own; the interface draws on
+Xvfb with software OpenGL. The camera paints the moment of publishing and the picture's number into
+each picture, as a line of black and white squares. This program asks the X server about a thousand
+times a second for the pixels of that line: the first time a new number is there, the picture has
+arrived, whatever software believes. A figure can be too high by one such interval (printed), never
+too low.
 
 `listing` is the paper's Listing 1 (picture, drag area, button) in a 640x480 window, the interface
-that the C++ plugin for ROS 1 was measured with on the same kind of machine; `cockpit` is the
-demo's whole screen, 1340x800. Exits 1 when the listing's median is 25 ms or more or a picture is
-missing.
+that the C++ plugin for ROS 1 was measured with on the same kind of machine. `plain` is a PySide6
+program with the same items that makes the same pictures itself, in a thread, and pushes them into
+a QVideoSink: no robot, no network. `shm` has Zenoh hand pictures over in shared memory, as robot and
+interface on one machine can; the others travel twice over TCP, by way of the router. `one` and `eight` show one camera once and eight times (three by
+three, less one) in a 640x480 window. `cockpit` is the demo's whole screen, 1340x800, with the
+simulated robot. Contenders take turns, round by round; figures are medians of the rounds. Exits 1
+when a target is missed or a picture is missing.
 """
 
 from __future__ import annotations
@@ -22,6 +26,7 @@ import contextlib
 import ctypes
 import os
 import re
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -31,16 +36,40 @@ from pathlib import Path
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).parent))
+
+from camera_peers import TOPIC, code_place
 from rosglass.demo import framecode
 from rosglass.demo.camera import CODE_POSITION, HEIGHT, WIDTH
 from rosglass.demo.processes import VirtualScreen
 from rosglass.ros2.zenoh.router import Router
 
-TARGET = 25.0
-#: The C++ plugin (qml_ros_plugin 1.0.0, ROS 1, qmlscene, same interface, same pictures).
-CPLUSPLUS = {"median": 10.3, "p90": 12.1, "worst": 15.0, "cpu": 21, "memory": 153}
 SCREEN = (1340, 800)
-LISTING = """
+PEERS = str(Path(__file__).with_name("camera_peers.py"))
+#: The C++ plugin (qml_ros_plugin 1.0.0, ROS 1, qmlscene, same interface): median, 90 %, worst
+#: (ms), CPU (% of a core), memory (MiB).
+CPLUSPLUS = {(640, 480): (10.3, 12.1, 15.0, 21, 153), (1920, 1080): (15.8, 18.4, 42.9, 35, 201)}
+#: Median latency to reach, ms.
+TARGETS = {"listing 640x480": 12.0, "listing 1920x1080 shm": 18.0}
+#: CPU to reach, as ratios: to the plain program, and of eight previews to one.
+CPU_TARGET = 1.3
+CONTROLS = """
+    Rectangle {
+        anchors.horizontalCenter: parent.horizontalCenter
+        width: 120; height: 120; radius: 60; color: "#aaaaaa"
+        MouseArea {
+            anchors.fill: parent
+            PUBLISH
+        }
+    }
+    Button { text: "Flashlight" }
+"""
+PUBLISH = """
+            property var pub: Ros2.createPublisher("/cmd_vel", "geometry_msgs/msg/Twist", 1)
+            onPositionChanged: pub.publish({ linear: { x: -mouseY }, angular: { z: -mouseX } })
+"""
+LISTING = (
+    """
 import QtQuick
 import QtQuick.Controls
 import Ros2 1.0
@@ -48,20 +77,85 @@ import Ros2 1.0
 Item {
     width: 640; height: 480
     Component.onCompleted: Ros2.init("listing")
-    ImageTransportSubscription { id: camera; topic: "/camera/image_raw"; defaultTransport: "%s" }
+    ImageTransportSubscription { id: camera; topic: "TOPIC"; defaultTransport: "raw" }
     VideoOutput { anchors.fill: parent; source: camera }
-    Rectangle {
-        anchors.horizontalCenter: parent.horizontalCenter
-        width: 120; height: 120; radius: 60; color: "#aaaaaa"
-        MouseArea {
-            anchors.fill: parent
-            property var pub: Ros2.createPublisher("/cmd_vel", "geometry_msgs/msg/Twist", 1)
-            onPositionChanged: pub.publish({ linear: { x: -mouseY }, angular: { z: -mouseX } })
+"""
+    + CONTROLS.replace("PUBLISH", PUBLISH)
+    + "}"
+)
+PLAIN = (
+    """
+import QtQuick
+import QtQuick.Controls
+import QtMultimedia
+
+Item {
+    width: 640; height: 480
+    property var sink: output.videoSink
+    VideoOutput { id: output; anchors.fill: parent }
+"""
+    + CONTROLS.replace("PUBLISH", "")
+    + "}"
+)
+PREVIEWS = """
+import QtQuick
+import QtMultimedia
+import Ros2 1.0
+
+Item {
+    width: 640; height: 480
+    Component.onCompleted: Ros2.init("previews")
+    Grid {
+        columns: COLUMNS
+        Repeater {
+            model: COUNT
+            VideoOutput {
+                id: output
+                width: 640 / COLUMNS; height: 480 / COLUMNS
+                property QtObject camera: ImageTransportSubscription {
+                    topic: "TOPIC"; defaultTransport: "raw"; videoSink: output.videoSink
+                }
+            }
         }
     }
-    Button { text: "Flashlight" }
 }
 """
+
+
+@dataclass(frozen=True)
+class Contender:
+    """An interface to measure.
+
+    Attributes:
+        name: Its name.
+        qml: Its source; empty for the demo's cockpit.
+        size: Width and height of the camera's pictures.
+        shown: Width and height of the first picture's item, whose top left corner is the screen's.
+        plain: Whether it runs without rosglass.
+        options: What the address of the robot ends with.
+    """
+
+    name: str
+    qml: str
+    size: tuple[int, int] = (640, 480)
+    shown: tuple[int, int] = (640, 480)
+    plain: bool = False
+    options: str = ""
+
+
+VGA, HD = (640, 480), (1920, 1080)
+CONTENDERS = (
+    Contender("listing 640x480", LISTING),
+    Contender("plain 640x480", PLAIN, plain=True),
+    Contender("listing 1920x1080", LISTING, HD),
+    Contender("listing 1920x1080 shm", LISTING, HD, options="?shm=true"),
+    Contender("plain 1920x1080", PLAIN, HD, plain=True),
+    Contender("one preview", PREVIEWS.replace("COUNT", "1").replace("COLUMNS", "1")),
+    Contender(
+        "eight previews", PREVIEWS.replace("COUNT", "8").replace("COLUMNS", "3"), shown=(213, 160)
+    ),
+    Contender("cockpit", ""),
+)
 
 
 class _Image(ctypes.Structure):
@@ -147,18 +241,32 @@ def resident(pid: int) -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
-def find_code(display: str) -> tuple[int, int, int]:
+def find_code(display: str, contender: Contender) -> tuple[int, int, int]:
     """Return where the line of squares is on the screen: x, y, width."""
-    for x, y, scale in [(0, 0, 1.0), *cockpit_places()]:
-        at = (
-            round(x + CODE_POSITION[0] * scale),
-            round(y + (CODE_POSITION[1] + framecode.SQUARE / 2) * scale),
-            round(framecode.BITS * framecode.SQUARE * scale),
-        )
-        with contextlib.suppress(framecode.FrameCodeError):
-            framecode.read(Pixels(display, *at).read())
-            return at
-    raise SystemExit("no frame code on the screen: is the interface showing the camera?")
+    if contender.qml:
+        (width, height), (room, space) = contender.size, contender.shown
+        scale = min(room / width, space / height)
+        x, y, square = code_place(width, height)
+        left, top = (room - width * scale) / 2, (space - height * scale) / 2
+        places = [(left + x * scale, top + (y + square / 2) * scale, square * scale)]
+    else:
+        places = [
+            (
+                x + CODE_POSITION[0] * scale,
+                y + (CODE_POSITION[1] + framecode.SQUARE / 2) * scale,
+                framecode.SQUARE * scale,
+            )
+            for x, y, scale in cockpit_places()
+        ]
+    until = time.monotonic() + 20
+    while time.monotonic() < until:
+        for x, y, square in places:
+            at = (round(x), round(y), round(framecode.BITS * square))
+            with contextlib.suppress(framecode.FrameCodeError):
+                framecode.read(Pixels(display, *at).read())
+                return at
+        time.sleep(0.2)
+    raise SystemExit(f"{contender.name}: no picture of the camera on the screen")
 
 
 def cockpit_places() -> list[tuple[float, float, float]]:
@@ -172,8 +280,8 @@ def cockpit_places() -> list[tuple[float, float, float]]:
     return [(x + dx, y + dy, scale) for dx in (0, -1, 1) for dy in (0, -1, 1)]
 
 
-def measure(ui: str, transport: str, seconds: float, loop: str, options: str) -> Result:
-    """Run router, robot and interface, and watch the screen."""
+def measure(contender: Contender, seconds: float) -> Result:
+    """Run router, camera and interface, and watch the screen."""
     rosglass = [sys.executable, "-m", "rosglass"]
     with (
         tempfile.TemporaryDirectory() as folder,
@@ -181,35 +289,33 @@ def measure(ui: str, transport: str, seconds: float, loop: str, options: str) ->
         Router("tcp/127.0.0.1:0") as router,
         contextlib.ExitStack() as stack,
     ):
-        url = router.url + options
+        url = router.url + contender.options
         # Keeps the screen, which ends with its last client.
         Pixels(screen.display, 0, 0, 8)
         environment = {**os.environ, "DISPLAY": screen.display, "QT_QPA_PLATFORM": "xcb"}
         environment["QT_LOGGING_RULES"] = "qt.multimedia.*=false"
-        if loop:
-            environment["QSG_RENDER_LOOP"] = loop
 
         def start(*command: str) -> subprocess.Popen[bytes]:
             process = subprocess.Popen(
-                [*rosglass, *command],
-                env=environment,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
+                command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
             )
             stack.callback(process.wait)
             stack.callback(process.terminate)
             return process
 
-        start("robot", "--url", url)
-        if ui == "listing":
-            file = Path(folder, "listing.qml")
-            file.write_text(LISTING % transport)
-            interface = start("run", str(file), "--url", url)
+        file = Path(folder, "view.qml")
+        file.write_text(contender.qml.replace("TOPIC", TOPIC))
+        size = [str(number) for number in contender.size]
+        if contender.plain:
+            interface = start(sys.executable, PEERS, "plain", *size, str(file))
+        elif contender.qml:
+            start(sys.executable, PEERS, "camera", url, *size)
+            interface = start(*rosglass, "run", str(file), "--url", url)
         else:
-            interface = start("demo", "--no-robot", "--url", url)
-        time.sleep(4.0)
-        place = find_code(screen.display)
-        pixels = Pixels(screen.display, *place)
+            start(*rosglass, "robot", "--url", url)
+            interface = start(*rosglass, "demo", "--no-robot", "--url", url)
+        time.sleep(2.0)
+        pixels = Pixels(screen.display, *find_code(screen.display, contender))
         watch(pixels, 2.0)
         begin, cpu = time.monotonic(), processor_seconds(interface.pid)
         result = watch(pixels, seconds)
@@ -224,43 +330,70 @@ def report(name: str, result: Result) -> None:
         f"{name:28}  {result.percentile(50):6.1f}  {result.percentile(90):6.1f}  "
         f"{result.percentile(100):6.1f}  {shown / result.seconds:5.1f}  {result.missing:7d}  "
         f"{100 * result.cpu:4.0f} %  {result.memory:6.0f}  "
-        f"{1000 * result.seconds / max(1, result.polls):5.1f}"
+        f"{1000 * result.seconds / max(1, result.polls):5.1f}  {os.getloadavg()[0]:5.1f}",
+        flush=True,
     )
+
+
+def judge(results: dict[str, list[Result]]) -> bool:
+    """Print the figures against their targets; returns whether one was missed."""
+    missed = False
+
+    def line(what: str, value: float, target: float, unit: str) -> None:
+        nonlocal missed
+        good = value <= target
+        missed |= not good
+        print(
+            f"{what:44} {value:6.2f}{unit} (target {target}{unit}: {'met' if good else 'MISSED'})"
+        )
+
+    def ratio(ours: str, theirs: str) -> float:
+        pairs = zip(results[ours], results[theirs], strict=True)
+        return statistics.median(a.cpu / b.cpu for a, b in pairs)
+
+    print()
+    for name, target in TARGETS.items():
+        if name in results:
+            median = statistics.median(result.percentile(50) for result in results[name])
+            line(f"{name}: median", median, target, " ms")
+        plain = name.replace("listing", "plain").removesuffix(" shm")
+        if {name, plain} <= results.keys():
+            line(f"{name}: CPU against plain", ratio(name, plain), CPU_TARGET, "x")
+    if {"one preview", "eight previews"} <= results.keys():
+        line("eight previews: CPU against one", ratio("eight previews", "one preview"), 1.3, "x")
+    for name, rounds in results.items():
+        missing = sum(result.missing for result in rounds)
+        if missing and not name.startswith("plain"):
+            missed = True
+            print(f"{name}: {missing} pictures MISSING")
+    return missed
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n", maxsplit=1)[0])
-    parser.add_argument("--seconds", type=float, default=20.0)
-    parser.add_argument("--ui", choices=["listing", "cockpit", "both"], default="both")
-    parser.add_argument("--transport", choices=["raw", "compressed"], default="raw")
-    parser.add_argument("--loop", choices=["", "basic", "threaded"], default="")
-    parser.add_argument("--shm", action="store_true", help="let Zenoh use shared memory")
+    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--only", nargs="*", default=[], metavar="NAME", help="parts of names")
     args = parser.parse_args()
-    processors = os.cpu_count()
+    chosen = [c for c in CONTENDERS if not args.only or any(n in c.name for n in args.only)]
     model = re.search(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text())
-    print(f"{WIDTH}x{HEIGHT} at 30 Hz, {args.transport}; Xvfb, software OpenGL, {processors} cores")
+    print(f"30 Hz, raw, over Zenoh; Xvfb, software OpenGL, {os.cpu_count()} cores")
     print(model[1] if model else "", f"load {os.getloadavg()[0]:.1f} before the start")
-    heading = "median     p90   worst  per s  missing     CPU     MiB   poll"
-    print(f"\n{'stamp -> pixel (ms)':28}  {heading}")
-    interfaces = ["listing", "cockpit"] if args.ui == "both" else [args.ui]
-    results = {}
-    options = "?shm=true" if args.shm else ""
-    for ui in interfaces:
-        results[ui] = measure(ui, args.transport, args.seconds, args.loop, options)
-        report(f"rosglass, {ui}", results[ui])
-    fixed = CPLUSPLUS
-    print(
-        f"{'C++ plugin, listing (fixed)':28}  {fixed['median']:6.1f}  {fixed['p90']:6.1f}  "
-        f"{fixed['worst']:6.1f}   30.0        0  {fixed['cpu']:4.0f} %  {fixed['memory']:6.0f}"
-    )
-    judged = results.get("listing")
-    if judged is None:
-        return 0
-    median = judged.percentile(50)
-    print(f"\nlisting: {median / CPLUSPLUS['median']:.2f} times the C++ plugin's median")
-    missed = not median < TARGET or judged.missing > 0
-    print(f"target: median below {TARGET:.0f} ms, nothing missing: {'MISSED' if missed else 'met'}")
-    return int(missed)
+    heading = "median     p90   worst  per s  missing     CPU     MiB   poll   load"
+    print(f"\n{'stamp -> pixel (ms)':28}  {heading}", flush=True)
+    results: dict[str, list[Result]] = {}
+    for _ in range(args.rounds):
+        for contender in chosen:
+            result = measure(contender, args.seconds)
+            results.setdefault(contender.name, []).append(result)
+            report(contender.name, result)
+    for (width, height), fixed in CPLUSPLUS.items():
+        median, most, worst, cpu, memory = fixed
+        print(
+            f"{f'C++ plugin {width}x{height} (fixed)':28}  {median:6.1f}  {most:6.1f}  {worst:6.1f}"
+            f"   30.0        0  {cpu:4.0f} %  {memory:6.0f}"
+        )
+    return int(judge(results))
 
 
 if __name__ == "__main__":

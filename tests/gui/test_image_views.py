@@ -493,3 +493,71 @@ def test_the_namespace_of_ros_1(running: Any, wait: Any) -> None:
     np.testing.assert_array_equal(show(running, arm, wait, root, quarters()), QUARTERS)
     assert sub.property("topic") == "/arm/cam"
     assert sub.property("ns") == "/arm"
+
+
+class TestReduction:
+    """Pictures have no more pixels than the screen shows of them."""
+
+    @pytest.fixture
+    def window(self, app: Any) -> Iterator[Any]:
+        from rosglass.qt import QtQuick
+
+        made = QtQuick.QQuickWindow()
+        made.resize(200, 200)
+        yield made
+        made.close()
+
+    def width(self, root: Any) -> int:
+        image = root.property("view0")._image
+        return 0 if image is None else image.width()
+
+    def test_a_large_picture_is_reduced_until_it_is_needed_whole(
+        self, running: Any, module: str, camera: Any, wait: Any, window: Any, tmp_path: Path
+    ) -> None:
+        root = load(running)
+        item, sub = root.property("view0"), root.property("sub0")
+        item.setParentItem(window.contentItem())
+        large = message(QUARTERS.repeat(96, 0).repeat(128, 1))
+
+        def shown(width: int) -> bool:
+            camera.publish(large)
+            return self.width(root) == width
+
+        wait(lambda: shown(64))
+        np.testing.assert_array_equal(seen(root), QUARTERS)
+        file = tmp_path / "whole.png"
+        sub.saveSnapshot(str(file))
+        wait(file.exists)
+        assert cv2.imread(str(file)).shape == (192, 256, 3)
+        # Enlarged by whatever means, it needs more of them.
+        item.setScale(2)
+        wait(lambda: shown(128))
+        item.setScale(1)
+        item.setWidth(256)
+        item.setHeight(192)
+        wait(lambda: shown(256))
+        item.setWidth(64)
+        item.setHeight(48)
+        wait(lambda: shown(64))
+        sub.setProperty("fullResolution", True)
+        wait(lambda: shown(256))
+
+    def test_turned_pictures_are_measured_against_their_other_side(
+        self, running: Any, camera: Any, wait: Any, window: Any
+    ) -> None:
+        root = load(running, "rotation: 90")
+        item = root.property("view0")
+        item.setParentItem(window.contentItem())
+        item.setWidth(48)
+        item.setHeight(64)
+        large = message(QUARTERS.repeat(96, 0).repeat(128, 1))
+        # 256 x 192 on 48 x 64: a quarter of each side.
+        wait(lambda: camera.publish(large) or self.width(root) == 48)
+
+    def test_a_part_of_a_picture_is_not_reduced(
+        self, running: Any, camera: Any, wait: Any, window: Any
+    ) -> None:
+        root = load(running, "regionOfInterest: Qt.rect(0, 0, 128, 96)")
+        root.property("view0").setParentItem(window.contentItem())
+        large = message(QUARTERS.repeat(96, 0).repeat(128, 1))
+        wait(lambda: camera.publish(large) or self.width(root) == 128)

@@ -5,6 +5,7 @@ from rosglass.images.compressed_depth import decompress_depth
 from rosglass.images.depth import COLOR_MAPS, DEPTH_ENCODINGS, DepthColors
 from rosglass.images.encodings import ANY_FORMAT, ENCODINGS, convert
 from rosglass.images.frame import Frame, PixelFormat, RawImage
+from rosglass.images.reduction import reduce
 from rosglass.images.snapshot import FILE_TYPES, save
 from rosglass.images.stream import ImageStream, StreamStatistics
 from rosglass.images.transports import TRANSPORTS, Choice, PictureReader, Transport, choose
@@ -31,5 +32,6 @@ __all__ = [
     "convert",
     "decompress",
     "decompress_depth",
+    "reduce",
     "save",
 ]

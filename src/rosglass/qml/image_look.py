@@ -28,6 +28,7 @@ class LookElement(TopicElement):
     minimumDepthChanged = Signal()
     maximumDepthChanged = Signal()
     throttleRateChanged = Signal()
+    fullResolutionChanged = Signal()
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
@@ -40,9 +41,14 @@ class LookElement(TopicElement):
         self._colors = ""
         self._near = self._far = -1.0
         self._rate = 0.0
+        self._full = False
 
-    def _look(self, video: bool) -> Look:
+    def _look(self, video: bool, room: tuple[int, int] | None) -> Look:
         """Return what the properties ask for.
+
+        Args:
+            video: Whether video frames are wanted; otherwise images.
+            room: Width and height on the screen, as far as known.
 
         Raises:
             UnsupportedError: The colour map is unknown, or the depths are no range.
@@ -61,7 +67,9 @@ class LookElement(TopicElement):
             near, far = (None if depth < 0 else depth for depth in (self._near, self._far))
             colors = (self._colors, near, far)
             DepthColors(*colors)
-        return Look(video, view, colors, self._interval)
+        if room is not None and self._rotation % 180:
+            room = (room[1], room[0])
+        return Look(video, view, colors, self._interval, None if self._full else room)
 
     @property
     def _interval(self) -> float:
@@ -140,6 +148,12 @@ class LookElement(TopicElement):
             self.throttleRateChanged.emit()
             self._schedule()
 
+    def _set_full(self, full: bool) -> None:
+        if full != self._full:
+            self._full = full
+            self.fullResolutionChanged.emit()
+            self._schedule()
+
     @property
     def _who(self) -> str:
         """What errors call this element."""
@@ -155,4 +169,7 @@ class LookElement(TopicElement):
     colorMap = Property(str, lambda self: self._colors, _set_colors, notify=colorMapChanged)
     minimumDepth = Property(float, lambda self: self._near, _set_near, notify=minimumDepthChanged)
     maximumDepth = Property(float, lambda self: self._far, _set_far, notify=maximumDepthChanged)
+    fullResolution = Property(
+        bool, lambda self: self._full, _set_full, notify=fullResolutionChanged
+    )
     throttleRate = Property(float, lambda self: self._rate, _set_rate, notify=throttleRateChanged)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
-from rosglass.images import DEPTH_ENCODINGS, DepthColors, View, convert
+from rosglass.images import DEPTH_ENCODINGS, DepthColors, View, convert, reduce
 from rosglass.qml.frames import IMAGE_FORMATS, VIDEO_FORMATS, VideoFrame, to_image
 
 if TYPE_CHECKING:
@@ -17,9 +17,11 @@ if TYPE_CHECKING:
     from rosglass.images.frame import Frame, RawImage
     from rosglass.qt import QtGui
 
-__all__ = ["Look", "Picture", "Renderer"]
+__all__ = ["Look", "Picture", "Renderer", "whole_frame"]
 
 _WHOLE = View()
+#: How much smaller than its place on the screen a picture may become.
+_UNSEEN = 1.05
 #: Settings of colours whose automatic range is remembered; a slider makes many.
 _MOST_COLORS = 8
 
@@ -33,12 +35,22 @@ class Look:
         view: Which part, and how it is turned.
         colors: Colour map, nearest and farthest depth for pictures of depths; None for greys.
         interval: Seconds between two pictures, 0 for all of them.
+        room: Width and height that the picture has on the screen, before it is turned; larger
+            ones are reduced to about that. None leaves them as they are.
     """
 
     video: bool = True
     view: View = _WHOLE
     colors: tuple[str, float | None, float | None] | None = None
     interval: float = 0.0
+    room: tuple[int, int] | None = None
+
+    def factor(self, image: RawImage) -> int:
+        """Return by which factor a picture can be made smaller without being seen to be."""
+        if self.room is None or self.view.region is not None or self.view.zoom > 1:
+            return 1
+        ratio = min(image.width / self.room[0], image.height / self.room[1])
+        return max(1, int(ratio * _UNSEEN))
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +64,7 @@ class Picture:
         received: When it arrived.
         late: Seconds that it was kept back on its way.
         made: When it was ready, seconds of :func:`time.monotonic`.
+        whole: What was received, when `frame` is smaller.
     """
 
     frame: Frame
@@ -60,6 +73,14 @@ class Picture:
     received: Time
     late: float
     made: float
+    whole: RawImage | None = None
+
+
+def whole_frame(picture: Picture, look: Look) -> Frame:
+    """Return a picture as a viewer sees it, with all the pixels that were received."""
+    if picture.whole is None:
+        return picture.frame
+    return look.view.apply(convert(picture.whole, IMAGE_FORMATS, picture.received))
 
 
 class Renderer:
@@ -89,14 +110,16 @@ class Renderer:
         """
         groups: dict[Any, dict[View, list[Look]]] = {}
         for look in looks:
-            groups.setdefault(look.colors, {}).setdefault(look.view, []).append(look)
+            group = groups.setdefault((look.colors, look.factor(image)), {})
+            group.setdefault(look.view, []).append(look)
         made: dict[Look, Picture] = {}
         failed: dict[Look, str] = {}
-        for colors, views in groups.items():
+        for (colors, factor), views in groups.items():
+            small = reduce(image, factor)
             kinds = {look.video for members in views.values() for look in members}
             # What is shown as it is can be converted where the display wants it.
             straight = VideoFrame() if kinds == {True} and [*views] == [_WHOLE] else None
-            frame = self._convert(image, received, colors, kinds, straight)
+            frame = self._convert(small, received, colors, kinds, straight)
             for view, members in views.items():
                 try:
                     seen = view.apply(frame)
@@ -106,7 +129,8 @@ class Renderer:
                 wanted = {look.video for look in members}
                 video = (straight or VideoFrame()).finish(seen) if True in wanted else None
                 painted = to_image(seen) if False in wanted else None
-                picture = Picture(seen, video, painted, received, late, time.monotonic())
+                whole = image if small is not image else None
+                picture = Picture(seen, video, painted, received, late, time.monotonic(), whole)
                 made |= dict.fromkeys(members, picture)
         return made, failed
 

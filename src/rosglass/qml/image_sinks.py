@@ -6,13 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import UnsupportedError
 from rosglass.qml.image_item import ImageItem
-from rosglass.qt import QT6, QtCore, is_alive, optional
+from rosglass.qt import QT6, QtCore, QtQuick, is_alive, optional
 
 if TYPE_CHECKING:
     from rosglass.qml.image_rendering import Picture
 
 __all__ = ["SURFACE_TYPE", "Sink"]
 
+#: Pixels to which the size of an item is rounded up: resizing it changes little.
+_STEP = 8
 #: What Qt 5's VideoOutput looks for in a property called ``videoSurface``. PySide 6 takes no other
 #: type than QObject for a video sink. Qt 6 loads its QtMultimedia only when a camera is shown.
 SURFACE_TYPE: Any = QtCore.QObject
@@ -49,6 +51,25 @@ class Sink:
     def is_alive(self) -> bool:
         """Whether it still exists."""
         return is_alive(self.item)
+
+    def room(self) -> tuple[int, int] | None:
+        """Return the width and height in pixels that it has on the screen, rounded up generously.
+
+        None when that cannot be told: nobody knows what becomes of the pictures then.
+        """
+        item = self.item if isinstance(self.item, ImageItem) else self.item.parent()
+        window = item.window() if isinstance(item, QtQuick.QQuickItem) else None
+        if window is None:
+            return None
+        place = item.mapRectToScene(QtCore.QRectF(0, 0, item.width(), item.height()))
+        ratio = window.effectiveDevicePixelRatio()
+        sides = [
+            -(-round(side * ratio) // _STEP) * _STEP for side in (place.width(), place.height())
+        ]
+        if not all(sides):
+            return None
+        turned = (item.property("orientation") or 0) % 180
+        return (sides[1], sides[0]) if turned else (sides[0], sides[1])
 
     def show(self, picture: Picture) -> bool:
         """Show a picture; return false when it was made for another kind of sink.

@@ -235,15 +235,17 @@ class ImageTransportSubscription(LookElement):
                 failed = isinstance(result, Error)
                 (self.snapshotFailed if failed else self.snapshotSaved).emit(str(result))
 
-        if picture is None:
+        look = self._has_look
+        if picture is None or look is None:
             done(Error("no picture is shown"))
             return promise.promise
 
         def work() -> Path:
             from rosglass.images import save  # noqa: PLC0415 - brings numpy
+            from rosglass.qml.image_rendering import whole_frame  # noqa: PLC0415
 
             # The picture, not only its frame, is held until then: the memory may be the video's.
-            return save(picture.frame, plain_path(path))
+            return save(whole_frame(picture, look), plain_path(path))
 
         runtime.session.background(work, done)
         return promise.promise
@@ -319,7 +321,7 @@ class ImageTransportSubscription(LookElement):
         assert self._sink is not None
         video = self._sink.takes_video
         try:
-            look = self._look(video)
+            look = self._look(video, self._sink.room())
         except Error as error:
             self._say(f"{self._who}: {error}")
             before = self._has_look
@@ -397,6 +399,9 @@ class ImageTransportSubscription(LookElement):
     @Slot()
     def _on_tick(self) -> None:
         super()._on_tick()
+        # Items are resized, moved to other windows and transformed without a word to their sinks.
+        if self._stream is not None and self._sink is not None and self._sink.is_alive:
+            self._follow(self._stream)
         self._refresh()
 
     def _refresh(self) -> None:
