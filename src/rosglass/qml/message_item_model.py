@@ -18,11 +18,13 @@ from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot
 if TYPE_CHECKING:
     from rosglass.messages import MessageType
 
+    _Index = QtCore.QModelIndex | QtCore.QPersistentModelIndex
+
 __all__ = ["MessageItemModel"]
 
-_DISPLAY = int(QtCore.Qt.ItemDataRole.DisplayRole)
-_EDIT = int(QtCore.Qt.ItemDataRole.EditRole)
-_TYPE, _INDEX, _ELEMENT = (int(QtCore.Qt.ItemDataRole.UserRole) + i for i in (1, 2, 3))
+# Qt.ItemDataRole, written out: naming it makes PySide load every enumeration of Qt, at start-up.
+_DISPLAY, _EDIT, _USER = 0, 2, 0x0100
+_TYPE, _INDEX, _ELEMENT = _USER + 1, _USER + 2, _USER + 3
 _ROLES = {
     _DISPLAY: b"display",
     _EDIT: b"edit",
@@ -33,7 +35,6 @@ _ROLES = {
 _NAME, _VALUE = 0, 1
 #: More rows inserted at once are a mistake that would freeze the screen.
 _MOST_ROWS = 100_000
-_Index = QtCore.QModelIndex | QtCore.QPersistentModelIndex
 
 
 class MessageItemModel(QtCore.QAbstractItemModel):
