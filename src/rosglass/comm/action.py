@@ -307,6 +307,11 @@ class ServerGoal(Handle):
     def is_cancel_requested(self) -> bool:
         """Whether it should end soon: with :meth:`canceled`, or because the server closes."""
 
+    @property
+    @abstractmethod
+    def cancel_request(self) -> Promise[None]:
+        """Comes when :attr:`is_cancel_requested` becomes true: to be told of it, or to await it."""
+
     @abstractmethod
     def wait_for_cancel(self, timeout: float) -> bool:
         """Sleep up to `timeout` seconds; return early, with True, when it should end."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import threading
 import time
+from concurrent.futures import Future
 from typing import TYPE_CHECKING, Any, Protocol
 
 from rosglass.comm.loop import LoopExecutor
@@ -13,7 +14,6 @@ from rosglass.errors import Error, NodeClosedError
 if TYPE_CHECKING:
     import logging
     from collections.abc import Callable
-    from concurrent.futures import Future
 
     from rosglass.comm.action import GoalStatus
     from rosglass.comm.node import Executor
@@ -124,8 +124,9 @@ class GoalRunner:
             self._ended()
             return
         if inspect.iscoroutine(result) and isinstance(self._executor, LoopExecutor):
-            future = self._executor.run(result)
-            future.add_done_callback(lambda done: self._finish(goal, done))
+            result = self._executor.run(result)
+        if isinstance(result, Future):
+            result.add_done_callback(lambda done: self._finish(goal, done))
             return
         if inspect.iscoroutine(result):
             result.close()
@@ -135,7 +136,7 @@ class GoalRunner:
         self._ended()
 
     def _finish(self, goal: Runnable, done: Future[Any]) -> None:
-        """Take the end of a coroutine."""
+        """Take what came later."""
         try:
             result = done.result(0)
         except BaseException as error:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm.action import ActionServer, ServerGoal
 from rosglass.comm.goal_runner import GoalRunner
 from rosglass.comm.loop import LoopExecutor, executor_for
+from rosglass.comm.promise import Promise
 from rosglass.errors import ConversionError, Error, NodeClosedError
 
 if TYPE_CHECKING:
@@ -60,6 +61,8 @@ class GoalServer(ActionServer):
         self._accept, self._cancel, self._decider, self._log = accept, cancel, chosen, log
         given = executor is not None or isinstance(chosen, LoopExecutor)
         self._runner = GoalRunner(name, execute, chosen if given else None, log, over)
+        #: Where is told what comes later.
+        self.dispatcher = core.dispatcher
         self._lock = threading.Lock()
         self._closed = False
 
@@ -122,11 +125,24 @@ class ExecutedGoal(ServerGoal):
     def __init__(self, server: GoalServer) -> None:
         self._server = server
         self._stop = threading.Event()
+        self._cancel_request: Promise[None] = Promise(
+            f"nobody asked to cancel a goal of {server.name}", server.dispatcher, cancellable=False
+        )
 
     @property
     def is_cancel_requested(self) -> bool:
         """Whether it should end soon: with :meth:`canceled`, or because the server closes."""
         return self._stop.is_set()
+
+    @property
+    def cancel_request(self) -> Promise[None]:
+        """Comes when :attr:`is_cancel_requested` becomes true."""
+        return self._cancel_request
+
+    def stop(self) -> None:
+        """Let who executes it know that it should end; not while a lock is held."""
+        self._stop.set()
+        self._cancel_request.fulfil(None)
 
     def wait_for_cancel(self, timeout: float) -> bool:
         """Sleep up to `timeout` seconds; return early, with True, when it should end."""

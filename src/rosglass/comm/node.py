@@ -238,8 +238,9 @@ class Node(Handle):
             execute: Called with each accepted goal, on a thread of the goal's own, or on
                 `executor`. What it returns is the result of a goal that succeeded, or was
                 cancelled when a request to cancel was accepted meanwhile; an exception aborts the
-                goal. It may also end the goal itself. A coroutine function runs in the event loop
-                in which the server is created.
+                goal. It may also return a :class:`concurrent.futures.Future` of the result, which
+                lets the goal go on, or end the goal itself. A coroutine function runs in the event
+                loop in which the server is created.
             accept: Told the goal; returns whether it is accepted. None accepts all.
             cancel: Told the goal; returns whether a request to cancel it is accepted. None
                 accepts all, and so does a callback that fails.

@@ -122,14 +122,10 @@ class Ros1ServerGoal(ExecutedGoal):
         self._server.publish_status()
         return True
 
-    def stop(self) -> None:
-        """Let who executes it know that it should end."""
-        self._stop.set()
-
     def replace(self) -> None:
         """Let it end for a newer goal."""
         self._replaced = True
-        self._stop.set()
+        self.stop()
 
     def conclude(self, result: Any) -> None:
         """End it with what executing it returned: cancelled if that was asked for, or done.
@@ -143,6 +139,7 @@ class Ros1ServerGoal(ExecutedGoal):
             status = GoalStatus.CANCELED if canceled or self._replaced else GoalStatus.SUCCEEDED
             ended = self._settle(status, "")
         if ended:
+            self.stop()
             self._server.publish_result(self._entry, made)
 
     def fail(self, error: BaseException) -> None:
@@ -167,6 +164,7 @@ class Ros1ServerGoal(ExecutedGoal):
                 raise self._not_asked()
             ended = self._settle(status, text)
         if ended:
+            self.stop()
             self._server.publish_result(self._entry, made)
         elif strict:
             raise self._over(f"it cannot end as {status.value}")
@@ -183,5 +181,4 @@ class Ros1ServerGoal(ExecutedGoal):
             end = _UNBEGUN.get(end, end)
         self._entry.go(end, text)
         self._server.note_end(self._entry)
-        self._stop.set()
         return True

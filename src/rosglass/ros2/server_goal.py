@@ -93,7 +93,7 @@ class Ros2ServerGoal(ExecutedGoal):
             if not self.cancelable:
                 return False
             self._status = GoalStatus.CANCELING
-        self._stop.set()
+        self.stop()
         return True
 
     @property
@@ -158,11 +158,11 @@ class Ros2ServerGoal(ExecutedGoal):
             return []
         self._status, self.ended = status, time.monotonic()
         self._response = self._server.make_response(CODES[status], result)
-        self._stop.set()
         waiting, self._waiting = self._waiting, []
         return waiting
 
     def _publish(self, waiting: list[Future[Any]]) -> None:
+        self.stop()
         self._server.publish_status()
         for future in waiting:
             if self._response is not None and future.set_running_or_notify_cancel():

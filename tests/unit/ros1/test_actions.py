@@ -697,6 +697,7 @@ def test_a_newer_goal_takes_the_place_of_those_before(offer, eventually):
     hand.send("b", stamp=11)
     eventually(lambda: hand.listed.get("b") == "PENDING")
     assert server.goals[0].is_cancel_requested
+    assert server.goals[0].cancel_request.done()
     assert server.goals[0].status is GoalStatus.EXECUTING
     hand.send("c", stamp=12)
     eventually(lambda: "b" in hand.results)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
+from concurrent.futures import Future
 
 import pytest
 
@@ -1045,6 +1046,31 @@ def test_what_a_running_goal_may_and_may_not_do(client, robot, eventually):
     for late in (theirs.succeed, theirs.abort, theirs.canceled, theirs.publish_feedback):
         with pytest.raises(rosglass.Error, match="has ended as succeeded already"):
             late()
+
+
+def test_a_future_lets_a_goal_go_on_without_a_thread(client, robot, eventually):
+    """Told of a request to cancel by a promise: what user interfaces need."""
+    goals, asked, answers = [], [], [Future(), Future()]
+
+    def execute(goal):
+        goals.append(goal)
+        goal.cancel_request.on_done(asked.append)
+        return answers[len(goals) - 1]
+
+    executor = Dispatcher("goals")
+    robot.create_action_server("/fib", FIB, execute, executor=executor)
+    first, second = client.send_goal({"order": 1}), client.send_goal({"order": 2})
+    eventually(lambda: len(goals) == 2)
+    assert [goal.status for goal in goals] == [EXECUTING, EXECUTING]
+    assert not asked
+    assert first.cancel().result(20).accepted
+    eventually(lambda: asked == [goals[0].cancel_request])
+    answers[0].set_result({"sequence": [1]})
+    assert (first.result(20).status, list(first.result().result.sequence)) == (CANCELED, [1])
+    answers[1].set_exception(ValueError("no"))
+    assert second.result(20).status is ABORTED
+    eventually(lambda: len(asked) == 2)  # it has ended
+    executor.close()
 
 
 def test_what_execute_returns_after_the_end_is_logged(client, robot, caplog, eventually):
