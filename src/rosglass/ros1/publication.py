@@ -229,11 +229,14 @@ class Publication(Member):
         with self._topics.registering:
             master.call("registerPublisher", self.topic, name, self._core.uri)
 
-    def unregister(self, master: Master) -> None:
+    def unregister(self, master: Master) -> Member | None:
         """Tell the master that it is published here no more, unless it is again."""
         with self._topics.registering:
-            if self._core.closed or self.topic not in self._topics.published():
+            heir = self._topics.published().get(self.topic)
+            if self._core.closed or heir is None:
                 master.call("unregisterPublisher", self.topic, self._core.uri)
+                return None
+        return heir
 
     def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - connections come by themselves
         """Tell the publishers who is connected, and who is in trouble."""

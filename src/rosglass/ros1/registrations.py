@@ -179,10 +179,14 @@ class Registrations:
         while self._leaving:
             member = self._leaving[0]
             if member in self._tried:
+                heir = None
                 with suppress(MasterError):
-                    member.unregister(self._core.master)
+                    heir = member.unregister(self._core.master)
                 self._tried.discard(member)
                 self._registered.discard(member)
+                if heir is not None:
+                    # It may leave before it was ever registered itself.
+                    self._tried.add(heir)
             self._leaving.popleft()
 
     def _register(self) -> list[str]:

@@ -46,7 +46,7 @@ def test_to_ros1(bridge, connect, rospy_peer, wait_for):
     value = rospy_peer.event("received")["value"]
     assert value["header"] == {"seq": 0, "stamp": {"secs": 12, "nsecs": 34}, "frame_id": "map"}
     assert value["pose"]["position"]["x"] == 1.5
-    assert relays(made)["/talk_two", "<-"].count == 1
+    wait_for(lambda: relays(made)["/talk_two", "<-"].count == 1)
 
 
 @pytest.mark.parametrize("way", ["->", "<-"])
@@ -186,7 +186,7 @@ def test_a_type_given_beforehand(bridge, connect, wait_for):
     assert listener.wait(30).message().linear.x == 0.5
 
 
-def test_services_of_ros1(bridge, connect, rospy_peer):
+def test_services_of_ros1(bridge, connect, rospy_peer, wait_for):
     made = bridge(services=["/arm/*"])
     for service, fails in (("/arm/set", ""), ("/arm/broken", "refusal")):
         rospy_peer.call(
@@ -204,7 +204,7 @@ def test_services_of_ros1(bridge, connect, rospy_peer):
     broken = node.create_service_client("/arm/broken", "std_srvs/srv/SetBool")
     with pytest.raises(ServiceError, match="not homed"):
         broken.call({"data": True}, timeout=30)
-    assert relays(made)["/arm/broken", "->"].refused == 1
+    wait_for(lambda: relays(made)["/arm/broken", "->"].refused == 1)
     rospy_peer.call("unserve", service="/arm/set")
     rospy_peer.call("unserve", service="/arm/broken")
 

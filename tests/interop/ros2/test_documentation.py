@@ -9,7 +9,6 @@ import inspect
 import logging
 import os
 import re
-import threading
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -271,6 +270,7 @@ class World:
         self.said: list[Any] = []
         self.nodes: list[Any] = []
         self._robot, self._connect = robot, rosglass.connect
+        self._names: dict[str, Any] = {}
         self._subscriptions: list[Any] = []
         monkeypatch.setattr(rosglass, "connect", self.connect)
 
@@ -290,7 +290,7 @@ class World:
 
     def given(self) -> dict[str, Any]:
         node = self.connect("dds://", "cockpit", "/left")
-        return {
+        self._names = {
             "__name__": "cockpit",
             "asyncio": asyncio,
             "concurrent": concurrent,
@@ -310,6 +310,7 @@ class World:
             "there": node,
             "update": lambda: self.say("tick"),
         }
+        return self._names
 
     def say(self, *values: Any) -> None:
         """Take what is printed; who loops over a subscription for ever has seen enough then."""
@@ -321,7 +322,11 @@ class World:
             self._subscriptions[-1].close()
 
     def _drive(self) -> None:
-        threading.Event().wait(0.2)
+        """Drive until something of it is recorded."""
+        deadline = time.monotonic() + 30
+        while not self._names["recorder"].status().messages:
+            assert time.monotonic() < deadline, self._names["recorder"].status()
+            time.sleep(0.01)
 
     def close(self) -> None:
         for node in self.nodes:

@@ -13,6 +13,8 @@ import pytest
 import rosglass
 from rosglass.comm import ConnectionState, EndpointKind, NodeName
 from rosglass.ros1 import address, farewells
+from rosglass.ros1.intake import Intake
+from rosglass.ros1.publication import Publication
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -90,6 +92,36 @@ def test_closing_from_other_threads_at_the_same_time(
     wait_for(lambda: "/panel" in offers.get("/a", {}))
     kept.close()
     wait_for(lambda: "/panel" not in offers["/a"])
+
+
+@pytest.mark.parametrize("create", ["create_publisher", "create_subscription"])
+def test_one_that_is_closed_while_the_master_is_told_of_the_one_before(
+    master: FakeMaster, node: Ros1Node, create: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    member = Publication if create == "create_publisher" else Intake
+    offers = master.publishers if create == "create_publisher" else master.subscribers
+    first = getattr(node, create)("/a", "std_msgs/Empty")
+    wait_for(lambda: "/panel" in offers.get("/a", {}))
+    second: list[Any] = []
+    unregister = member.unregister
+
+    def unregister_and_close(self: Any, *arguments: Any) -> Any:
+        left = unregister(self, *arguments)
+        while second:
+            second.pop().close()  # before it was registered itself
+        return left
+
+    def hold(*_: Any) -> Any:
+        # The node's thread is about to tell the master of both.
+        first.close()
+        second.append(getattr(node, create)("/a", "std_msgs/Empty"))
+        del master.answers["lookupNode"]
+        return master._lookupNode("/panel", "/panel")
+
+    monkeypatch.setattr(member, "unregister", unregister_and_close)
+    master.answers["lookupNode"] = hold
+    wait_for(lambda: "/panel" not in offers["/a"])
+    assert not second
 
 
 @pytest.mark.parametrize(
