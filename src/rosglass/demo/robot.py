@@ -8,6 +8,7 @@ node's own thread and take effect with the body's next step.
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import QoS, Time
 from rosglass.demo import telemetry
+from rosglass.demo.duties import Duties
 from rosglass.demo.scan import LaserScanner, occupancy
 from rosglass.demo.simulation import CommandRejectedError, Simulation
 from rosglass.errors import Error, NodeClosedError
@@ -105,6 +107,7 @@ class Robot:
                 ),
             )
         ]
+        self._duties = Duties(node, lambda: self.state, self._switch, self._drive)
 
     @property
     def state(self) -> RobotState:
@@ -133,6 +136,7 @@ class Robot:
     def close(self) -> None:
         """Stop moving and end the threads; safe to call twice, from any thread but the robot's."""
         self._ending.set()
+        self._duties.close()
         for subscription in self._subscriptions:
             subscription.close()
         for thread in self._threads:
@@ -177,6 +181,12 @@ class Robot:
                     f"a motion only along linear.x and angular.z expected, "
                     f"got another component {value}"
                 )
+        self._drive(speed, turn)
+
+    def _drive(self, speed: float, turn: float) -> None:
+        fastest = self._duties.max_speed
+        if math.isfinite(speed) and abs(speed) <= self._simulation.limits.believable:
+            speed = max(-fastest, min(fastest, speed))
         with self._lock:
             self._simulation.command_velocity(speed, turn)
 
@@ -189,8 +199,11 @@ class Robot:
         self._confirm()
 
     def _on_flashlight(self, message: Message) -> None:
+        self._switch(message.data)
+
+    def _switch(self, on: bool) -> None:
         with self._lock:
-            self._simulation.set_flashlight(message.data)
+            self._simulation.set_flashlight(on)
         self._send["/flashlight/state"].publish(data=self.state.flashlight)
 
     def _on_flippers(self, message: Message) -> None:

@@ -46,10 +46,26 @@ class Listener:
         pass
 
 
+class Settings:
+    """Parameters that anybody may set."""
+
+    def __init__(self) -> None:
+        self.values: dict[str, Any] = {}
+
+    def declare(self, name: str, value: Any, descriptor: Any) -> None:
+        assert descriptor.range.low <= value <= descriptor.range.high
+        self.values[name] = value
+
+    def get(self, name: str) -> Any:
+        return self.values[name]
+
+
 class StubNode:
     """As much of a node as the robot uses."""
 
     def __init__(self) -> None:
+        self.parameters = Settings()
+        self.services: dict[str, Callable[[Any], Any]] = {}
         self.publishers: dict[str, Recorder] = {}
         self.commands: dict[str, tuple[Any, Callable[[Any], None]]] = {}
 
@@ -61,6 +77,18 @@ class StubNode:
         self, topic: str, type: str, callback: Callable[[Any], None], qos: QoS | int = 10
     ) -> Listener:
         self.commands[topic] = (rosglass.load(type), callback)
+        return Listener()
+
+    def create_service_server(
+        self, name: str, type: str, callback: Callable[[Any], Any]
+    ) -> Listener:
+        self.services[name] = callback
+        return Listener()
+
+    def create_action_server(
+        self, name: str, type: str, callback: Callable[[Any], Any]
+    ) -> Listener:
+        self.services[name] = callback
         return Listener()
 
     def command(self, topic: str, **fields: Any) -> None:
@@ -254,6 +282,49 @@ def test_a_network_that_blocks_does_not_stop_the_body(node: StubNode, robot: Rob
         for recorder in stuck:
             recorder.blocked.set()
     until(lambda: robot.state.speed == 0.0)
+
+
+class Turning:
+    """A goal of the action /turn."""
+
+    is_cancel_requested = False
+
+    def __init__(self, theta: float) -> None:
+        self.goal = type("Goal", (), {"theta": theta})
+        self.left: list[float] = []
+
+    def publish_feedback(self, feedback: dict[str, float]) -> None:
+        self.left.append(feedback["remaining"])
+
+
+def test_it_turns_to_a_heading(node: StubNode, robot: Robot) -> None:
+    wanted = robot.state.yaw + 0.3
+    goal = Turning(wanted)
+    result = node.services["/turn"](goal)
+    assert abs(math.remainder(robot.state.yaw - wanted, math.tau)) < 0.1
+    assert result["delta"] == pytest.approx(0.3, abs=0.1)
+    assert goal.left[0] == pytest.approx(0.3, abs=0.05)
+
+
+def test_no_goal_overrides_the_emergency_stop(node: StubNode, robot: Robot) -> None:
+    node.command("/emergency_stop", data=True)
+    with pytest.raises(Error, match="emergency stop"):
+        node.services["/turn"](Turning(robot.state.yaw + 1.0))
+    with pytest.raises(Error, match="no angle"):
+        node.services["/turn"](Turning(math.nan))
+
+
+def test_the_flashlight_is_a_service_too(node: StubNode, robot: Robot) -> None:
+    request = type("Request", (), {"data": True})
+    assert node.services["/flashlight/set"](request) == {"success": True, "message": "on"}
+    assert robot.state.flashlight
+
+
+def test_the_highest_speed_is_a_parameter(node: StubNode, robot: Robot) -> None:
+    node.parameters.values["max_speed"] = 0.1
+    until(lambda: node.command("/cmd_vel", linear={"x": 1.0}) or robot.state.speed > 0.05)
+    assert robot.state.speed <= 0.11
+    node.parameters.values["max_speed"] = 1.2
 
 
 def test_a_robot_that_fails_ends_instead_of_driving_on() -> None:
