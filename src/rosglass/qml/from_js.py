@@ -9,14 +9,13 @@ the plugins take without loss.
 from __future__ import annotations
 
 import math
-from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.qos import Durability, History, QoS, Reliability
 from rosglass.errors import ConversionError
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.js_values import Shown, integral, is_model, properties_of, roles_of, shown, wide
-from rosglass.qml.times import DECIMAL, from_milliseconds, known_parts, time_parts
+from rosglass.qml.times import DECIMAL, from_milliseconds, known_parts, number_from_text, time_parts
 from rosglass.qt import QJSValue, QtCore, QtGui
 
 if TYPE_CHECKING:
@@ -383,9 +382,9 @@ def _as_number(value: Any, code: str) -> Any:
     if isinstance(value, bool):
         return int(value)
     if isinstance(value, str) and DECIMAL.match(value.strip()):
-        found = Fraction(value.strip())
         if code in "fd":
             return float(value)
+        found = number_from_text(value)
         return int(found) if found.denominator == 1 else value
     return value
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -70,13 +71,19 @@ class Runtime(QtCore.QObject):
         self._kept: set[QtCore.QObject] = set()
         self._debt = 0
         self._host = Host(self)
+
+    @cached_property
+    def _helper(self) -> dict[str, QJSValue]:
+        """Functions of our scripts; read for the first value, which is after the first frame."""
         parts = [self._script(name) for name in ("times.js", "arrays.js")]
-        made = self._script("helpers.js").call([*parts, engine.newQObject(self._host)])
-        self._helper = {name: made.property(name) for name in _HELPERS}
-        for name, helper in self._helper.items():
+        host = self._engine.newQObject(self._host)
+        made = self._script("helpers.js").call([*parts, host])
+        found = {name: made.property(name) for name in _HELPERS}
+        for name, helper in found.items():
             if not helper.isCallable():
                 raise Error(f"helpers.js: {name}: {made.toString()}")
-        self._helper["makePromise"] = _evaluate(engine, _PROMISE)
+        found["makePromise"] = _evaluate(self._engine, _PROMISE)
+        return found
 
     @property
     def engine(self) -> QtQml.QQmlEngine | None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.time import Duration, Time
@@ -12,6 +11,8 @@ from rosglass.errors import ConversionError
 from rosglass.qml.js_values import integral, is_model, properties_of, shown, wide
 
 if TYPE_CHECKING:
+    from fractions import Fraction
+
     from rosglass.qt import QJSValue
 
 __all__ = [
@@ -32,6 +33,8 @@ _NS = 1_000_000_000
 
 def number_from_text(text: str) -> Fraction:
     """Return the number that a decimal text says, exactly; raises ConversionError."""
+    from fractions import Fraction  # noqa: PLC0415 - takes milliseconds at start-up
+
     if not DECIMAL.match(text.strip()):
         raise ConversionError("", text, "a decimal number")
     return Fraction(text.strip())
@@ -109,7 +112,8 @@ def from_milliseconds(milliseconds: float, path: str) -> tuple[int, int]:
     """Return seconds and nanoseconds of milliseconds."""
     if not math.isfinite(milliseconds) or abs(milliseconds) > 2**53:
         raise ConversionError(path, milliseconds, "milliseconds")
-    return divmod(round(Fraction(milliseconds) * 1_000_000), _NS)
+    whole = math.floor(milliseconds)
+    return divmod(whole * 1_000_000 + round((milliseconds - whole) * 1_000_000), _NS)
 
 
 def _given(value: QJSValue) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import ConversionError, Error
@@ -93,6 +92,8 @@ class Host(QtCore.QObject):
     @Slot(float, float, float, result=QJSValue)
     def multiply(self, sec: float, nanosec: float, factor: float) -> QJSValue:
         """Return a duration times a number, rounded to the nanosecond, as two parts."""
+        from fractions import Fraction  # noqa: PLC0415 - takes milliseconds at start-up
+
         total = round(Fraction(factor) * (int(sec) * _NS + int(nanosec)))
         return self._runtime.value(list(divmod(total, _NS)))
 
