@@ -69,7 +69,7 @@ def test_arrays_and_their_elements(bench: Any) -> None:
     assert tree == [
         ["name", "array", [[0, "string", "a"], [1, "string", "b"]]],
         ["position", "array", [[0, "double", 1], [1, "double", 2]]],
-        ["velocity", "array", None],
+        ["velocity", "array", ""],
     ]
     assert (element, field) == (True, False)
 

@@ -230,7 +230,8 @@ class MessageItemModel(QtCore.QAbstractItemModel):
         if index.column() == _NAME:
             return item.name
         if not item.is_leaf:
-            return None
+            # Qt's own delegates complain about undefined.
+            return "" if role == _DISPLAY else None
         value = item.value
         return exact(value) if type(value) is int else value
 
