@@ -12,11 +12,12 @@ too low.
 `listing` is the paper's Listing 1 (picture, drag area, button) in a 640x480 window, the interface
 that the C++ plugin for ROS 1 was measured with on the same kind of machine. `plain` is a PySide6
 program with the same items that makes the same pictures itself, in a thread, and pushes them into
-a QVideoSink: no robot, no network. `shm` has Zenoh hand pictures over in shared memory, as robot and
-interface on one machine can; the others travel twice over TCP, by way of the router. `one` and `eight` show one camera once and eight times (three by
-three, less one) in a 640x480 window. `cockpit` is the demo's whole screen, 1340x800, with the
-simulated robot. Contenders take turns, round by round; figures are medians of the rounds. Exits 1
-when a target is missed or a picture is missing.
+a QVideoSink: no robot, no network. With `shm`, Zenoh hands pictures over in shared memory, as it
+can on one machine; otherwise they travel over TCP twice, by way of the router. With `ros1` they
+travel over TCP once, between Debian's rosmaster's nodes. `one preview` and `eight previews` show
+one camera once, and eight times (three by three, less one), in a 640x480 window. `cockpit` is the
+demo's whole screen, 1340x800, with the simulated robot. Contenders take turns, round by round;
+figures are medians of the rounds. Exits 1 when a target is missed or a picture is missing.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ import contextlib
 import ctypes
 import os
 import re
+import socket
 import statistics
 import subprocess
 import sys
@@ -33,6 +35,7 @@ import tempfile
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -44,13 +47,21 @@ from rosglass.demo.camera import CODE_POSITION, HEIGHT, WIDTH
 from rosglass.demo.processes import VirtualScreen
 from rosglass.ros2.zenoh.router import Router
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
 SCREEN = (1340, 800)
 PEERS = str(Path(__file__).with_name("camera_peers.py"))
 #: The C++ plugin (qml_ros_plugin 1.0.0, ROS 1, qmlscene, same interface): median, 90 %, worst
 #: (ms), CPU (% of a core), memory (MiB).
 CPLUSPLUS = {(640, 480): (10.3, 12.1, 15.0, 21, 153), (1920, 1080): (15.8, 18.4, 42.9, 35, 201)}
 #: Median latency to reach, ms.
-TARGETS = {"listing 640x480": 12.0, "listing 1920x1080 shm": 18.0}
+TARGETS = {
+    "listing 640x480": 12.0,
+    "listing 640x480 ros1": 12.0,
+    "listing 1920x1080 shm": 18.0,
+    "listing 1920x1080 ros1": 18.0,
+}
 #: CPU to reach, as ratios: to the plain program, and of eight previews to one.
 CPU_TARGET = 1.3
 CONTROLS = """
@@ -133,6 +144,7 @@ class Contender:
         shown: Width and height of the first picture's item, whose top left corner is the screen's.
         plain: Whether it runs without rosglass.
         options: What the address of the robot ends with.
+        ros1: Whether camera and interface speak ROS 1 instead of Zenoh.
     """
 
     name: str
@@ -141,14 +153,17 @@ class Contender:
     shown: tuple[int, int] = (640, 480)
     plain: bool = False
     options: str = ""
+    ros1: bool = False
 
 
 VGA, HD = (640, 480), (1920, 1080)
 CONTENDERS = (
     Contender("listing 640x480", LISTING),
+    Contender("listing 640x480 ros1", LISTING, ros1=True),
     Contender("plain 640x480", PLAIN, plain=True),
     Contender("listing 1920x1080", LISTING, HD),
     Contender("listing 1920x1080 shm", LISTING, HD, options="?shm=true"),
+    Contender("listing 1920x1080 ros1", LISTING, HD, ros1=True),
     Contender("plain 1920x1080", PLAIN, HD, plain=True),
     Contender("one preview", PREVIEWS.replace("COUNT", "1").replace("COLUMNS", "1")),
     Contender(
@@ -280,16 +295,43 @@ def cockpit_places() -> list[tuple[float, float, float]]:
     return [(x + dx, y + dy, scale) for dx in (0, -1, 1) for dy in (0, -1, 1)]
 
 
+@contextlib.contextmanager
+def master() -> Iterator[str]:
+    """Run a ROS 1 master; gives its address."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
+    process = subprocess.Popen(
+        ["/usr/bin/rosmaster", "--core", "-p", str(port)],
+        env=environment | {"PATH": "/usr/bin:/bin", "ROS_MASTER_URI": f"http://127.0.0.1:{port}"},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        until = time.monotonic() + 20
+        while time.monotonic() < until:
+            with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port)):
+                break
+            time.sleep(0.1)
+        yield f"ros1://127.0.0.1:{port}?ip=127.0.0.1"
+    finally:
+        process.terminate()
+        process.wait()
+
+
 def measure(contender: Contender, seconds: float) -> Result:
     """Run router, camera and interface, and watch the screen."""
     rosglass = [sys.executable, "-m", "rosglass"]
     with (
         tempfile.TemporaryDirectory() as folder,
         VirtualScreen(*SCREEN) as screen,
-        Router("tcp/127.0.0.1:0") as router,
         contextlib.ExitStack() as stack,
     ):
-        url = router.url + contender.options
+        if contender.ros1:
+            url = stack.enter_context(master())
+        else:
+            url = stack.enter_context(Router("tcp/127.0.0.1:0")).url + contender.options
         # Keeps the screen, which ends with its last client.
         Pixels(screen.display, 0, 0, 8)
         environment = {**os.environ, "DISPLAY": screen.display, "QT_QPA_PLATFORM": "xcb"}
@@ -356,7 +398,7 @@ def judge(results: dict[str, list[Result]]) -> bool:
         if name in results:
             median = statistics.median(result.percentile(50) for result in results[name])
             line(f"{name}: median", median, target, " ms")
-        plain = name.replace("listing", "plain").removesuffix(" shm")
+        plain = " ".join(name.replace("listing", "plain").split()[:2])
         if {name, plain} <= results.keys():
             line(f"{name}: CPU against plain", ratio(name, plain), CPU_TARGET, "x")
     if {"one preview", "eight previews"} <= results.keys():
@@ -376,6 +418,9 @@ def main() -> int:
     parser.add_argument("--only", nargs="*", default=[], metavar="NAME", help="parts of names")
     args = parser.parse_args()
     chosen = [c for c in CONTENDERS if not args.only or any(n in c.name for n in args.only)]
+    if not Path("/usr/bin/rosmaster").exists():
+        print("without ROS 1, which needs: apt install python3-rosmaster")
+        chosen = [contender for contender in chosen if not contender.ros1]
     model = re.search(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text())
     print(f"30 Hz, raw, over Zenoh; Xvfb, software OpenGL, {os.cpu_count()} cores")
     print(model[1] if model else "", f"load {os.getloadavg()[0]:.1f} before the start")

@@ -63,13 +63,14 @@ class Film:
 
 def camera(url: str, width: int, height: int) -> None:
     import rosglass
+    from rosglass.comm import Time
 
     node = rosglass.connect(url, "camera")
     publisher = node.create_publisher(TOPIC, "sensor_msgs/msg/Image", 1)
 
     def show(picture: np.ndarray, now: int) -> None:
         publisher.publish(
-            header={"stamp": {"sec": now // 10**9, "nanosec": now % 10**9}},
+            header={"stamp": Time(now)},
             width=width,
             height=height,
             encoding="rgb8",
