@@ -239,8 +239,8 @@ def main() -> int:
         print(
             f"{one['way']:8} {one['received']} of {one['sent']} pictures, median "
             f"{one['median_ms']:.1f} ms, 95 % {one['p95_ms']:.1f} ms, {one['cpu']:.0%} of a core, "
-            f"{one['relayed']} relayed; dropped by the camera {one['camera_dropped']}, by the bridge "
-            f"{one['dropped']}, on the way to the viewer {one['lost']}"
+            f"{one['relayed']} relayed; dropped by the camera {one['camera_dropped']}, by the "
+            f"bridge {one['dropped']}, on the way to the viewer {one['lost']}"
         )
     times = alone()
     ratio = times["elements"] / max(times["there"], times["back"])

@@ -1,0 +1,65 @@
+"""Reading from one publisher."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+from rosglass.comm import History, QoS
+from rosglass.ros1 import publisher_link
+
+ALL = QoS(history=History.KEEP_ALL)
+
+
+@pytest.fixture
+def flood(connect, eventually, monkeypatch):
+    """Return a publisher, a slow subscription, its link, the callback's gate and what it got."""
+    monkeypatch.setattr(publisher_link, "_BATCH", 1)
+    monkeypatch.setattr(publisher_link, "_BEHIND", 10)
+    robot, cockpit = connect("robot"), connect("cockpit")
+    publisher = robot.create_publisher("/flood", "std_msgs/Int32", ALL)
+    gate, got = threading.Event(), []
+
+    def take(message):
+        gate.wait(60)
+        got.append(message.data)
+
+    subscription = cockpit.create_subscription("/flood", "std_msgs/Int32", take, ALL)
+    eventually(lambda: subscription.publisher_count() and publisher.subscription_count())
+    (link,) = cockpit._topics._intakes["/flood"].links()
+    yield publisher, subscription, link, gate, got
+    gate.set()
+
+
+def test_reading_makes_way_for_callbacks_that_are_behind(flood, eventually, monkeypatch):
+    monkeypatch.setattr(publisher_link, "_BREATH", 3600.0)
+    publisher, subscription, link, _, _ = flood
+    sent = iter(range(10_000))
+    eventually(lambda: publisher.publish({"data": next(sent)}) or not link._connection._reading)
+    waiting = subscription.waiting
+    assert waiting > 10
+    publisher.publish({"data": -1})
+    for _ in range(3):  # the loop has looked at its sockets meanwhile
+        looked = threading.Event()
+        link._core.loop.call(looked.set)
+        assert looked.wait(30)
+    assert subscription.waiting == waiting
+
+
+def test_what_was_left_in_the_socket_comes_when_callbacks_have_caught_up(
+    flood, eventually, monkeypatch
+):
+    pauses = []
+    publisher, _, link, gate, got = flood
+    pause = link._connection.pause
+    monkeypatch.setattr(
+        link._connection, "pause", lambda reading: (pauses.append(reading), pause(reading))
+    )
+    for number in range(500):
+        publisher.publish({"data": number})
+    eventually(lambda: True in pauses)
+    gate.set()
+    eventually(lambda: len(got) == 500)
+    assert got == list(range(500))
+    assert pauses[0] is False
