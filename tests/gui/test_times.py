@@ -71,6 +71,31 @@ def test_fields_that_ros2_renamed_answer_to_the_name_of_the_module(bench: Any) -
     assert list(info["k"]) == k
 
 
+def test_every_renamed_field_of_types_that_both_have_is_known() -> None:
+    from rosglass.errors import Error
+    from rosglass.interfaces import Counterparts, Definition, Library
+    from rosglass.messages.schema import schema_of
+    from rosglass.qml.dialect import Dialect
+
+    library, found = Library(), set()
+    for name in library.names(1, "msg"):
+        definition = library.definition(name, ros=1)
+        assert isinstance(definition, Definition)
+        try:
+            pair = Counterparts(library).message(definition)
+        except Error:
+            continue
+        if pair.two.source.provider.startswith("derived from "):
+            continue
+        fields = [(f.one[0], f.two[0]) for f in pair.fields if len(f.one) == len(f.two) == 1]
+        renamed = {one: two for one, two in fields if one != two}
+        found |= set(renamed)
+        assert Dialect.ROS2.names(schema_of(pair.one)) == renamed, name
+        back = {two: one for one, two in renamed.items()}
+        assert Dialect.ROS1.names(schema_of(pair.two)) == back, name
+    assert found == set("DKRPT")
+
+
 @pytest.mark.parametrize(
     ("script", "expected"),
     [

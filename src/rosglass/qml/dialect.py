@@ -15,6 +15,9 @@ _PRIMITIVE_TIMES = {
     "time": "builtin_interfaces/msg/Time",
     "duration": "builtin_interfaces/msg/Duration",
 }
+#: Fields of ROS 1 that are lower case in ROS 2, in all types that both distribute (Noetic's
+#: definitions against all of ROS 2's): looking types up takes longer than a screen may stand still.
+_CAPITALS = {"sensor_msgs/msg/CameraInfo": "DKRP", "stereo_msgs/msg/DisparityImage": "T"}
 
 
 class Dialect(Enum):
@@ -54,27 +57,7 @@ class Dialect(Enum):
         Returns:
             The module's name by the robot's.
         """
-        if schema.ros == self.ros or schema.is_time:
+        if schema.ros == self.ros:
             return {}
-        found: dict[str, str] = schema.cached(("qml names", self), lambda: _renamed(schema))
-        return found
-
-
-def _renamed(schema: Schema) -> dict[str, str]:
-    from rosglass.errors import Error  # noqa: PLC0415 - only where both ROSes meet
-    from rosglass.interfaces import Counterparts  # noqa: PLC0415
-    from rosglass.messages.loading import default_library  # noqa: PLC0415
-
-    try:
-        pair = Counterparts(default_library()).message(schema.definition)
-    except Error:
-        return {}
-    other = pair.two if schema.ros == 1 else pair.one
-    if other.source.provider.startswith("derived from "):
-        return {}
-    paths = [(f.one, f.two) if schema.ros == 1 else (f.two, f.one) for f in pair.fields]
-    return {
-        ours[0]: theirs[0]
-        for ours, theirs in paths
-        if len(ours) == 1 and len(theirs) == 1 and ours != theirs
-    }
+        upper = _CAPITALS.get(schema.name, "")
+        return {n.lower(): n for n in upper} if schema.ros == 2 else {n: n.lower() for n in upper}
