@@ -36,6 +36,8 @@ Item {
         // The last picture stays, so that the operator can see where the robot was; that it is
         // old is said below.
         timeout: 0
+        // The figures are read from the pixels of the picture.
+        fullResolution: true
     }
     Connections {
         target: output.videoSink
