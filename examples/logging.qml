@@ -1,0 +1,25 @@
+// What an interface logs goes to the terminal with file and line, and to the robot's /rosout.
+import QtQuick 2.15
+import QtQuick.Controls 2.15
+import Ros2 1.0
+
+Column {
+    width: 480; height: 320; padding: 20; spacing: 8
+    property string title: "Logging"
+    property var arm: Ros2.getLogger("arm")
+    property var lines: []
+    Component.onCompleted: { Ros2.init("logging_example"); Ros2.info("the interface is there") }
+
+    Subscription {
+        topic: "/rosout"; throttleRate: 0; qos: Ros2.QoS().reliable().transient_local().keep_last(10)
+        onNewMessage: lines = lines.concat([message.name + ": " + message.msg]).slice(-8)
+    }
+
+    Row {
+        spacing: 8
+        Button { text: "Info"; onClicked: Ros2.info("a word") }
+        Button { text: "Warn"; onClicked: arm.warn("the arm is warm") }
+        Button { text: "Debug on"; onClicked: arm.setLoggerLevel(Ros2LoggerLevel.Debug) }
+    }
+    Repeater { model: lines; Label { text: modelData } }
+}

@@ -1,0 +1,19 @@
+// Any topic's message as a tree, whatever its type.
+import QtQuick 2.15
+import QtQuick.Controls 2.15
+import Ros2 1.0
+
+Column {
+    width: 480; height: 320; padding: 20; spacing: 8
+    property string title: "Messages of any type"
+    Component.onCompleted: Ros2.init("tree_example")
+
+    Subscription { id: battery; topic: "/battery_state" }
+    MessageItemModel { id: tree; message: battery.message; messageType: battery.messageType }
+
+    Label { text: battery.topic + " [" + battery.messageType + "]"; font.bold: true }
+    Repeater {
+        model: tree
+        Label { text: model.display + ": " + tree.data(tree.index(index, 1)) }
+    }
+}
