@@ -10,7 +10,7 @@ from rosglass.qt import QJSValue, QtCore, QtQml
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-__all__ = ["Shown", "integral", "is_model", "properties_of", "roles_of", "shown", "wide"]
+__all__ = ["Shown", "integral", "is_model", "null", "properties_of", "roles_of", "shown", "wide"]
 
 #: No 64-bit integer has more digits.
 _WHOLE = re.compile(r"-?0*[0-9]{1,20}\Z")
@@ -70,3 +70,8 @@ class Shown:
 
     def __repr__(self) -> str:
         return self._text
+
+
+def null() -> QJSValue:
+    """Return JavaScript's null."""
+    return QJSValue(QJSValue.SpecialValue.NullValue)

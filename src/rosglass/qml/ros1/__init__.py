@@ -1,5 +1,6 @@
 """What only ``import Ros 1.0`` has."""
 
+from rosglass.qml.goal_states import ActionCommStates, ActionGoalStatus, ActionTerminalStates
 from rosglass.qml.image_item import ImageItem
 from rosglass.qml.image_manager import ImageTransportManager
 from rosglass.qml.parameter import Parameter
@@ -37,4 +38,7 @@ TYPES = {
     "ImageItem": ImageItem,
     "RosConsoleLevels": ConsoleLevels,
     "RosInitOptions": InitOptions,
+    "ActionCommStates": ActionCommStates,
+    "ActionGoalStatus": ActionGoalStatus,
+    "ActionTerminalStates": ActionTerminalStates,
 }

@@ -12,6 +12,7 @@ from rosglass.qml.from_js import qos_from_js
 from rosglass.qml.graph import GraphSingleton
 from rosglass.qml.log import Caller, log_from_qml
 from rosglass.qml.message_waiting import next_message
+from rosglass.qml.ros1.action_client import RosActionClient
 from rosglass.qml.ros1.console import Console, InitOptions, short_logger
 from rosglass.qml.ros1.namespaces import within
 from rosglass.qml.ros1.package import Package
@@ -170,6 +171,26 @@ class Ros(ValueFunctions, GraphSingleton):
         server = RosServiceServer(None, self._runtime)
         server.configure(name, type_name, handler)
         return self._runtime.keep(server)
+
+    # Actions.
+
+    @Slot(QJSValue, QJSValue, result=QtCore.QObject)
+    @Slot(QJSValue, QJSValue, QJSValue, result=QtCore.QObject)
+    def createActionClient(self, *given: QJSValue) -> QtCore.QObject | None:
+        """Return a client of an action; it lives as long as JavaScript holds it, or a goal runs.
+
+        Arguments are optional namespace, action type (``pkg/DoAction``) and name.
+        """
+        texts = [value.toString() for value in given if value.isString()]
+        try:
+            if len(texts) != len(given) or not texts[-2] or not texts[-1]:
+                raise InvalidNameError("write Ros.createActionClient([ns,] type, name)")
+            name = within(texts[0] if len(texts) > 2 else "", texts[-1])
+            self._check_topic(name)
+        except Error as error:
+            self._runtime.throw(f"Ros.createActionClient: {error}")
+            return None
+        return self._runtime.keep(RosActionClient(self._runtime, name, texts[-2]))
 
     def _check_topic(self, topic: str) -> None:
         from rosglass.ros1.names import expand  # noqa: PLC0415 - not needed at start-up

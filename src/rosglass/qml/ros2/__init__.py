@@ -1,6 +1,7 @@
 """What only ``import Ros2 1.0`` has."""
 
 from rosglass.qml.clock_types import ClockTypes
+from rosglass.qml.goal_states import ActionGoalStatus
 from rosglass.qml.image_item import ImageItem
 from rosglass.qml.image_manager import ImageTransportManager
 from rosglass.qml.image_subscription import ImageTransportSubscription
@@ -37,4 +38,5 @@ TYPES = {
     "MessageItemModel": MessageItemModel,
     "Ros2LoggerLevel": LoggerLevel,
     "Ros2ClockTypes": ClockTypes,
+    "ActionGoalStatus": ActionGoalStatus,
 }

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from rosglass.comm.qos import QoS
 from rosglass.comm.time import Time
 from rosglass.errors import Error, InvalidNameError
+from rosglass.qml.action_client import ActionClient
 from rosglass.qml.from_js import qos_from_js
 from rosglass.qml.graph import GraphSingleton
 from rosglass.qml.logger import Logger
@@ -213,6 +214,24 @@ class Ros2(ValueFunctions, GraphSingleton):
         server = ServiceServer(None, self._runtime)
         server.configure(name, type_name, handler)
         return self._runtime.keep(server)
+
+    # Actions.
+
+    @Slot(str, str, result=QtCore.QObject)
+    def createActionClient(self, name: str, type_name: str) -> QtCore.QObject | None:
+        """Return a client of an action; it lives as long as JavaScript holds it, or a goal runs.
+
+        Args:
+            name: Action name.
+            type_name: Action type, ``pkg/action/Type`` or ``pkg/Type``; empty takes the server's.
+        """
+        try:
+            self._check_topic(name)
+        except Error as error:
+            self._runtime.throw(f"Ros2.createActionClient: {error}")
+            return None
+        client = ActionClient(self._runtime, name, full_type(type_name, "action"))
+        return self._runtime.keep(client)
 
     @Slot(str, result=bool)
     def isValidTopic(self, topic: str) -> bool:

@@ -1,0 +1,280 @@
+"""Action clients: what both modules share, and the one of ``Ros2.createActionClient``."""
+# ruff: noqa: N802, N815 - the names of slots and signals are QML's
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from rosglass.comm.action import GoalStatus
+from rosglass.errors import Error
+from rosglass.qml.callbacks import Deferred, call_back
+from rosglass.qml.client_element import ClientElement
+from rosglass.qml.goal_handle import GoalCallbacks, GoalHandle, tell_cancelling
+from rosglass.qml.js_values import null, properties_of
+from rosglass.qml.log import log_from_qml
+from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rosglass.comm.action import ActionClient as Sender
+    from rosglass.comm.action import CancelAnswer
+    from rosglass.comm.node import Node
+    from rosglass.comm.promise import Promise
+    from rosglass.qml.runtime import Runtime
+
+__all__ = ["ActionClient", "GoalSender"]
+
+_CLOSED = "its client was closed before it ended; nobody knows what becomes of it"
+_CALLBACKS = ("onGoalResponse", "onFeedback", "onResult")
+
+
+class GoalSender(ClientElement):
+    """Sends goals, and stays until they have ended even if JavaScript has let it go.
+
+    Args:
+        runtime: The engine's runtime.
+        name: Action name, as in QML.
+        type_name: Action type; empty takes the one that the server announces.
+    """
+
+    _HANDLE: ClassVar[type[GoalHandle]] = GoalHandle
+    _client: Sender | None
+
+    def __init__(self, runtime: Runtime, name: str, type_name: str) -> None:
+        super().__init__(runtime, name, type_name, self.DIALECT)
+        self._goals: list[GoalHandle] = []
+        #: Keeps JavaScript from collecting it while goals run.
+        self._held = QJSValue()
+        goals, executor = self._goals, runtime.session.executor
+        self._at_end["goals"] = lambda: executor.post(lambda: _end_all(goals, _CLOSED))
+
+    @Slot()
+    def cancelAllGoals(self) -> None:
+        """Ask the server to cancel all its goals, other clients' too."""
+        for handle in list(self._goals):
+            if not handle.sent:
+                handle.cancel()
+        self._ask_cancel(lambda client: client.cancel_all())
+
+    def _cancel_until(self, value: QJSValue) -> None:
+        """Ask the server to cancel what it accepted at or before a time."""
+        from rosglass.qml.times import time_from_js  # noqa: PLC0415 - few interfaces ask
+
+        try:
+            time = time_from_js(value)
+            self._ask_cancel(lambda client: client.cancel_before(time))
+        except Error as error:
+            self._throw(error)
+
+    def _ask_cancel(self, ask: Callable[[Sender], Promise[CancelAnswer]]) -> None:
+        runtime, client, session = self._runtime, self._client, self._session
+        assert runtime is not None
+        caller, what = runtime.caller(), f"what {self._name} does"
+        if client is None or session is None:
+            text = f"{what} could not be cancelled: there is no connection with the robot"
+            log_from_qml("", logging.ERROR, text, caller)
+            return
+        ask(client).on_done(
+            lambda answer: tell_cancelling(answer, what, caller, logging.INFO), session.executor
+        )
+
+    # Sending.
+
+    def _send(self, goal: QJSValue | None, told: GoalCallbacks) -> QJSValue:
+        """Send a goal as soon as there is a server; one that does not fit throws into JavaScript.
+
+        Returns:
+            The handle; undefined when something was thrown.
+        """
+        runtime = self._runtime
+        assert runtime is not None
+        handle = self._HANDLE(
+            runtime,
+            self._name,
+            QJSValue() if goal is None else goal,
+            told,
+            self._dialect,
+            self._patience,
+            self._forget,
+        )
+        js = handle.js
+        self._goals.append(handle)
+        if self._client is not None and self._client.type is not None:
+            try:
+                self._start(handle, self._client)
+            except Error as error:
+                self._forget(handle)
+                handle.js = QJSValue()
+                self._throw(error)
+                return QJSValue()
+        elif self._patience:
+            QtCore.QTimer.singleShot(self._patience, lambda: self._give_up(handle))
+        if self._held.isUndefined() and runtime.engine is not None:
+            self._held = runtime.engine.newQObject(self)
+        return js
+
+    def _start(self, handle: GoalHandle, client: Sender) -> None:
+        assert self._session is not None
+        handle.start(client, self._session.executor)
+
+    def _submit_waiting(self) -> None:
+        client = self._client
+        if client is None or client.type is None:
+            return
+        for handle in list(self._goals):
+            if handle in self._goals and not handle.sent:
+                try:
+                    self._start(handle, client)
+                except Error as error:
+                    handle.end(GoalStatus.REJECTED, None, str(error))
+
+    def _give_up(self, handle: GoalHandle) -> None:
+        """End a goal for which there is no client, or no type, yet."""
+        if is_alive(self) and handle in self._goals and not handle.sent:
+            why = self._problem or self._missing()
+            seconds = (self._patience or 0) / 1000
+            told = f"no goal could be sent to {self._name} within {seconds:g} s: {why}"
+            handle.end(GoalStatus.LOST, None, told)
+
+    def _missing(self) -> str:
+        client = self._client
+        if client is None:
+            return "there is no connection with the robot"
+        return client.problem or "is its server running, and its name right?"
+
+    def _forget(self, handle: GoalHandle) -> None:
+        """Let a goal go that has ended."""
+        if handle in self._goals:
+            self._goals.remove(handle)
+        if not self._goals:
+            self._held = QJSValue()
+
+    def _throw(self, error: Error) -> None:
+        if self._runtime is not None:
+            self._runtime.throw(f"action {self._name}: {error}")
+
+    def _check_functions(self, functions: dict[str, QJSValue | None]) -> bool:
+        """Return whether these are functions, or left out; throws into JavaScript otherwise."""
+        for what, value in functions.items():
+            if value is None or value.isCallable() or value.isUndefined() or value.isNull():
+                continue
+            self._throw(Error(f"{what} is not a function"))
+            return False
+        return True
+
+    # The client.
+
+    def _create(self, node: Node, type_name: str | None) -> Any:
+        return node.create_action_client(self._name, type_name)
+
+    def _fail_all(self, error: Error) -> None:
+        _end_all(self._goals, str(error))
+
+
+def _end_all(goals: list[GoalHandle], reason: str) -> None:
+    for handle in list(goals):
+        if is_alive(handle):
+            handle.expire(reason)
+
+
+class ActionClient(GoalSender):
+    """What ``Ros2.createActionClient`` returns."""
+
+    serverReadyChanged = Signal()
+    connectionTimeoutChanged = Signal()
+    problemChanged = Signal()
+
+    def _set_patience(self, milliseconds: int) -> None:
+        if milliseconds < 0:
+            self._refuse(f"action {self._name}: connectionTimeout {milliseconds} ms is negative")
+        elif milliseconds != self._patience:
+            self._patience = milliseconds
+            self.connectionTimeoutChanged.emit()
+
+    ready = Property(bool, lambda self: self._ready, notify=serverReadyChanged)
+    name = Property(str, lambda self: self._name, constant=True)
+    type = Property(str, lambda self: self._type, constant=True)
+    actionType = Property(str, lambda self: self._type, constant=True)
+    connectionTimeout = Property(
+        int, lambda self: self._patience, _set_patience, notify=connectionTimeoutChanged
+    )
+    problem = Property(str, lambda self: self._problem, notify=problemChanged)
+
+    @Slot(result=bool)
+    def isServerReady(self) -> bool:
+        """Return whether a server is there."""
+        return self._ready
+
+    @Slot(QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, result=QJSValue)
+    def sendGoalAsync(self, goal: QJSValue, options: QJSValue | None = None) -> QJSValue:
+        """Send a goal and return its handle; a goal that does not fit throws.
+
+        Args:
+            goal: An object with the goal's fields.
+            options: Functions ``onGoalResponse(handle)``, told null when the server does not accept
+                it, ``onFeedback(handle, feedback)`` and ``onResult({goalId, code, result})``.
+        """
+        runtime = self._runtime
+        assert runtime is not None
+        given: dict[str, QJSValue] = {}
+        if options is not None and options.isObject():
+            given = {name: options.property(name) for name in properties_of(options)}
+        elif options is not None and not (options.isUndefined() or options.isNull()):
+            self._throw(Error(f"the second argument must be an object of {', '.join(_CALLBACKS)}"))
+            return QJSValue()
+        unknown = [name for name in given if name not in _CALLBACKS]
+        if unknown:
+            known = ", ".join(_CALLBACKS)
+            self._throw(Error(f"there is no callback {unknown[0]}; there are {known}"))
+            return QJSValue()
+        if not self._check_functions(dict(given)):
+            return QJSValue()
+        response, feedback, result = (given.get(name, QJSValue()) for name in _CALLBACKS)
+        js = QJSValue()
+
+        def respond(accepted: bool) -> None:
+            call_back(runtime, response, js if accepted else null())
+
+        js = self._send(
+            goal,
+            GoalCallbacks(
+                response=respond,
+                feedback=lambda message: call_back(runtime, feedback, js, message),
+                result=lambda handle: call_back(runtime, result, handle.outcome()),
+            ),
+        )
+        return js
+
+    @Slot(result=QJSValue)
+    @Slot(QJSValue, result=QJSValue)
+    def sendGoal(self, goal: QJSValue | None = None) -> QJSValue:
+        """Send a goal and return a promise of ``{goalId, code, result}``.
+
+        It is rejected when there is no result: the server does not accept it, or went away.
+        """
+        runtime = self._runtime
+        assert runtime is not None
+        deferred = Deferred(runtime, f"action {self._name}")
+
+        def ended(handle: GoalHandle) -> None:
+            if handle.failure:
+                deferred.reject(handle.failure)
+            else:
+                deferred.resolve(handle.outcome())
+
+        sent = self._send(goal, GoalCallbacks(result=ended, handles_failure=True))
+        return QJSValue() if sent.isUndefined() else deferred.promise
+
+    @Slot(QJSValue)
+    def cancelGoalsBefore(self, time: QJSValue) -> None:
+        """Ask the server to cancel the goals that it accepted at or before a time, or Date."""
+        self._cancel_until(time)
+
+    def _ready_changed(self) -> None:
+        self.serverReadyChanged.emit()
+
+    def _problem_changed(self) -> None:
+        self.problemChanged.emit()

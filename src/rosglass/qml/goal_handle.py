@@ -1,0 +1,300 @@
+"""``GoalHandle``: a goal as the interface that sent it sees it."""
+# ruff: noqa: N815 - the names of signals are QML's
+
+from __future__ import annotations
+
+import logging
+import time
+from typing import TYPE_CHECKING, NamedTuple
+
+from rosglass.comm.action import GoalStatus
+from rosglass.comm.time import Time
+from rosglass.errors import Error
+from rosglass.qml.client_element import given_fields, named
+from rosglass.qml.goal_states import status_code
+from rosglass.qml.log import log_from_qml
+from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rosglass.comm.action import ActionClient, CancelAnswer, ClientGoal
+    from rosglass.comm.node import Executor
+    from rosglass.comm.promise import Promise
+    from rosglass.messages import Message
+    from rosglass.qml.dialect import Dialect
+    from rosglass.qml.log import Caller
+    from rosglass.qml.runtime import Runtime
+
+__all__ = ["GoalCallbacks", "GoalHandle", "tell_cancelling"]
+
+
+def _ignore(_: object) -> None:
+    pass
+
+
+class GoalCallbacks(NamedTuple):
+    """Who is told what becomes of a goal; on the GUI thread.
+
+    Attributes:
+        response: Whether the server accepts it; once.
+        feedback: Each feedback.
+        transition: The handle, whenever its ``commState`` has changed.
+        result: The handle, once, when the goal has ended, one way or another.
+        handles_failure: Whether `result` tells of failures, which are logged otherwise.
+    """
+
+    response: Callable[[bool], object] = _ignore
+    feedback: Callable[[QJSValue], object] = _ignore
+    transition: Callable[[QJSValue], object] = _ignore
+    result: Callable[[GoalHandle], object] = _ignore
+    handles_failure: bool = False
+
+
+class GoalHandle(QtCore.QObject):
+    """A goal; JavaScript sees the same object everywhere, which stays until it has ended.
+
+    Args:
+        runtime: The engine's runtime.
+        action: Name of the action, as in QML.
+        value: What is asked for.
+        told: Who is told what becomes of it.
+        dialect: Whose habits feedback and result follow.
+        patience: Milliseconds for a server to appear and to answer; 0 for ever.
+        forget: Called when it has ended.
+    """
+
+    #: With the new status. The status may stay the same while ``isActive`` changes.
+    statusChanged = Signal(int)
+    goalIdChanged = Signal()
+    feedbackChanged = Signal()
+    resultChanged = Signal()
+
+    def __init__(
+        self,
+        runtime: Runtime,
+        action: str,
+        value: QJSValue,
+        told: GoalCallbacks,
+        dialect: Dialect,
+        patience: int,
+        forget: Callable[[GoalHandle], None],
+    ) -> None:
+        super().__init__()
+        self._runtime, self._action, self._value = runtime, action, value
+        self._told, self._dialect, self._forget = told, dialect, forget
+        self._deadline = time.monotonic() + patience / 1000 if patience else None
+        self._caller = runtime.caller()
+        self._goal: ClientGoal | None = None
+        self._status = GoalStatus.PENDING
+        self._answered = self._over = False
+        self._reason = ""
+        self._executed = False
+        self._feedback: Message | None = None
+        self._result: Message | None = None
+        self._shown: dict[str, QJSValue] = {}
+        engine = runtime.engine
+        #: Keeps JavaScript from collecting it before the goal has ended.
+        self.js: QJSValue = QJSValue() if engine is None else engine.newQObject(runtime.keep(self))
+
+    # What QML sees.
+
+    def _get_id(self) -> str:
+        return self._goal.id_text if self._goal is not None else ""
+
+    def _get_stamp(self) -> QJSValue:
+        accepted = self._goal.accepted if self._goal is not None else None
+        return self._runtime.time(accepted or Time(), self._dialect)
+
+    def _is_active(self) -> bool:
+        return not self._over and self._status.is_active
+
+    def _get_feedback(self) -> QJSValue:
+        return self._show("feedback", self._feedback)
+
+    def _get_result(self) -> QJSValue:
+        return self._show("result", self._result)
+
+    def _show(self, what: str, message: Message | None) -> QJSValue:
+        if message is None:
+            return QJSValue()
+        if what not in self._shown:
+            self._shown[what] = self._runtime.message(message, self._dialect)
+        return self._shown[what]
+
+    status = Property(int, lambda self: int(status_code(self._status)), notify=statusChanged)
+    isActive = Property(bool, _is_active, notify=statusChanged)
+    goalId = Property(str, _get_id, notify=goalIdChanged)
+    goalStamp = Property(QJSValue, _get_stamp, notify=statusChanged)
+    feedback = Property(QJSValue, _get_feedback, notify=feedbackChanged)
+    result = Property(QJSValue, _get_result, notify=resultChanged)
+    reason = Property(str, lambda self: self._reason, notify=resultChanged)
+
+    @Slot()
+    def cancel(self) -> None:
+        """Ask the server to cancel it; a goal that was not sent yet is not sent at all."""
+        if self._over:
+            return
+        if self._goal is None:
+            self.end(GoalStatus.CANCELED, None, "it was cancelled before it was sent")
+            return
+        caller = self._runtime.caller()
+
+        def answered(answer: Promise[CancelAnswer]) -> None:
+            if is_alive(self) and not self._over:
+                tell_cancelling(answer, self._label, caller, logging.WARNING)
+
+        self._goal.cancel().on_done(answered, self._runtime.session.executor)
+
+    # For its client.
+
+    @property
+    def sent(self) -> bool:
+        """Whether it was handed over to a client of the node."""
+        return self._goal is not None
+
+    @property
+    def left(self) -> float | None:
+        """Seconds that a server may take yet; None for ever."""
+        return None if self._deadline is None else max(0.0, self._deadline - time.monotonic())
+
+    def start(self, client: ActionClient, executor: Executor) -> None:
+        """Send it, as soon as there is a server.
+
+        Args:
+            client: A client that knows its type.
+            executor: The GUI thread's.
+
+        Raises:
+            ConversionError: What is asked for does not fit.
+            Error: The client cannot send.
+        """
+        assert client.type is not None
+        goal = client.send_goal(
+            given_fields(self._value, client.type.goal, self._dialect),
+            on_feedback=self._on_feedback,
+            on_status_change=self._on_status,
+            on_done=self._on_done,
+            executor=executor,
+            timeout=self.left,
+        )
+        self._goal, self._value = goal, QJSValue()
+        goal.acceptance.on_done(self._on_acceptance, executor)
+        self.goalIdChanged.emit()
+        self._sent(goal, executor)
+
+    def end(self, status: GoalStatus, result: Message | None, reason: str) -> None:
+        """Let it have ended, and tell everybody; for once.
+
+        Args:
+            status: How.
+            result: The server's result; None when there is none.
+            reason: Why there is none.
+        """
+        if self._over or not is_alive(self):
+            return
+        js = self.js
+        self._forget(self)
+        self._answer(False)
+        active, self._over, self._result = self._is_active(), True, result
+        # ROS 1 servers tell why.
+        self._reason = reason or getattr(self._goal, "text", "")
+        if reason and not self._told.handles_failure:
+            text = named(self._action, Error(reason))
+            log_from_qml("", logging.WARNING, text, self._caller)
+        self._set_status(status, active)
+        self.resultChanged.emit()
+        self._ended(js)
+        self._told.result(self)
+        # From here on it lives for as long as JavaScript holds it.
+        self.js, self._told = QJSValue(), GoalCallbacks()
+
+    def outcome(self) -> QJSValue:
+        """Return ``{goalId, code, result, reason}``; the result is empty when there is none."""
+        runtime = self._runtime
+        parts = {"goalId": self._get_id(), "code": int(status_code(self._status))}
+        made = runtime.value({**parts, "reason": self._reason})
+        result = runtime.value({}) if self._result is None else self._get_result()
+        made.setProperty("result", result)
+        return made
+
+    @property
+    def failure(self) -> str:
+        """Why there is no result; empty when there is one, or the goal has not ended."""
+        return self._reason if self._result is None else ""
+
+    def expire(self, reason: str) -> None:
+        """Let it have ended, as its client is gone."""
+        self.end(GoalStatus.LOST, None, reason)
+
+    # What others make of it.
+
+    def _sent(self, goal: ClientGoal, executor: Executor) -> None:
+        """Take note that it was sent."""
+
+    def _moved(self, status: GoalStatus) -> None:
+        """Take note of a new status."""
+
+    def _ended(self, js: QJSValue) -> None:
+        """Take note that it has ended; `js` is the handle in JavaScript."""
+
+    # What happens to it.
+
+    @property
+    def _label(self) -> str:
+        return f"goal {self._get_id()} of {self._action}"
+
+    def _on_status(self, status: GoalStatus) -> None:
+        if is_alive(self) and not self._over:
+            self._set_status(status, self._is_active())
+
+    def _set_status(self, status: GoalStatus, was_active: bool) -> None:
+        if status is self._status and was_active == self._is_active():
+            return
+        self._status = status
+        self._executed |= status in (GoalStatus.EXECUTING, GoalStatus.SUCCEEDED)
+        self.statusChanged.emit(int(status_code(status)))
+        self._moved(status)
+
+    def _on_acceptance(self, acceptance: Promise[bool]) -> None:
+        if is_alive(self) and not self._over:
+            self._answer(acceptance.exception(0) is None and acceptance.result(0))
+
+    def _answer(self, accepted: bool) -> None:
+        if not self._answered:
+            self._answered = True
+            self._told.response(accepted)
+
+    def _on_feedback(self, feedback: Message) -> None:
+        if is_alive(self) and not self._over:
+            self._feedback = feedback
+            self._shown.pop("feedback", None)
+            self.feedbackChanged.emit()
+            self._told.feedback(self._get_feedback())
+
+    def _on_done(self, goal: ClientGoal) -> None:
+        if not is_alive(self) or self._over:
+            return
+        error = goal.done.exception(0)
+        if error is None:
+            end = goal.done.result(0)
+            self.end(end.status, end.result, "")
+        else:
+            self.end(goal.status, None, str(error))
+
+
+def tell_cancelling(answer: Promise[CancelAnswer], what: str, caller: Caller, refused: int) -> None:
+    """Log that a request to cancel failed, or was refused.
+
+    Args:
+        answer: The answer, which has come.
+        what: What was to be cancelled.
+        caller: Where in QML that was asked for.
+        refused: The level at which refusals are logged.
+    """
+    error = answer.exception(0)
+    if error is not None:
+        log_from_qml("", logging.ERROR, f"{what} could not be cancelled: {error}", caller)
+    elif not answer.result(0).accepted:
+        reason = answer.result(0).reason or "there is none"
+        log_from_qml("", refused, f"{what} is not cancelled: {reason}", caller)

@@ -1,0 +1,121 @@
+"""The enumerations of goals, and what they mean in the terms of both worlds."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import TYPE_CHECKING
+
+from rosglass.qt import QtCore
+
+if TYPE_CHECKING:
+    from rosglass.comm.action import GoalStatus
+
+__all__ = [
+    "ActionCommStates",
+    "ActionGoalStatus",
+    "ActionTerminalStates",
+    "comm_state_of",
+    "status_code",
+    "terminal_state_of",
+]
+
+
+class ActionGoalStatus(QtCore.QObject):
+    """What has become of a goal; the numbers of ``action_msgs/msg/GoalStatus``."""
+
+    @QtCore.QEnum
+    class Status(IntEnum):
+        """``Unknown`` until the server has accepted it, and when nobody knows any more."""
+
+        Unknown = 0
+        Accepted = 1
+        Executing = 2
+        Canceling = 3
+        Succeeded = 4
+        Canceled = 5
+        Aborted = 6
+
+
+class ActionCommStates(QtCore.QObject):
+    """How far client and server have come with a goal; actionlib's ``CommState``."""
+
+    @QtCore.QEnum
+    class State(IntEnum):
+        """In the order in which a goal goes through some of them."""
+
+        WAITING_FOR_GOAL_ACK = 0
+        PENDING = 1
+        ACTIVE = 2
+        WAITING_FOR_RESULT = 3
+        WAITING_FOR_CANCEL_ACK = 4
+        RECALLING = 5
+        PREEMPTING = 6
+        DONE = 7
+
+
+class ActionTerminalStates(QtCore.QObject):
+    """How a goal ended; actionlib's ``TerminalState``, and UNKNOWN while it has not ended."""
+
+    @QtCore.QEnum
+    class State(IntEnum):
+        """What the server said, or LOST."""
+
+        RECALLED = 0
+        REJECTED = 1
+        PREEMPTED = 2
+        ABORTED = 3
+        SUCCEEDED = 4
+        LOST = 5
+        UNKNOWN = 6
+
+
+_Status, _Comm, _Terminal = (
+    ActionGoalStatus.Status,
+    ActionCommStates.State,
+    ActionTerminalStates.State,
+)
+#: By the values of GoalStatus. A rejected goal counts as aborted, as in the reference.
+_CODES = {
+    "accepted": _Status.Accepted,
+    "executing": _Status.Executing,
+    "canceling": _Status.Canceling,
+    "succeeded": _Status.Succeeded,
+    "canceled": _Status.Canceled,
+    "aborted": _Status.Aborted,
+    "rejected": _Status.Aborted,
+}
+_COMM = {
+    "pending": _Comm.WAITING_FOR_GOAL_ACK,
+    "accepted": _Comm.PENDING,
+    "executing": _Comm.ACTIVE,
+    "canceling": _Comm.PREEMPTING,
+}
+_TERMINAL = {
+    "succeeded": _Terminal.SUCCEEDED,
+    "canceled": _Terminal.PREEMPTED,
+    "aborted": _Terminal.ABORTED,
+    "rejected": _Terminal.REJECTED,
+    "lost": _Terminal.LOST,
+}
+
+
+def status_code(status: GoalStatus) -> ActionGoalStatus.Status:
+    """Return what ``Ros2 1.0`` calls a status."""
+    return _CODES.get(status.value, _Status.Unknown)
+
+
+def comm_state_of(status: GoalStatus) -> ActionCommStates.State:
+    """Return the state that actionlib would be in for a goal of a ROS 2 robot."""
+    return _COMM.get(status.value, _Comm.WAITING_FOR_RESULT)
+
+
+def terminal_state_of(status: GoalStatus, executed: bool) -> ActionTerminalStates.State:
+    """Return how actionlib would say that a goal ended.
+
+    Args:
+        status: What has become of it.
+        executed: Whether it was executed: otherwise a cancelled one was recalled.
+    """
+    if status.value == "canceled" and not executed:
+        return _Terminal.RECALLED
+    return _TERMINAL.get(status.value, _Terminal.UNKNOWN)

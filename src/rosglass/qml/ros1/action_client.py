@@ -1,0 +1,108 @@
+"""What ``Ros.createActionClient`` returns."""
+# ruff: noqa: N802, N815 - the names of slots and signals are QML's
+
+from __future__ import annotations
+
+import logging
+import re
+from typing import TYPE_CHECKING
+
+from rosglass.qml.action_client import GoalSender
+from rosglass.qml.callbacks import call_back
+from rosglass.qml.dialect import Dialect
+from rosglass.qml.goal_handle import GoalCallbacks
+from rosglass.qml.js_values import null
+from rosglass.qml.log import log_from_qml
+from rosglass.qml.ros1.goal_handle import RosGoalHandle
+from rosglass.qml.singleton import full_type
+from rosglass.qt import Property, QJSValue, Signal, Slot
+
+if TYPE_CHECKING:
+    from rosglass.qml.runtime import Runtime
+
+__all__ = ["RosActionClient", "action_type"]
+
+_MESSAGE = re.compile(r"([A-Za-z]\w*)/([A-Za-z]\w*)Action\Z")
+
+
+def action_type(name: str) -> str:
+    """Return ``pkg/action/Do`` for ``pkg/DoAction``, as ROS 1 calls it, and for ``pkg/Do``."""
+    return full_type(_MESSAGE.sub(r"\1/\2", name), "action")
+
+
+class RosActionClient(GoalSender):
+    """Sends goals while a server is connected.
+
+    Args:
+        runtime: The engine's runtime.
+        name: Action name, as in QML.
+        type_name: Action type as ROS 1 calls it, ``pkg/DoAction``.
+    """
+
+    DIALECT = Dialect.ROS1
+    _HANDLE = RosGoalHandle
+
+    connectedChanged = Signal()
+    problemChanged = Signal()
+
+    def __init__(self, runtime: Runtime, name: str, type_name: str) -> None:
+        super().__init__(runtime, name, action_type(type_name))
+        self._given_type = type_name
+
+    connected = Property(bool, lambda self: self._ready, notify=connectedChanged)
+    name = Property(str, lambda self: self._name, constant=True)
+    actionType = Property(str, lambda self: self._given_type, constant=True)
+    problem = Property(str, lambda self: self._problem, notify=problemChanged)
+
+    @Slot(result=bool)
+    def isServerConnected(self) -> bool:
+        """Return whether a server is there."""
+        return self._ready
+
+    @Slot(QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, QJSValue, result=QJSValue)
+    def sendGoal(
+        self,
+        goal: QJSValue,
+        transition: QJSValue | None = None,
+        feedback: QJSValue | None = None,
+    ) -> QJSValue:
+        """Send a goal and return its handle; null while no server is connected.
+
+        Args:
+            goal: An object with the goal's fields; one that does not fit throws.
+            transition: Told the handle whenever its ``commState`` has changed.
+            feedback: Told the handle and each feedback.
+        """
+        runtime = self._runtime
+        assert runtime is not None
+        if not self._check_functions({"transition_cb": transition, "feedback_cb": feedback}):
+            return QJSValue()
+        if not self._ready:
+            text = f"action {self._name}: no goal was sent: {self._problem or self._missing()}"
+            log_from_qml("", logging.WARNING, text, runtime.caller())
+            return null()
+        js = QJSValue()
+
+        def changed(handle: QJSValue) -> None:
+            if transition is not None:
+                call_back(runtime, transition, handle)
+
+        def fed(message: QJSValue) -> None:
+            if feedback is not None:
+                call_back(runtime, feedback, js, message)
+
+        js = self._send(goal, GoalCallbacks(transition=changed, feedback=fed))
+        return js
+
+    @Slot(QJSValue)
+    def cancelGoalsAtAndBeforeTime(self, time: QJSValue) -> None:
+        """Ask the server to cancel the goals sent at or before a time, or Date."""
+        self._cancel_until(time)
+
+    def _ready_changed(self) -> None:
+        self.connectedChanged.emit()
+
+    def _problem_changed(self) -> None:
+        self.problemChanged.emit()
