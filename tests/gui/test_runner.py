@@ -10,6 +10,7 @@ from memory_world import MemoryWorld
 from rosglass.errors import QmlError
 from rosglass.qml import Session
 from rosglass.qml.runner import Runner, needs_widgets
+from rosglass.qt import is_alive
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -44,6 +45,7 @@ def file(tmp_path: Path) -> Path:
 @pytest.fixture
 def runner(app: Any, file: Path, world: MemoryWorld, wait: Any) -> Iterator[Runner]:
     made = Runner(file, Session(connect=world.connect))
+    made.load()
     wait(lambda: world.publishers and world.subscriptions)
     yield made
     made.close()
@@ -99,7 +101,7 @@ def test_roots_may_change_between_item_and_window(runner: Runner, file: Path, wa
     assert runner.window is not first
     assert runner.window.title() == "window"
     assert runner.window.isVisible()
-    assert not first.isVisible()
+    assert not is_alive(first)
     file.write_text(window % ("window 2", "blue"))
     assert runner.reload()
     wait(50)
@@ -114,7 +116,7 @@ def test_a_file_with_errors_leaves_nothing_open(app: Any, file: Path, world: Mem
     file.write_text("import QtQuick 2.15\nItem { x: }")
     session = Session(connect=world.connect)
     with pytest.raises(QmlError, match=r"Main\.qml:2:11: "):
-        Runner(file, session)
+        Runner(file, session).load()
     session.close()
     assert not world.nodes
 

@@ -14,9 +14,7 @@ from rosglass.cli.connecting import add_definitions_option
 from rosglass.errors import QmlError, UnsupportedError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from rosglass.qml.runner import Runner
+    from rosglass.qml.application import Application
 
 __all__ = ["configure", "run", "show"]
 
@@ -26,7 +24,9 @@ _QUIET = "qt.multimedia.symbolsresolver=false;qt.multimedia.ffmpeg*=false;qt.qpa
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Describe the options."""
-    parser.add_argument("file", metavar="FILE.qml", type=Path, help="the interface")
+    parser.add_argument(
+        "file", metavar="FILE.qml", help="the interface; package://name/path for one in a package"
+    )
     parser.add_argument(
         "--url",
         default="",
@@ -41,7 +41,21 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-watch", dest="watch", action="store_false", help="don't; this is the default"
     )
+    parser.add_argument(
+        "-I",
+        dest="import_paths",
+        metavar="FOLDER",
+        action="append",
+        default=[],
+        help="a folder with QML modules, searched besides QML_IMPORT_PATH; may be repeated",
+    )
     parser.add_argument("--fullscreen", action="store_true", help="fill the screen")
+    parser.add_argument(
+        "--kiosk",
+        action="store_true",
+        help="fill the screen, ignore what would close the window (Alt-F4), and hide the pointer "
+        "while it is not moved; Ctrl-C, SIGTERM and Qt.quit() end it",
+    )
     parser.add_argument(
         "--screenshot",
         metavar="PICTURE",
@@ -75,21 +89,21 @@ def _seconds(text: str) -> float:
 
 def run(args: argparse.Namespace) -> int:
     """Show the interface until it is closed; returns the exit code."""
-    if not args.file.is_file():
-        print(f"{args.file}:0:0: there is no such file", file=sys.stderr)
-        return 1
     try:
         return show(
             args.file,
-            url=args.url,
-            name=args.name,
-            watch=args.watch,
-            fullscreen=args.fullscreen,
             screenshot=args.screenshot,
             after=args.after,
+            verbose=args.verbose > 1,
+            end_process=True,
+            url=args.url,
+            name=args.name,
+            import_paths=args.import_paths,
+            watch=args.watch,
+            fullscreen=args.fullscreen,
+            kiosk=args.kiosk,
             arguments=args.arguments,
             ros_arguments=args.ros_arguments,
-            verbose=args.verbose > 1,
         )
     except QmlError as error:
         print(error, file=sys.stderr)
@@ -97,32 +111,23 @@ def run(args: argparse.Namespace) -> int:
 
 
 def show(
-    file: Path,
+    file: str,
     *,
-    url: str = "",
-    name: str = "",
-    watch: bool = False,
-    fullscreen: bool = False,
     screenshot: Path | None = None,
     after: float = 2.0,
-    arguments: Sequence[str] = (),
-    ros_arguments: Sequence[str] = (),
     verbose: bool = False,
+    end_process: bool = False,
+    **options: Any,
 ) -> int:
     """Show a QML file in a window until it is closed.
 
     Args:
         file: The file.
-        url: Address of the robot; empty for ROSGLASS_URL.
-        name: Node name, instead of the one in the file.
-        watch: Show it anew whenever a file in its folder is saved.
-        fullscreen: Fill the screen.
         screenshot: Where to save a picture of the window, after which the program ends.
         after: Seconds until the screenshot.
-        arguments: What the interface finds in ``Qt.application.arguments``.
-        ros_arguments: What the node is told, ``--ros-args`` included; see
-            :func:`rosglass.connect`.
         verbose: Show what is logged for developers, too.
+        end_process: End the process soon after the interface, whatever still runs in it.
+        options: Of :class:`rosglass.qml.Application`.
 
     Returns:
         The exit code: 0, what QML gave to ``Qt.exit()``, 130 after Ctrl-C.
@@ -130,7 +135,7 @@ def show(
     Raises:
         QmlError: The file is missing or has errors.
         UnsupportedError: There is no display.
-        RosArgumentError: One of `ros_arguments` is not valid.
+        RosArgumentError: One of the arguments for ROS is not valid.
     """
     # Qt reads these when it is loaded.
     os.environ["QT_LOGGING_RULES"] = ";".join(
@@ -143,18 +148,7 @@ def show(
     # Nothing of what is made until the window is there becomes garbage.
     gc.disable()
     try:
-        return _show(
-            file,
-            url,
-            name,
-            watch,
-            fullscreen,
-            screenshot,
-            after,
-            arguments,
-            ros_arguments,
-            verbose,
-        )
+        return _show(file, screenshot, after, verbose, end_process, options)
     finally:
         gc.enable()
         # PySide takes down what is left in any order at the end of the program, and may crash.
@@ -162,63 +156,35 @@ def show(
 
 
 def _show(
-    file: Path,
-    url: str,
-    name: str,
-    watch: bool,
-    fullscreen: bool,
+    file: str,
     screenshot: Path | None,
     after: float,
-    arguments: Sequence[str],
-    ros_arguments: Sequence[str],
     verbose: bool,
+    end_process: bool,
+    options: dict[str, Any],
 ) -> int:
-    from rosglass.qml.display import require_display
-    from rosglass.qml.interrupt import QuitOnSignal
+    from rosglass.qml.application import Application
     from rosglass.qml.log import install_message_handler
-    from rosglass.qml.runner import Runner, needs_widgets
-    from rosglass.qml.session import Session
-    from rosglass.qt import QtCore, QtGui, optional, run_event_loop
+    from rosglass.qt import QtCore
 
     _format_log(verbose)
-    connected = require_display()
     install_message_handler()
-    widgets = optional("QtWidgets") if needs_widgets(file) else None
-    kind: Any = QtGui.QGuiApplication if widgets is None else widgets.QApplication
-    app = kind([str(file), *arguments])
-    connected()
-    app.setApplicationName(file.stem)
-    app.setApplicationDisplayName(file.stem)
-    address = url or os.environ.get("ROSGLASS_URL", "")
-    session = Session(address, name, arguments=ros_arguments)
-    signals: list[int] = []
+    app = Application(file, **options)
 
-    def interrupted(number: int) -> None:
-        signals.append(number)
-        session.executor.post(app.quit)
-
-    with QuitOnSignal(interrupted):
-        try:
-            runner = Runner(file, session, watch=watch, fullscreen=fullscreen)
-        except QmlError:
-            session.close()
-            raise
+    def shown() -> None:
         gc.enable()
         if screenshot is not None:
-            QtCore.QTimer.singleShot(
-                round(after * 1000), lambda: app.exit(_save(runner, screenshot))
-            )
-        code = 0 if signals else run_event_loop(app)
-        runner.close()
-        session.close()
-    return 128 + signals[0] if signals else code
+            QtCore.QTimer.singleShot(round(after * 1000), lambda: app.quit(_save(app, screenshot)))
+
+    QtCore.QTimer.singleShot(0, shown)
+    return app.run(end_process=end_process)
 
 
-def _save(runner: Runner, target: Path) -> int:
+def _save(app: Application, target: Path) -> int:
     try:
-        if runner.window is None:
+        if app.window is None:
             raise UnsupportedError("the interface has no window to take a picture of")
-        image = runner.grab()
+        image = app.grab()
         if image.isNull():
             raise UnsupportedError(
                 "Qt gave no picture of the window, as Qt 5 does offscreen; use a virtual screen: "

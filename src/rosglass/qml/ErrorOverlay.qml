@@ -6,7 +6,7 @@ Rectangle {
 
     property string text: ""
 
-    z: 1000000
+    z: 2000000 // popups are at 1000001
     anchors.fill: parent
     color: "#c0301010"
 

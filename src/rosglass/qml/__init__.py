@@ -1,11 +1,25 @@
-"""QML modules for robots: ``import Ros2 1.0``.
+"""QML modules for robots: ``import Ros 1.0`` and ``import Ros2 1.0``.
 
-A program that has a QML engine of its own calls :func:`install`; ``rosglass run`` does it for QML
-files.
+:class:`Application` is a whole program around a QML file, as ``rosglass run`` is; a program that
+has a QML engine of its own calls :func:`install`.
 """
+
+from typing import TYPE_CHECKING
 
 from rosglass.qml.executor import GuiExecutor
 from rosglass.qml.modules import IMPORT_PATHS, install
 from rosglass.qml.session import Session
 
-__all__ = ["IMPORT_PATHS", "GuiExecutor", "Session", "install"]
+if TYPE_CHECKING:
+    from rosglass.qml.application import Application
+
+__all__ = ["IMPORT_PATHS", "Application", "GuiExecutor", "Session", "install"]
+
+
+def __getattr__(name: str) -> object:
+    # Programs with an engine of their own need none of it.
+    if name == "Application":
+        from rosglass.qml.application import Application  # noqa: PLC0415
+
+        return Application
+    raise AttributeError(f"module 'rosglass.qml' has no attribute {name!r}")

@@ -6,16 +6,27 @@ import os
 import signal
 import sys
 import threading
+import time
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from types import TracebackType
 
-__all__ = ["QuitOnSignal"]
+__all__ = ["QuitOnSignal", "end_process_within"]
 
 #: Seconds that the program has to end in good order.
 _PATIENCE = 4.0
+
+
+def end_process_within(seconds: float, code: int) -> None:
+    """End the process after some time with an exit code, unless it has ended by then."""
+
+    def end() -> None:
+        time.sleep(seconds)
+        os._exit(code)
+
+    threading.Thread(target=end, name="end", daemon=True).start()
 
 
 class QuitOnSignal:
@@ -26,10 +37,11 @@ class QuitOnSignal:
 
     Args:
         quit: Called in that thread with the signal's number.
+        patience: Seconds that the program has to end in good order.
     """
 
-    def __init__(self, quit: Callable[[int], None]) -> None:
-        self._quit = quit
+    def __init__(self, quit: Callable[[int], None], patience: float = _PATIENCE) -> None:
+        self._quit, self._patience = quit, patience
         self._reader, self._writer = os.pipe()
         self._ended = threading.Event()
         self._before: dict[int, Any] = {}
@@ -64,7 +76,7 @@ class QuitOnSignal:
         while received := os.read(self._reader, 1):
             if received[0] in ending:
                 self._quit(received[0])
-                if not self._ended.wait(_PATIENCE):
+                if not self._ended.wait(self._patience):
                     sys.stderr.write("rosglass: the interface does not react; ending it\n")
                     sys.stderr.flush()
                     os._exit(128 + received[0])

@@ -1,22 +1,26 @@
-"""Showing a QML file in a window, and showing it anew when it changes."""
+"""Showing a QML file in its windows, and showing it anew when it changes."""
 
 from __future__ import annotations
 
 import logging
+import os
 import re
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import QmlError
-from rosglass.qml.log import plain_path
+from rosglass.qml.load_errors import error_list
 from rosglass.qml.modules import install
+from rosglass.qml.places import import_folder, interface_file
+from rosglass.qml.runtime import runtime_of
 from rosglass.qml.watcher import Watcher
-from rosglass.qt import QtCore, QtGui, QtQml, QtQuick, is_alive, send_deferred_deletes
+from rosglass.qt import QT6, QtCore, QtGui, QtQml, QtQuick, is_alive, send_deferred_deletes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from rosglass.qml.kiosk import Kiosk
     from rosglass.qml.session import Session
 
 __all__ = ["Runner", "needs_widgets"]
@@ -41,48 +45,89 @@ def _text(path: Path) -> str:
 
 
 class Runner(QtCore.QObject):
-    """Holds the engine, the window and the interface in it.
+    """Holds the engine, the windows and the interface in them.
 
     Args:
         file: The QML file.
         session: The node its QML talks through.
-        watch: Show it anew whenever a file in its folder changes.
-        fullscreen: Fill the screen.
+        watch: Show it anew whenever a file in its folder, or in `import_paths`, changes.
+        fullscreen: Fill the screen; an interface of several windows, all screens it uses.
+        kiosk: Fill the screen, and let nobody close it by accident.
+        import_paths: Further folders with QML modules.
 
     Raises:
-        QmlError: The file is missing or has errors; the message lists them.
+        QmlError: There is no such file or folder.
     """
 
     def __init__(
-        self, file: Path, session: Session, *, watch: bool = False, fullscreen: bool = False
+        self,
+        file: str | os.PathLike[str],
+        session: Session,
+        *,
+        watch: bool = False,
+        fullscreen: bool = False,
+        kiosk: bool = False,
+        import_paths: Sequence[str | os.PathLike[str]] = (),
     ) -> None:
         super().__init__()
-        self.file, self.session = file.absolute(), session
-        self._fullscreen = fullscreen
+        self.file, self.session = interface_file(file), session
+        self._fullscreen = fullscreen or kiosk
+        folders = [import_folder(path) for path in import_paths]
         self.engine = QtQml.QQmlEngine()
+        # The last one is looked into first, and nothing hides our own modules.
+        for path in [*_environment_paths(), *map(str, reversed(folders))]:
+            self.engine.addImportPath(path)
         install(self.engine, session)
         self.engine.quit.connect(self._quit)
-        self.engine.exit.connect(self._exit)
-        #: The window the interface is in; None for an interface that opens its own.
+        self.engine.exit.connect(self.exit)
+        #: The window the interface is in, or the first of those it opens; None while it has none.
         self.window: QtQuick.QQuickWindow | None = None
+        #: What the program is to end with, once something has asked for its end.
+        self.exit_code: int | None = None
+        #: Whether `window` is ours, around an interface that is no window itself.
+        self._own = False
         self._root: QtCore.QObject | None = None
         # Must live as long as its root: dropping it destroys the root.
         self._component: QtQml.QQmlComponent | None = None
-        self._overlay: tuple[Any, Any] | None = None
+        self._overlays: list[Any] = []
+        self._overlay_component: QtQml.QQmlComponent | None = None
+        #: Interfaces that were replaced and are not destroyed yet.
+        self._leaving = 0
+        self._put_off = False
+        self._kiosk: Kiosk | None = None
+        app: Any = QtCore.QCoreApplication.instance()
+        if kiosk and app is not None:
+            from rosglass.qml.kiosk import Kiosk  # noqa: PLC0415 - few screens are kiosks
+
+            self._kiosk = Kiosk(app)
         # Before anything is read, so that no change in between goes unnoticed.
-        self._watcher = Watcher(self.file.parent) if watch else None
-        try:
-            self._show(*self._create())
-        except QmlError:
-            self.close()
-            raise
+        self._watcher = Watcher(self.file.parent, *folders) if watch else None
+
+    def load(self) -> None:
+        """Show the file.
+
+        Raises:
+            QmlError: The file has errors; the message lists them.
+        """
+        self._show(*self._create())
         if self._watcher is not None:
             self._watcher.changed.connect(self.reload)
+            self.session.call_ended.connect(self._reload_at_last)
 
     def reload(self) -> bool:
-        """Show the file as it is now; with errors, keep what is shown and show them over it."""
+        """Show the file as it is now; with errors, keep what is shown and show them over it.
+
+        Put off while a call from QML waits, which would return into an interface that is gone.
+
+        Returns:
+            Whether it is shown.
+        """
+        self._put_off = bool(self.session.waiting_calls)
+        if self._put_off or not is_alive(self.engine):
+            return False
         started = time.perf_counter()
         self.engine.clearComponentCache()
+        before = {id(window): window for window in self.windows()}
         try:
             root, component = self._create()
         except QmlError as error:
@@ -92,67 +137,102 @@ class Runner(QtCore.QObject):
         self._hide_errors()
         # Cleaning up, the old interface may shut Ros2 down, which the new one already uses.
         self.session.holding = True
+        self._leaving += 1
         old_root, old_component = self._root, self._component
-        self._show(root, component)
-        if isinstance(old_root, QtQuick.QQuickWindow):
-            old_root.close()
+        self._show(root, component, list(before.values()))
+        for window in before.values():
+            if window is not self.window and is_alive(window):
+                self._let_go(window)
         if is_alive(old_root) and old_root is not None:
             # Component.onDestruction runs a little after this signal.
             old_root.destroyed.connect(
                 lambda: QtCore.QTimer.singleShot(0, lambda: self._reloaded(old_component))
             )
             old_root.deleteLater()
+        else:
+            self._reloaded(old_component)
         _log.info("%s reloaded in %.0f ms", self.file, (time.perf_counter() - started) * 1000)
         return True
+
+    def windows(self) -> list[QtQuick.QQuickWindow]:
+        """Return the windows of the interface, those it hides included."""
+        app: Any = QtCore.QCoreApplication.instance()
+        found = [self.window] if self.window is not None and is_alive(self.window) else []
+        mine = runtime_of(self.engine)
+        for window in app.topLevelWindows():
+            known = window in found or not isinstance(window, QtQuick.QQuickWindow)
+            if not known and runtime_of(window) is mine:
+                found.append(window)
+        return found
 
     def grab(self) -> QtGui.QImage:
         """Return what the window shows; a null image when there is none."""
         window = self.window
         return QtGui.QImage() if window is None else window.grabWindow()
 
+    def exit(self, code: int) -> None:
+        """End the program, also when this is asked for before the event loop runs."""
+        self.exit_code = code
+        QtCore.QTimer.singleShot(0, lambda: QtCore.QCoreApplication.exit(code))
+
     def close(self) -> None:
         """Take the interface down; safe to call twice."""
+        if self._kiosk is not None:
+            self._kiosk.close()
+            self._kiosk = None
+        self._watcher = None
         root, self._root = self._root, None
         window, self.window = self.window, None
         self._hide_errors()
-        for item in (root, window, self._component, self.engine):
+        for item in (root, window, self._component, self._overlay_component, self.engine):
             if is_alive(item) and item is not None:
                 item.deleteLater()
-        self._component = None
+        self._component = self._overlay_component = None
         send_deferred_deletes()
 
     def _create(self) -> tuple[QtCore.QObject, QtQml.QQmlComponent]:
         if not self.file.is_file():
-            raise QmlError(f"{self.file}: there is no such file")
+            raise QmlError(f"{self.file}:0:0: there is no such file")
         component = QtQml.QQmlComponent(self.engine, QtCore.QUrl.fromLocalFile(str(self.file)))
         root: QtCore.QObject | None = None if component.isError() else component.create()
         if root is None:
-            raise QmlError(_error_list(component.errors(), self.file))
+            raise QmlError(error_list(component.errors(), self.file))
         return root, component
 
-    def _show(self, root: QtCore.QObject, component: QtQml.QQmlComponent) -> None:
-        before = self.window
+    def _show(
+        self,
+        root: QtCore.QObject,
+        component: QtQml.QQmlComponent,
+        before: Sequence[QtQuick.QQuickWindow] = (),
+    ) -> None:
+        old, was_own = self.window, self._own
+        self._root, self._component = root, component
+        self._own = isinstance(root, QtQuick.QQuickItem)
         if isinstance(root, QtQuick.QQuickItem):
-            own = before is not None and before is not self._root
-            window = before if own and before is not None else QtQuick.QQuickWindow()
-            self._fit(root, window, first=not own)
+            stays = old is not None and was_own
+            window = old if stays and old is not None else QtQuick.QQuickWindow()
+            self._fit(root, window, first=not stays)
+            self.window = window
+            others = [w for w in self.windows() if w is not window and w not in before]
+            wanted = [] if stays else [window]
         elif isinstance(root, QtQuick.QQuickWindow):
-            window = root
-            if before is not None:
-                window.setGeometry(before.geometry())
+            self.window, wanted = root, [root]
+            others = [w for w in self.windows() if w is not root and w not in before]
         else:
-            self._root, self._component, self.window = root, component, None
-            return
-        self._root, self._component, self.window = root, component, window
-        if window is before:
-            return
-        window.sceneGraphError.connect(self._no_graphics)
-        if self._fullscreen:
-            window.showFullScreen()
-        elif not window.isVisible():
-            window.show()
-        if before is not None and before is not self._root and is_alive(before):
-            before.close()
+            self.window = None
+            others = [w for w in self.windows() if w not in before]
+            wanted = [w for w in others if w.isVisible()]
+            self.window = next(iter(wanted or others), None)
+        _keep_places([*wanted, *others], before)
+        for window in {id(w): w for w in (*wanted, *others)}.values():
+            window.sceneGraphError.connect(self._no_graphics)
+            if self._kiosk is not None:
+                self._kiosk.keep(window)
+        for window in wanted:
+            if self._fullscreen:
+                window.showFullScreen()
+            elif not window.isVisible():
+                window.show()
 
     def _fit(self, item: QtQuick.QQuickItem, window: QtQuick.QQuickWindow, first: bool) -> None:
         """Put an item into a window, which then gives it its size."""
@@ -172,8 +252,24 @@ class Runner(QtCore.QObject):
         window.heightChanged.connect(resize)
         resize()
 
+    def _let_go(self, window: QtQuick.QQuickWindow) -> None:
+        """Close a window of the old interface, whatever its handlers say."""
+        if self._kiosk is not None:
+            window.removeEventFilter(self._kiosk)
+        window.setVisible(False)
+        if runtime_of(window) is None:
+            # Around an item; QML destroys its own with their root.
+            window.deleteLater()
+
+    def _reload_at_last(self) -> None:
+        # The call that has ended is still to return into QML.
+        if self._put_off:
+            QtCore.QTimer.singleShot(0, self.reload)
+
     def _reloaded(self, old_component: QtQml.QQmlComponent | None) -> None:
-        self.session.holding = False
+        self._leaving -= 1
+        if not self._leaving:
+            self.session.holding = False
         if is_alive(old_component) and old_component is not None:
             old_component.deleteLater()
         if is_alive(self.engine):
@@ -181,39 +277,46 @@ class Runner(QtCore.QObject):
             self.engine.collectGarbage()
 
     def _show_errors(self, text: str) -> None:
-        window = self.window
-        if window is None:
-            return
-        if self._overlay is None:
-            component = QtQml.QQmlComponent(self.engine, QtCore.QUrl.fromLocalFile(str(_OVERLAY)))
-            overlay: Any = component.create()
-            overlay.setParentItem(window.contentItem())
-            self._overlay = (overlay, component)
-        self._overlay[0].setProperty("text", text)
+        if not self._overlays:
+            url = QtCore.QUrl.fromLocalFile(str(_OVERLAY))
+            component = self._overlay_component = QtQml.QQmlComponent(self.engine, url)
+            for window in self.windows():
+                overlay: Any = component.create()
+                overlay.setParentItem(window.contentItem())
+                self._overlays.append(overlay)
+        for overlay in self._overlays:
+            if is_alive(overlay):
+                overlay.setProperty("text", text)
 
     def _hide_errors(self) -> None:
-        overlay, self._overlay = self._overlay, None
-        if overlay is not None:
-            overlay[0].deleteLater()
+        for overlay in self._overlays:
+            if is_alive(overlay):
+                overlay.deleteLater()
+        self._overlays = []
 
     def _no_graphics(self, error: Any, message: str) -> None:  # noqa: ARG002 - Qt's signature
         _log.error("the window cannot be drawn: %s; try QT_QUICK_BACKEND=software", message)
-        self._exit(1)
+        self.exit(1)
 
     def _quit(self, *_: Any) -> None:
-        self._exit(0)
-
-    def _exit(self, code: int) -> None:
-        # Also works when it is asked for before the event loop runs.
-        QtCore.QTimer.singleShot(0, lambda: QtCore.QCoreApplication.exit(code))
+        self.exit(0)
 
 
-def _error_list(errors: Sequence[QtQml.QQmlError], file: Path) -> str:
-    """Return errors as ``file:line:column: message``, one per line."""
-    lines = []
-    for error in errors:
-        place = plain_path(error.url().toString()) or str(file)
-        lines.append(
-            f"{place}:{max(error.line(), 0)}:{max(error.column(), 0)}: {error.description()}"
-        )
-    return "\n".join(lines) or f"{file}:0:0: it could not be created"
+def _environment_paths() -> list[str]:
+    """Return what Qt 5 does not read itself: QML_IMPORT_PATH, the first path last."""
+    paths = [] if QT6 else os.environ.get("QML_IMPORT_PATH", "").split(os.pathsep)
+    return [path for path in reversed(paths) if path]
+
+
+def _keep_places(
+    windows: Sequence[QtQuick.QQuickWindow], before: Sequence[QtQuick.QQuickWindow]
+) -> None:
+    """Put windows where those of the same title were; a single one in any case."""
+    places = {window.title(): window.geometry() for window in reversed(before)}
+    for window in windows:
+        if window in before:
+            continue
+        if window.title() in places:
+            window.setGeometry(places[window.title()])
+        elif len(windows) == len(before) == 1:
+            window.setGeometry(before[0].geometry())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import re
 import threading
+import time
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
@@ -30,8 +31,8 @@ _T = TypeVar("_T")
 TICK = 100
 #: Milliseconds until connecting is tried again when this machine could not open a session.
 _RETRY = 1000
-#: Seconds that the end of the program waits for the node to say goodbye.
-_PATIENCE = 3.0
+#: Seconds that the end of the program waits for the node to say goodbye, and for all threads.
+_PATIENCE = 1.2
 
 
 def _connect(url: str | None, name: str, namespace: str, arguments: Sequence[str] = ()) -> Node:
@@ -78,6 +79,8 @@ class Session(QtCore.QObject):
     graph_changed = Signal()
     #: Ten times per second while anybody holds :meth:`use_ticks`.
     tick = Signal()
+    #: A call from QML that waited has ended, and returns to QML.
+    call_ended = Signal()
 
     _default: ClassVar[Session | None] = None
 
@@ -103,6 +106,8 @@ class Session(QtCore.QObject):
         self.balancer = LoadBalancer()
         #: While true, QML's wish to shut down is ignored: its successor needs the node.
         self.holding = False
+        #: Calls from QML that wait in an event loop of their own.
+        self.waiting_calls = 0
         self._url, self._forced_name, self._connect = url, name, connect
         self._owns_node = True
         self._status = Status(ConnectionState.CLOSED)
@@ -236,20 +241,22 @@ class Session(QtCore.QObject):
         self._set_status(Status(ConnectionState.CLOSED))
 
     def close(self) -> None:
-        """Shut down and wait, at most some seconds, for the threads; safe to call twice."""
+        """Shut down and wait, little more than a second, for the threads; safe to call twice."""
         if self._closed:
             return
         self._closed = True
         self.holding = False
+        until = time.monotonic() + _PATIENCE
         streams = list(self.streams.values())
         self.shutdown()
-        for stream in streams:
-            stream.close()
-            stream.stream.join(_PATIENCE)
         done = threading.Event()
         self._worker.post(done.set)
-        if not done.wait(_PATIENCE):
-            _log.warning("the node is still closing after %.0f s", _PATIENCE)
+        for stream in streams:
+            stream.close()
+        for stream in streams:
+            stream.stream.join(max(0.0, until - time.monotonic()))
+        if not done.wait(max(0.0, until - time.monotonic())):
+            _log.warning("the node is still closing after %.1f s", _PATIENCE)
         self.executor.close()
         self._worker.close()
         if Session._default is self:

@@ -63,6 +63,7 @@ def wait_for(session: Session, begin: Callable[[Callable[[], None]], None]) -> N
     if ended:
         return
     app.installEventFilter(keeper)
+    session.waiting_calls += 1
     try:
         # Jobs behind the one that is running now would wait for it.
         session.executor.resume()
@@ -71,3 +72,5 @@ def wait_for(session: Session, begin: Callable[[Callable[[], None]], None]) -> N
     finally:
         app.removeEventFilter(keeper)
         keeper.release()
+        session.waiting_calls -= 1
+        session.call_ended.emit()

@@ -1,0 +1,210 @@
+"""A program that shows an interface written in QML; ``rosglass run`` is one."""
+
+from __future__ import annotations
+
+import os
+import threading
+from typing import TYPE_CHECKING, Any
+
+from rosglass.errors import Error
+from rosglass.qml.display import require_display
+from rosglass.qml.interrupt import QuitOnSignal, end_process_within
+from rosglass.qml.places import interface_file
+from rosglass.qml.runner import Runner, needs_widgets
+from rosglass.qml.session import Session
+from rosglass.qt import QtCore, QtGui, QtQml, QtQuick, optional, run_event_loop
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+__all__ = ["Application"]
+
+#: Seconds after which a program ends that was told to, whatever the robot is doing.
+_PATIENCE = 1.7
+
+
+class Application:
+    """An interface, the window it is in, and the node it talks through.
+
+    The file is read by :meth:`load` or :meth:`run`; what QML is to find is made known before::
+
+        app = Application("cockpit.qml", url="ros1://robot:11311", context={"arm": arm})
+        sys.exit(app.run())
+
+    Must be made in the main thread. Makes the Qt application unless there is one.
+
+    Args:
+        file: The QML file; ``package://name/path`` for one in a ROS package.
+        url: Address of the robot; empty for ``ROSGLASS_URL``.
+        name: Node name, instead of the one in the file.
+        session: The node to talk through, instead of one of its own; it is left open at the end.
+        context: Objects that QML finds by name: QObjects, or plain values.
+        import_paths: Further folders with QML modules; ``package://`` as well.
+        arguments: What the interface finds in ``Qt.application.arguments``.
+        ros_arguments: What the node is told, ``--ros-args`` included; see :func:`rosglass.connect`.
+        watch: Show it anew whenever a file in its folder is saved.
+        fullscreen: Fill the screen.
+        kiosk: Fill the screen, and let nobody close it by accident: Alt-F4 is ignored, the pointer
+            disappears while it is not moved; ``Qt.quit()``, Ctrl-C and SIGTERM end it.
+
+    Raises:
+        QmlError: There is no such file or folder, or it is none of QML.
+        UnsupportedError: There is no display.
+        RosArgumentError: One of `ros_arguments` is not valid.
+        Error: This is not the main thread; `session` is given together with what describes one; a
+            name in `context` is none that QML can write.
+    """
+
+    def __init__(
+        self,
+        file: str | os.PathLike[str],
+        *,
+        url: str = "",
+        name: str = "",
+        session: Session | None = None,
+        context: Mapping[str, Any] | None = None,
+        import_paths: Sequence[str | os.PathLike[str]] = (),
+        arguments: Sequence[str] = (),
+        ros_arguments: Sequence[str] = (),
+        watch: bool = False,
+        fullscreen: bool = False,
+        kiosk: bool = False,
+    ) -> None:
+        if threading.current_thread() is not threading.main_thread():
+            raise Error("a user interface must be made in the main thread of the program")
+        if session is not None and (url or name or ros_arguments):
+            raise Error("give either a session, or url, name and ros_arguments to make one of")
+        for word in context or ():
+            if not word.isidentifier() or word[0].isupper():
+                raise Error(f"context: QML cannot use the name {word!r}: expected e.g. {'arm'!r}")
+        path = interface_file(file)
+        #: The Qt application.
+        self.qt: Any = QtCore.QCoreApplication.instance() or _qt_application(path, arguments)
+        self._owns_session = session is None
+        #: The node that QML talks through.
+        self.session = session or Session(
+            url or os.environ.get("ROSGLASS_URL", ""), name, arguments=ros_arguments
+        )
+        try:
+            self._runner = Runner(
+                path,
+                self.session,
+                watch=watch,
+                fullscreen=fullscreen,
+                kiosk=kiosk,
+                import_paths=import_paths,
+            )
+        except Error:
+            self._close_session()
+            raise
+        # QML does not keep them.
+        self._context = dict(context or {})
+        for word, value in self._context.items():
+            self.engine.rootContext().setContextProperty(word, value)
+        self._loaded = self._closed = False
+
+    @property
+    def engine(self) -> QtQml.QQmlEngine:
+        """The QML engine, e.g. for image providers."""
+        return self._runner.engine
+
+    @property
+    def window(self) -> QtQuick.QQuickWindow | None:
+        """The window, or the first of several; None before it is loaded."""
+        return self._runner.window
+
+    @property
+    def windows(self) -> list[QtQuick.QQuickWindow]:
+        """All windows of the interface, those it hides included."""
+        return self._runner.windows()
+
+    def load(self) -> None:
+        """Show the interface; :meth:`run` does it when this was not called.
+
+        Raises:
+            QmlError: The file has errors; the message lists them as ``file:line:column: text``.
+        """
+        if not self._loaded:
+            self._loaded = True
+            self._runner.load()
+
+    def reload(self) -> bool:
+        """Show the file as it is now; with errors, keep what is shown and show them over it."""
+        self.load()
+        return self._runner.reload()
+
+    def grab(self) -> QtGui.QImage:
+        """Return a picture of the window; a null image when there is none."""
+        return self._runner.grab()
+
+    def quit(self, code: int = 0) -> None:
+        """Have :meth:`run` return; from any thread."""
+        self.session.executor.post(lambda: self._runner.exit(code))
+
+    def run(self, *, end_process: bool = False) -> int:
+        """Show the interface until it is closed, and take everything down.
+
+        Args:
+            end_process: End the whole process within 2 s of the interface's end, also while a
+                thread of it hangs; for programs that do nothing afterwards.
+
+        Returns:
+            The exit code: 0, what QML gave to ``Qt.exit()``, 128 and the signal's number after
+            Ctrl-C (130) or SIGTERM (143).
+
+        Raises:
+            QmlError: The file has errors.
+            Error: It was closed before.
+        """
+        if self._closed:
+            raise Error("this application has been closed; make another one")
+        signals: list[int] = []
+
+        def interrupted(number: int) -> None:
+            signals.append(number)
+            self.quit(128 + number)
+
+        with QuitOnSignal(interrupted, _PATIENCE):
+            try:
+                self.load()
+                code = self._runner.exit_code
+                # A call that waits may have been told to end before there was a loop to do so.
+                if code is None:
+                    code = run_event_loop(self.qt)
+                if signals:
+                    code = 128 + signals[0]
+                if end_process:
+                    end_process_within(_PATIENCE, code)
+            finally:
+                self.close()
+        return code
+
+    def close(self) -> None:
+        """Take the interface down and close its node; safe to call twice."""
+        if self._closed:
+            return
+        self._closed = True
+        self._runner.close()
+        self._close_session()
+
+    def _close_session(self) -> None:
+        if self._owns_session:
+            self.session.close()
+
+    def __enter__(self) -> Application:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _qt_application(file: Path, arguments: Sequence[str]) -> QtGui.QGuiApplication:
+    connected = require_display()
+    widgets = optional("QtWidgets") if needs_widgets(file) else None
+    kind: Any = QtGui.QGuiApplication if widgets is None else widgets.QApplication
+    app: QtGui.QGuiApplication = kind([str(file), *arguments])
+    connected()
+    app.setApplicationName(file.stem)
+    app.setApplicationDisplayName(file.stem)
+    return app

@@ -1,0 +1,76 @@
+"""What is wrong with a QML file, in lines that editors understand, and what to do about it."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+from rosglass.qml.log import plain_path
+from rosglass.qt import QT6
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from rosglass.qt import QtQml
+
+__all__ = ["error_list"]
+
+_MODULE = re.compile(r'module "([\w.]+)"(?: version ([\d.]+))?')
+_OURS = {"Ros", "Ros2"}
+#: Module -> what brings it, on Qt 6 and on Qt 5.
+_BROUGHT_BY = {
+    "QtMultimedia": ('pip install "rosglass[camera]"', "apt install qml-module-qtmultimedia"),
+    "QtQuick3D": ('pip install "rosglass[camera]"', ""),
+    "QtCharts": ('pip install "rosglass[camera]"', "apt install qml-module-qtcharts"),
+    "QtQuick.Controls": ("", "apt install qml-module-qtquick-controls2"),
+    "QtQuick.Layouts": ("", "apt install qml-module-qtquick-layouts"),
+    "QtQuick.Window": ("", "apt install qml-module-qtquick-window2"),
+}
+#: Modules that Qt 6 has no longer -> what to use.
+_GONE = {
+    "QtQuick.Controls.Styles": "QtQuick.Controls 2.15",
+    "QtQuick.Extras": "QtQuick.Controls 2.15",
+    "QtQuick.Dialogs": "QtQuick.Dialogs 6.0",
+    "QtQuick.Controls": "QtQuick.Controls 2.15",
+    "QtGraphicalEffects": "Qt5Compat.GraphicalEffects",
+}
+
+
+def error_list(errors: Sequence[QtQml.QQmlError], file: Path) -> str:
+    """Return errors as ``file:line:column: message``, one per line.
+
+    Args:
+        errors: What Qt says.
+        file: The file that was loaded, for errors that name none.
+    """
+    lines = []
+    for error in errors:
+        place = plain_path(error.url().toString()) or str(file)
+        text = error.description()
+        hint = _advice(text)
+        lines.append(
+            f"{place}:{max(error.line(), 0)}:{max(error.column(), 0)}: {text}"
+            f"{f'; {hint}' if hint else ''}"
+        )
+    return "\n".join(lines) or f"{file}:0:0: it could not be created"
+
+
+def _advice(text: str) -> str:
+    """Return what to do about an error; empty when it says it itself."""
+    if "requires a version" in text:
+        return "Qt 5 needs one after the module's name: import QtQuick 2.15"
+    found = _MODULE.search(text)
+    if found is None:
+        return ""
+    module, version = found[1], found[2]
+    if module in _OURS:
+        return f"its version is 1.0: import {module} 1.0"
+    if QT6 and module in _GONE:
+        return f"Qt 6 has {_GONE[module]} instead"
+    if version and "is not installed" in text and module.startswith("Qt"):
+        hint = "this Qt may have another version of it"
+    else:
+        hint = "folders that hold modules are named with -I FOLDER or in QML_IMPORT_PATH"
+    package = _BROUGHT_BY.get(module, ("", ""))[0 if QT6 else 1]
+    return f"to install it: {package}" if package else hint

@@ -1,0 +1,76 @@
+"""Finding what an interface is told to use: its file, and folders of modules."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from rosglass.errors import QmlError
+
+__all__ = ["import_folder", "interface_file", "locate"]
+
+_PACKAGE = "package://"
+
+
+def locate(place: str | os.PathLike[str]) -> Path:
+    """Return the path of a file or folder, which may be in a ROS package.
+
+    Args:
+        place: A path, or ``package://name/path``; packages are found by ``ROS_PACKAGE_PATH``,
+            ``AMENT_PREFIX_PATH`` and ``CMAKE_PREFIX_PATH``.
+
+    Raises:
+        QmlError: The environment knows no such package.
+    """
+    text = os.fspath(place)
+    if not text.startswith(_PACKAGE):
+        return Path(text).absolute()
+    package, _, rest = text.removeprefix(_PACKAGE).partition("/")
+    if not package:
+        raise QmlError(f"{text}: expected package://name/path")
+    from rosglass.interfaces.folders import workspace  # noqa: PLC0415 - few need it
+
+    folder = workspace(os.environ).package(package)
+    if not folder:
+        raise QmlError(
+            f"{text}: there is no package {package!r} in ROS_PACKAGE_PATH, AMENT_PREFIX_PATH and "
+            "CMAKE_PREFIX_PATH; source its workspace first"
+        )
+    return Path(folder, rest).absolute()
+
+
+def interface_file(place: str | os.PathLike[str]) -> Path:
+    """Return the path of a QML file.
+
+    Args:
+        place: See :func:`locate`.
+
+    Raises:
+        QmlError: There is no such file, or it is none of QML.
+    """
+    path = locate(place)
+    shown = path if os.fspath(place).startswith(_PACKAGE) else place
+    if path.is_dir():
+        inside = sorted(file.name for file in path.glob("*.qml"))
+        hint = f"name a file in it: {', '.join(inside[:5])}" if inside else "it has no QML files"
+        raise QmlError(f"{shown}:0:0: this is a folder; {hint}")
+    if not path.is_file():
+        raise QmlError(f"{shown}:0:0: there is no such file")
+    if path.suffix != ".qml":
+        raise QmlError(f"{shown}:0:0: not a QML file, whose name would end in .qml")
+    return path
+
+
+def import_folder(place: str | os.PathLike[str]) -> Path:
+    """Return the path of a folder that holds QML modules.
+
+    Args:
+        place: See :func:`locate`.
+
+    Raises:
+        QmlError: There is no such folder.
+    """
+    path = locate(place)
+    if not path.is_dir():
+        raise QmlError(f"{os.fspath(place)}: there is no such folder to import QML modules from")
+    return path
