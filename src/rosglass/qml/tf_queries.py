@@ -53,10 +53,11 @@ class TfQueries(Element):
 
         Arguments are those of :meth:`lookUpTransform`.
         """
+        runtime = self._find_runtime()
         result = self._look_up("canTransform", given)
-        if isinstance(result, _Missing):
-            return QJSValue(result.why)
-        return QJSValue(not isinstance(result, str))
+        if runtime is None or isinstance(result, str):
+            return QJSValue()
+        return runtime.value(result.why if isinstance(result, _Missing) else True)
 
     @Slot(QJSValue, QJSValue, result=QJSValue)
     @Slot(QJSValue, QJSValue, QJSValue, result=QJSValue)
@@ -254,7 +255,7 @@ def shown_transform(
 
     kind: Any = load("geometry_msgs/msg/TransformStamped", ros=2)
     value = runtime.message(kind.create(transform.to_dict(2)), element.DIALECT)
-    value.setProperty("valid", QJSValue(not exception))
+    value.setProperty("valid", runtime.value(not exception))
     if exception:
         value.setProperty("exception", QJSValue(exception))
         value.setProperty("message", QJSValue(why))

@@ -1,0 +1,121 @@
+"""The members of the reference plugins' types, and how ours differ where they do.
+
+Reference: qml_ros_plugin 1.0.0 (``Ros``), qml_ros2_plugin 2.26 and qml6_ros2_plugin 4.26
+(``Ros2``), their public QML interfaces.
+"""
+
+from __future__ import annotations
+
+__all__ = ["NOTES", "REFERENCE"]
+
+_TF = "canTransform lookUpTransform"
+_FRAMES = "getFrameAuthority getFrame getAllFrames getTransformAge"
+_IMAGE = (
+    "topic defaultTransport subscribed networkLatency processingLatency latency framerate timeout "
+    "enabled"
+)
+#: Members by module and type.
+REFERENCE = {
+    "Ros": {
+        "Ros": "console package io debug info warn error fatal isInitialized init ok spinOnce "
+        "setThreads getName getNamespace queryTopics queryTopicInfo queryTopicType "
+        "createEmptyMessage createEmptyServiceRequest waitForMessageAsync getEnvironmentVariable "
+        "logInternal advertise subscribe createActionClient initialized shutdown",
+        "Console": "defaultName setLoggerLevel",
+        "Package": "command getPath getAll getPlugins",
+        "IO": "writeYaml readYaml",
+        "Publisher": "type topic isLatched queueSize isAdvertised getNumSubscribers publish "
+        "advertised connected disconnected",
+        "Subscriber": "topic queueSize ns message messageType throttleRate running "
+        "getNumPublishers newMessage",
+        "Service": "call callAsync",
+        "ActionClient": "connected actionType isServerConnected sendGoal cancelAllGoals "
+        "cancelGoalsAtAndBeforeTime",
+        "GoalHandle": "expired terminalState commState cancel resend getResult",
+        "TfTransformListener": f"{_TF} transformChanged",
+        "TfTransform": "sourceFrame targetFrame enabled active transform message translation "
+        "rotation rate valid",
+        "Time": "now create isSimTime isSystemTime isValid",
+        "WallTime": "now create",
+        "ImageTransportSubscriber": f"videoSurface throttleRate playbackState play pause stop "
+        f"{_IMAGE}",
+        "RosInitOptions": "NoSigintHandler AnonymousName NoRosout",
+        "RosConsoleLevels": "Debug Info Warn Error Fatal Count",
+        "ActionCommStates": "WAITING_FOR_GOAL_ACK PENDING ACTIVE WAITING_FOR_RESULT "
+        "WAITING_FOR_CANCEL_ACK RECALLING PREEMPTING DONE",
+        "ActionTerminalStates": "RECALLED REJECTED PREEMPTED ABORTED SUCCEEDED LOST UNKNOWN",
+    },
+    "Ros2": {
+        "Ros2": "hostname io debug info warn error fatal createInitOptions QoS BestAvailableQoS "
+        "ClockQoS SensorDataQoS ServicesQoS SystemDefaultsQoS init shutdown isInitialized ok "
+        "getName getNamespace now isValidTopic queryTopics queryTopicInfo queryTopicTypes "
+        "getTopicTypes getTopicNamesAndTypes queryServices getServiceNamesAndTypes "
+        "getServiceTypes queryActions getActionNamesAndTypes getActionTypes createEmptyMessage "
+        "createEmptyServiceRequest createEmptyActionGoal getLogger createPublisher "
+        "createSubscription createServiceClient createActionClient initialized aboutToShutdown",
+        "Logger": "debug info warn error fatal setLoggerLevel",
+        "IO": "writeYaml readYaml",
+        "Publisher": "type topic queueSize qos isAdvertised advertised getSubscriptionCount "
+        "publish",
+        "Subscription": "topic queueSize qos message messageType throttleRate enabled subscribed "
+        "frequency bandwidth getPublisherCount newMessage",
+        "ServiceClient": "ready serviceReadyChanged name type connectionTimeout pendingRequests "
+        "sendRequestAsync",
+        "ActionClient": "ready serverReadyChanged name type actionType connectionTimeout "
+        "isServerReady sendGoalAsync cancelAllGoals cancelGoalsBefore",
+        "GoalHandle": "status goalId goalStamp isActive cancel",
+        "TfTransformListener": f"initialize {_TF} {_FRAMES}",
+        "TfBuffer": f"ns clear {_TF} {_FRAMES}",
+        "TfTransform": "sourceFrame targetFrame enabled transform message translation rotation "
+        "rate valid buffer",
+        "AmentIndex": "getPackageShareDirectory getPackagePrefix getPackages",
+        "MessageItemModel": "message messageType modified",
+        "ImageTransportSubscription": f"videoSink videoSurface encoding hasAlpha isColor {_IMAGE}",
+        "Ros2LoggerLevel": "Unset Debug Info Warn Error Fatal",
+        "ActionGoalStatus": "Unknown Accepted Executing Canceling Succeeded Canceled Aborted",
+        "Ros2ClockTypes": "Uninitialized Ros System Steady",
+    },
+}
+
+_THROWS = "a value that does not fit throws a JavaScript Error with the field's path"
+_LOST = "false again when the server is lost"
+#: Verdict and reason where it is not plainly the same, or new.
+NOTES = {
+    ("Ros", "Ros", "spinOnce"): ("different", "does nothing: callbacks come by themselves"),
+    ("Ros", "Ros", "setThreads"): ("different", "does nothing: receiving has its own threads"),
+    ("Ros", "Ros", "init"): (
+        "better",
+        "`initialized` follows when `isInitialized()` is true; works again after a shutdown",
+    ),
+    ("Ros", "Ros", "advertise"): ("better", "wrong arguments throw; no type, no queue: an error"),
+    ("Ros", "Ros", "waitForMessageAsync"): ("better", "latched messages too; or a promise"),
+    ("Ros", "Publisher", "publish"): ("better", _THROWS),
+    ("Ros", "Subscriber", "throttleRate"): ("better", "0 delivers every message"),
+    ("Ros", "Subscriber", "running"): ("better", "while false, nothing subscribes"),
+    ("Ros", "Subscriber", "messageType"): ("better", "can be set"),
+    ("Ros", "Service", "call"): (
+        "better",
+        "the interface lives on while it waits; waits up to 5 s for a server",
+    ),
+    ("Ros", "Service", "callAsync"): ("better", "the callback is called for unknown types, too"),
+    ("Ros", "Console", "setLoggerLevel"): ("same", ""),
+    ("Ros", "TfTransform", "rate"): ("better", "0 is no limit, as was meant"),
+    ("Ros", "TfTransform", "valid"): ("better", "`message` is new before `validChanged`"),
+    ("Ros", "TfTransform", "rotation"): ("better", "the identity while nothing is known"),
+    ("Ros", "ActionClient", "connected"): ("better", _LOST),
+    ("Ros", "ImageTransportSubscriber", "pause"): ("better", "really pauses"),
+    ("Ros2", "Publisher", "publish"): ("better", _THROWS),
+    ("Ros2", "Publisher", "isAdvertised"): ("better", "false after a shutdown, true after init"),
+    ("Ros2", "Subscription", "enabled"): ("better", "while false, nothing subscribes"),
+    ("Ros2", "Subscription", "queueSize"): ("better", "its change signal is sent"),
+    ("Ros2", "Subscription", "messageType"): ("better", "several types are told, not guessed"),
+    ("Ros2", "ServiceClient", "ready"): ("better", _LOST),
+    ("Ros2", "ServiceClient", "sendRequestAsync"): ("better", f"no callback needed; {_THROWS}"),
+    ("Ros2", "ActionClient", "ready"): ("better", _LOST),
+    ("Ros2", "GoalHandle", "goalId"): ("better", "as ROS 2's tools show it, digits in order"),
+    ("Ros2", "Ros2", "queryServices"): ("better", "hides what actions are made of"),
+    ("Ros2", "Ros2", "init"): ("better", "every ROS argument; elements revive after a shutdown"),
+    ("Ros2", "TfTransform", "valid"): ("better", "recovers with an unchanged stamp, too"),
+    ("Ros2", "ImageTransportSubscription", "videoSurface"): ("same", "Qt 5"),
+    ("Ros2", "ImageTransportSubscription", "videoSink"): ("same", "Qt 6; an ImageItem, too"),
+}
