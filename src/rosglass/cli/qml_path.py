@@ -1,0 +1,66 @@
+"""``rosglass qml-path``: where the QML modules are, for editors and other programs."""
+
+from __future__ import annotations
+
+import configparser
+import io
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rosglass.errors import Error
+
+if TYPE_CHECKING:
+    import argparse
+
+__all__ = ["configure", "run"]
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Describe the options."""
+    parser.add_argument(
+        "--qmlls-ini",
+        action="store_true",
+        help="write .qmlls.ini in this folder, from which the QML language server of an editor "
+        "learns of the modules; other settings in it stay",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the import path, or write the settings; returns the exit code."""
+    from rosglass.qml import IMPORT_PATHS
+
+    path = os.pathsep.join(map(str, IMPORT_PATHS))
+    if not args.qmlls_ini:
+        print(path)
+        return 0
+    file = Path(".qmlls.ini")
+    file.write_text(_with_import_path(file, path), encoding="utf-8")
+    print(f"wrote {file.absolute()}")
+    return 0
+
+
+def _with_import_path(file: Path, path: str) -> str:
+    """Return the settings of a file with our folders among the import paths.
+
+    Raises:
+        Error: The file is not one of settings.
+    """
+    settings = configparser.ConfigParser(interpolation=None)
+    # Qt tells upper from lower case.
+    settings.optionxform = str  # type: ignore[assignment, method-assign]
+    try:
+        settings.read(file, encoding="utf-8")
+    except (configparser.Error, UnicodeDecodeError) as error:
+        raise Error(f"{file}: {error}; mend or delete it first") from None
+    if not settings.has_section("General"):
+        settings.add_section("General")
+    old = settings.get("General", "importPaths", fallback="").strip('"').split(os.pathsep)
+    ours = path.split(os.pathsep)
+    others = [folder for folder in old if folder and folder not in ours]
+    settings.set("General", "importPaths", f'"{os.pathsep.join([*others, *ours])}"')
+    # Otherwise it looks for a C++ project to build.
+    settings["General"].setdefault("no-cmake-calls", "true")
+    text = io.StringIO()
+    settings.write(text, space_around_delimiters=False)
+    return text.getvalue()
