@@ -149,7 +149,7 @@ def test_a_server_that_is_killed_in_mid_call_and_started_again(
     with pytest.raises(rosglass.ConnectionLostError, match="may have carried it out or not"):
         call.result(30)
     wait_for(lambda: not client.ready, what=lambda: client.problem)
-    assert f"/{node_name} offers it at rosrpc://" in client.problem
+    wait_for(lambda: f"/{node_name} offers it at rosrpc://" in client.problem)
     waiting = client.call_async({"data": True}, timeout=50)
     again = start_peer(node_name)
     again.call("serve", service=name, type=BOOL, returns=DONE)

@@ -220,7 +220,7 @@ def test_the_commands_with_a_ros1_bag(
         capture_output=True, text=True, check=True, timeout=60,
     )  # fmt: skip
     assert json.loads(listed.stdout)["topics"] == [
-        {"topic": "/scan", "type": name, "wire": "ros1", "messages": 5}
+        {"topic": "/scan", "type": "sensor_msgs/LaserScan", "wire": "ros1", "messages": 5}
     ]
     output = tmp_path / "again.mcap"
     recorder = subprocess.Popen(

@@ -542,4 +542,5 @@ def test_what_lives_in_the_graph_cannot_be_copied(node, take):
     ):
         with pytest.raises(rosglass.UnsupportedError, match="neither be copied nor") as told:
             take(made)
-        assert str(told.value).startswith(f"{made!r} can")
+        # A clock shows its time, too.
+        assert str(told.value).startswith(repr(made).partition(":")[0])
