@@ -155,8 +155,10 @@ class GoalHandle(QtCore.QObject):
 
     @property
     def left(self) -> float | None:
-        """Seconds that a server may take yet; None for ever."""
-        return None if self._deadline is None else max(0.0, self._deadline - time.monotonic())
+        """Seconds that a server may take yet, as errors show them; None for ever."""
+        if self._deadline is None:
+            return None
+        return round(max(0.0, self._deadline - time.monotonic()), 1)
 
     def start(self, client: ActionClient, executor: Executor) -> None:
         """Send it, as soon as there is a server.

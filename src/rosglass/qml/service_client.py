@@ -7,31 +7,27 @@ import logging
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
-from rosglass.errors import Error, ServiceUnavailableError, TypeNotFoundError
+from rosglass.errors import Error, ServiceUnavailableError
 from rosglass.qml.callbacks import Deferred, call_back
+from rosglass.qml.client_element import ClientElement, given_fields, named
 from rosglass.qml.dialect import Dialect
-from rosglass.qml.element import RETRY, Element
-from rosglass.qml.from_js import fields_from_js
 from rosglass.qml.log import log_from_qml
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rosglass.comm.node import Handle, Node
+    from rosglass.comm.node import Node
     from rosglass.comm.qos import QoS
     from rosglass.comm.service import Call
     from rosglass.comm.service import ServiceClient as Caller_
-    from rosglass.messages import Message, MessageType
+    from rosglass.messages import Message
     from rosglass.qml.runtime import Runtime
 
     #: Told the response, or why there is none; on the GUI thread.
     Done: TypeAlias = Callable[[Message | Error], None]
 
 __all__ = ["ServiceClient"]
-
-#: Milliseconds that requests wait for a server.
-_PATIENCE = 10_000
 
 
 @dataclass(eq=False)
@@ -43,7 +39,7 @@ class _Request:
     call: Call | None = None
 
 
-class ServiceClient(Element):
+class ServiceClient(ClientElement):
     """Calls a service; requests made before there is a server wait for it.
 
     Args:
@@ -53,6 +49,8 @@ class ServiceClient(Element):
         dialect: Whose habits responses follow.
         qos: Profile of requests and replies; None for the usual one.
     """
+
+    _client: Caller_ | None
 
     serviceReadyChanged = Signal()
     connectionTimeoutChanged = Signal()
@@ -67,14 +65,9 @@ class ServiceClient(Element):
         dialect: Dialect = Dialect.ROS2,
         qos: QoS | None = None,
     ) -> None:
-        super().__init__(None, runtime)
-        self._name, self._type, self._dialect, self._qos = name, type_name, dialect, qos
-        self._patience = _PATIENCE
+        super().__init__(runtime, name, type_name, dialect)
+        self._qos = qos
         self._requests: list[_Request] = []
-        self._client: Caller_ | None = None
-        self._watch: Handle | None = None
-        self._have: Node | None = None
-        self._ready = False
 
     # Properties.
 
@@ -119,7 +112,7 @@ class ServiceClient(Element):
 
         def done(result: Message | Error) -> None:
             if isinstance(result, Error):
-                log_from_qml("", logging.ERROR, _told(self._name, result), caller)
+                log_from_qml("", logging.ERROR, named(self._name, result), caller)
             if callback is not None:
                 call_back(runtime, callback, self.shown(result))
 
@@ -135,7 +128,7 @@ class ServiceClient(Element):
 
         def done(result: Message | Error) -> None:
             if isinstance(result, Error):
-                deferred.reject(_told(self._name, result))
+                deferred.reject(named(self._name, result))
             else:
                 deferred.resolve(runtime.message(result, self._dialect))
 
@@ -175,7 +168,7 @@ class ServiceClient(Element):
         assert client.type is not None
         assert session is not None
         try:
-            fields = _fields(request.value, client.type.request)
+            fields = given_fields(request.value, client.type.request, self._dialect)
             call = client.call_async(fields, timeout=None)
         except Error as error:
             self._end(request, error, tell=not running)
@@ -234,63 +227,8 @@ class ServiceClient(Element):
 
     # The client.
 
-    def _update(self) -> None:
-        node = self.node
-        if node is self._have:
-            return
-        self._withdraw()
-        self._have = node
-        if node is not None:
-            self._make(node, self._type or None)
-
-    def _make(self, node: Node, type_name: str | None) -> None:
-        session = self._session
-        assert session is not None
-
-        def done(result: Caller_ | Error) -> None:
-            if not is_alive(self) or self._have is not node:
-                if not isinstance(result, Error):
-                    session.background(result.close)
-            elif isinstance(result, TypeNotFoundError):
-                self._say(f"{self._name}: {result}")
-                self._fetch(node)
-            elif isinstance(result, Error):
-                self._say(f"{self._name}: {result}")
-                self._fail_all(result)
-            else:
-                self._made(result)
-
-        session.background(
-            lambda: node.create_service_client(self._name, type_name, self._qos), done
-        )
-
-    def _fetch(self, node: Node) -> None:
-        """Ask the robot for a type that nobody here knows."""
-        session = self._session
-        assert session is not None
-
-        def again() -> None:
-            if is_alive(self) and self._have is node and self._client is None:
-                self._make(node, self._type)
-
-        try:
-            promise = node.fetch_type_async(self._type)
-        except Error:
-            QtCore.QTimer.singleShot(RETRY, again)
-        else:
-            promise.on_done(
-                lambda got: again() if got.exception() is None else _later(again), session.executor
-            )
-
-    def _made(self, client: Caller_) -> None:
-        session = self._session
-        assert session is not None
-        self._client = client
-        self._watch = client.on_ready_change(self._on_ready, session.executor)
-        self._at_end["client"] = lambda: session.background(client.close)
-        self._say("")
-        self._on_ready(client.ready)
-        self._submit_waiting()
+    def _create(self, node: Node, type_name: str | None) -> Caller_:
+        return node.create_service_client(self._name, type_name, self._qos)
 
     def _submit_waiting(self) -> None:
         if self._client is None or self._client.type is None:
@@ -299,44 +237,8 @@ class ServiceClient(Element):
             if request.call is None and request in self._requests:
                 self._submit(request)
 
-    def _on_ready(self, ready: bool) -> None:
-        if not is_alive(self) or self._client is None:
-            return
-        self._say(self._client.problem)
-        self._submit_waiting()
-        if ready != self._ready:
-            self._ready = ready
-            self.serviceReadyChanged.emit()
-
-    def _withdraw(self) -> None:
-        client, self._client = self._client, None
-        watch, self._watch = self._watch, None
-        self._at_end.pop("client", None)
-        if watch is not None:
-            watch.close()
-        if client is not None and self._session is not None:
-            self._session.background(client.close)
-            self._fail_all(Error(f"{self._name}: the node was shut down"))
-        if self._ready:
-            self._ready = False
-            self.serviceReadyChanged.emit()
+    def _ready_changed(self) -> None:
+        self.serviceReadyChanged.emit()
 
     def _problem_changed(self) -> None:
         self.problemChanged.emit()
-
-
-def _later(job: Callable[[], None]) -> None:
-    QtCore.QTimer.singleShot(RETRY, job)
-
-
-def _told(name: str, error: Error) -> str:
-    text = str(error)
-    return text if name in text else f"{name}: {text}"
-
-
-def _fields(value: QJSValue, type: MessageType) -> dict[str, object]:
-    from rosglass.messages.schema import schema_of  # noqa: PLC0415 - loaded by now
-
-    if value.isUndefined() or value.isNull():
-        return {}
-    return fields_from_js(value, schema_of(type.definition))
