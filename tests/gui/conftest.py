@@ -66,7 +66,7 @@ def wait(app: QCoreApplication) -> Callable[..., None]:
         send_deferred_deletes()
         time.sleep(0.001)
 
-    def wait_until(condition: Callable[[], Any] | int, timeout: float = 20.0) -> None:
+    def wait_until(condition: Callable[[], Any] | int, timeout: float = 30.0) -> None:
         if isinstance(condition, int):
             timeout, until = condition / 1000, time.monotonic() + condition / 1000
             while time.monotonic() < until:
@@ -258,7 +258,7 @@ class Program:
         """Everything it has written."""
         return "\n".join(self.lines)
 
-    def until(self, text: str, timeout: float = 15.0) -> str:
+    def until(self, text: str, timeout: float = 30.0) -> str:
         """Wait until a line with `text` is written and return it; later calls want later lines."""
         until = time.monotonic() + timeout
         while True:
@@ -270,7 +270,7 @@ class Program:
             assert self._process.poll() is None or self._reader.is_alive(), self.text
             time.sleep(0.01)
 
-    def end(self, timeout: float = 15.0) -> int:
+    def end(self, timeout: float = 30.0) -> int:
         """Wait for its end and return the exit code."""
         code = self._process.wait(timeout)
         self._reader.join(5)
