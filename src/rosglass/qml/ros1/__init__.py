@@ -3,6 +3,7 @@
 from rosglass.qml.goal_states import ActionCommStates, ActionGoalStatus, ActionTerminalStates
 from rosglass.qml.image_item import ImageItem
 from rosglass.qml.image_manager import ImageTransportManager
+from rosglass.qml.image_publisher import RosImagePublisher
 from rosglass.qml.parameter import Parameter
 from rosglass.qml.ros1.console import ConsoleLevels, InitOptions
 from rosglass.qml.ros1.image_transport_subscriber import ImageTransportSubscriber
@@ -28,6 +29,7 @@ NATIVE = {
 }
 #: What QML can write, by name.
 TYPES = {
+    "ImagePublisher": RosImagePublisher,
     "TfBroadcaster": RosTfBroadcaster,
     "TfBuffer": RosTfBuffer,
     "TfTransform": RosTfTransform,

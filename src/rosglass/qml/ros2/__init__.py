@@ -4,6 +4,7 @@ from rosglass.qml.clock_types import ClockTypes
 from rosglass.qml.goal_states import ActionGoalStatus
 from rosglass.qml.image_item import ImageItem
 from rosglass.qml.image_manager import ImageTransportManager
+from rosglass.qml.image_publisher import ImagePublisher
 from rosglass.qml.image_subscription import ImageTransportSubscription
 from rosglass.qml.logger import LoggerLevel
 from rosglass.qml.message_item_model import MessageItemModel
@@ -27,6 +28,7 @@ NATIVE = {
 }
 #: What QML can write, by name.
 TYPES = {
+    "ImagePublisher": ImagePublisher,
     "TfBroadcaster": TfBroadcaster,
     "TfBuffer": TfBuffer,
     "TfTransform": TfTransform,
