@@ -138,7 +138,7 @@ def on_two_machines() -> Callable[..., dict[str, Any]]:
     """
 
     def on_two_machines(
-        script: Path, *arguments: str, env: Mapping[str, str] | None = None, timeout: float = 60.0
+        script: Path, *arguments: str, env: Mapping[str, str] | None = None, timeout: float = 100.0
     ) -> dict[str, Any]:
         places = (str(Path(__file__).parent), os.environ.get("PYTHONPATH", ""))
         done = subprocess.run(
