@@ -24,6 +24,7 @@ app = QtGui.QGuiApplication([])
 install_message_handler()
 session = Session(sys.argv[2])
 runner = Runner(Path(sys.argv[1]), session)
+runner.load()
 window = runner.window
 window.resize(400, 300)
 test = optional("QtTest").QTest

@@ -61,9 +61,11 @@ class Cockpit:
         keyboard.register()
         self.session = Session(url)
         self._closed = False
+        self._runner = Runner(_QML, self.session)
         try:
-            self._runner = Runner(_QML, self.session)
+            self._runner.load()
         except QmlError:
+            self._runner.close()
             self.session.close()
             raise
         assert self._runner.window is not None
