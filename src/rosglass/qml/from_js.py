@@ -276,9 +276,10 @@ class _Conversion:
             return self._scalar(value.toString(), member, member.is_array)
         if value.isBool():
             return self._scalar(value.toBool(), member, member.is_array)
-        if member.number is None and value.isObject() and not value.isQObject():
+        # A url has no properties; what has may be a web of objects that would take for ever.
+        if value.isObject() and not value.isQObject() and not properties_of(value):
             held = value.toVariant()
-            if isinstance(held, QtCore.QUrl):
+            if member.number is None and isinstance(held, QtCore.QUrl):
                 return held.toString()
         return shown(value)
 

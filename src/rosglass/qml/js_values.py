@@ -14,6 +14,8 @@ __all__ = ["Shown", "integral", "is_model", "null", "properties_of", "roles_of",
 
 #: No 64-bit integer has more digits.
 _WHOLE = re.compile(r"-?0*[0-9]{1,20}\Z")
+#: Elements of an array that an error shows in full.
+_SHOWN = 100
 
 
 def properties_of(value: QJSValue) -> list[str]:
@@ -59,6 +61,9 @@ def shown(value: QJSValue) -> Any:
         return value.toBool()
     if value.isCallable():
         return Shown("a function")
+    if value.isArray() and value.property("length").toNumber() > _SHOWN:
+        # ``a.length = 4e9`` is written in a moment, and its text never is.
+        return Shown(f"an array of {value.property('length').toNumber():.0f} elements")
     return value.toString() if value.isString() else Shown(value.toString())
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from rosglass.comm.qos import QoS
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
     from rosglass.qml.subscription import Subscription
 
 __all__ = ["next_message", "wait_for_message"]
+
+#: Milliseconds that Qt's timers can wait, 24 days.
+_LONGEST = 2**31 - 1
 
 
 def next_message(
@@ -39,6 +43,10 @@ def next_message(
     timed = first is not None and first.isNumber()
     callback = second if timed else first
     milliseconds = first.toNumber() if timed and first is not None else 0.0
+    if math.isnan(milliseconds):
+        runtime.throw(f"waitForMessageAsync({topic!r}): the milliseconds to wait are NaN")
+        subscription.deleteLater()
+        return QJSValue()
     if callback is not None and callback.isCallable():
 
         def tell(message: QJSValue | None) -> None:
@@ -77,7 +85,7 @@ def wait_for_message(
         subscription: A new one, made for this.
         topic: Topic name.
         type_name: Message type; empty takes the one that publishers announce.
-        milliseconds: How long to wait, 0 for ever.
+        milliseconds: How long to wait, 0 or infinity for ever.
         done: Told the message; None when none came.
     """
     subscription.setParent(runtime)
@@ -94,5 +102,5 @@ def wait_for_message(
         done(message)
 
     subscription.newMessage.connect(end)
-    if milliseconds > 0:
-        QtCore.QTimer.singleShot(round(milliseconds), lambda: end(None))
+    if 0 < milliseconds < math.inf:
+        QtCore.QTimer.singleShot(round(min(milliseconds, _LONGEST)), lambda: end(None))

@@ -27,7 +27,8 @@ _MESSAGE = re.compile(r"([A-Za-z]\w*)/([A-Za-z]\w*)Action\Z")
 
 def action_type(name: str) -> str:
     """Return ``pkg/action/Do`` for ``pkg/DoAction``, as ROS 1 calls it, and for ``pkg/Do``."""
-    return full_type(_MESSAGE.sub(r"\1/\2", name), "action")
+    match = _MESSAGE.match(name)
+    return full_type(f"{match[1]}/{match[2]}" if match else name, "action")
 
 
 class RosActionClient(GoalSender):
