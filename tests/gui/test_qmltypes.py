@@ -1,0 +1,170 @@
+"""What editors and qmllint know of the QML modules."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rosglass.qml import IMPORT_PATHS
+from rosglass.qt import QT6
+
+if not QT6:
+    pytest.skip("the tools for editors come with PySide6", allow_module_level=True)
+
+ROOT = Path(__file__).parents[2]
+FOLDERS = [option for path in IMPORT_PATHS for option in ("-I", str(path))]
+#: What an author may do, and we too.
+STYLE = {"unqualified", "property-override"}
+
+
+def tool(name: str) -> str:
+    import PySide6
+
+    return str(Path(PySide6.__file__).with_name(name))
+
+
+def lint(*files: Path) -> list[str]:
+    """Return what qmllint says about files, style aside."""
+    command = [tool("qmllint"), "--ignore-settings", "--json", "-", *FOLDERS, *map(str, files)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    return [
+        f"{Path(file['filename']).name}:{found.get('line', 0)}: {found['message']} [{found['id']}]"
+        for file in json.loads(done.stdout)["files"]
+        for found in file["warnings"]
+        if found["id"] not in STYLE and found["type"] != "info"
+    ]
+
+
+def test_the_descriptions_are_those_of_the_types() -> None:
+    place = ROOT / "scripts" / "qmltypes.py"
+    spec = importlib.util.spec_from_file_location("qmltypes", place)
+    assert spec is not None
+    script: Any = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)  # type: ignore[union-attr]
+    for path, text in script.files().items():
+        assert path.read_text(encoding="utf-8") == text, "run scripts/qmltypes.py --write"
+
+
+def test_qmllint_knows_all_that_the_examples_use() -> None:
+    assert lint(*sorted((ROOT / "examples").glob("*.qml"))) == []
+
+
+@pytest.mark.parametrize("module", ["Ros", "Ros2"])
+def test_our_own_files_are_clean(module: str) -> None:
+    assert lint(*sorted((IMPORT_PATHS[0] / module).glob("*.qml"))) == []
+
+
+def test_qmllint_finds_what_does_not_exist(tmp_path: Path) -> None:
+    file = tmp_path / "Main.qml"
+    file.write_text(
+        """import QtQuick 2.15
+import Ros2 1.0
+Item {
+    Subscription { id: feed; topic: "/x"; nonsense: 3; onNewMessage: (m) => console.log(m.data) }
+    property string text: feed.topic + feed.noSuchThing + Ros2.getName() + Ros2.noSuchCall()
+    property int level: Ros2LoggerLevel.Warn
+}"""
+    )
+    found = lint(file)
+    assert len(found) == 3, found
+    assert "4: " in found[0]
+    assert "nonsense" in found[0]
+    assert "noSuchThing" in found[1]
+    assert "noSuchCall" in found[2]
+
+
+class LanguageServer:
+    """Speaks the Language Server Protocol with qmlls."""
+
+    def __init__(self, folder: Path) -> None:
+        self._process = subprocess.Popen(
+            [tool("qmlls")],
+            cwd=folder,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env={k: v for k, v in os.environ.items() if "IMPORT_PATH" not in k},
+        )
+        self._watchdog = threading.Timer(60, self._process.kill)
+        self._watchdog.start()
+        settings = {"processId": None, "rootUri": folder.as_uri(), "capabilities": {}}
+        self.send("initialize", settings, id=1)
+        self.receive()
+        self.send("initialized", {})
+
+    def send(self, method: str, params: Any, **more: Any) -> None:
+        body = json.dumps({"jsonrpc": "2.0", "method": method, "params": params, **more}).encode()
+        assert self._process.stdin is not None
+        self._process.stdin.write(b"Content-Length: %d\r\n\r\n%b" % (len(body), body))
+        self._process.stdin.flush()
+
+    def receive(self) -> Any:
+        output: Any = self._process.stdout
+        length = 0
+        while line := output.readline().strip():
+            name, _, value = line.partition(b":")
+            if name.lower() == b"content-length":
+                length = int(value)
+        assert length, "the language server has ended"
+        return json.loads(output.read(length))
+
+    def diagnose(self, file: Path) -> list[str]:
+        document = {"uri": file.as_uri(), "languageId": "qml", "version": 1}
+        self.send("textDocument/didOpen", {"textDocument": {**document, "text": file.read_text()}})
+        while True:
+            told = self.receive()
+            found = told.get("params", {}).get("diagnostics")
+            # The first is said before modules were read.
+            if told.get("method") == "textDocument/publishDiagnostics" and found:
+                return [item["message"] for item in found]
+
+    def close(self) -> None:
+        self._watchdog.cancel()
+        self._process.kill()
+        self._process.communicate()
+
+
+def test_an_editor_knows_the_types(tmp_path: Path) -> None:
+    settings = tmp_path / ".qmlls.ini"
+    settings.write_text("[General]\nbuildDir=/somewhere\nimportPaths=/elsewhere\n")
+    command = [sys.executable, "-m", "rosglass.cli", "qml-path", "--qmlls-ini"]
+    for _ in range(2):
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+        assert done.stdout == f"wrote {settings}\n"
+    wanted = os.pathsep.join(map(str, ["/elsewhere", *IMPORT_PATHS]))
+    assert f'importPaths="{wanted}"\n' in settings.read_text()
+    assert "buildDir=/somewhere\n" in settings.read_text()
+    settings.write_text(settings.read_text().replace("buildDir=/somewhere\n", ""))
+    file = tmp_path / "Main.qml"
+    file.write_text('import Ros2 1.0\nSubscription { topic: "/x"; nonsense: 3 }')
+    server = LanguageServer(tmp_path)
+    try:
+        found = server.diagnose(file)
+    finally:
+        server.close()
+    assert len(found) == 1, found
+    assert 'Could not find property "nonsense"' in found[0]
+
+
+def test_the_import_path_is_printed() -> None:
+    command = [sys.executable, "-m", "rosglass.cli", "qml-path"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.strip().split(os.pathsep) == list(map(str, IMPORT_PATHS))
+
+
+def test_settings_that_are_none_are_left_alone(tmp_path: Path) -> None:
+    settings = tmp_path / ".qmlls.ini"
+    settings.write_text("what is this")
+    command = [sys.executable, "-m", "rosglass.cli", "qml-path", "--qmlls-ini"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "mend or delete it first" in done.stderr
+    assert settings.read_text() == "what is this"
