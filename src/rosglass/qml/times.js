@@ -17,11 +17,16 @@
         return Object.setPrototypeOf(function () { return value }, number)
     }
 
+    // What is within an object that is shown may have no end.
+    function flat(key, inner) {
+        return key !== "" && inner !== null && typeof inner === "object" ? "..." : inner
+    }
+
     function fail(value, wanted) {
         // A time's own toString() would come back here.
         const plain = value !== null && typeof value === "object" && !(value instanceof Date)
-        const shown = plain ? JSON.stringify(value) : String(value)
-        throw new TypeError("expected " + wanted + ", got " + shown)
+        const shown = Array.isArray(value) ? "an array" : plain ? JSON.stringify(value, flat) : String(value)
+        throw new TypeError("expected " + wanted + ", got " + shown.slice(0, 200))
     }
 
     // Seconds and nanoseconds, the latter from 0 to 999,999,999.
