@@ -8,11 +8,13 @@
         int16: Int16Array, uint16: Uint16Array, int32: Int32Array, uint32: Uint32Array,
         float32: Float32Array, float64: Float64Array
     }
+    // No message has longer ones; filling up to what is beyond would freeze the screen.
+    const LONGEST = 1 << 24
     const WIDE = ["int64", "uint64"]
 
     function place(i) {
-        if (!Number.isSafeInteger(i) || i < 0)
-            throw new RangeError("an array index is an integer from 0 on, got " + i)
+        if (!Number.isSafeInteger(i) || i < 0 || i >= LONGEST)
+            throw new RangeError("an array index is an integer from 0 to " + (LONGEST - 1) + ", got " + String(i).slice(0, 100))
         return i
     }
 
@@ -34,7 +36,8 @@
         toVariantList: function () { return filled(this) },
         append: function (value) { this.push(value) },
         replace: function (i, value) {
-            for (let last = this.length; last < place(i); ++last) this[last] = this["#default"]()
+            place(i)
+            for (let last = this.length; last < i; ++last) this[last] = this["#default"]()
             this[i] = value
         },
         spliceList: function (start, count, items) {
@@ -99,6 +102,7 @@
         function change() { changed = true; return whole() }
         function count() { return real ? real.length : length }
         function resize(length) {
+            if (length !== 0) place(length - 1)
             const made = change()
             const before = made.length
             made.length = length
