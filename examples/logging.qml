@@ -8,11 +8,15 @@ Column {
     property string title: "Logging"
     property var arm: Ros2.getLogger("arm")
     property var lines: []
-    Component.onCompleted: { Ros2.init("logging_example"); Ros2.info("the interface is there") }
+    Component.onCompleted: Ros2.init("logging_example")
+    Timer { id: hello; interval: 1000; onTriggered: Ros2.info("the interface is there") }
 
     Subscription {
-        topic: "/rosout"; throttleRate: 0; qos: Ros2.QoS().reliable().transient_local().keep_last(10)
-        onNewMessage: lines = lines.concat([message.name + ": " + message.msg]).slice(-8)
+        topic: "/rosout"; throttleRate: 0; qos: Ros2.QoS().reliable().keep_last(10)
+        onSubscribedChanged: if (subscribed) hello.start()
+        onNewMessage: function (message) {
+            lines = lines.concat([message.name + ": " + message.msg]).slice(-8)
+        }
     }
 
     Row {

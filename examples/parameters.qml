@@ -8,7 +8,7 @@ Column {
     property string title: "Parameter"
     Component.onCompleted: Ros2.init("parameter_example")
 
-    Parameter { id: speed; nodeName: "/robot"; name: "max_speed"; onRejected: note.text = reason }
+    Parameter { id: speed; nodeName: "/robot"; name: "max_speed"; onRejected: function (reason) { note.text = reason } }
 
     Label { text: speed.description || speed.name }
     Slider {
