@@ -307,3 +307,22 @@ def start(platform: dict[str, str]) -> Iterator[Callable[..., Program]]:
     yield start
     for program in programs:
         program.close()
+
+
+@pytest.fixture
+def python(platform: dict[str, str], tmp_path: Path) -> Iterator[Callable[[str], Program]]:
+    """Start a Python program of its own, given its text."""
+    programs = []
+
+    def run(text: str) -> Program:
+        file = tmp_path / "program.py"
+        file.write_text(text)
+        gone = {"DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM", "ROSGLASS_URL"}
+        environment = {k: v for k, v in os.environ.items() if k not in gone} | platform
+        environment["PYTHONUNBUFFERED"] = "1"
+        programs.append(Program([sys.executable, str(file)], environment))
+        return programs[-1]
+
+    yield run
+    for program in programs:
+        program.close()

@@ -133,3 +133,238 @@ def test_a_file_with_errors_leaves_nothing_open(app: Any, file: Path, world: Mem
 def test_modules_that_need_widgets(file: Path, line: str, expected: bool) -> None:
     file.with_name("Part.qml").write_text(f"{line}\nItem {{}}")
     assert needs_widgets(file) is expected
+
+
+WINDOWS = """import QtQuick 2.15
+import QtQuick.Window 2.15
+import QtQml 2.15
+import Ros2 1.0
+QtObject {
+    property var first: Window { visible: true; title: "first"; width: 200; height: 100 }
+    property var second: Window { visible: true; title: "second"; width: 210; height: 110 }
+    property var hidden: Window { title: "hidden" }
+    Component.onCompleted: Ros2.init("ui")
+    Component.onDestruction: Ros2.shutdown()
+}"""
+
+
+def titles(runner: Runner) -> list[str]:
+    return sorted(window.title() for window in runner.windows())
+
+
+def overlays(runner: Runner) -> int:
+    return sum(
+        "last one without errors" in str(child.property("text") or "")
+        for window in runner.windows()
+        for item in window.contentItem().childItems()
+        for child in item.childItems()
+    )
+
+
+def test_several_windows(runner: Runner, file: Path, wait: Any, caplog: Any) -> None:
+    file.write_text(WINDOWS)
+    assert runner.reload()
+    wait(100)
+    assert titles(runner) == ["first", "hidden", "second"]
+    assert runner.window.title() in {"first", "second"}
+    old = {window.title(): window for window in runner.windows()}
+    old["second"].setGeometry(150, 160, 333, 222)
+    wait(50)
+    node = runner.session.node
+    # With errors all windows stay, and all tell.
+    file.write_text(WINDOWS.replace("height: 100", "heigth: 100"))
+    assert not runner.reload()
+    wait(50)
+    assert titles(runner) == ["first", "hidden", "second"]
+    assert overlays(runner) == 3
+    file.write_text(WINDOWS.replace("width: 200", "width: 240"))
+    assert runner.reload()
+    wait(lambda: not any(is_alive(window) for window in old.values()))
+    assert titles(runner) == ["first", "hidden", "second"]
+    assert overlays(runner) == 0
+    assert runner.session.node is node
+    # They stay where they were put.
+    new = {window.title(): window for window in runner.windows()}
+    assert (new["second"].width(), new["second"].height()) == (333, 222)
+    assert [w.title() for w in runner.windows() if w.isVisible()].count("hidden") == 0
+    file.write_text(UI % ("alone", "red"))
+    assert runner.reload()
+    wait(100)
+    assert titles(runner) == ["alone"]
+
+
+def test_windows_within_a_window(runner: Runner, file: Path, wait: Any) -> None:
+    file.write_text(
+        """import QtQuick 2.15
+        import QtQuick.Window 2.15
+        import QtQuick.Controls 2.15
+        ApplicationWindow {
+            visible: true; title: "outer"; width: 300; height: 200
+            header: Label { text: "header" }
+            Window { visible: true; title: "inner"; width: 100; height: 50 }
+        }"""
+    )
+    for _ in range(2):
+        assert runner.reload()
+        wait(100)
+        assert titles(runner) == ["inner", "outer"]
+        assert runner.window.title() == "outer"
+
+
+def test_a_root_without_windows_may_get_one_later(runner: Runner, file: Path, wait: Any) -> None:
+    file.write_text("import QtQml 2.15\nQtObject {}")
+    assert runner.reload()
+    wait(50)
+    assert runner.window is None
+    assert runner.grab().isNull()
+    file.write_text("import QtQml 2.15\nQtObject { x: }")
+    assert not runner.reload()
+    file.write_text(UI % ("back", "red"))
+    assert runner.reload()
+    wait(50)
+    assert runner.window.title() == "back"
+
+
+def test_errors_at_run_time_do_not_stop_a_reload(
+    runner: Runner, file: Path, world: MemoryWorld, wait: Any
+) -> None:
+    broken = (UI % ("broken", "red")).replace(
+        'Ros2.init("ui")', '{ Ros2.init("ui"); nothing.here() }'
+    )
+    node = runner.session.node
+    for _ in range(2):
+        file.write_text(
+            broken.replace("Ros2.shutdown()", '{ Ros2.shutdown(); throw new Error("end") }')
+        )
+        assert runner.reload()
+        wait(50)
+        assert runner.window.title() == "broken"
+    # Reloading quickly, one before the former has been taken down, keeps the node, too.
+    for _ in range(3):
+        assert runner.reload()
+    wait(200)
+    assert runner.session.node is node
+    assert not runner.session.holding
+    wait(lambda: len(world.publishers) == 1)
+
+
+def test_a_reload_is_put_off_while_a_call_waits(runner: Runner, file: Path, wait: Any) -> None:
+    from rosglass.qml.waiting import wait_for
+    from rosglass.qt import QtCore
+
+    file.write_text(UI % ("new", "lime"))
+    runner.session.call_ended.connect(runner._reload_at_last)
+    during: list[Any] = []
+
+    def begin(end: Any) -> None:
+        def job() -> None:
+            during.append((runner.reload(), runner.window.title()))
+            end()
+
+        QtCore.QTimer.singleShot(0, job)
+
+    wait_for(runner.session, begin)
+    assert during == [(False, "one")]
+    assert runner.window.title() == "one"
+    wait(lambda: runner.window.title() == "new")
+
+
+def test_import_paths_and_packages(
+    app: Any, tmp_path: Path, world: MemoryWorld, monkeypatch: Any
+) -> None:
+    package = tmp_path / "ws" / "my_robot"
+    module = package / "qml" / "Parts"
+    module.mkdir(parents=True)
+    (package / "package.xml").write_text('<package format="2"><name>my_robot</name></package>')
+    (module / "qmldir").write_text("module Parts\nPart 1.0 Part.qml\n")
+    (module / "Part.qml").write_text("import QtQuick 2.15\nRectangle { color: 'lime' }")
+    # One that is called as ours does not hide it.
+    (package / "qml" / "Ros2").mkdir()
+    (package / "qml" / "Ros2" / "qmldir").write_text("module Ros2\n")
+    main = "import QtQuick 2.15\nimport Parts 1.0\nimport Ros2 1.0\nPart { Subscription {} }"
+    (package / "qml" / "Main.qml").write_text(main)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "ws"))
+    session = Session(connect=world.connect)
+    place = "package://my_robot/qml"
+    made = Runner(f"{place}/Main.qml", session, import_paths=[place])
+    made.load()
+    assert made.file == package / "qml" / "Main.qml"
+    made.close()
+    monkeypatch.setenv("QML_IMPORT_PATH", str(package / "qml"))
+    made = Runner(f"{place}/Main.qml", session)
+    made.load()
+    made.close()
+    session.close()
+
+
+@pytest.mark.parametrize(
+    ("place", "message"),
+    [
+        ("package://none/x.qml", "there is no package 'none' in ROS_PACKAGE_PATH"),
+        ("package://", "expected package://name/path"),
+        ("{0}", r"this is a folder; name a file in it: Main\.qml"),
+        ("{0}/empty", "this is a folder; it has no QML files"),
+        ("{0}/Other.qml", "there is no such file"),
+        ("{0}/data.bin", "not a QML file"),
+    ],
+)
+def test_files_that_are_none(file: Path, world: MemoryWorld, place: str, message: str) -> None:
+    (file.parent / "empty").mkdir()
+    (file.parent / "data.bin").write_bytes(b"\0\1")
+    session = Session(connect=world.connect)
+    with pytest.raises(QmlError, match=message):
+        Runner(place.format(file.parent), session)
+    session.close()
+
+
+@pytest.mark.parametrize(
+    ("text", "advice"),
+    [
+        ("import Ros2 2.0\nimport QtQuick 2.15\nItem {}", "its version is 1.0: import Ros2 1.0"),
+        ("import QtQuick 2.15\nimport No.Such 1.0\nItem {}", "-I FOLDER or in QML_IMPORT_PATH"),
+        ("import QtQuick 7.0\nItem {}", "this Qt may have another version of it"),
+    ],
+)
+def test_errors_say_what_to_do(
+    app: Any, file: Path, world: MemoryWorld, text: str, advice: str
+) -> None:
+    file.write_text(text)
+    session = Session(connect=world.connect)
+    runner = Runner(file, session)
+    with pytest.raises(QmlError, match=r"Main\.qml:\d+:\d+: ") as caught:
+        runner.load()
+    assert advice in str(caught.value)
+    runner.close()
+    session.close()
+
+
+def test_a_kiosk_stays_open_and_hides_the_pointer(
+    app: Any, file: Path, world: MemoryWorld, wait: Any, monkeypatch: Any
+) -> None:
+    from rosglass.qml import kiosk
+    from rosglass.qt import QtCore, optional
+
+    monkeypatch.setattr(kiosk, "_STILL", 50)
+    session = Session(connect=world.connect)
+    runner = Runner(file, session, kiosk=True)
+    runner.load()
+    window = runner.window
+    assert window.visibility() == window.Visibility.FullScreen
+    wait(lambda: app.overrideCursor() is not None)
+    optional("QtTest").QTest.mouseMove(window, QtCore.QPoint(30, 40))
+    wait(lambda: app.overrideCursor() is None)
+    window.close()
+    wait(50)
+    assert window.isVisible()
+    # Reloading with another kind of root closes the old window all the same.
+    text = UI.replace("Rectangle", "Window").replace("property string title", "title")
+    file.write_text(text.replace("implicitWidth: 300; implicitHeight: 200", "") % ("w", "red"))
+    assert runner.reload()
+    wait(lambda: not is_alive(window))
+    assert runner.window.visibility() == runner.window.Visibility.FullScreen
+    runner.window.close()
+    wait(50)
+    assert runner.window.isVisible()
+    runner.close()
+    assert app.overrideCursor() is None
+    session.close()
