@@ -5,6 +5,7 @@ from rosglass.qml.image_item import ImageItem
 from rosglass.qml.image_manager import ImageTransportManager
 from rosglass.qml.image_publisher import RosImagePublisher
 from rosglass.qml.parameter import Parameter
+from rosglass.qml.ros1.action_server import RosActionServer
 from rosglass.qml.ros1.console import ConsoleLevels, InitOptions
 from rosglass.qml.ros1.image_transport_subscriber import ImageTransportSubscriber
 from rosglass.qml.ros1.ros import Ros
@@ -42,5 +43,6 @@ TYPES = {
     "RosInitOptions": InitOptions,
     "ActionCommStates": ActionCommStates,
     "ActionGoalStatus": ActionGoalStatus,
+    "ActionServer": RosActionServer,
     "ActionTerminalStates": ActionTerminalStates,
 }

@@ -7,12 +7,14 @@ import logging
 from typing import TYPE_CHECKING
 
 from rosglass.errors import Error, InvalidNameError
+from rosglass.qml.action_server import server_functions
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.from_js import qos_from_js
 from rosglass.qml.graph import GraphSingleton
 from rosglass.qml.log import Caller, log_from_qml
 from rosglass.qml.message_waiting import next_message
 from rosglass.qml.ros1.action_client import RosActionClient
+from rosglass.qml.ros1.action_server import RosActionServer
 from rosglass.qml.ros1.console import Console, InitOptions, short_logger
 from rosglass.qml.ros1.namespaces import within
 from rosglass.qml.ros1.package import Package
@@ -191,6 +193,29 @@ class Ros(ValueFunctions, GraphSingleton):
             self._runtime.throw(f"Ros.createActionClient: {error}")
             return None
         return self._runtime.keep(RosActionClient(self._runtime, name, texts[-2]))
+
+    @Slot(str, str, QJSValue, result=QtCore.QObject)
+    def advertiseAction(
+        self, type_name: str, name: str, execute: QJSValue
+    ) -> QtCore.QObject | None:
+        """Offer an action for as long as JavaScript holds what is returned.
+
+        Args:
+            type_name: Action type, ``pkg/DoAction``.
+            name: Action name.
+            execute: Told the goal and its handle; returns the result, or a promise of it, or
+                nothing, and ends the goal by its handle. Or an object of ``execute``, ``accept``
+                and ``cancel``.
+        """
+        try:
+            self._check_topic(name)
+            functions = server_functions(execute)
+        except Error as error:
+            self._runtime.throw(f"Ros.advertiseAction: {error}")
+            return None
+        server = RosActionServer(None, self._runtime)
+        server.configure(name, type_name, functions)
+        return self._runtime.keep(server)
 
     def _check_topic(self, topic: str) -> None:
         from rosglass.ros1.names import expand  # noqa: PLC0415 - not needed at start-up

@@ -1,5 +1,6 @@
 """What only ``import Ros2 1.0`` has."""
 
+from rosglass.qml.action_server import ActionServer
 from rosglass.qml.clock_types import ClockTypes
 from rosglass.qml.goal_states import ActionGoalStatus
 from rosglass.qml.image_item import ImageItem
@@ -41,4 +42,5 @@ TYPES = {
     "Ros2LoggerLevel": LoggerLevel,
     "Ros2ClockTypes": ClockTypes,
     "ActionGoalStatus": ActionGoalStatus,
+    "ActionServer": ActionServer,
 }

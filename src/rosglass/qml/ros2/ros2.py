@@ -9,6 +9,7 @@ from rosglass.comm.qos import QoS
 from rosglass.comm.time import Time
 from rosglass.errors import Error, InvalidNameError
 from rosglass.qml.action_client import ActionClient
+from rosglass.qml.action_server import ActionServer, server_functions
 from rosglass.qml.from_js import qos_from_js
 from rosglass.qml.graph import GraphSingleton
 from rosglass.qml.logger import Logger
@@ -232,6 +233,29 @@ class Ros2(ValueFunctions, GraphSingleton):
             return None
         client = ActionClient(self._runtime, name, full_type(type_name, "action"))
         return self._runtime.keep(client)
+
+    @Slot(str, str, QJSValue, result=QtCore.QObject)
+    def createActionServer(
+        self, name: str, type_name: str, execute: QJSValue
+    ) -> QtCore.QObject | None:
+        """Offer an action for as long as JavaScript holds what is returned.
+
+        Args:
+            name: Action name.
+            type_name: Action type, ``pkg/action/Type`` or ``pkg/Type``.
+            execute: Told the goal and its handle; returns the result, or a promise of it, or
+                nothing, and ends the goal by its handle. Or an object of ``execute``, ``accept``
+                and ``cancel``.
+        """
+        try:
+            self._check_topic(name)
+            functions = server_functions(execute)
+        except Error as error:
+            self._runtime.throw(f"Ros2.createActionServer: {error}")
+            return None
+        server = ActionServer(None, self._runtime)
+        server.configure(name, type_name, functions)
+        return self._runtime.keep(server)
 
     @Slot(str, result=bool)
     def isValidTopic(self, topic: str) -> bool:

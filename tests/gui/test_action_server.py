@@ -1,0 +1,286 @@
+"""Actions that QML offers, called by a robot over real middleware; both modules."""
+
+from __future__ import annotations
+
+import json
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from conftest import Bench
+from rosglass.comm import GoalStatus
+from rosglass.errors import GoalRejectedError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from rosglass.comm import ClientGoal
+
+SUCCEEDED, CANCELED, ABORTED = GoalStatus.SUCCEEDED, GoalStatus.CANCELED, GoalStatus.ABORTED
+
+
+class Robot:
+    """Sends goals to the interface.
+
+    Attributes:
+        type: The action's type, of the robot's ROS.
+    """
+
+    def __init__(self, node: Any, url: str, wait: Any) -> None:
+        self.ros1 = url.startswith("ros1")
+        package = "actionlib_tutorials" if self.ros1 else "example_interfaces"
+        self.type = f"{package}/action/Fibonacci"
+        self.client = node.create_action_client("/count", self.type)
+        self.wait = wait
+        self.feedback: list[list[int]] = []
+
+    def send(self, order: int) -> ClientGoal:
+        self.wait(lambda: self.client.ready, 30)
+        goal: ClientGoal = self.client.send_goal(
+            {"order": order}, on_feedback=lambda m: self.feedback.append(list(m.sequence))
+        )
+        return goal
+
+    def end(self, goal: ClientGoal) -> tuple[GoalStatus, list[int]]:
+        self.wait(goal.done.done, 30)
+        end = goal.done.result()
+        return end.status, list(end.result.sequence)
+
+
+@pytest.fixture
+def robot(live: Bench, url: str, wait: Any) -> Robot:
+    return Robot(live.robot, url, wait)
+
+
+def offer(live: Bench, robot: Robot, body: str) -> Any:
+    return live.load(f"""
+        QtObject {{
+            property var handle
+            property var seen: []
+            property int asked
+            property ActionServer server: ActionServer {{
+                name: "/count"; actionType: "{robot.type}"
+                {body}
+            }}
+            function run(script) {{ return JSON.stringify(eval(script)) }}
+        }}
+    """)
+
+
+def run(root: Any, script: str) -> Any:
+    text = root.run(script)
+    return None if not text else json.loads(text)
+
+
+@pytest.mark.parametrize(
+    ("execute", "end"),
+    [
+        ("function (goal) { return {sequence: [goal.order]} }", (SUCCEEDED, [7])),
+        (
+            (
+                "function (goal) { return new Promise(function (ok) { Qt.callLater(ok, "
+                "{sequence: [goal.order, 1]}) }) }"
+            ),
+            (SUCCEEDED, [7, 1]),
+        ),
+        (
+            (
+                "function (goal, handle) { handle.publishFeedback({sequence: [1]}); "
+                "Qt.callLater(handle.succeed, {sequence: [2]}) }"
+            ),
+            (SUCCEEDED, [2]),
+        ),
+        ("function (goal, handle) { Qt.callLater(handle.abort, {sequence: [3]}) }", (ABORTED, [3])),
+        ("function (goal, handle) { handle.succeed() }", (SUCCEEDED, [])),
+        ("function (goal) { return Promise.resolve() }", (SUCCEEDED, [])),
+        ("function (goal) { throw new Error('no power') }", (ABORTED, [])),
+        ("function (goal) { return Promise.reject('no power') }", (ABORTED, [])),
+        ("function (goal) { return {sequnce: []} }", (ABORTED, [])),
+        ("function (goal) { return 5 }", (ABORTED, [])),
+    ],
+)
+def test_ends(live: Bench, robot: Robot, wait: Any, execute: str, end: Any, caplog: Any) -> None:
+    root = offer(live, robot, f"execute: {execute}")
+    goal = robot.send(7)
+    assert robot.end(goal) == end
+    if "power" in execute:
+        wait(lambda: "no power" in caplog.text)
+        if robot.ros1:
+            assert "no power" in goal.text  # type: ignore[attr-defined]
+    if "publishFeedback" in execute:
+        wait(lambda: robot.feedback == [[1]])
+    wait(lambda: run(root, "server.activeGoals") == 0)
+    assert run(root, "[server.ready, server.enabled, server.problem]") == [True, True, ""]
+
+
+def test_a_handle(live: Bench, robot: Robot, wait: Any) -> None:
+    root = offer(
+        live,
+        robot,
+        """
+        accept: function (goal) { return goal.order < 10 }
+        execute: function (goal, h) {
+            h.statusChanged.connect(function (status) { seen.push(status) })
+            h.cancelRequestedChanged.connect(function () { asked++ })
+            handle = h
+        }
+        cancel: function (h) { return h === handle }
+        """,
+    )
+    refused = robot.send(11)
+    wait(refused.done.done)
+    assert isinstance(refused.done.exception(), GoalRejectedError)
+    goal = robot.send(5)
+    wait(lambda: run(root, "Boolean(handle)"))
+    assert run(root, "[handle.goal.order, handle.isActive, handle.isCancelRequested]") == [
+        5,
+        True,
+        False,
+    ]
+    assert run(root, "handle.goalId") == goal.id_text
+    assert run(root, "handle.status === ActionGoalStatus.Executing && handle.goalStamp.sec > 0")
+    for script, told in (
+        ("handle.publishFeedback({sequence: ['x']})", "sequence[0]"),
+        ("handle.succeed({sequnce: []})", "sequnce"),
+        ("handle.canceled()", "nobody asked to cancel"),
+    ):
+        text = run(root, f"(function () {{ try {{ {script} }} catch (e) {{ return '' + e }} }})()")
+        assert told in text, text
+    run(root, "handle.publishFeedback({sequence: [1, 2]})")
+    wait(lambda: robot.feedback == [[1, 2]])
+    live.engine.collectGarbage()
+    goal.cancel()
+    wait(lambda: root.property("asked") == 1)
+    assert run(root, "[handle.isCancelRequested, handle.isActive]") == [True, True]
+    run(root, "handle.canceled({sequence: [9]})")
+    assert robot.end(goal) == (CANCELED, [9])
+    wait(lambda: run(root, "seen[seen.length - 1] === ActionGoalStatus.Canceled"))
+    assert run(root, "[handle.isActive, handle.isCancelRequested]") == [False, True]
+    text = run(root, "(function () { try { handle.succeed() } catch (e) { return '' + e } })()")
+    assert "ended" in text
+
+
+def test_a_refused_cancel(live: Bench, robot: Robot, wait: Any) -> None:
+    root = offer(
+        live,
+        robot,
+        """
+        execute: function (goal, h) { handle = h }
+        cancel: function (h) { asked++; return false }
+        """,
+    )
+    goal = robot.send(5)
+    wait(lambda: run(root, "Boolean(handle)"))
+    goal.cancel()
+    wait(lambda: root.property("asked"))
+    wait(100)
+    assert run(root, "handle.isCancelRequested") is False
+    run(root, "handle.succeed({sequence: [1]})")
+    assert robot.end(goal) == (SUCCEEDED, [1])
+
+
+@pytest.mark.parametrize("accept", ["function () { }", "function () { throw new Error('odd') }"])
+def test_a_goal_is_accepted_by_true_alone(
+    live: Bench, robot: Robot, wait: Any, accept: str, caplog: Any
+) -> None:
+    root = offer(live, robot, f"execute: function () {{ asked++ }}\naccept: {accept}")
+    goal = robot.send(5)
+    wait(goal.done.done)
+    assert isinstance(goal.done.exception(), GoalRejectedError)
+    assert root.property("asked") == 0
+    assert "did not say true or false" in caplog.text
+
+
+def test_withdrawing_ends_the_goals(live: Bench, robot: Robot, wait: Any) -> None:
+    root = offer(live, robot, "execute: function (goal, h) { handle = h }")
+    goal = robot.send(5)
+    wait(lambda: run(root, "Boolean(handle)"))
+    run(root, "server.enabled = false")
+    assert robot.end(goal)[0] is ABORTED
+    wait(lambda: run(root, "[handle.isActive, server.ready]") == [False, False])
+    wait(lambda: not robot.client.ready, 30)
+    run(root, "handle = null; server.enabled = true")
+    goal = robot.send(6)
+    wait(lambda: run(root, "Boolean(handle)"))
+    live.session.shutdown()
+    wait(goal.done.done, 30)
+    wait(lambda: run(root, "handle.isActive") is False)
+    live.session.init("ui")
+    wait(lambda: run(root, "server.ready"), 30)
+    goal = robot.send(7)
+    wait(lambda: run(root, "handle.goal.order") == 7)
+    run(root, "handle.succeed()")
+    assert robot.end(goal)[0] is SUCCEEDED
+
+
+def test_an_engine_that_goes_away_ends_the_goals(
+    live: Bench, robot: Robot, wait: Any, tmp_path: Path, caplog: Any
+) -> None:
+    from rosglass.qml import install
+    from rosglass.qt import QtQml
+
+    engine = QtQml.QQmlEngine()
+    install(engine, live.session)
+    world = SimpleNamespace(connect=lambda *_: live.robot)
+    other = Bench(live.session, engine, world, tmp_path / "other")
+    root = offer(
+        other,
+        robot,
+        "execute: function (goal, h) { handle = h; return new Promise(function () {}) }",
+    )
+    goal = robot.send(5)
+    wait(lambda: run(root, "Boolean(handle)"))
+    root.deleteLater()
+    engine.deleteLater()
+    assert robot.end(goal)[0] is ABORTED
+    wait(100)
+    assert "callback failed" not in caplog.text
+
+
+def test_servers_of_functions(live: Bench, robot: Robot, wait: Any) -> None:
+    root: Any = live.load(f"""
+        QtObject {{
+            property var server: Ros2.createActionServer("/count", "{robot.type}", {{
+                accept: function (goal) {{ return goal.order > 0 }},
+                execute: function (goal) {{ return {{sequence: [goal.order]}} }}
+            }})
+        }}
+    """)
+    assert robot.end(robot.send(3)) == (SUCCEEDED, [3])
+    goal = robot.send(0)
+    wait(goal.done.done)
+    assert isinstance(goal.done.exception(), GoalRejectedError)
+    assert root is not None
+
+
+def test_ros1_servers(live: Bench, robot: Robot) -> None:
+    live.module = "Ros 1.0"
+    name = "actionlib_tutorials/FibonacciAction" if robot.ros1 else "example_interfaces/Fibonacci"
+    root: Any = live.load(f"""
+        QtObject {{
+            property var server: Ros.advertiseAction("{name}", "/count",
+                function (goal, handle) {{ return {{sequence: [handle.goal.order]}} }})
+            property ActionServer other: ActionServer {{
+                name: "/other"; actionType: "{name}"
+                execute: function (goal) {{ return {{sequence: [goal.order]}} }}
+            }}
+        }}
+    """)
+    assert robot.end(robot.send(3)) == (SUCCEEDED, [3])
+    robot.client = live.robot.create_action_client("/other", robot.type)
+    assert robot.end(robot.send(4)) == (SUCCEEDED, [4])
+    assert root is not None
+
+
+def test_misused_makers_throw(live: Bench) -> None:
+    for script, told in (
+        ('Ros2.createActionServer("/x", "a/B", 5)', "a function that executes goals"),
+        ('Ros2.createActionServer("/x", "a/B", {accept: function () {}})', "with execute"),
+        ('Ros2.createActionServer("/x", "a/B", {execute: 5})', "execute is not a function"),
+        ('Ros2.createActionServer("/x", "a/B", {excute: 5})', "no function excute"),
+        ('Ros2.createActionServer("no good", "a/B", function () {})', "no good"),
+    ):
+        text = live.run(f"try {{ {script} }} catch (e) {{ return String(e) }}; return ''")
+        assert text.startswith("Error:"), script
+        assert told in text, text
