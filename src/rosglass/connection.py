@@ -21,7 +21,10 @@ __all__ = ["connect", "default_url"]
 
 _EXAMPLE = "zenoh://127.0.0.1:7447"
 _EXAMPLES = "zenoh://127.0.0.1:7447 or dds://?domain=0"
-_KNOWN = "dds:// (ROS 2 with any DDS), zenoh:// (ROS 2 with rmw_zenoh), ros1:// (ROS 1, its master)"
+_KNOWN = (
+    "dds:// (ROS 2 with any DDS), zenoh:// (ROS 2 with rmw_zenoh), ros1:// (ROS 1, its master), "
+    "replay:FILE (a recording)"
+)
 #: Values of RMW_IMPLEMENTATION and what they mean; dynamic and vendor variants speak plain DDS.
 _MIDDLEWARES = {
     "rmw_zenoh_cpp": "zenoh://",
@@ -74,6 +77,11 @@ def connect(
             second node of a name ends the first one). ``ros1://`` alone means the master that
             ROS_MASTER_URI names, or one on this machine.
 
+            ``replay:drive.mcap`` plays a recording (MCAP file, ROS 2 bag, ROS 1 bag) to the node's
+            subscriptions, without a robot. Options follow as in ``replay:/data/drive.bag?rate=2``:
+            ``rate``, ``loop=true`` (else it pauses at the end), ``paused=true``. See
+            :class:`rosglass.bags.ReplayNode`.
+
             None asks the environment: ROSGLASS_URL, then RMW_IMPLEMENTATION,
             ZENOH_SESSION_CONFIG_URI, ROS_DISTRO, ROS_DOMAIN_ID and ROS_MASTER_URI.
         name: Base name of the node; None for one that nobody else has, ``rosglass_<process id>``;
@@ -101,6 +109,7 @@ def connect(
         UnsupportedError: The URL's scheme is unknown, or there is neither URL nor environment.
         InvalidNameError: The name or namespace breaks ROS's rules.
         ConnectionLostError: This machine cannot open a session at all.
+        BagError: The recording cannot be read.
     """
     if url is None:
         url = default_url(os.environ)
@@ -113,6 +122,10 @@ def connect(
     if library is not None and not isinstance(library, Library):
         raise ConversionError("library", library, "a rosglass.Library, or None for the shared one")
     check_flag(own_services, "own_services", "connect()")
+    if url.lower().startswith("replay:"):
+        from rosglass.bags.replay_node import connect_replay  # noqa: PLC0415
+
+        return connect_replay(url, *_named(name, namespace, arguments))
     if scheme not in ("dds", "zenoh", "ros1") or not separator:
         reason = f"unknown scheme {scheme!r}" if separator else "no scheme"
         raise UnsupportedError(
@@ -133,18 +146,26 @@ def connect(
             options.arguments.parameters,
             own_services=own_services,
         )
-    if name is None:
-        number = next(_anonymous)
-        name = f"rosglass_{os.getpid()}" + (f"_{number}" if number > 1 else "")
     from rosglass.ros2.arguments import Arguments  # noqa: PLC0415
 
     told = Arguments.parse(arguments)
-    name = told.node_name(name)
-    namespace = told.namespace(name, "/" if namespace is None else namespace)
+    name, namespace = _named(name, namespace, arguments)
     middleware = _dds(url) if scheme == "dds" else _zenoh(url)
     from rosglass.ros2.node import Ros2Node  # noqa: PLC0415
 
     return Ros2Node(middleware, url, name, namespace, library, told, own_services=own_services)
+
+
+def _named(name: str | None, namespace: str | None, arguments: Sequence[str]) -> tuple[str, str]:
+    """Return what a node is called, by ROS 2's rules."""
+    from rosglass.ros2.arguments import Arguments  # noqa: PLC0415
+
+    if name is None:
+        number = next(_anonymous)
+        name = f"rosglass_{os.getpid()}" + (f"_{number}" if number > 1 else "")
+    told = Arguments.parse(arguments)
+    name = told.node_name(name)
+    return name, told.namespace(name, "/" if namespace is None else namespace)
 
 
 def default_url(env: Mapping[str, str]) -> str:

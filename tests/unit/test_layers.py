@@ -19,16 +19,16 @@ RANK = {
     "comm": 3,
     "ros1": 4,
     "ros2": 4,
-    "connection": 5,
+    "connection": 6,
     "bags": 5,
     "bridge": 5,
     "tf": 5,
     "images": 5,
     "qt": 5,
-    "qml": 6,
-    "rviz": 7,
-    "cli": 9,
-    "demo": 8,
+    "qml": 7,
+    "rviz": 8,
+    "cli": 10,
+    "demo": 9,
 }
 QT = {"PySide6", "PySide2", "PyQt5", "PyQt6", "shiboken6", "shiboken2"}
 MODULES = sorted(ROOT.rglob("*.py"))

@@ -1,16 +1,20 @@
 """Recordings: writing topics to a file, and playing files back."""
 
 from rosglass.bags.bag import Bag, BagMessage, Channel, open_bag
+from rosglass.bags.playback import Playback
 from rosglass.bags.player import Player, PlayerState
 from rosglass.bags.recorder import Recorder, RecordingStatus
+from rosglass.bags.replay_node import ReplayNode
 
 __all__ = [
     "Bag",
     "BagMessage",
     "Channel",
+    "Playback",
     "Player",
     "PlayerState",
     "Recorder",
     "RecordingStatus",
+    "ReplayNode",
     "open_bag",
 ]

@@ -81,6 +81,9 @@ class Player(Handle):
         duration: Seconds of the recording to play; None for all.
         delay: Seconds to wait before the first message, so that subscriptions are linked.
         paused: Whether to begin paused.
+        hold: Whether to pause at the end, for :meth:`seek` and :meth:`resume`, instead of ending.
+        context: After :meth:`seek`, the newest message of each topic is sent at once if it is not
+            older than so many seconds: what a display showed at that place.
 
     Attributes:
         channels: What is played.
@@ -105,18 +108,21 @@ class Player(Handle):
         duration: float | None = None,
         delay: float = 1.0,
         paused: bool = False,
+        hold: bool = False,
+        context: float = 0.0,
     ) -> None:
         _check("rate", rate, 1e-3, 1e3)
         _check("clock", clock, 0.0, 1e4)
         _check("start", start, 0.0, max(bag.duration, 0.0))
         _check("delay", delay, 0.0, 3600.0)
+        _check("context", context, 0.0, 3600.0)
         if duration is not None:
             _check("duration", duration, 0.0, 1e9)
         self._node, self._bag = node, bag
         self._rate, self._loop = float(rate), loop
         self._begin = bag.start + int(start * _NS)
         self._end = None if duration is None else self._begin + int(duration * _NS)
-        self._delay = delay
+        self._delay, self._hold, self._context = delay, hold, int(context * _NS)
         self.problems: dict[str, str] = {}
         self.channels = self._choose(topics, exclude, clock)
         self._send: dict[Channel, Callable[[bytes], None]] = {}
@@ -144,12 +150,18 @@ class Player(Handle):
     @property
     def position(self) -> float:
         """Seconds since the recording's first message."""
-        return (self._position - self._bag.start) / _NS
+        target = self._target
+        return ((self._position if target is None else target) - self._bag.start) / _NS
 
     @property
     def is_paused(self) -> bool:
         """Whether time stands still."""
         return self._paused
+
+    @property
+    def loop(self) -> bool:
+        """Whether it begins again at the end."""
+        return self._loop
 
     def status(self) -> PlayerStatus:
         """Return what the player does now."""
@@ -186,6 +198,11 @@ class Player(Handle):
             self._rate = float(rate)
             self._set_anchor(self._position)
             self._lock.notify_all()
+
+    def set_loop(self, loop: bool) -> None:
+        """Begin again at the end, or not."""
+        with self._lock:
+            self._loop = loop
 
     def seek(self, seconds: float) -> None:
         """Go on at another place of the recording; latched messages from before are sent again.
@@ -315,8 +332,10 @@ class Player(Handle):
     def _play(self, start: int) -> None:
         place: int | None = start
         while place is not None and not self._closed:
+            if self._clock:
+                self._tell_time()
             if place > self._bag.start:
-                self._send_latched(place)
+                self._send_context(place)
             place = self._pass(place)
             if place is None and self._loop and not self._closed:
                 place = self._begin
@@ -330,10 +349,19 @@ class Player(Handle):
                 return self._take_target()
             self._publish(message)
         with self._lock:
+            holds = self._hold and not self._loop
+            if holds and self._target is None and not self._closed:
+                self._paused = True
+                self._position = self._bag.end if self._end is None else self._end
+        if holds and self._clock:
+            self._tell_time()
+        with self._lock:
             # At the end, a player that was paused can still be sent elsewhere.
             self._lock.wait_for(
                 lambda: self._closed or self._target is not None or not self._paused
             )
+            if holds and self._target is None:
+                self._target = self._begin
         return self._take_target()
 
     def _wait_for(self, moment: int) -> bool:
@@ -387,17 +415,20 @@ class Player(Handle):
         self._clock.publish(clock={words[0]: seconds, words[1]: rest})
         self._clock_due = time.monotonic() + self._clock_period
 
-    def _send_latched(self, before: int) -> None:
-        """Send what a subscription would have kept from before the place where playing begins."""
-        latched = [
-            channel
-            for channel in self.channels
-            if channel.profile().durability is Durability.TRANSIENT_LOCAL
-        ]
+    def _send_context(self, place: int) -> None:
+        """Send what a display shows of what came before the place where playing begins."""
+        latched: list[Channel] = []
+        others: list[Channel] = []
+        for channel in self.channels:
+            kept = channel.profile().durability is Durability.TRANSIENT_LOCAL
+            (latched if kept else others).append(channel)
         last: dict[Channel, BagMessage] = {}
-        for message in self._bag.messages(latched, None, before) if latched else ():
+        for message in self._bag.messages(latched, None, place) if latched else ():
             last[message.channel] = message
-        for message in last.values():
+        if others and self._context:
+            for message in self._bag.messages(others, place - self._context, place):
+                last[message.channel] = message
+        for message in sorted(last.values(), key=lambda message: message.time):
             self._publish(message)
 
     def _take_target(self) -> int | None:

@@ -152,6 +152,11 @@ class Publisher(Element):
         self.topicChanged.emit()
         self.advertised.emit()
 
+    @Slot()
+    def _on_tick(self) -> None:
+        if self._sender is not None:
+            self._say(self._sender.problem)
+
     def _withdraw(self) -> None:
         self._retry.stop()
         sender, self._sender = self._sender, None

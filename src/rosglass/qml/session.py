@@ -172,6 +172,11 @@ class Session(QtCore.QObject):
             self._drop_node()
             self._start()
 
+    @property
+    def owns_node(self) -> bool:
+        """Whether it connects by itself, by :attr:`url`; not with a node that was adopted."""
+        return self._owns_node
+
     def init(
         self,
         name: str,

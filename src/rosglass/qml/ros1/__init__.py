@@ -5,6 +5,7 @@ from rosglass.qml.image_item import ImageItem
 from rosglass.qml.image_manager import ImageTransportManager
 from rosglass.qml.image_publisher import RosImagePublisher
 from rosglass.qml.parameter import Parameter
+from rosglass.qml.replay import Replay
 from rosglass.qml.ros1.action_server import RosActionServer
 from rosglass.qml.ros1.console import ConsoleLevels, InitOptions
 from rosglass.qml.ros1.image_transport_subscriber import ImageTransportSubscriber
@@ -30,6 +31,7 @@ NATIVE = {
 }
 #: What QML can write, by name.
 TYPES = {
+    "Replay": Replay,
     "ImagePublisher": RosImagePublisher,
     "TfBroadcaster": RosTfBroadcaster,
     "TfBuffer": RosTfBuffer,

@@ -10,6 +10,7 @@ from rosglass.qml.image_subscription import ImageTransportSubscription
 from rosglass.qml.logger import LoggerLevel
 from rosglass.qml.message_item_model import MessageItemModel
 from rosglass.qml.parameter import Parameter
+from rosglass.qml.replay import Replay
 from rosglass.qml.ros2.ament_index import AmentIndex
 from rosglass.qml.ros2.ros2 import Ros2
 from rosglass.qml.service_server import ServiceServer
@@ -29,6 +30,7 @@ NATIVE = {
 }
 #: What QML can write, by name.
 TYPES = {
+    "Replay": Replay,
     "ImagePublisher": ImagePublisher,
     "TfBroadcaster": TfBroadcaster,
     "TfBuffer": TfBuffer,

@@ -1,0 +1,268 @@
+"""A recording in a robot's place."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from mcap import writer as mcap_writer
+from rosbags import rosbag1
+from rosbags.typesys import Stores, get_typestore
+
+import rosglass
+from rosglass import load
+from rosglass.bags import ReplayNode
+from rosglass.comm import ConnectionState, QoS, Time
+from rosglass.errors import BagError, ConversionError, NodeClosedError, UnsupportedError
+from rosglass.interfaces import full_text
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+SECOND = 1_000_000_000
+#: When the recordings were made: not now.
+START = 1_700_000_000 * SECOND
+STRING, CLOCK = "std_msgs/msg/String", "rosgraph_msgs/msg/Clock"
+LATCHED = "- {reliability: reliable, durability: transient_local, depth: 1, history: 1}"
+
+
+def write(path: Path, seconds: float = 2.0, *, clock: bool = False) -> Path:
+    """Record ``/chatter`` at 10 Hz, and ``/plan``, latched, once at the beginning."""
+    writer = mcap_writer.Writer(str(path))
+    writer.start("ros2")
+
+    def channel(topic: str, name: str, **more: str) -> Callable[[int, Any], None]:
+        found = load(name)
+        schema = writer.register_schema(name, "ros2msg", full_text(found.definition).encode())
+        number = writer.register_channel(topic, "cdr", schema, more)
+
+        def add(at: int, fields: Any) -> None:
+            writer.add_message(number, at, found.encode(fields), at)
+
+        return add
+
+    plan = channel("/plan", STRING, offered_qos_profiles=LATCHED)
+    chatter = channel("/chatter", STRING)
+    time_of = channel("/clock", CLOCK) if clock else None
+    plan(START, {"data": "go"})
+    for i in range(round(seconds * 10) + 1):
+        at = START + i * SECOND // 10
+        chatter(at, {"data": str(i)})
+        if time_of is not None:
+            time_of(at, {"clock": {"sec": 50 + i, "nanosec": 0}})
+    writer.finish()
+    return path
+
+
+@pytest.fixture
+def drive(tmp_path: Path) -> Path:
+    return write(tmp_path / "drive.mcap")
+
+
+@pytest.fixture
+def play() -> Iterator[Callable[..., ReplayNode]]:
+    made = []
+
+    def connect(path: Path, options: str = "") -> ReplayNode:
+        node = rosglass.connect(f"replay:{path}{options}", "cockpit")
+        assert isinstance(node, ReplayNode)
+        made.append(node)
+        return node
+
+    yield connect
+    for node in made:
+        node.close()
+
+
+def until(condition: Callable[[], Any], what: str = "did not happen") -> None:
+    end = time.monotonic() + 30
+    while not condition():
+        assert time.monotonic() < end, what
+        time.sleep(0.005)
+
+
+def listen(node: ReplayNode, topic: str, **options: Any) -> list[str]:
+    found: list[str] = []
+    node.create_subscription(topic, callback=lambda m: found.append(m.data), **options)
+    return found
+
+
+def test_subscriptions_get_what_was_recorded(drive, play):
+    node = play(drive, "?rate=20")
+    found = listen(node, "/chatter", qos=100)
+    until(lambda: len(found) == 21, "the whole recording")
+    assert found == [str(i) for i in range(21)]
+    until(lambda: not node.playback.is_playing, "it pauses at its end")
+    assert node.playback.position == pytest.approx(2.0)
+    assert node.playback.duration == pytest.approx(2.0)
+    assert node.status().state is ConnectionState.CONNECTED
+    assert "drive.mcap" in node.status().detail
+
+
+def test_time_is_the_recordings(drive, play):
+    node = play(drive)
+    assert node.now() == Time(START)
+    stamps = []
+    got = threading.Event()
+
+    def take(sample: Any) -> None:
+        stamps.append((sample.received_ns, node.now().nanoseconds))
+        if len(stamps) > 5:
+            got.set()
+
+    node.create_subscription("/chatter", raw_callback=take)
+    assert got.wait(30)
+    for received, now in stamps:
+        assert START <= received <= now <= START + 2.2 * SECOND
+
+
+def test_a_recorded_clock_is_the_time(tmp_path, play):
+    node = play(write(tmp_path / "sim.mcap", clock=True), "?rate=5")
+    until(lambda: node.now() >= Time(60 * SECOND))
+    assert node.now() <= Time(70 * SECOND)
+
+
+def test_seeking_shows_what_was_there_while_it_is_paused(drive, play):
+    node = play(drive, "?paused=true")
+    chatter, plan = listen(node, "/chatter"), listen(node, "/plan", qos=QoS.latched(1))
+    assert not node.playback.is_playing
+    node.playback.seek(1.05)
+    assert node.playback.position == pytest.approx(1.05)
+    until(lambda: chatter and plan)
+    assert (chatter, plan) == (["10"], ["go"])
+    node.playback.seek(0.35)
+    until(lambda: len(chatter) > 1)
+    assert chatter == ["10", "3"]
+    assert not node.playback.is_playing
+    node.playback.play()
+    until(lambda: chatter[-1] == "20")
+    assert chatter == ["10", *map(str, range(3, 21))]
+
+
+def test_latecomers_get_what_was_latched(drive, play):
+    node = play(drive, "?rate=20")
+    until(lambda: not node.playback.is_playing)
+    assert listen(node, "/chatter") == []
+    plan = listen(node, "/plan", qos=QoS.latched(1))
+    until(lambda: plan == ["go"])
+
+
+def test_playing_again_from_the_end_and_looping(drive, play):
+    node = play(drive, "?rate=20")
+    found = listen(node, "/chatter", qos=1000)
+    until(lambda: not node.playback.is_playing and len(found) == 21)
+    count = len(found)
+    node.playback.play()
+    until(lambda: len(found) > count)
+    assert found[count] == "0"
+    node.playback.set_loop(True)
+    until(lambda: found.count("0") >= 4)
+    assert node.playback.is_playing
+    assert node.playback.loop
+    node.playback.set_rate(0.5)
+    assert node.playback.rate == 0.5
+    with pytest.raises(BagError, match="rate"):
+        node.playback.set_rate(0)
+    with pytest.raises(BagError, match="position"):
+        node.playback.seek(3)
+
+
+def test_what_is_published_reaches_nobody_and_says_so(drive, play):
+    node = play(drive, "?paused=true")
+    found = listen(node, "/cmd")
+    with node.create_publisher("/cmd", STRING) as publisher:
+        publisher.publish(data="stop")
+        assert "reaches no robot" in publisher.problem
+        assert publisher.subscription_count() == 0
+        with pytest.raises(ConversionError, match="data"):
+            publisher.publish(data=7)
+    with pytest.raises(NodeClosedError):
+        publisher.publish(data="stop")
+    assert found == []
+    with pytest.raises(UnsupportedError, match=r"drive\.mcap is a recording, which answers nobody"):
+        node.create_service_client("/reset", "std_srvs/srv/Trigger")
+
+
+def test_the_graph_is_the_recordings(drive, play):
+    node = play(drive, "?paused=true")
+    assert node.topics()["/chatter"] == [STRING]
+    assert [p.node.full for p in node.publishers("/chatter")] == ["/recording"]
+    assert [n.full for n in node.nodes()] == ["/cockpit", "/recording"]
+    assert node.services() == node.actions() == {}
+    changed = threading.Event()
+    node.on_graph_change(changed.set)
+    listen(node, "/chatter")
+    assert changed.wait(20)
+    assert [s.node.full for s in node.subscriptions("/chatter")] == ["/cockpit"]
+
+
+def test_some_topics_only(drive, play):
+    node = play(drive, "?paused=true")
+    node.choose(["plan"])
+    chatter, plan = listen(node, "/chatter"), listen(node, "/plan", qos=QoS.latched(1))
+    assert node.publishers("/chatter") == []
+    node.playback.seek(1.0)
+    until(lambda: plan)
+    assert chatter == []
+    node.choose([])
+    node.playback.seek(0.55)
+    until(lambda: chatter == ["5"])
+
+
+def test_another_type_than_recorded_is_told(drive, play):
+    node = play(drive)
+    other = node.create_subscription("/chatter", "std_msgs/msg/Bool")
+    until(lambda: other.problem)
+    assert other.problem == "this is std_msgs/msg/String here, not std_msgs/msg/Bool"
+    assert "chatter" in node.create_subscription("/chater").hint
+
+
+def test_a_ros_1_recording(tmp_path, play):
+    store = get_typestore(Stores.ROS1_NOETIC)
+    kind = store.types[STRING]
+    path = tmp_path / "old.bag"
+    with rosbag1.Writer(path) as writer:
+        connection = writer.add_connection("/chatter", STRING, typestore=store)
+        for i in range(5):
+            data = store.serialize_ros1(kind(data=str(i)), STRING)
+            writer.write(connection, START + i * SECOND // 10, data)
+    node = play(path)
+    assert node.wire == "ros1"
+    found = listen(node, "/chatter")
+    until(lambda: len(found) == 5)
+    assert found == ["0", "1", "2", "3", "4"]
+    assert node.now() >= Time(START)
+
+
+@pytest.mark.parametrize(
+    ("rest", "error", "told"),
+    [
+        ("", ConversionError, r"a recording such as replay:drive\.mcap"),
+        ("nothing.mcap", BagError, r"nothing\.mcap does not exist"),
+        ("drive.mcap?rate=fast", ConversionError, "a number such as 0.5"),
+        ("drive.mcap?rate=0", BagError, "rate must be"),
+        ("drive.mcap?speed=2", ConversionError, "options such as rate=2"),
+        ("drive.mcap?loop=maybe", ConversionError, "options such as rate=2"),
+    ],
+)
+def test_what_cannot_be_played_is_refused(drive, monkeypatch, rest, error, told):
+    monkeypatch.chdir(drive.parent)
+    with pytest.raises(error, match=told):
+        rosglass.connect(f"replay:{rest}")
+
+
+def test_closing_ends_everything(drive, play):
+    threads = threading.active_count()
+    node = play(drive)
+    subscription = node.create_subscription("/chatter")
+    assert subscription.wait(20) is not None
+    node.close()
+    node.close()
+    assert subscription.closed
+    assert node.status().state is ConnectionState.CLOSED
+    until(lambda: threading.active_count() <= threads)
+    with pytest.raises(NodeClosedError):
+        node.create_subscription("/chatter")
