@@ -211,12 +211,15 @@ def test_windows_within_a_window(runner: Runner, file: Path, wait: Any) -> None:
         assert runner.window.title() == "outer"
 
 
-def test_a_root_without_windows_may_get_one_later(runner: Runner, file: Path, wait: Any) -> None:
+def test_a_root_without_windows_may_get_one_later(
+    runner: Runner, file: Path, wait: Any, caplog: Any
+) -> None:
     file.write_text("import QtQml 2.15\nQtObject {}")
     assert runner.reload()
     wait(50)
     assert runner.window is None
     assert runner.grab().isNull()
+    assert "shows no window" in caplog.text
     file.write_text("import QtQml 2.15\nQtObject { x: }")
     assert not runner.reload()
     file.write_text(UI % ("back", "red"))

@@ -4,6 +4,7 @@ import QtQuick 2.15
 Rectangle {
     id: overlay
 
+    property string heading: ""
     property string text: ""
 
     z: 2000000 // popups are at 1000001
@@ -17,6 +18,6 @@ Rectangle {
         font.family: "monospace"
         font.pixelSize: 15
         wrapMode: Text.Wrap
-        text: "The interface below is the last one without errors.\n\n" + overlay.text
+        text: overlay.heading + "\n\n" + overlay.text
     }
 }

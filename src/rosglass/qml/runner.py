@@ -28,6 +28,10 @@ __all__ = ["Runner", "needs_widgets"]
 _log = logging.getLogger("rosglass.qml")
 _DEFAULT_SIZE = (1024, 640)
 _OVERLAY = Path(__file__).with_name("ErrorOverlay.qml")
+_HEADINGS = (
+    "This interface has errors. It is shown once they are mended.",
+    "The interface below is the last one without errors.",
+)
 _WIDGET_MODULES = re.compile(r"^\s*import\s+(QtCharts|Qt\.labs\.platform)\b", re.MULTILINE)
 
 
@@ -104,12 +108,18 @@ class Runner(QtCore.QObject):
         self._watcher = Watcher(self.file.parent, *folders) if watch else None
 
     def load(self) -> None:
-        """Show the file.
+        """Show the file; one with errors that is watched is shown once they are mended.
 
         Raises:
             QmlError: The file has errors; the message lists them.
         """
-        self._show(*self._create())
+        try:
+            self._show(*self._create())
+        except QmlError as error:
+            if self._watcher is None:
+                raise
+            _log.error("%s", error)
+            self._show_empty(str(error))
         if self._watcher is not None:
             self._watcher.changed.connect(self.reload)
             self.session.call_ended.connect(self._reload_at_last)
@@ -223,6 +233,8 @@ class Runner(QtCore.QObject):
             others = [w for w in self.windows() if w not in before]
             wanted = [w for w in others if w.isVisible()]
             self.window = next(iter(wanted or others), None)
+            if not wanted:
+                _log.warning("%s shows no window: none in it has `visible: true`", self.file)
         _keep_places([*wanted, *others], before)
         for window in {id(w): w for w in (*wanted, *others)}.values():
             window.sceneGraphError.connect(self._no_graphics)
@@ -233,6 +245,15 @@ class Runner(QtCore.QObject):
                 window.showFullScreen()
             elif not window.isVisible():
                 window.show()
+
+    def _show_empty(self, text: str) -> None:
+        """Show errors where there is no interface yet."""
+        window = self.window = QtQuick.QQuickWindow()
+        self._own = True
+        window.resize(*_DEFAULT_SIZE)
+        window.setTitle(self.file.stem)
+        window.show()
+        self._show_errors(text)
 
     def _fit(self, item: QtQuick.QQuickItem, window: QtQuick.QQuickWindow, first: bool) -> None:
         """Put an item into a window, which then gives it its size."""
@@ -282,6 +303,7 @@ class Runner(QtCore.QObject):
             component = self._overlay_component = QtQml.QQmlComponent(self.engine, url)
             for window in self.windows():
                 overlay: Any = component.create()
+                overlay.setProperty("heading", _HEADINGS[self._root is not None])
                 overlay.setParentItem(window.contentItem())
                 self._overlays.append(overlay)
         for overlay in self._overlays:
