@@ -21,6 +21,7 @@ class Counter:
     Attributes:
         type: The action's type, of the robot's ROS.
         go: Goals wait for it.
+        stop: Goals that are cancelled wait for it.
         server: The server; None while none is offered.
     """
 
@@ -28,8 +29,9 @@ class Counter:
         package = "actionlib_tutorials" if url.startswith("ros1") else "example_interfaces"
         self.type = f"{package}/action/Fibonacci"
         self.ros1 = url.startswith("ros1")
-        self.robot, self.go = robot, threading.Event()
+        self.robot, self.go, self.stop = robot, threading.Event(), threading.Event()
         self.go.set()
+        self.stop.set()
         self.server: Any = None
 
     def offer(self) -> None:
@@ -42,6 +44,7 @@ class Counter:
         sequence = [0, 1]
         while len(sequence) < goal.goal.order:
             if goal.wait_for_cancel(0.01):
+                self.stop.wait(30)
                 break
             sequence = [*sequence[:40], sequence[-1] + 1]
             goal.publish_feedback(sequence=sequence)
@@ -55,6 +58,7 @@ def counter(live: Bench, url: str) -> Iterator[Counter]:
     made = Counter(live.robot, url)
     yield made
     made.go.set()
+    made.stop.set()
     if made.server is not None:
         made.server.close()
 
@@ -151,7 +155,10 @@ def test_cancelling(client: Client, counter: Counter, wait: Any) -> None:
     wait(lambda: client.run("client.ready"))
     client.run("send(50)")
     client.until("feedback")
+    counter.stop.clear()
     client.run("handle.cancel()")
+    wait(lambda: client.of("status")[-1] == [3])
+    counter.stop.set()
     assert client.until("result")[1] == 5
     assert client.of("status")[-2:] == [[3], [5]]
 
@@ -423,7 +430,10 @@ def test_ros1_cancelling(actionlib: Client, counter: Counter, wait: Any) -> None
     wait(lambda: actionlib.run("client.connected"))
     actionlib.run("send(50)")
     actionlib.until("feedback")
+    counter.stop.clear()
     actionlib.run("handle.cancel()")
+    wait(lambda: actionlib.run("handle.commState") == PREEMPTING)
+    counter.stop.set()
     actionlib.until("done")
     states = [state for _, state, _ in actionlib.of("state")]
     assert states[-4:] == [CANCEL_ACK, PREEMPTING, RESULT, DONE]

@@ -12,7 +12,6 @@ from rosglass.qml.answering import Answers
 from rosglass.qml.callbacks import call_back
 from rosglass.qml.element import RETRY, Element
 from rosglass.qml.js_values import properties_of
-from rosglass.qml.server_goal import ServerGoalHandle
 from rosglass.qml.singleton import full_type
 from rosglass.qt import Property, QJSValue, QtCore, Signal, is_alive
 
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
     from rosglass.comm.node import Node
     from rosglass.messages import Message
     from rosglass.qml.runtime import Runtime
+    from rosglass.qml.server_goal import ServerGoalHandle
 
 __all__ = ["ActionServer", "server_functions"]
 
@@ -252,6 +252,8 @@ class ActionServer(Element):
     ) -> Future[Any]:
         runtime = self._runtime
         assert runtime is not None
+
+        from rosglass.qml.server_goal import ServerGoalHandle  # noqa: PLC0415 - few have actions
 
         def forget(handle: ServerGoalHandle) -> None:
             if offer.handles.pop(goal.id, None) is handle and is_alive(self):

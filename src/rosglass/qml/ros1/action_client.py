@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import logging
-import re
 from typing import TYPE_CHECKING
 
 from rosglass.qml.action_client import GoalSender
@@ -13,22 +12,14 @@ from rosglass.qml.dialect import Dialect
 from rosglass.qml.goal_handle import GoalCallbacks
 from rosglass.qml.js_values import null
 from rosglass.qml.log import log_from_qml
+from rosglass.qml.ros1.action_server import action_type
 from rosglass.qml.ros1.goal_handle import RosGoalHandle
-from rosglass.qml.singleton import full_type
 from rosglass.qt import Property, QJSValue, Signal, Slot
 
 if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime
 
-__all__ = ["RosActionClient", "action_type"]
-
-_MESSAGE = re.compile(r"([A-Za-z]\w*)/([A-Za-z]\w*)Action\Z")
-
-
-def action_type(name: str) -> str:
-    """Return ``pkg/action/Do`` for ``pkg/DoAction``, as ROS 1 calls it, and for ``pkg/Do``."""
-    match = _MESSAGE.match(name)
-    return full_type(f"{match[1]}/{match[2]}" if match else name, "action")
+__all__ = ["RosActionClient"]
 
 
 class RosActionClient(GoalSender):

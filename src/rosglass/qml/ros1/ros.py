@@ -13,7 +13,6 @@ from rosglass.qml.from_js import qos_from_js
 from rosglass.qml.graph import GraphSingleton
 from rosglass.qml.log import Caller, log_from_qml
 from rosglass.qml.message_waiting import next_message
-from rosglass.qml.ros1.action_client import RosActionClient
 from rosglass.qml.ros1.action_server import RosActionServer
 from rosglass.qml.ros1.console import Console, InitOptions, short_logger
 from rosglass.qml.ros1.namespaces import within
@@ -192,6 +191,8 @@ class Ros(ValueFunctions, GraphSingleton):
         except Error as error:
             self._runtime.throw(f"Ros.createActionClient: {error}")
             return None
+        from rosglass.qml.ros1.action_client import RosActionClient  # noqa: PLC0415 - few have any
+
         return self._runtime.keep(RosActionClient(self._runtime, name, texts[-2]))
 
     @Slot(str, str, QJSValue, result=QtCore.QObject)

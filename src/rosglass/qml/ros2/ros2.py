@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from rosglass.comm.qos import QoS
 from rosglass.comm.time import Time
 from rosglass.errors import Error, InvalidNameError
-from rosglass.qml.action_client import ActionClient
 from rosglass.qml.action_server import ActionServer, server_functions
 from rosglass.qml.from_js import qos_from_js
 from rosglass.qml.graph import GraphSingleton
@@ -231,6 +230,8 @@ class Ros2(ValueFunctions, GraphSingleton):
         except Error as error:
             self._runtime.throw(f"Ros2.createActionClient: {error}")
             return None
+        from rosglass.qml.action_client import ActionClient  # noqa: PLC0415 - few have actions
+
         client = ActionClient(self._runtime, name, full_type(type_name, "action"))
         return self._runtime.keep(client)
 
