@@ -14,7 +14,16 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm.qos import Durability, History, QoS, Reliability
 from rosglass.errors import ConversionError
 from rosglass.qml.dialect import Dialect
-from rosglass.qml.js_values import Shown, integral, is_model, properties_of, roles_of, shown, wide
+from rosglass.qml.js_values import (
+    Shown,
+    integral,
+    is_model,
+    object_of,
+    properties_of,
+    roles_of,
+    shown,
+    wide,
+)
 from rosglass.qml.times import DECIMAL, from_milliseconds, known_parts, number_from_text, time_parts
 from rosglass.qt import QJSValue, QtCore, QtGui
 
@@ -159,7 +168,7 @@ class _Conversion:
         if value.isArray() or value.property("#index").isNumber():
             return self._elements(value, member, path)
         if is_model(value):
-            return self._rows(value.toQObject(), member, path)
+            return self._rows(object_of(value), member, path)
         constructor = value.property("constructor").property("name").toString()
         if member.number is not None and value.isObject():
             numbers = typed_array(value)
@@ -182,7 +191,7 @@ class _Conversion:
         source = value.property("#source")
         if source.isQObject():
             # A received array on its way back, untouched: no need to fetch it into JavaScript.
-            arrays: Any = getattr(source.toQObject(), "arrays", [])
+            arrays: Any = getattr(object_of(source), "arrays", [])
             index = value.property("#index").toInt()
             if 0 <= index < len(arrays) and arrays[index][0].struct is member.struct:
                 return arrays[index][1]

@@ -10,7 +10,17 @@ from rosglass.qt import QJSValue, QtCore, QtQml
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-__all__ = ["Shown", "integral", "is_model", "null", "properties_of", "roles_of", "shown", "wide"]
+__all__ = [
+    "Shown",
+    "integral",
+    "is_model",
+    "null",
+    "object_of",
+    "properties_of",
+    "roles_of",
+    "shown",
+    "wide",
+]
 
 #: No 64-bit integer has more digits.
 _WHOLE = re.compile(r"-?0*[0-9]{1,20}\Z")
@@ -30,9 +40,16 @@ def _iterate(value: QJSValue) -> Iterator[str]:
         yield properties.name()
 
 
+def object_of(value: QJSValue) -> Any:
+    """Return the QObject that a value is; something else when it is none."""
+    # PySide2 takes the value for the owner of what toQObject() gives: whoever else holds the object
+    # in Python would find it gone with the value.
+    return value.toVariant()
+
+
 def is_model(value: QJSValue) -> bool:
     """Return whether it is an item model: a ListModel, or one of C++ or Python."""
-    return value.isQObject() and isinstance(value.toQObject(), QtCore.QAbstractItemModel)
+    return value.isQObject() and isinstance(object_of(value), QtCore.QAbstractItemModel)
 
 
 def roles_of(model: Any) -> dict[str, int]:

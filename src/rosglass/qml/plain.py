@@ -6,7 +6,7 @@ from typing import Any
 
 from rosglass.errors import ConversionError
 from rosglass.qml.from_js import typed_array
-from rosglass.qml.js_values import Shown, integral, is_model, properties_of, roles_of
+from rosglass.qml.js_values import Shown, integral, is_model, object_of, properties_of, roles_of
 from rosglass.qml.times import duration_from_js, time_from_js
 from rosglass.qt import QJSValue, QtCore
 
@@ -47,9 +47,9 @@ def plain_from_js(value: QJSValue, path: str = "", depth: int = 0) -> Any:
     if value.isArray() or value.property("#index").isNumber():
         return _array(value, path, depth)
     if is_model(value):
-        return _rows(value.toQObject(), path, depth)
+        return _rows(object_of(value), path, depth)
     if value.isQObject():
-        meta = value.toQObject().metaObject()
+        meta = object_of(value).metaObject()
         own = range(meta.propertyOffset(), meta.propertyCount())
         names = [str(meta.property(at).name()) for at in own]
         return {name: _inner(value, name, path, depth) for name in names}
