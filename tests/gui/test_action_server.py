@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
@@ -13,8 +14,6 @@ from rosglass.comm import GoalStatus
 from rosglass.errors import GoalRejectedError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from rosglass.comm import ClientGoal
 
 SUCCEEDED, CANCELED, ABORTED = GoalStatus.SUCCEEDED, GoalStatus.CANCELED, GoalStatus.ABORTED
@@ -284,3 +283,49 @@ def test_misused_makers_throw(live: Bench) -> None:
         text = live.run(f"try {{ {script} }} catch (e) {{ return String(e) }}; return ''")
         assert text.startswith("Error:"), script
         assert told in text, text
+
+
+def test_the_example(live: Bench, robot: Robot, wait: Any) -> None:
+    from rosglass.qt import QtCore, QtQml
+
+    if robot.ros1:
+        pytest.skip("the example offers an action whose type only ROS 2 has")
+    file = Path(__file__).parents[2] / "examples" / "action_server.qml"
+    component = QtQml.QQmlComponent(live.engine, QtCore.QUrl.fromLocalFile(str(file)))
+    root: Any = component.create()
+    assert root is not None, component.errorString()
+    robot.client = live.robot.create_action_client("/fetch", robot.type)
+    goal = robot.send(2)
+    wait(lambda: root.property("job") is not None)
+    refused = robot.send(1)
+    wait(refused.done.done)
+    root.fetched()
+    assert goal.status is GoalStatus.EXECUTING
+    root.fetched()
+    assert robot.end(goal) == (SUCCEEDED, [2])
+    wait(lambda: root.property("job") is None)
+    root.deleteLater()
+
+
+def test_the_clients_example(live: Bench, robot: Robot, wait: Any) -> None:
+    from rosglass.qt import QtCore, QtQml
+
+    if robot.ros1:
+        pytest.skip("the example asks for an action whose type only ROS 2 has")
+
+    def turn(goal: Any) -> Any:
+        goal.publish_feedback(remaining=1.0)
+        goal.wait_for_cancel(30)
+        return {"delta": 1.0}
+
+    live.robot.create_action_server("/turn", "turtlesim/action/RotateAbsolute", turn)
+    file = Path(__file__).parents[2] / "examples" / "action_client.qml"
+    component = QtQml.QQmlComponent(live.engine, QtCore.QUrl.fromLocalFile(str(file)))
+    root: Any = component.create()
+    assert root is not None, component.errorString()
+    wait(lambda: root.property("client").property("ready"))
+    root.turn(90)
+    wait(lambda: root.property("outcome") == "57° to go")
+    root.property("goal").cancel()
+    wait(lambda: root.property("outcome") == "cancelled")
+    root.deleteLater()
