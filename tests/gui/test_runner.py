@@ -341,6 +341,24 @@ def test_errors_say_what_to_do(
     session.close()
 
 
+@pytest.mark.parametrize("module", ["QtMultimedia", "QtQuick.Controls"])
+def test_errors_name_the_package_that_is_missing(file: Path, module: str) -> None:
+    from rosglass.qml.load_errors import error_list
+    from rosglass.qt import QT6, QtCore, QtQml
+
+    error = QtQml.QQmlError()
+    error.setUrl(QtCore.QUrl.fromLocalFile(str(file)))
+    error.setLine(2)
+    error.setColumn(1)
+    error.setDescription(f'module "{module}" is not installed')
+    text = error_list([error], file)
+    assert text.startswith(f'{file}:2:1: module "{module}" is not installed; ')
+    if not QT6:
+        assert "apt install qml-module-qt" in text
+    elif module == "QtMultimedia":
+        assert text.endswith('to install it: pip install "rosglass[camera]"')
+
+
 def test_a_kiosk_stays_open_and_hides_the_pointer(
     app: Any, file: Path, world: MemoryWorld, wait: Any, monkeypatch: Any
 ) -> None:

@@ -122,6 +122,8 @@ class Application:
     def load(self) -> None:
         """Show the interface; :meth:`run` does it when this was not called.
 
+        A file with errors that is watched is shown once they are mended.
+
         Raises:
             QmlError: The file has errors; the message lists them as ``file:line:column: text``.
         """

@@ -1,5 +1,8 @@
 """Finding what an interface is told to use: its file, and folders of modules."""
 
+# Unlike pathlib's, these never raise.
+# ruff: noqa: PTH112, PTH113
+
 from __future__ import annotations
 
 import os
@@ -50,11 +53,11 @@ def interface_file(place: str | os.PathLike[str]) -> Path:
     """
     path = locate(place)
     shown = path if os.fspath(place).startswith(_PACKAGE) else place
-    if path.is_dir():
+    if os.path.isdir(path):
         inside = sorted(file.name for file in path.glob("*.qml"))
         hint = f"name a file in it: {', '.join(inside[:5])}" if inside else "it has no QML files"
         raise QmlError(f"{shown}:0:0: this is a folder; {hint}")
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise QmlError(f"{shown}:0:0: there is no such file")
     if path.suffix != ".qml":
         raise QmlError(f"{shown}:0:0: not a QML file, whose name would end in .qml")
@@ -71,6 +74,6 @@ def import_folder(place: str | os.PathLike[str]) -> Path:
         QmlError: There is no such folder.
     """
     path = locate(place)
-    if not path.is_dir():
+    if not os.path.isdir(path):
         raise QmlError(f"{os.fspath(place)}: there is no such folder to import QML modules from")
     return path

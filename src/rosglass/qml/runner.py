@@ -201,7 +201,7 @@ class Runner(QtCore.QObject):
         send_deferred_deletes()
 
     def _create(self) -> tuple[QtCore.QObject, QtQml.QQmlComponent]:
-        if not self.file.is_file():
+        if not os.path.isfile(self.file):  # noqa: PTH113 - pathlib's may raise
             raise QmlError(f"{self.file}:0:0: there is no such file")
         component = QtQml.QQmlComponent(self.engine, QtCore.QUrl.fromLocalFile(str(self.file)))
         root: QtCore.QObject | None = None if component.isError() else component.create()
