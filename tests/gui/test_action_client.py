@@ -323,6 +323,32 @@ def test_the_interface_shuts_down_and_starts_again(
     assert client.until("result")[1] == 4
 
 
+def test_the_type_is_the_servers(live: Bench, counter: Counter, wait: Any) -> None:
+    root: Any = live.load("""
+        QtObject {
+            property var client: Ros2.createActionClient("/count", "")
+            property int count
+            Component.onCompleted: client.sendGoal({order: 6}).then(
+                function (r) { count = r.result.sequence.length })
+        }
+    """)
+    wait(100)
+    counter.offer()
+    wait(lambda: root.property("count") == 6, 30)
+
+
+def test_a_goal_nobody_will_hear_of_any_more(client: Client, counter: Counter, wait: Any) -> None:
+    counter.offer()
+    wait(lambda: client.run("client.ready"))
+    client.run("send(50)")
+    client.until("feedback")
+    goal = client.root.property("handle")._goal
+    goal.close()  # as when its server is lost
+    assert client.until("result")[:3] == [True, 0, None]
+    assert client.run("[handle.status, handle.isActive]") == [0, False]
+    assert client.of("status")[-1] == [0]
+
+
 def test_nobody_holds_the_client(live: Bench, counter: Counter, wait: Any) -> None:
     """It stays, and so do its goals, until these have ended."""
     counter.offer()
@@ -423,6 +449,19 @@ def test_ros1_a_goal(actionlib: Client, counter: Counter, wait: Any) -> None:
     ]
     assert actionlib.run("handle.terminalState.state === ActionTerminalStates.SUCCEEDED")
     actionlib.run("handle.resend()")  # told in the log
+
+
+def test_ros1_names_within_a_namespace(live: Bench, counter: Counter, wait: Any) -> None:
+    counter.offer()
+    live.module = "Ros 1.0"
+    root: Any = live.load("""
+        QtObject {
+            property var client: Ros.createActionClient("/arm", "a/BAction", "count")
+            property var other: Ros.createActionClient("/arm", "a/BAction", "/count")
+            function names() { return [client.name, other.name, client.actionType].join() }
+        }
+    """)
+    assert root.names() == "/arm/count,/count,a/BAction"
 
 
 def test_ros1_cancelling(actionlib: Client, counter: Counter, wait: Any) -> None:

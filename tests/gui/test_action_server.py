@@ -160,6 +160,19 @@ def test_a_handle(live: Bench, robot: Robot, wait: Any) -> None:
     assert "ended" in text
 
 
+def test_a_forgotten_cancel_is_told_of(
+    live: Bench, robot: Robot, wait: Any, caplog: Any, monkeypatch: Any
+) -> None:
+    monkeypatch.setattr("rosglass.qml.server_goal._REMINDER", 50)
+    root = offer(live, robot, "execute: function (goal, h) { handle = h }")
+    goal = robot.send(5)
+    wait(lambda: run(root, "Boolean(handle)"))
+    goal.cancel()
+    wait(lambda: "end it with canceled()" in caplog.text)
+    run(root, "handle.canceled()")
+    assert robot.end(goal)[0] is CANCELED
+
+
 def test_a_refused_cancel(live: Bench, robot: Robot, wait: Any) -> None:
     root = offer(
         live,

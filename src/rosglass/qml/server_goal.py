@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 __all__ = ["ServerGoalHandle"]
 
+#: Milliseconds after which a request to cancel that has had no effect is told of.
+_REMINDER = 5000
+
 
 class ServerGoalHandle(QtCore.QObject):
     """A goal that was accepted; JavaScript sees the same object everywhere.
@@ -163,9 +166,18 @@ class ServerGoalHandle(QtCore.QObject):
         if requested and not self._requested:
             self._requested = True
             self.cancelRequestedChanged.emit()
+            QtCore.QTimer.singleShot(_REMINDER, self._remind)
         self._tell(self._goal.status)
         if not status.is_active:
             self.js = QJSValue()
+
+    def _remind(self) -> None:
+        if is_alive(self) and self._goal.status.is_active and not self._abandoned:
+            text = (
+                f"{self._label} was asked to be cancelled {_REMINDER / 1000:g} s ago, and runs on: "
+                "when isCancelRequested becomes true, end it with canceled()"
+            )
+            log_from_qml("", logging.WARNING, text, self._caller)
 
     def _tell(self, status: GoalStatus) -> None:
         if status is not self._status:
