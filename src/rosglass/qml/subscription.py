@@ -120,6 +120,10 @@ class Subscription(TopicElement):
         """Set what ``Ros2.createSubscription`` was given."""
         self._topic, self._wanted_type, self._qos = topic, type_name, qos
 
+    def source(self) -> tuple[str, str, QoS]:
+        """Return what it receives: topic (empty while unknown), type (empty for any), profile."""
+        return self._resolve(self._topic), self._wanted_type, self._qos
+
     # Properties that QML sets.
 
     def _get_topic(self) -> str:

@@ -14,6 +14,7 @@ from rosglass.qml.ros1.service import Service
 from rosglass.qml.ros1.service_server import RosServiceServer
 from rosglass.qml.ros1.subscriber import Subscriber
 from rosglass.qml.ros1.time import Time, WallTime
+from rosglass.qml.synchronized_subscription import RosSynchronizedSubscription
 from rosglass.qml.tf_broadcaster import RosTfBroadcaster
 from rosglass.qml.tf_buffer import RosTfBuffer, RosTfTransformListener
 from rosglass.qml.tf_transform import RosTfTransform
@@ -31,6 +32,7 @@ NATIVE = {
 }
 #: What QML can write, by name.
 TYPES = {
+    "SynchronizedSubscription": RosSynchronizedSubscription,
     "Replay": Replay,
     "ImagePublisher": RosImagePublisher,
     "TfBroadcaster": RosTfBroadcaster,

@@ -15,6 +15,7 @@ from rosglass.qml.ros2.ament_index import AmentIndex
 from rosglass.qml.ros2.ros2 import Ros2
 from rosglass.qml.service_server import ServiceServer
 from rosglass.qml.subscription import Subscription
+from rosglass.qml.synchronized_subscription import SynchronizedSubscription
 from rosglass.qml.tf_broadcaster import TfBroadcaster
 from rosglass.qml.tf_buffer import TfBuffer, TfTransformListener
 from rosglass.qml.tf_transform import TfTransform
@@ -30,6 +31,7 @@ NATIVE = {
 }
 #: What QML can write, by name.
 TYPES = {
+    "SynchronizedSubscription": SynchronizedSubscription,
     "Replay": Replay,
     "ImagePublisher": ImagePublisher,
     "TfBroadcaster": TfBroadcaster,

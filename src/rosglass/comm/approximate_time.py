@@ -1,0 +1,183 @@
+"""Matching messages of several topics by their time stamps.
+
+The policy is that of ROS's message_filters (``sync_policies::ApproximateTime``, described at
+https://wiki.ros.org/message_filters/ApproximateTime): sets are chosen by stamps alone, not by when
+messages arrive; no message is in two sets; sets do not cross; among the sets around one message,
+the pivot, the one that spans the least time is chosen.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Generic, TypeVar
+
+from rosglass.errors import ConversionError
+
+__all__ = ["ApproximateTime"]
+
+_T = TypeVar("_T")
+#: How much more a later set must gain in length, in tenths of what it is later: the age penalty.
+_PENALTY = 11
+
+
+class ApproximateTime(Generic[_T]):
+    """Finds sets of messages, one of each topic, whose stamps lie close together.
+
+    Of each topic, the messages from the candidate's on are kept until it is clear that no better
+    set can follow: as a rule until the next message of the topic that is not the pivot's. Stamps
+    that are equal match at once. Not safe for threads.
+
+    Args:
+        count: Topics, at least two.
+        queue_size: Messages of a topic that wait at most; the oldest one makes room.
+        slop: Nanoseconds that a set may span.
+
+    Attributes:
+        dropped: Messages that came into no set.
+
+    Raises:
+        ConversionError: An argument makes no sense.
+    """
+
+    def __init__(self, count: int, queue_size: int = 10, slop: int = 100_000_000) -> None:
+        if count < 2:
+            raise ConversionError("topics", count, "at least two of them")
+        if queue_size < 1:
+            raise ConversionError("queue size", queue_size, "at least 1")
+        if slop < 0:
+            raise ConversionError("slop", slop, "a time of 0 or more")
+        self._size, self._slop = queue_size, slop
+        self._queues: list[deque[tuple[int, _T]]] = [deque() for _ in range(count)]
+        #: What was passed over since the candidate was found, the candidate's own messages first.
+        self._past: list[list[tuple[int, _T]]] = [[] for _ in range(count)]
+        self._newest: list[int | None] = [None] * count
+        #: Whether messages were thrown out that could have made a better set.
+        self._cut = [False] * count
+        self._candidate: list[tuple[int, _T]] | None = None
+        self._pivot = 0
+        self._pivot_time = 0
+        self.dropped = 0
+
+    def add(self, index: int, stamp: int, item: _T) -> list[list[_T]]:
+        """Take a message in.
+
+        Stamps that go back, as when a recording begins again, throw away all that waits.
+
+        Args:
+            index: Its topic.
+            stamp: Its time in nanoseconds.
+            item: The message.
+
+        Returns:
+            The sets that are complete now, each in the order of the topics.
+        """
+        newest = self._newest[index]
+        if newest is not None and stamp < newest:
+            self.clear()
+        self._newest[index] = stamp
+        found: list[list[_T]] = []
+        queue = self._queues[index]
+        queue.append((stamp, item))
+        if len(queue) == 1:
+            self._search(found)
+        if len(queue) + len(self._past[index]) > self._size:
+            searching = self._candidate is not None
+            self._candidate = None
+            self._recover()
+            queue.popleft()
+            self.dropped += 1
+            self._cut[index] = True
+            if searching:
+                self._search(found)
+        return found
+
+    def clear(self) -> None:
+        """Throw away all that waits."""
+        self.dropped += sum(map(len, self._queues)) + sum(map(len, self._past))
+        for queue, past in zip(self._queues, self._past, strict=True):
+            queue.clear()
+            past.clear()
+        self._newest = [None] * len(self._queues)
+        self._cut = [False] * len(self._queues)
+        self._candidate = None
+
+    def _search(self, found: list[list[_T]]) -> None:
+        while all(self._queues):
+            heads = [queue[0][0] for queue in self._queues]
+            first, last = min(heads), max(heads)
+            start, end = heads.index(first), heads.index(last)
+            for index in range(len(heads)):
+                self._cut[index] &= index == end
+            if self._candidate is None:
+                if last - first > self._slop or self._cut[end]:
+                    self._queues[start].popleft()
+                    self.dropped += 1
+                    continue
+                self._keep()
+                self._pivot, self._pivot_time = end, last
+            elif self._is_better(first, last):
+                self._keep()
+            self._pass_over(start)
+            if start == self._pivot or self._is_late(last) or self._is_best():
+                self._give(found)
+
+    def _bounds(self) -> tuple[int, int]:
+        assert self._candidate is not None
+        stamps = [stamp for stamp, _ in self._candidate]
+        return min(stamps), max(stamps)
+
+    def _is_better(self, first: int, last: int) -> bool:
+        """Return whether a set is better than the candidate."""
+        start, end = self._bounds()
+        return (last - end) * _PENALTY < (first - start) * 10
+
+    def _is_late(self, last: int) -> bool:
+        """Return whether no set that ends at `last` or later can be better than the candidate."""
+        start, end = self._bounds()
+        return (last - end) * _PENALTY >= (self._pivot_time - start) * 10
+
+    def _is_best(self) -> bool:
+        """Return whether no better set can follow, whatever comes next on topics without more."""
+        if all(self._queues):
+            return False
+        at = [0] * len(self._queues)
+        while True:
+            # What is to come of a topic without more may at best have the pivot's stamp.
+            heads = [
+                queue[i][0] if i < len(queue) else max(self._newest_of(index), self._pivot_time)
+                for index, (queue, i) in enumerate(zip(self._queues, at, strict=True))
+            ]
+            first, last = min(heads), max(heads)
+            if self._is_late(last):
+                return True
+            if self._is_better(first, last):
+                return False
+            at[heads.index(first)] += 1
+
+    def _newest_of(self, index: int) -> int:
+        newest = self._newest[index]
+        assert newest is not None
+        return newest
+
+    def _keep(self) -> None:
+        """Make the heads the candidate."""
+        self._candidate = [queue[0] for queue in self._queues]
+        for past in self._past:
+            self.dropped += len(past)
+            past.clear()
+
+    def _pass_over(self, index: int) -> None:
+        self._past[index].append(self._queues[index].popleft())
+
+    def _recover(self) -> None:
+        for queue, past in zip(self._queues, self._past, strict=True):
+            queue.extendleft(reversed(past))
+            past.clear()
+
+    def _give(self, found: list[list[_T]]) -> None:
+        assert self._candidate is not None
+        found.append([item for _, item in self._candidate])
+        self._candidate = None
+        self._recover()
+        for queue in self._queues:
+            queue.popleft()
