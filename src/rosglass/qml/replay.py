@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
 from rosglass.qml.element import Element
-from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
+from rosglass.qml.singleton import strings
+from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
     from rosglass.bags import Playback
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["Replay"]
 
 _SCHEME = "replay:"
-_STRINGS: Any = "QStringList"
+_MOST_TOPICS = 10_000
 
 
 class Replay(Element):
@@ -99,9 +100,20 @@ class Replay(Element):
         if problem:
             self._refuse(f"Replay: {problem}")
 
-    def _set_topics(self, topics: list[Any]) -> None:
+    def _get_topics(self) -> QJSValue:
+        runtime = self._find_runtime()
+        return QJSValue() if runtime is None else runtime.value(self._topics)
+
+    def _set_topics(self, value: QJSValue | None) -> None:
+        topics: list[str] = []
+        if value is not None and not value.isUndefined() and not value.isNull():
+            # A list of Python is none that JavaScript calls an array.
+            if not (value.isObject() and value.property("length").toNumber() <= _MOST_TOPICS):
+                self._refuse("Replay: topics must be an array of names")
+                return
+            topics = strings(value)
         if topics != self._topics:
-            self._topics = list(topics)
+            self._topics = topics
             self.topicsChanged.emit()
             self._schedule()
 
@@ -117,7 +129,8 @@ class Replay(Element):
     playing = Property(bool, lambda self: self._shown[0], _set_playing, notify=playingChanged)
     position = Property(float, lambda self: self._shown[1], _set_position, notify=positionChanged)
     duration = Property(float, lambda self: self._shown[2], notify=durationChanged)
-    topics = Property(_STRINGS, lambda self: self._topics, _set_topics, notify=topicsChanged)
+    # Qt 5 ends the program when it makes a list of texts of certain objects.
+    topics = Property(QJSValue, _get_topics, _set_topics, notify=topicsChanged)
     toRobot = Property(bool, lambda self: self._to_robot, _set_to_robot, notify=toRobotChanged)
     ready = Property(bool, lambda self: self._playback is not None, notify=readyChanged)
     problem = Property(str, lambda self: self._problem, notify=problemChanged)
