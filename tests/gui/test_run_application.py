@@ -145,6 +145,48 @@ for _ in range(2):
     assert program.text.count("code 3 False") == 2
 
 
+def test_it_fits_into_the_qt_application_there_is(python: Any, tmp_path: Path) -> None:
+    (tmp_path / "Main.qml").write_text("import QtQuick 2.15\nItem {}")
+    program = python(
+        HEAD
+        + f"""
+from rosglass import Error
+from rosglass.qt import QtCore, QtGui, run_event_loop
+def attempt(job):
+    try:
+        print("result", job())
+    except Error as error:
+        print(error)
+file = {str(tmp_path / "Main.qml")!r}
+qt = QtGui.QGuiApplication([])
+app = Application(file)
+def later():
+    app.load()
+    attempt(app.run)
+    attempt(lambda: app.grab().width() > 0)
+    app.close()
+    app.close()
+    qt.exit(9)
+QtCore.QTimer.singleShot(0, later)
+print("code", run_event_loop(qt))
+"""
+    )
+    assert program.end(40) == 0, program.text
+    assert "Qt's event loop runs already: call load()" in program.text
+    assert "result True" in program.text
+    assert "code 9" in program.text
+    plain = python(
+        HEAD
+        + f"""
+from rosglass.qt import QtCore
+qt = QtCore.QCoreApplication([])
+Application({str(tmp_path / "Main.qml")!r})
+"""
+    )
+    assert plain.end(40) == 1
+    assert "can open no window: make a QGuiApplication" in plain.text
+
+
 def examples(page: Path) -> list[str]:
     """Return the Python programs of a page of the documentation."""
     return re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)

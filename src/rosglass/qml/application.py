@@ -52,8 +52,9 @@ class Application:
         QmlError: There is no such file or folder, or it is none of QML.
         UnsupportedError: There is no display.
         RosArgumentError: One of `ros_arguments` is not valid.
-        Error: This is not the main thread; `session` is given together with what describes one; a
-            name in `context` is none that QML can write.
+        Error: This is not the main thread, or the Qt application is one without windows; `session`
+            is given together with what describes one; a name in `context` is none that QML can
+            write.
     """
 
     def __init__(
@@ -81,6 +82,8 @@ class Application:
         path = interface_file(file)
         #: The Qt application.
         self.qt: Any = QtCore.QCoreApplication.instance() or _qt_application(path, arguments)
+        if not isinstance(self.qt, QtGui.QGuiApplication):
+            raise Error("the program's Qt application can open no window: make a QGuiApplication")
         self._owns_session = session is None
         #: The node that QML talks through.
         self.session = session or Session(
@@ -157,10 +160,12 @@ class Application:
 
         Raises:
             QmlError: The file has errors.
-            Error: It was closed before.
+            Error: It was closed before, or Qt's event loop runs already.
         """
         if self._closed:
             raise Error("this application has been closed; make another one")
+        if QtCore.QThread.currentThread().loopLevel():
+            raise Error("Qt's event loop runs already: call load() and leave the rest to it")
         signals: list[int] = []
 
         def interrupted(number: int) -> None:
