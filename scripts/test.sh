@@ -16,7 +16,8 @@ say "wheel"
 scripts/check_wheel.sh
 # Most tests wait for others most of the time: three side by side, each file in one process.
 # Once more what failed: with other programs, machines under load can. Each is listed at the end.
-side_by_side=(-n 3 --dist loadfile --reruns 1 --rerun-show-tracebacks)
+# A process that crashes fails its test and is not replaced: the others would wait for it for ever.
+side_by_side=(-n 3 --dist loadfile --max-worker-restart=0 --reruns 1 --rerun-show-tracebacks)
 say "tests on Debian's own Python and Qt 5 ($(.venv-system/bin/python -V))"
 scripts/private_network.sh .venv-system/bin/python -m pytest -q "${side_by_side[@]}" \
   tests/unit tests/gui "$@"

@@ -284,7 +284,7 @@ class ServiceFinder:
                 self.place = self.peer = None
                 self._fault = ""
         # The graph may lag behind: who has come and gone between two looks is in none of them.
-        known = bool(nodes) or self.peer is not None
+        known = bool(nodes or self._fault) or self.peer is not None
         if (known and time.monotonic() >= self._due) or self._owner.waits:
             self.look()
         self._owner.server_changed()

@@ -516,6 +516,18 @@ def test_a_server_that_was_killed_is_explained(client, node, master, free_port, 
     assert 0 < lookups < 20, "the master is asked again, but not without pause"
 
 
+def test_a_server_that_was_there_too_briefly_for_the_graph_is_missed_no_longer(
+    client, master, free_port, eventually
+):
+    state = master._getSystemState("/test")
+    master.answers["getSystemState"] = lambda _: state
+    master.offer("/add", free_port)
+    with pytest.raises(rosglass.ServiceUnavailableError, match="somebody offers it"):
+        client.call(timeout=1)
+    del master.services["/add"]
+    eventually(lambda: "no server offers /add" in client.problem)
+
+
 def test_a_server_that_comes_back_on_another_port_is_called_there(client, start_robot):
     first = start_robot(lambda sock, _: (receive_request(sock), sock.sendall(response(1))))
     assert client.call().sum == 1
