@@ -13,7 +13,7 @@ from rosglass.qml.callbacks import call_back
 from rosglass.qml.element import RETRY, Element
 from rosglass.qml.js_values import properties_of
 from rosglass.qml.singleton import full_type
-from rosglass.qt import Property, QJSValue, QtCore, Signal, is_alive
+from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -163,6 +163,7 @@ class ActionServer(Element):
                 self._at_end["offer"] = self._offer.close
             self._serve()
 
+    @Slot()
     def _serve(self) -> None:
         session, offer = self._session, self._offer
         if session is None or offer is None or offer.server is not None:

@@ -121,6 +121,7 @@ class Publisher(Element):
         if node is not None:
             self._advertise()
 
+    @Slot()
     def _advertise(self) -> None:
         node, session = self._have, self._session
         if node is None or session is None or self._sender is not None:

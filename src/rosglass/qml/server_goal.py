@@ -171,6 +171,7 @@ class ServerGoalHandle(QtCore.QObject):
         if not status.is_active:
             self.js = QJSValue()
 
+    @Slot()
     def _remind(self) -> None:
         if is_alive(self) and self._goal.status.is_active and not self._abandoned:
             text = (

@@ -10,7 +10,7 @@ from rosglass.qml.answering import Answers
 from rosglass.qml.element import RETRY, Element
 from rosglass.qml.from_js import fields_from_js
 from rosglass.qml.singleton import full_type
-from rosglass.qt import Property, QJSValue, QtCore, Signal, is_alive
+from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -99,6 +99,7 @@ class ServiceServer(Element):
             self._have = want
             self._offer()
 
+    @Slot()
     def _offer(self) -> None:
         session, runtime, want = self._session, self._runtime, self._have
         if session is None or runtime is None or want is None or self._server is not None:
