@@ -14,7 +14,8 @@ from rosglass.errors import Error
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.element import Element, changed_enough
 from rosglass.qml.from_js import fields_from_js
-from rosglass.qml.item_grab import GRABBED, ItemGrab, pixels_of, window_of
+from rosglass.qml.item_grab import GRABBED, ItemGrab, pixels_of
+from rosglass.qml.item_window import window_of
 from rosglass.qml.log import log_from_qml
 from rosglass.qt import Property, QJSValue, QtCore, QtGui, QtQuick, Signal, Slot, is_alive
 

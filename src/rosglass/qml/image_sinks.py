@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import UnsupportedError
 from rosglass.qml.image_item import ImageItem
+from rosglass.qml.item_window import window_of
 from rosglass.qt import QT6, QtCore, QtQuick, is_alive, optional
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ class Sink:
         None when that cannot be told: nobody knows what becomes of the pictures then.
         """
         item = self.item if isinstance(self.item, ImageItem) else self.item.parent()
-        window = item.window() if isinstance(item, QtQuick.QQuickItem) else None
+        window = window_of(item) if isinstance(item, QtQuick.QQuickItem) else None
         if window is None:
             return None
         place = item.mapRectToScene(QtCore.QRectF(0, 0, item.width(), item.height()))

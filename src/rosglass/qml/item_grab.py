@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rosglass.qml.item_window import window_of
 from rosglass.qt import QT6, QtCore, QtGui, QtQuick, is_alive
 
 if TYPE_CHECKING:
@@ -11,7 +12,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["GRABBED", "ItemGrab", "pixels_of", "window_of"]
+__all__ = ["GRABBED", "ItemGrab", "pixels_of"]
 
 #: Encodings that a grabbed picture can be turned into: Qt's format, and channels.
 GRABBED = {
@@ -22,20 +23,6 @@ GRABBED = {
 }
 #: Shares of red, green and blue in grey (ITU-R BT.601), as OpenCV and ROS's drivers have them.
 _GREY = (0.299, 0.587, 0.114)
-
-
-def window_of(item: QtQuick.QQuickItem) -> QtQuick.QQuickWindow | None:
-    """Return the window that an item is in, None when it is in none.
-
-    PySide takes an item for the owner of what ``item.window()`` gives: with the item's wrapper that
-    of the window would end, whoever holds it.
-    """
-    for window in QtGui.QGuiApplication.allWindows():
-        if isinstance(window, QtQuick.QQuickWindow):
-            content = window.contentItem()
-            if content is item or content.isAncestorOf(item):
-                return window
-    return None
 
 
 class ItemGrab:
