@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import threading
+import weakref
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
@@ -533,3 +535,24 @@ def test_ros1_misuse_throws(actionlib: Client, counter: Counter, wait: Any) -> N
         assert text is not None, script
         assert text.startswith("Error:"), text
         assert told in text, text
+
+
+def test_goals_leave_nothing_behind(
+    live: Bench, client: Client, counter: Counter, wait: Any
+) -> None:
+    counter.offer()
+    wait(lambda: client.run("client.ready"))
+    goals = []
+    for _ in range(3):
+        client.run("log = []; send(3)")
+        goals.append(weakref.ref(client.root.property("handle")._goal))
+        client.until("result")
+    client.run("handle = null; log = []; 0")
+
+    def gone() -> bool:
+        live.engine.collectGarbage()
+        gc.collect()
+        # JavaScript may take what is on its stack for a reference to the last one.
+        return sum(goal() is not None for goal in goals) <= 1
+
+    wait(gone)

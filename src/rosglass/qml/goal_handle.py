@@ -16,7 +16,7 @@ from rosglass.qml.log import log_from_qml
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from rosglass.comm.action import ActionClient, CancelAnswer, ClientGoal
     from rosglass.comm.node import Executor
@@ -26,7 +26,11 @@ if TYPE_CHECKING:
     from rosglass.qml.log import Caller
     from rosglass.qml.runtime import Runtime
 
-__all__ = ["GoalCallbacks", "GoalHandle", "tell_cancelling"]
+__all__ = ["GoalCallbacks", "GoalHandle", "let_go", "tell_cancelling"]
+
+
+#: Let go when JavaScript collects a handle: PySide 6.11 never frees the Python half.
+_HELD = ("_goal", "_told", "_forget", "_value", "_feedback", "_result", "_shown")
 
 
 def _ignore(_: object) -> None:
@@ -96,6 +100,8 @@ class GoalHandle(QtCore.QObject):
         engine = runtime.engine
         #: Keeps JavaScript from collecting it before the goal has ended.
         self.js: QJSValue = QJSValue() if engine is None else engine.newQObject(runtime.keep(self))
+        state = self.__dict__
+        self.destroyed.connect(lambda: let_go(state, _HELD))
 
     # What QML sees.
 
@@ -193,7 +199,7 @@ class GoalHandle(QtCore.QObject):
             result: The server's result; None when there is none.
             reason: Why there is none.
         """
-        if self._over or not is_alive(self):
+        if not is_alive(self) or self._over:
             return
         js = self.js
         self._forget(self)
@@ -283,6 +289,12 @@ class GoalHandle(QtCore.QObject):
             self.end(end.status, end.result, "")
         else:
             self.end(goal.status, None, str(error))
+
+
+def let_go(state: dict[str, object], names: Iterable[str]) -> None:
+    """Forget some attributes of an object that JavaScript has collected."""
+    for name in names:
+        state.pop(name, None)
 
 
 def tell_cancelling(answer: Promise[CancelAnswer], what: str, caller: Caller, refused: int) -> None:

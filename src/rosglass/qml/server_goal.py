@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
 from rosglass.qml.client_element import given_fields
+from rosglass.qml.goal_handle import let_go
 from rosglass.qml.goal_states import status_code
 from rosglass.qml.log import log_from_qml
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
@@ -25,6 +26,8 @@ __all__ = ["ServerGoalHandle"]
 
 #: Milliseconds after which a request to cancel that has had no effect is told of.
 _REMINDER = 5000
+#: Let go when JavaScript collects a handle: PySide 6.11 never frees the Python half.
+_HELD = ("_goal", "_forget", "_type", "_asked")
 
 
 class ServerGoalHandle(QtCore.QObject):
@@ -61,6 +64,8 @@ class ServerGoalHandle(QtCore.QObject):
         engine = runtime.engine
         #: Keeps JavaScript from collecting it before the goal has ended.
         self.js: QJSValue = QJSValue() if engine is None else engine.newQObject(runtime.keep(self))
+        self._id, state = goal.id_text, self.__dict__
+        self.destroyed.connect(lambda: None if goal.status.is_active else let_go(state, _HELD))
         goal.cancel_request.on_done(lambda _: self.refresh(), runtime.session.executor)
 
     # What QML sees.
@@ -155,6 +160,8 @@ class ServerGoalHandle(QtCore.QObject):
 
     def refresh(self) -> None:
         """Tell what has changed."""
+        if "_goal" not in self.__dict__:
+            return
         status = self._goal.status
         requested = self._is_requested()
         if not status.is_active:
@@ -162,6 +169,8 @@ class ServerGoalHandle(QtCore.QObject):
                 self.ended.set_result(None)
             self._forget(self)
         if not is_alive(self):
+            if not status.is_active:
+                let_go(self.__dict__, _HELD)
             return
         if requested and not self._requested:
             self._requested = True
@@ -187,4 +196,4 @@ class ServerGoalHandle(QtCore.QObject):
 
     @property
     def _label(self) -> str:
-        return f"goal {self._goal.id_text}"
+        return f"goal {self._id}"
