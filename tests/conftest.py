@@ -107,4 +107,5 @@ def pytest_runtest_makereport(
 def pytest_runtest_teardown(item: pytest.Item) -> None:
     """After a failure, end the peers of the whole module: neither it nor others get broken ones."""
     if item.stash[FAILED]:
-        item.session._setupstate.teardown_exact(None)
+        # What lasts for the session stays: user interfaces have their screen and application there.
+        item.session._setupstate.teardown_exact(item.session)
