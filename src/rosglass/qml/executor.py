@@ -8,7 +8,7 @@ from collections import deque
 from typing import TYPE_CHECKING
 
 from rosglass.comm.node import Executor
-from rosglass.qt import QtCore
+from rosglass.qt import QtCore, Signal, Slot
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -19,27 +19,32 @@ _log = logging.getLogger("rosglass.qml")
 
 
 class _Waker(QtCore.QObject):
-    """Lives on the GUI thread, which its events wake.
+    """Lives on the GUI thread, which its signal wakes.
 
-    A queued signal would do the same, but naming the kind of connection makes PySide load every
-    enumeration of Qt, which takes longer than anything else here.
+    An event of our own would do the same, but whoever posts it from another thread touches it once
+    more when it may have been delivered, and deleted, already: PySide2 crashes.
     """
+
+    _asked = Signal()
 
     def __init__(self, job: Callable[[], None]) -> None:
         super().__init__()
-        self._job = job
-        self._kind = QtCore.QEvent.Type.User
+        self._job, self._home = job, threading.get_ident()
+        # Queued between threads without saying so; naming the kind makes PySide load all of Qt's
+        # enumerations, which takes longer than anything else here.
+        self._asked.connect(self.run)
 
     def wake(self) -> None:
         """Run the job soon; from any thread."""
-        QtCore.QCoreApplication.postEvent(self, QtCore.QEvent(self._kind))
+        if threading.get_ident() == self._home:
+            QtCore.QTimer.singleShot(0, self.run)
+        else:
+            self._asked.emit()
 
-    def event(self, event: QtCore.QEvent) -> bool:
+    @Slot()
+    def run(self) -> None:
         """Run the job; Qt calls this on the GUI thread."""
-        if event.type() == self._kind:
-            self._job()
-            return True
-        return super().event(event)
+        self._job()
 
 
 class GuiExecutor(Executor):
