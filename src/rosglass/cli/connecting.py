@@ -44,8 +44,8 @@ _DISCOVERY = 3.0
 _PATIENCE, _KNOCK = 2.0, 0.5
 #: The same once the robot has answered.
 _SOON = 1.0
-#: Seconds without news after which the graph counts as known; ROS 1's master knows it at once.
-_QUIET = {"zenoh": 0.3, "dds": 0.7, "ros1": 0.0}
+#: Seconds without news after which the graph counts as known; some know it at once.
+_QUIET = {"zenoh": 0.3, "dds": 0.7, "ros1": 0.0, "replay": 0.0}
 
 
 def add_connection_options(

@@ -30,7 +30,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--url",
         default="",
-        help="address of the robot, e.g. zenoh://192.168.1.5:7447; default: ROSGLASS_URL",
+        help="address of the robot, e.g. zenoh://192.168.1.5:7447, or replay:FILE for a "
+        "recording; default: ROSGLASS_URL",
     )
     parser.add_argument("--name", default="", help="node name, instead of the one in the file")
     parser.add_argument(

@@ -266,3 +266,19 @@ def test_closing_ends_everything(drive, play):
     until(lambda: threading.active_count() <= threads)
     with pytest.raises(NodeClosedError):
         node.create_subscription("/chatter")
+
+
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        (["topic", "list"], "/chatter"),
+        (["topic", "echo", "/chatter", "--once"], "data: '"),
+        (["node", "list"], "/recording"),
+        (["service", "list"], ""),
+    ],
+)
+def test_commands_look_at_recordings(drive, capsys, command, told):
+    from rosglass.cli import main
+
+    main([*command, "--url", f"replay:{drive}"])
+    assert told in capsys.readouterr().out
