@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm.qos import Durability, History, QoS, Reliability
 from rosglass.errors import ConversionError
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.js_values import (
@@ -30,7 +29,7 @@ from rosglass.qt import QJSValue, QtCore, QtGui
 if TYPE_CHECKING:
     from rosglass.messages.schema import Member, Number, Schema
 
-__all__ = ["elements_from_js", "fields_from_js", "qos_from_js", "scalar_from_python", "typed_array"]
+__all__ = ["elements_from_js", "fields_from_js", "scalar_from_python", "typed_array"]
 
 _TYPED = {
     "Int8Array": "i1",
@@ -397,32 +396,3 @@ def _as_number(value: Any, code: str) -> Any:
         found = number_from_text(value)
         return int(found) if found.denominator == 1 else value
     return value
-
-
-def qos_from_js(value: QJSValue | None, default: QoS) -> QoS:
-    """Return the profile that QML gave: one made by ``Ros2.QoS()``, or a queue size.
-
-    Raises:
-        ConversionError: It is neither, or its depth is not a positive integer.
-    """
-    if value is None or value.isUndefined() or value.isNull():
-        return default
-    if value.isNumber():
-        return default.with_depth(_depth(value.toNumber()))
-    try:
-        if not value.hasProperty("reliability"):
-            raise ValueError
-        return QoS(
-            depth=_depth(value.property("size").toNumber()),
-            reliability=Reliability(value.property("reliability").toString()),
-            durability=Durability(value.property("durability").toString()),
-            history=History(value.property("history").toString()),
-        )
-    except ValueError:
-        raise ConversionError("qos", shown(value), "a queue size or Ros2.QoS()") from None
-
-
-def _depth(value: float) -> int:
-    if not value.is_integer() or not 1 <= value <= 1_000_000:
-        raise ConversionError("queue size", value, "an integer of 1 to 1000000")
-    return int(value)

@@ -56,19 +56,33 @@
         return revive(finish(JSON.parse(text)), shape, source)
     }
 
+    const BEST = "best_available"
     const qos = prototype(Object.prototype, {
         reliable: function () { this.reliability = "reliable"; return this },
         best_effort: function () { this.reliability = "best_effort"; return this },
+        reliability_system_default: function () { this.reliability = "system_default"; return this },
         durability_volatile: function () { this.durability = "volatile"; return this },
         transient_local: function () { this.durability = "transient_local"; return this },
+        durability_system_default: function () { this.durability = "system_default"; return this },
         keep_all: function () { this.history = "keep_all"; return this },
         keep_last: function (depth) { this.history = "keep_last"; this.size = depth; return this },
+        deadline: function (milliseconds) { this.deadlineMs = milliseconds; return this },
+        lifespan: function (milliseconds) { this.lifespanMs = milliseconds; return this },
+        liveliness_automatic: function () { this.liveliness = "automatic"; return this },
+        liveliness_manual_by_topic: function () { this.liveliness = "manual_by_topic"; return this },
+        liveliness_lease_duration: function (milliseconds) { this.leaseMs = milliseconds; return this },
+        best_available: function () {
+            this.reliability = this.durability = this.liveliness = BEST
+            this.deadlineMs = this.leaseMs = BEST
+            return this
+        },
         depth: function () { return this.size }
     })
 
-    function makeQos(reliability, durability, history, size) {
+    function makeQos(reliability, durability, history, size, liveliness, deadline, lifespan, lease) {
         return Object.assign(Object.create(qos), {
-            reliability: reliability, durability: durability, history: history, size: size
+            reliability: reliability, durability: durability, history: history, size: size,
+            liveliness: liveliness, deadlineMs: deadline, lifespanMs: lifespan, leaseMs: lease
         })
     }
 

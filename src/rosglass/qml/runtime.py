@@ -193,8 +193,9 @@ class Runtime(QtCore.QObject):
 
     def qos(self, qos: QoS) -> QJSValue:
         """Return a profile that QML can change and give to a publisher or subscription."""
-        parts = (qos.reliability.value, qos.durability.value, qos.history.value, qos.depth)
-        return self._call("makeQos", [self.value(part) for part in parts])
+        from rosglass.qml.profiles import qos_parts  # noqa: PLC0415 - few are made at start-up
+
+        return self._call("makeQos", [self.value(part) for part in qos_parts(qos)])
 
     def _shape(self, schema: Schema, dialect: Dialect) -> QJSValue:
         shape = self._shapes.get((schema, dialect))

@@ -12,7 +12,7 @@ from rosglass.comm.node import Executor
 from rosglass.comm.qos import Durability, QoS, Reliability
 from rosglass.errors import ConversionError, DecodeError, Error, TypeNotFoundError
 from rosglass.qml.element import DEFAULT_TIMEOUT, RETRY, TopicElement, changed_enough
-from rosglass.qml.from_js import qos_from_js
+from rosglass.qml.profiles import qos_from_js
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:

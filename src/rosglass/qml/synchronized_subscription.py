@@ -14,7 +14,7 @@ from rosglass.comm.executor import Dispatcher
 from rosglass.errors import ConversionError, DecodeError, Error, TypeNotFoundError
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.element import DEFAULT_TIMEOUT, RETRY, Element, changed_enough
-from rosglass.qml.from_js import qos_from_js
+from rosglass.qml.profiles import qos_from_js
 from rosglass.qml.subscription import DEFAULT_QOS, Subscription
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 from rosglass.errors import Error, InvalidNameError
 from rosglass.qml.action_server import server_functions
 from rosglass.qml.dialect import Dialect
-from rosglass.qml.from_js import qos_from_js
 from rosglass.qml.graph import GraphSingleton
 from rosglass.qml.log import Caller, log_from_qml
 from rosglass.qml.message_waiting import next_message
+from rosglass.qml.profiles import qos_from_js
 from rosglass.qml.ros1.action_server import RosActionServer
 from rosglass.qml.ros1.console import Console, InitOptions, short_logger
 from rosglass.qml.ros1.namespaces import within

@@ -9,10 +9,10 @@ from rosglass.comm.qos import QoS
 from rosglass.comm.time import Time
 from rosglass.errors import Error, InvalidNameError
 from rosglass.qml.action_server import ActionServer, server_functions
-from rosglass.qml.from_js import qos_from_js
 from rosglass.qml.graph import GraphSingleton
 from rosglass.qml.logger import Logger
 from rosglass.qml.message_waiting import next_message
+from rosglass.qml.profiles import qos_from_js
 from rosglass.qml.publisher import Publisher
 from rosglass.qml.service_client import ServiceClient
 from rosglass.qml.service_server import ServiceServer

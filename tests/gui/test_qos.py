@@ -1,0 +1,97 @@
+"""Quality of service in QML: every policy, there and back; what becomes of those that clash."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from rosglass.comm.qos import BEST_AVAILABLE, Durability, Liveliness, QoS, Reliability
+from rosglass.comm.time import Duration
+
+ALL = """Ros2.QoS().reliable().transient_local().keep_last(7).deadline(250).lifespan(1500.5)
+    .liveliness_manual_by_topic().liveliness_lease_duration(2000)"""
+
+
+def test_a_publisher_offers_every_policy(running: Any, wait: Any) -> None:
+    running.load(
+        f"QtObject {{ property var p: Ros2.createPublisher('/a', 'std_msgs/msg/Bool', {ALL}) }}"
+    )
+    wait(lambda: running.world.publishers)
+    assert running.world.publishers[0].qos == QoS(
+        depth=7,
+        durability=Durability.TRANSIENT_LOCAL,
+        deadline=Duration(250_000_000),
+        lifespan=Duration(1_500_500_000),
+        liveliness=Liveliness.MANUAL_BY_TOPIC,
+        lease_duration=Duration(2_000_000_000),
+    )
+
+
+def test_a_subscription_asks_for_what_is_available(running: Any, wait: Any) -> None:
+    running.load(
+        "Subscription { topic: '/a'; messageType: 'std_msgs/msg/Bool'; "
+        "qos: Ros2.QoS().best_available() }"
+    )
+    wait(lambda: running.world.subscriptions)
+    asked = running.world.subscriptions[0].qos
+    assert asked.reliability is Reliability.BEST_AVAILABLE
+    assert asked.durability is Durability.BEST_AVAILABLE
+    assert asked.liveliness is Liveliness.BEST_AVAILABLE
+    assert asked.deadline == asked.lease_duration == BEST_AVAILABLE
+
+
+def test_every_policy_can_be_read(bench: Any) -> None:
+    read = """const q = CODE
+        return [q.reliability, q.durability, q.liveliness, q.deadlineMs, q.lifespanMs, q.leaseMs]"""
+    assert bench.run(read.replace("CODE", ALL)) == [
+        "reliable",
+        "transient_local",
+        "manual_by_topic",
+        250,
+        1500.5,
+        2000,
+    ]
+    left = (
+        "Ros2.QoS().reliability_system_default().durability_system_default().liveliness_automatic()"
+    )
+    assert bench.run(read.replace("CODE", left)) == [
+        "system_default",
+        "system_default",
+        "automatic",
+        0,
+        0,
+        0,
+    ]
+
+
+def test_a_profile_comes_back_as_it_was_given(running: Any) -> None:
+    script = f"""const p = Ros2.createPublisher('/a', 'std_msgs/msg/Bool', {ALL})
+        const q = p.qos
+        return [q.deadlineMs, q.lifespanMs, q.leaseMs, q.liveliness, q.depth()]"""
+    assert running.run(script) == [250, 1500.5, 2000, "manual_by_topic", 7]
+
+
+def test_the_graph_tells_every_policy(running: Any, wait: Any) -> None:
+    profile = QoS(deadline=Duration(10_000_000), lease_duration=Duration(20_000_000))
+    running.robot.create_publisher("/a", "std_msgs/msg/Bool", profile)
+    script = """const q = Ros2.getPublishersInfo('/a')[0].qos
+        return [q.deadlineMs, q.lifespanMs, q.leaseMs, q.liveliness]"""
+    assert running.run(script) == [10, 0, 20, "automatic"]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        "deadline(-1)",
+        "deadline('soon')",
+        "deadline(NaN)",
+        "deadline(1e300)",
+        "lifespan({})",
+        "liveliness_lease_duration(undefined).deadline(null)",
+    ],
+)
+def test_limits_that_are_none_are_refused(running: Any, wrong: str) -> None:
+    script = f"""try {{ Ros2.createPublisher('/a', 'std_msgs/msg/Bool', Ros2.QoS().{wrong}) }}
+        catch (e) {{ return e.message }}"""
+    assert "milliseconds" in running.run(script)
