@@ -188,11 +188,14 @@ class Ros1ServiceServer(AnsweringServer[Session], Member):
             _log.info("%s: the request of %s is refused: %s", self.name, session.client, error)
             self._tell(session, f"service cannot process request: {error}")
             return
+        # Our own errors say where and why, as those of handlers in QML do.
+        reason = f": {error}" if isinstance(error, Error) else ""
         _log.error(
-            "%s: the callback failed on a request of %s; it is told the error instead",
+            "%s: the callback failed on a request of %s; it is told the error instead%s",
             self.name,
             session.client,
-            exc_info=error,
+            reason,
+            exc_info=None if reason else error,
         )
         told = str(error) or type(error).__name__
         self._tell(session, f"error processing request: {told}")

@@ -150,12 +150,15 @@ class Ros2ServiceServer(AnsweringServer[RequestId], Member):
         return "it is told the error instead" if told else "it gets no response, and waits"
 
     def _failed(self, request: RequestId, error: Exception) -> None:
+        # Our own errors say where and why, as those of handlers in QML do.
+        reason = f": {error}" if isinstance(error, Error) else ""
         _log.error(
-            "%s: the callback failed on a request of %s; %s",
+            "%s: the callback failed on a request of %s; %s%s",
             self.name,
             self._origin(request),
             self._consequence,
-            exc_info=error,
+            reason,
+            exc_info=None if reason else error,
         )
         self._replier.fail(request, f"{type(error).__name__}: {error}")
 
