@@ -9,50 +9,13 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from counting import Client, Counter
 
 from conftest import Bench
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
     from pathlib import Path
-
-
-class Counter:
-    """The robot's side: counts up to the order; an order of 50 goes on until it is cancelled.
-
-    Attributes:
-        type: The action's type, of the robot's ROS.
-        go: Goals wait for it.
-        stop: Goals that are cancelled wait for it.
-        server: The server; None while none is offered.
-    """
-
-    def __init__(self, robot: Any, url: str) -> None:
-        package = "actionlib_tutorials" if url.startswith("ros1") else "example_interfaces"
-        self.type = f"{package}/action/Fibonacci"
-        self.ros1 = url.startswith("ros1")
-        self.robot, self.go, self.stop = robot, threading.Event(), threading.Event()
-        self.go.set()
-        self.stop.set()
-        self.server: Any = None
-
-    def offer(self) -> None:
-        self.server = self.robot.create_action_server(
-            "/count", self.type, self.count, accept=lambda goal: goal.order > 0
-        )
-
-    def count(self, goal: Any) -> Any:
-        self.go.wait(30)
-        sequence = [0, 1]
-        while len(sequence) < goal.goal.order:
-            if goal.wait_for_cancel(0.01):
-                self.stop.wait(30)
-                break
-            sequence = [*sequence[:40], sequence[-1] + 1]
-            goal.publish_feedback(sequence=sequence)
-        if goal.goal.order == 13:
-            raise ValueError("unlucky")
-        return {"sequence": sequence}
 
 
 @pytest.fixture
@@ -92,30 +55,6 @@ CLIENT = """
         function run(script) { return JSON.stringify(eval(script)) }
     }
 """
-
-
-class Client:
-    """A root object with a client, its log as Python has it."""
-
-    def __init__(self, root: Any, wait: Callable[..., None]) -> None:
-        self.root, self.wait = root, wait
-
-    @property
-    def log(self) -> list[list[Any]]:
-        return self.run("log")
-
-    def of(self, kind: str) -> list[list[Any]]:
-        return [entry[1:] for entry in self.log if entry[0] == kind]
-
-    def run(self, script: str) -> Any:
-        import json
-
-        text = self.root.run(script)
-        return None if not text else json.loads(text)
-
-    def until(self, kind: str) -> list[Any]:
-        self.wait(lambda: self.of(kind), 30)
-        return self.of(kind)[-1]
 
 
 @pytest.fixture
@@ -396,145 +335,6 @@ def test_the_engine_goes_away_while_a_goal_runs(
     assert live.session.state == "connected"
     assert "internal error" not in caplog.text
     assert "callback failed" not in caplog.text
-
-
-# Ros 1.0
-
-
-@pytest.fixture
-def actionlib(live: Bench, counter: Counter, wait: Any) -> Client:
-    live.module = "Ros 1.0"
-    name = "actionlib_tutorials/FibonacciAction" if counter.ros1 else "example_interfaces/Fibonacci"
-    root = live.load(f"""
-        QtObject {{
-            property var client: Ros.createActionClient("{name}", "/count")
-            property var handle
-            property var log: []
-            property int connections
-            function send(order) {{
-                handle = client.sendGoal({{order: order}}, function (h) {{
-                    log.push(["state", h === handle, h.commState, h.terminalState.state])
-                    if (h.commState === ActionCommStates.DONE)
-                        log.push(["done", h.terminalState.text,
-                                  h.getResult() ? h.getResult().sequence.length : null])
-                }}, function (h, feedback) {{
-                    log.push(["feedback", h === handle, feedback.sequence.length])
-                }})
-            }}
-            function run(script) {{ return JSON.stringify(eval(script)) }}
-            Component.onCompleted: client.connectedChanged.connect(function () {{ connections++ }})
-        }}
-    """)
-    return Client(root, wait)
-
-
-GOAL_ACK, PENDING, ACTIVE, RESULT, CANCEL_ACK, RECALLING, PREEMPTING, DONE = range(8)
-RECALLED, REJECTED, PREEMPTED, ABORTED, SUCCEEDED, GOAL_LOST, UNKNOWN = range(7)
-
-
-def test_ros1_a_goal(actionlib: Client, counter: Counter, wait: Any) -> None:
-    assert actionlib.run("[client.connected, client.sendGoal({order: 3})]") == [False, None]
-    counter.offer()
-    wait(lambda: actionlib.run("client.connected && client.isServerConnected()"))
-    assert actionlib.run("connections") == 1
-    actionlib.run("send(5)")
-    assert actionlib.until("done")[1] == 5
-    states = actionlib.of("state")
-    assert states[-1] == [True, DONE, SUCCEEDED]
-    assert [state for _, state, _ in states] == sorted(state for _, state, _ in states)
-    assert {ACTIVE, RESULT} <= {state for _, state, _ in states}
-    assert {end for _, _, end in states[:-1]} == {UNKNOWN}
-    assert actionlib.of("feedback")[0] == [True, 3]
-    assert actionlib.run("[handle.expired, handle.commState === ActionCommStates.DONE]") == [
-        False,
-        True,
-    ]
-    assert actionlib.run("handle.terminalState.state === ActionTerminalStates.SUCCEEDED")
-    actionlib.run("handle.resend()")  # told in the log
-
-
-def test_ros1_names_within_a_namespace(live: Bench, counter: Counter, wait: Any) -> None:
-    counter.offer()
-    live.module = "Ros 1.0"
-    root: Any = live.load("""
-        QtObject {
-            property var client: Ros.createActionClient("/arm", "a/BAction", "count")
-            property var other: Ros.createActionClient("/arm", "a/BAction", "/count")
-            function names() { return [client.name, other.name, client.actionType].join() }
-        }
-    """)
-    assert root.names() == "/arm/count,/count,a/BAction"
-
-
-def test_ros1_cancelling(actionlib: Client, counter: Counter, wait: Any) -> None:
-    counter.offer()
-    wait(lambda: actionlib.run("client.connected"))
-    actionlib.run("send(50)")
-    actionlib.until("feedback")
-    counter.stop.clear()
-    actionlib.run("handle.cancel()")
-    wait(lambda: actionlib.run("handle.commState") == PREEMPTING)
-    counter.stop.set()
-    actionlib.until("done")
-    states = [state for _, state, _ in actionlib.of("state")]
-    assert states[-4:] == [CANCEL_ACK, PREEMPTING, RESULT, DONE]
-    assert actionlib.of("state")[-1][2] == PREEMPTED
-    actionlib.run("log = []; send(50)")
-    actionlib.until("feedback")
-    wait(20)  # dates have milliseconds
-    actionlib.run("client.cancelGoalsAtAndBeforeTime(new Date())")
-    assert actionlib.until("done") is not None
-    assert actionlib.of("state")[-1] == [True, DONE, PREEMPTED]
-    actionlib.run("log = []; send(50)")
-    actionlib.until("feedback")
-    actionlib.run("client.cancelAllGoals()")
-    actionlib.until("done")
-
-
-def test_ros1_goals_that_fail(actionlib: Client, counter: Counter, wait: Any) -> None:
-    counter.offer()
-    wait(lambda: actionlib.run("client.connected"))
-    actionlib.run("send(13)")
-    text, _ = actionlib.until("done")
-    assert actionlib.of("state")[-1][2] == ABORTED
-    assert "unlucky" in text or not counter.ros1
-    actionlib.run("log = []; send(0)")
-    actionlib.until("done")
-    assert actionlib.of("state")[-1][2] == REJECTED
-
-
-def test_ros1_the_interface_shuts_down(
-    live: Bench, actionlib: Client, counter: Counter, wait: Any, caplog: Any
-) -> None:
-    counter.offer()
-    wait(lambda: actionlib.run("client.connected"))
-    actionlib.run("send(50)")
-    actionlib.until("feedback")
-    live.session.shutdown()
-    assert actionlib.until("done")[1] is None
-    assert actionlib.of("state")[-1] == [True, DONE, GOAL_LOST]
-    assert actionlib.run("[handle.expired, client.connected]") == [True, False]
-    actionlib.run("handle.cancel()")
-    assert "has expired" in caplog.text
-
-
-def test_ros1_misuse_throws(actionlib: Client, counter: Counter, wait: Any) -> None:
-    counter.offer()
-    wait(lambda: actionlib.run("client.connected"))
-    for script, told in (
-        ("client.sendGoal({order: 'x'})", "order: expected"),
-        ("client.sendGoal({order: 1}, 5)", "transition_cb is not a function"),
-        ("client.sendGoal({order: 1}, null, 5)", "feedback_cb is not a function"),
-        ("client.cancelGoalsAtAndBeforeTime('noon')", "a time or a Date"),
-        ("Ros.createActionClient('a/BAction', 'no good')", "no good"),
-        ("Ros.createActionClient('a/BAction', 5)", "write Ros.createActionClient"),
-    ):
-        text = actionlib.run(
-            f"(function () {{ try {{ {script} }} catch (e) {{ return String(e) }} }})()"
-        )
-        assert text is not None, script
-        assert text.startswith("Error:"), text
-        assert told in text, text
 
 
 def test_goals_leave_nothing_behind(
