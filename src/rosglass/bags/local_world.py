@@ -54,6 +54,8 @@ class LocalWorld:
         self.dispatcher = Dispatcher("local callbacks")
         self.clock = Clock("local", self.dispatcher)
         self.clock.simulate(True)
+        #: When a message that is sent now arrives, in nanoseconds since the Unix epoch.
+        self.arrival: Callable[[], int] = lambda: self.clock.now().nanoseconds
         self.graph_listeners: Listeners[None] = Listeners(merge=True)
         self._lock = threading.Lock()
         self._publishers: list[LocalPublisher] = []
@@ -185,9 +187,9 @@ class LocalPublisher(Publisher):
         self._sequence += 1
         held = data.data if isinstance(data, Sample) else data
         held = bytes(held) if isinstance(held, bytearray) else held
-        now = self.world.clock.now().nanoseconds
-        sample = Sample(held, self.world.wire, self.type, now, None, b"", self._sequence)
-        self.world.send(self, sample)
+        world = self.world
+        sample = Sample(held, world.wire, self.type, world.arrival(), None, b"", self._sequence)
+        world.send(self, sample)
 
     def subscription_count(self) -> int:
         """Return how many subscriptions there are."""

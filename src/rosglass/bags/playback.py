@@ -82,6 +82,11 @@ class Playback(Handle):
         return self._player.position
 
     @property
+    def moment(self) -> int:
+        """The same as recorded: nanoseconds since the Unix epoch."""
+        return self._player.moment
+
+    @property
     def is_playing(self) -> bool:
         """Whether time passes."""
         running = self._player.status().state in {PlayerState.STARTING, PlayerState.PLAYING}

@@ -154,6 +154,11 @@ class Player(Handle):
         return ((self._position if target is None else target) - self._bag.start) / _NS
 
     @property
+    def moment(self) -> int:
+        """Where it is, as recorded: nanoseconds since the Unix epoch."""
+        return self._position
+
+    @property
     def is_paused(self) -> bool:
         """Whether time stands still."""
         return self._paused

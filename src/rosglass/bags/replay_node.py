@@ -84,6 +84,8 @@ class ReplayNode(LocalNode):
             self.world.close()
             raise
         if not self.playback.has_clock:
+            # The clock ticks; messages came in between.
+            self.world.arrival = lambda: self.playback.moment
             self.world.clock.advance(Time(self.playback.start))
         self._status = Status(ConnectionState.CONNECTED, f"playing the recording {path}")
 
