@@ -76,3 +76,36 @@ def test_a_foreign_source_gives_nothing(bench: Any) -> None:
 def test_functions_throw_what_javascript_can_catch(bench: Any, call: str) -> None:
     script = f"try {{ {call} }} catch (e) {{ return String(e).includes('Error') }}"
     assert bench.run(script) is True
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "<img src='file:///etc/passwd'><a href='http://x'>y</a>",
+        "file:///etc/passwd",
+        "'); Qt.quit(); ('",
+        "${Qt.quit()}",
+        '"}); Qt.openUrlExternally("http://x"); ({"',
+        "__proto__",
+        "\\u2028\\x00\\x1b[2J",
+        '{"#": "NaN", "#at": 0, "length": 9}',
+    ],
+)
+def test_text_from_the_network_stays_text(running: Any, wait: Any, text: str) -> None:
+    root: Any = running.load("""QtObject { id: root
+        property Subscription subscription: Subscription {
+            topic: "/evil"; throttleRate: 0; onNewMessage: message => root.got = message }
+        property var got
+        property string bound: subscription.message ? subscription.message.status[0].name : ""
+        function same(text) {
+            const status = got.status[0]
+            return typeof status.name === "string" && status.name === text && bound === text
+                && status.values[0].key === text && typeof status.values[0].key === "string"
+                && got.header.frame_id === text && Object.keys(got).length === 2 }
+    }""")
+    publisher = running.robot.create_publisher("/evil", "diagnostic_msgs/msg/DiagnosticArray")
+    wait(lambda: running.world.subscriptions)
+    pair = {"key": text, "value": text}
+    publisher.publish(header={"frame_id": text}, status=[{"name": text, "values": [pair]}])
+    wait(lambda: root.property("bound"))
+    assert root.same(text) is True

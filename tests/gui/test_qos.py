@@ -95,3 +95,23 @@ def test_limits_that_are_none_are_refused(running: Any, wrong: str) -> None:
     script = f"""try {{ Ros2.createPublisher('/a', 'std_msgs/msg/Bool', Ros2.QoS().{wrong}) }}
         catch (e) {{ return e.message }}"""
     assert "milliseconds" in running.run(script)
+
+
+def test_a_profile_that_clashes_is_a_problem_on_both_sides(
+    running: Any, wait: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root: Any = running.load("""QtObject {
+        property var publisher: Ros2.createPublisher("/a", "std_msgs/msg/Bool", 1)
+        property Subscription subscription: Subscription { topic: "/b" }
+        property int told: 0
+        Component.onCompleted: publisher.problemChanged.connect(() => told += 1)
+        function offered() { return publisher.problem }
+        function asked() { return subscription.problem }
+    }""")
+    wait(lambda: running.world.publishers and running.world.subscriptions)
+    assert root.offered() == ""
+    clash = "incompatible: reliable requested, best effort offered"
+    monkeypatch.setattr(type(running.world.publishers[0]), "problem", clash)
+    running.world.subscriptions[0].set_problem(clash)
+    wait(lambda: root.offered() == root.asked() == clash)
+    assert root.property("told") == 1
