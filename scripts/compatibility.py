@@ -17,9 +17,13 @@ sys.path.insert(0, str(Path(__file__).parent))
 from reference_members import NOTES, REFERENCE
 
 from rosglass.qml import ros1, ros2
+from rosglass.qml.action_client import ActionClient
+from rosglass.qml.goal_handle import GoalHandle
 from rosglass.qml.logger import Logger
 from rosglass.qml.publisher import Publisher
+from rosglass.qml.ros1.action_client import RosActionClient
 from rosglass.qml.ros1.console import Console
+from rosglass.qml.ros1.goal_handle import RosGoalHandle
 from rosglass.qml.ros1.package import Package
 from rosglass.qml.ros1.publisher import RosPublisher
 from rosglass.qml.service_client import ServiceClient
@@ -29,8 +33,22 @@ from rosglass.qt import QtCore
 PAGE = Path(__file__).parents[1] / "docs" / "compatibility.md"
 #: What only functions return, by the name that the reference gives it.
 RETURNED = {
-    "Ros": {"Console": Console, "IO": Io, "Package": Package, "Publisher": RosPublisher},
-    "Ros2": {"IO": Io, "Logger": Logger, "Publisher": Publisher, "ServiceClient": ServiceClient},
+    "Ros": {
+        "ActionClient": RosActionClient,
+        "Console": Console,
+        "GoalHandle": RosGoalHandle,
+        "IO": Io,
+        "Package": Package,
+        "Publisher": RosPublisher,
+    },
+    "Ros2": {
+        "ActionClient": ActionClient,
+        "GoalHandle": GoalHandle,
+        "IO": Io,
+        "Logger": Logger,
+        "Publisher": Publisher,
+        "ServiceClient": ServiceClient,
+    },
 }
 BEGIN, END = "<!-- members -->\n", "<!-- end -->\n"
 
