@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+# PySide2 cannot tell what a type inherits; the members are the same files' on both Qt versions.
+pytestmark = pytest.mark.skipif(
+    find_spec("PySide6") is None, reason="the page is made from the types as Qt 6 sees them"
+)
 
 ROOT = Path(__file__).parents[2]
 

@@ -14,9 +14,10 @@ from rosglass.qt import _refuse_broken_binding, choose_binding
 def test_none_keeps_its_references(app) -> None:
     app.processEvents()
     before = sys.getrefcount(None)
-    for _ in range(200):
+    for _ in range(1000):
         app.processEvents()
-    assert sys.getrefcount(None) - before > -20
+    # What other tests have left behind may go meanwhile; the fault takes one per call.
+    assert sys.getrefcount(None) - before > -500
 
 
 def test_the_version_that_does_not_is_refused() -> None:
