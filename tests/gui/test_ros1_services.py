@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -124,3 +125,61 @@ def test_the_interface_lives_while_a_call_waits(live: Bench, told: list[Any], wa
     threading.Timer(1.5, go.set).start()
     wait(lambda: root.property("answer") is True)
     assert root.property("ticks") > 30
+
+
+def test_calls_that_wait_within_each_other_leave_the_stop_button_alive(
+    live: Bench, told: list[Any], wait: Any, caplog: Any
+) -> None:
+    """A robot that does not answer must not use up the stack, which everything needs."""
+    go, heard = threading.Event(), []
+
+    def slow(request: Any) -> dict[str, Any]:
+        assert go.wait(60)
+        return {"success": True}
+
+    live.robot.create_service_server("/slow", "std_srvs/srv/Trigger", slow)
+    observer = live.world.connect(None, "observer")
+    observer.create_subscription("/stop", "std_msgs/msg/Bool", lambda m: heard.append(m.data))
+    root: Any = live.load("""
+        QtObject {
+            id: root
+            property int depth: 0
+            property int deepest: 0
+            property int calls: 0
+            property var answers: []
+            property var stop: Ros.advertise("std_msgs/Bool", "/stop", 10)
+            function ready() { return stop.getNumSubscribers() }
+            function start() { timer.start() }
+            property Timer timer: Timer {
+                interval: 1; repeat: true
+                onTriggered: {
+                    if (++root.calls === 400) {
+                        stop()
+                        root.stop.publish({data: true})
+                        return
+                    }
+                    root.deepest = Math.max(root.deepest, ++root.depth)
+                    root.answers.push(Service.call("/slow", "std_srvs/Trigger"))
+                    --root.depth
+                }
+            }
+            function refused() { return answers.filter(a => a === false).length }
+            function given() { return answers.filter(a => a && a.success).length }
+        }
+    """)
+    wait(root.ready)
+    observing = threading.Thread(target=lambda: (_until(lambda: heard), go.set()))
+    observing.start()
+    root.start()
+    wait(lambda: root.property("depth") == 0 and root.given())
+    observing.join()
+    assert heard == [True]
+    assert 10 < root.property("deepest") < 50
+    assert root.refused() > 300
+    assert "not waited for" in caplog.text
+
+
+def _until(condition: Any) -> None:
+    until = time.monotonic() + 30
+    while not condition() and time.monotonic() < until:
+        time.sleep(0.01)

@@ -11,7 +11,11 @@ if TYPE_CHECKING:
 
     from rosglass.qml.session import Session
 
-__all__ = ["wait_for"]
+__all__ = ["MOST_WAITING", "wait_for"]
+
+#: Calls that wait within each other at most. Each needs a part of the stack, and once that is used
+#: up, nothing works any more, a stop button neither.
+MOST_WAITING = 16
 
 
 class _Keeper(QtCore.QObject):
@@ -39,7 +43,7 @@ class _Keeper(QtCore.QObject):
                 item.deleteLater()
 
 
-def wait_for(session: Session, begin: Callable[[Callable[[], None]], None]) -> None:
+def wait_for(session: Session, begin: Callable[[Callable[[], None]], None]) -> bool:
     """Return once something has ended; meanwhile the interface lives on.
 
     Events are handled as ever: pictures are drawn, a stop button works. Ends early when the
@@ -48,6 +52,9 @@ def wait_for(session: Session, begin: Callable[[Callable[[], None]], None]) -> N
     Args:
         session: The session.
         begin: Starts it; given the function to call, on the GUI thread, when it has ended.
+
+    Returns:
+        False when it was started and not waited for, as :data:`MOST_WAITING` calls wait already.
     """
     app = QtCore.QCoreApplication.instance()
     assert app is not None
@@ -61,7 +68,9 @@ def wait_for(session: Session, begin: Callable[[Callable[[], None]], None]) -> N
 
     begin(end)
     if ended:
-        return
+        return True
+    if session.waiting_calls >= MOST_WAITING:
+        return False
     app.installEventFilter(keeper)
     session.waiting_calls += 1
     try:
@@ -74,3 +83,4 @@ def wait_for(session: Session, begin: Callable[[Callable[[], None]], None]) -> N
         keeper.release()
         session.waiting_calls -= 1
         session.call_ended.emit()
+    return True

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from rosglass.errors import Error
 from rosglass.qml.log import log_from_qml
-from rosglass.qml.waiting import wait_for
+from rosglass.qml.waiting import MOST_WAITING, wait_for
 from rosglass.qt import QJSValue, QtCore, Slot
 
 if TYPE_CHECKING:
@@ -89,7 +89,8 @@ class Package(QtCore.QObject):
 
             session.background(lambda: _rospack(command), done)
 
-        wait_for(session, begin)
+        if not wait_for(session, begin):
+            printed[0] = Error(f"{MOST_WAITING} calls wait already")
         result = printed[0]
         if isinstance(result, Error):
             text = f"Ros.package.command({command!r}) failed: {result}"

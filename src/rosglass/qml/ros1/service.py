@@ -12,7 +12,7 @@ from rosglass.qml.log import log_from_qml
 from rosglass.qml.runtime import own_runtime
 from rosglass.qml.service_client import ServiceClient
 from rosglass.qml.singleton import full_type
-from rosglass.qml.waiting import wait_for
+from rosglass.qml.waiting import MOST_WAITING, wait_for
 from rosglass.qt import QJSValue, QtCore, Slot, is_alive
 
 if TYPE_CHECKING:
@@ -56,8 +56,13 @@ class Service(QtCore.QObject):
                 end()
 
         caller = runtime.caller()
-        wait_for(runtime.session, begin)
-        result = answer[0] if answer else Error(f"{service} was not called to the end")
+        if wait_for(runtime.session, begin):
+            result = answer[0] if answer else Error(f"{service} was not called to the end")
+        else:
+            result = Error(
+                f"{service} is called, but not waited for: {MOST_WAITING} calls wait already, for "
+                "robots that do not answer; use Service.callAsync() where many may wait"
+            )
         if isinstance(result, Error):
             log_from_qml("", logging.ERROR, f"Service.call: {result}", caller)
         return client.shown(result)
