@@ -487,3 +487,23 @@ def test_a_topic_much_faster_than_it_is_shown_may_come_some_messages_at_a_time(
     wait(patient)
     sub.setProperty("throttleRate", 0)
     wait(lambda: not received.patient)
+
+
+@pytest.mark.parametrize("url", ["zenoh"], indirect=True, scope="module")
+def test_a_successor_that_has_said_nothing_is_not_trusted(live: Any, wait: Any) -> None:
+    """The robot was restarted: what its predecessor latched is not what holds now."""
+    latched = QoS(depth=1, durability=Durability.TRANSIENT_LOCAL)
+    live.robot.create_publisher("/armed", TEXT, latched).publish(data="disarmed")
+    root = load(live, 'topic: "/armed"; qos: Ros2.QoS().transient_local().reliable()')
+    sub = root.property("sub")
+    wait(lambda: not sub.property("stale"))
+    live.robot.close()
+    wait(lambda: sub.property("stale"))
+    robot = live.world.connect(None, "robot")
+    successor = robot.create_publisher("/armed", TEXT, latched)
+    wait(lambda: sub.getPublisherCount() == 1)
+    wait(300)
+    assert sub.property("stale")
+    successor.publish(data="armed")
+    wait(lambda: not sub.property("stale"))
+    robot.close()

@@ -103,6 +103,8 @@ class Subscription(TopicElement):
         self._throttle = 20
         self._timeout: int | None = None
         self._sample: Sample | None = None
+        #: Whether it came with the present subscription, and so from the present robot.
+        self._current = False
         self._value: QJSValue | None = None
         self._shown_at = self._late = 0.0
         self._age, self._frequency, self._bandwidth, self._dropped = -1.0, 0.0, 0.0, 0
@@ -316,6 +318,7 @@ class Subscription(TopicElement):
         self._timer.stop()
         self._retry.stop()
         feed, self._feed = self._feed, None
+        self._current = False
         self._at_end.pop("feed", None)
         if feed is None or self._session is None:
             return
@@ -369,7 +372,7 @@ class Subscription(TopicElement):
         name = self.DIALECT.type_name(sample.type.definition.name)
         new_type = name != self._found_type and not self._wanted_type
         self._found_type = name
-        self._sample, self._value = sample, None
+        self._sample, self._value, self._current = sample, None, True
         self._shown_at = time.monotonic()
         self._late = self._lateness(sample)
         self._age = 0.0
@@ -422,8 +425,20 @@ class Subscription(TopicElement):
         # Who latched the message is there: had it changed, the new one would have come.
         latched = self._qos.durability is Durability.TRANSIENT_LOCAL
         connected = self._session is not None and self._session.state == "connected"
-        if latched and connected and self._get_subscribed() and self._count_publishers():
+        if latched and connected and self._current and self._sender_is_there():
             self._suspect = False
+
+    def _sender_is_there(self) -> bool:
+        """Return whether who sent the message still publishes, and is not one who came after it."""
+        node, sample = self.node, self._sample
+        if node is None or sample is None:
+            return False
+        try:
+            publishers = node.publishers(self._resolved)
+        except Error:
+            return False
+        known = [one.gid for one in publishers if one.gid]
+        return sample.publisher in known if known else bool(publishers)
 
     def _stale_changed(self) -> None:
         self.staleChanged.emit()
