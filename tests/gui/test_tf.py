@@ -86,6 +86,55 @@ def test_following(live: Bench, robot: Robot, module: str, wait: Any) -> None:
     wait(lambda: root.shown().startswith("true,true"))
 
 
+def test_a_chain_with_a_link_that_stands_still_is_stale(live: Bench, wait: Any) -> None:
+    """The localisation goes on, the odometry is dead: the robot stands still on the screen."""
+    broadcaster, ended = TransformBroadcaster(live.robot), threading.Event()
+
+    def send(parent: str, child: str) -> None:
+        place = Transform((1.0, 0.0, 0.0), stamp=Time.now(), frame_id=parent, child_frame_id=child)
+        broadcaster.send_transform(place)
+
+    odometry = threading.Event()
+
+    def localise() -> None:
+        while not ended.wait(0.05):
+            send("map", "odom")
+            if not odometry.is_set():
+                send("odom", "base")
+
+    thread = threading.Thread(target=localise)
+    thread.start()
+    try:
+        root: Any = live.load(FOLLOWING)
+        wait(lambda: root.shown().startswith("true,false"))
+        odometry.set()
+        wait(lambda: root.shown().startswith("true,true"))
+    finally:
+        ended.set()
+        thread.join()
+
+
+def test_what_a_dead_robot_left_behind_is_stale(live: Bench, robot: Robot, wait: Any) -> None:
+    first: Any = live.load(FOLLOWING)
+    wait(lambda: first.shown().startswith("true,false"))
+    robot.close()
+    wait(lambda: first.shown().startswith("true,true"))
+    page: Any = live.load("""
+        QtObject {
+            property var seen: []
+            property TfTransform tf: TfTransform {
+                sourceFrame: "base"; targetFrame: "map"
+                onStaleChanged: seen.push(stale)
+            }
+            function valid() { return tf.valid }
+            function seenLive() { return seen.length }
+        }
+    """)
+    wait(page.valid)
+    wait(200)
+    assert page.seenLive() == 0
+
+
 def test_static_transforms_stay_fresh(live: Bench, robot: Robot, wait: Any) -> None:
     root: Any = live.load("""
         QtObject {
