@@ -87,3 +87,26 @@ def test_setting_too_early_is_told(bench: Any, caplog: Any) -> None:
     root: Any = bench.load(QML)
     root.set(1)
     assert "nothing was set" in caplog.text
+
+
+@ROS2
+def test_what_is_wrong_stays_said(ros2: Bench, wait: Any) -> None:
+    root: Any = ros2.load(QML.replace('"speed"', '"sped"'))
+    wait(lambda: "has no 'sped'" in root.info())
+    ticks: list[None] = []
+    ros2.session.tick.connect(lambda: ticks.append(None))
+    wait(lambda: len(ticks) > 3)
+    assert "has no 'sped'" in root.info()
+    ros2.robot.parameters.declare("sped", 2)
+    wait(lambda: root.info().endswith(","))
+    assert root.shown() == "2"
+
+
+def test_nothing_is_pending_without_a_node(live: Bench, wait: Any) -> None:
+    live.robot.parameters.declare("speed", 1.5)
+    root: Any = live.load(QML)
+    wait(lambda: root.info().startswith("true,false"))
+    root.set(1)
+    assert root.info().startswith("true,true")
+    live.session.shutdown()
+    wait(lambda: root.info().startswith("false,false"))

@@ -57,6 +57,11 @@ class MessageItemModel(QtCore.QAbstractItemModel):
         self._items: dict[int, TreeItem] = {}
         self._waiting: QJSValue | None = None
         self._value: QJSValue | None = None
+        # PySide 6.11 never frees the Python half of what QML has made.
+        state = self.__dict__
+        self.destroyed.connect(
+            lambda: state.update(_root=None, _items={}, _waiting=None, _value=None)
+        )
 
     # Properties.
 

@@ -44,6 +44,8 @@ class Parameter(Element):
         self._value: Any = None
         self._descriptor: ParameterDescriptor | None = None
         self._ready, self._writes = False, 0
+        #: Why there is no value although the node is there.
+        self._missing = ""
         self._link: ParameterLink | None = None
         self._have: tuple[Node, str, str] | None = None
 
@@ -66,8 +68,7 @@ class Parameter(Element):
         return QJSValue() if runtime is None else runtime.value(_shown(self._value))
 
     def _set_value(self, value: QJSValue) -> None:
-        caller = self._find_runtime()
-        link = self._link
+        runtime, link = self._find_runtime(), self._link
         if link is None or self._have is None:
             self._refuse(f"Parameter {self._name!r}: nothing was set: {self._reason()}")
             return
@@ -76,18 +77,16 @@ class Parameter(Element):
         except ConversionError as error:
             self._refuse(f"Parameter {self._name!r}: {error}")
             return
-        place = caller.caller() if caller is not None else None
+        place = runtime.caller() if runtime is not None else None
         have = self._have
         self._writes += 1
         self.pendingChanged.emit()
 
         def done(reason: str | Error) -> None:
-            if not is_alive(self):
+            if not is_alive(self) or have is not self._have:
                 return
             self._writes -= 1
             self.pendingChanged.emit()
-            if have is not self._have:
-                return
             if reason:
                 text = f"Parameter {self._name!r} of {have[1]}: {reason}"
                 if place is not None:
@@ -159,7 +158,12 @@ class Parameter(Element):
         self._at_end.pop("link", None)
         if link is not None:
             link.leave(self)
+        self._missing = ""
         self._set_ready(False)
+        if self._writes:
+            # Nobody will say what became of them.
+            self._writes = 0
+            self.pendingChanged.emit()
         if self._value is not None:
             self._value = None
             self.valueChanged.emit()
@@ -168,7 +172,7 @@ class Parameter(Element):
     def _on_tick(self) -> None:
         link = self._link
         if link is not None:
-            self._say(link.problem)
+            self._say(link.problem or self._missing)
             self._set_ready(link.ready)
 
     def _set_ready(self, ready: bool) -> None:
@@ -185,10 +189,12 @@ class Parameter(Element):
             if not is_alive(self) or link is not self._link:
                 return
             if isinstance(result, Error):
-                self._say(f"Parameter {self._name!r}: {result}")
+                self._missing = f"Parameter {self._name!r}: {result}"
+                self._say(self._missing)
                 return
             value, self._descriptor = result
-            self._say("" if value is not None else f"{self._node_name} has no {self._name!r}")
+            self._missing = "" if value is not None else f"{self._node_name} has no {self._name!r}"
+            self._say(self._missing)
             self.descriptionChanged.emit()
             self._take(self._name, value)
 
@@ -196,7 +202,7 @@ class Parameter(Element):
 
     def _take(self, name: str, value: Any) -> None:
         if is_alive(self) and name == self._name and value != self._value:
-            self._value = value
+            self._value, self._missing = value, ""
             self.valueChanged.emit()
 
     def _problem_changed(self) -> None:

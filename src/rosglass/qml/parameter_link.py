@@ -79,8 +79,8 @@ class ParameterLink:
             return
         self._closed = True
         self._session.shared.pop((type(self), self._node, self._name), None)
-        self._worker.post(self._shut)
-        self._worker.close()
+        # A question may be on its way, which the GUI thread must not wait for.
+        self._session.background(self._shut)
 
     @property
     def ready(self) -> bool:
@@ -139,6 +139,7 @@ class ParameterLink:
             _log.warning("the parameters of %s: %s", self._name, error)
 
     def _shut(self) -> None:
+        self._worker.close()
         for part in (self._watch, self._client):
             if part is not None:
                 part.close()

@@ -19,6 +19,8 @@ from rosglass.qml.subscription import DEFAULT_QOS, Subscription
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rosglass.comm.node import Node
     from rosglass.comm.qos import QoS
     from rosglass.comm.sample import Sample
@@ -42,7 +44,7 @@ class _Matcher:
         queue_size: Messages of a topic that wait at most.
         slop: Nanoseconds that a set may span.
         headerless: Whether messages without header count by the time of their arrival.
-        arrived: Called on the GUI thread when there are sets.
+        arrived: Called on the GUI thread with this object when there are sets.
         executor: The GUI thread.
 
     Raises:
@@ -56,7 +58,7 @@ class _Matcher:
         queue_size: int,
         slop: int,
         headerless: bool,
-        arrived: Any,
+        arrived: Callable[[_Matcher], None],
         executor: GuiExecutor,
     ) -> None:
         self._match: ApproximateTime[Sample] = ApproximateTime(len(wanted), queue_size, slop)
@@ -162,7 +164,7 @@ class SynchronizedSubscription(Element):
     problemChanged = Signal()
     newMessages = Signal(QJSValue, arguments=["messages"])
 
-    _HOLDS = ("_samples", "_value", "_matcher", "_have")
+    _HOLDS = ("_topics", "_subscriptions", "_samples", "_value", "_matcher", "_have")
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None

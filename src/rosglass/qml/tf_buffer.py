@@ -11,7 +11,7 @@ from rosglass.qml.tf_queries import TfQueries
 from rosglass.qt import Property, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
-    from rosglass.comm.node import Handle, Node
+    from rosglass.comm.node import Node
     from rosglass.qml.runtime import Runtime
     from rosglass.qt import QtCore
 
@@ -29,13 +29,13 @@ class _Listening(TfQueries):
     bufferChanged = Signal()
     problemChanged = Signal()
 
+    _HOLDS = ("_link", "_have")
+
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         super().__init__(parent, runtime)
         self._have: tuple[Node, str] | None = None
-        self._watches: list[Handle] = []
-        self._told = False
 
     problem = Property(str, lambda self: self._problem, notify=problemChanged)
 
@@ -61,21 +61,24 @@ class _Listening(TfQueries):
             from rosglass.qml.tf_link import TfLink  # noqa: PLC0415 - brings in the transforms
 
             link = self._link = TfLink.join(session, want[0], want[1], self)
-            self._at_end["link"] = lambda: link.leave(self)
-            self._watches = [
+            watches = [
                 link.buffer.on_update(self._on_update, session.executor),
                 link.buffer.on_tree_change(self._on_tree, session.executor),
             ]
+
+            def end() -> None:
+                for watch in watches:
+                    watch.close()
+                link.leave(self)
+
+            self._at_end["link"] = end
         self.bufferChanged.emit()
 
     def _leave(self) -> None:
-        for watch in self._watches:
-            watch.close()
-        self._watches = []
-        link, self._link = self._link, None
-        self._at_end.pop("link", None)
-        if link is not None:
-            link.leave(self)
+        self._link = None
+        end = self._at_end.pop("link", None)
+        if end is not None:
+            end()
 
     def _on_update(self) -> None:
         if is_alive(self):

@@ -5,11 +5,11 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING, Any
 
-from rosglass.errors import Error
 from rosglass.tf import TransformBuffer
 
 if TYPE_CHECKING:
     from rosglass.comm.node import Node
+    from rosglass.errors import Error
     from rosglass.qml.session import Session
     from rosglass.tf import TransformListener
 
@@ -34,10 +34,11 @@ class TfLink:
         self.buffer = TransformBuffer()
         self.problem = ""
 
-        def work() -> TransformListener:
+        def work() -> None:
             from rosglass.tf import TransformListener  # noqa: PLC0415 - loaded with the buffer
 
-            return TransformListener(node, self.buffer, namespace)
+            # Here and not on the GUI thread: who shuts it may be next on this one.
+            self._listener = TransformListener(node, self.buffer, namespace)
 
         session.background(work, self._opened)
 
@@ -60,12 +61,10 @@ class TfLink:
             self._session.shared.pop(self._key, None)
             self._session.background(self._shut)
 
-    def _opened(self, result: TransformListener | Error) -> None:
-        if isinstance(result, Error):
+    def _opened(self, result: Error | None) -> None:
+        if result is not None:
             self.problem = str(result)
             _log.warning("transforms are not received: %s", result)
-        else:
-            self._listener = result
 
     def _shut(self) -> None:
         if self._listener is not None:

@@ -1,0 +1,137 @@
+"""What elements share is let go when QML destroys them, also in the middle of something."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from rosglass.comm.node import Handle
+from rosglass.qml.parameter_link import ParameterLink
+from rosglass.tf import TransformBuffer
+
+if TYPE_CHECKING:
+    from conftest import Bench
+
+
+class Watch(Handle):
+    """A handle that counts itself among those that are open."""
+
+    def __init__(self, handle: Handle, opened: list[Handle]) -> None:
+        self._handle, self._open = handle, opened
+        opened.append(self)
+
+    def close(self) -> None:
+        self._handle.close()
+        if self in self._open:
+            self._open.remove(self)
+
+
+@pytest.fixture
+def watches(monkeypatch: pytest.MonkeyPatch) -> list[Handle]:
+    """Who wants to know of changes of transforms."""
+    opened: list[Handle] = []
+    for name in ("on_change", "on_update", "on_tree_change"):
+        plain = getattr(TransformBuffer, name)
+
+        def counted(*arguments: Any, plain: Any = plain) -> Handle:
+            return Watch(plain(*arguments), opened)
+
+        monkeypatch.setattr(TransformBuffer, name, counted)
+    return opened
+
+
+def test_transforms_are_not_followed_any_more(
+    running: Bench, watches: list[Handle], wait: Any
+) -> None:
+    """The listener, which all elements share, stays."""
+    root: Any = running.load("""
+        QtObject {
+            property var listener: TfTransformListener
+            property Component one: Component {
+                QtObject {
+                    property TfTransform tf: TfTransform { sourceFrame: "a"; targetFrame: "b" }
+                    property TfBuffer buffer: TfBuffer { }
+                }
+            }
+            property var made: []
+            Component.onCompleted: {
+                listener.initialize()
+                for (let i = 0; i < 3; ++i) made.push(one.createObject(null))
+            }
+            function drop() { for (const item of made) item.destroy(); made = [] }
+        }
+    """)
+    wait(lambda: len(watches) == 2 + 3 * 3)
+    root.drop()
+    wait(lambda: len(watches) == 2)
+
+
+def test_who_leaves_at_once_leaves_no_listener(
+    running: Bench, wait: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.qml.tf_link import TfLink
+
+    told: list[str] = []
+
+    class Listener:
+        def __init__(self, *_: Any) -> None:
+            told.append("opened")
+
+        def close(self) -> None:
+            told.append("closed")
+
+    monkeypatch.setattr("rosglass.tf.TransformListener", Listener)
+    session, node, done = running.session, running.session.node, threading.Event()
+    assert node is not None
+    TfLink.join(session, node, "/", "it").leave("it")
+    session.background(done.set)
+    wait(done.is_set)
+    assert told == ["opened", "closed"]
+
+
+class SlowClient:
+    """Is asked, and does not answer."""
+
+    ready = True
+
+    def __init__(self) -> None:
+        self.asked, self.go = threading.Event(), threading.Event()
+        self.closed_in: threading.Thread | None = None
+
+    def watch(self, *_: Any) -> Handle:
+        return self
+
+    def get(self, names: list[str], timeout: float) -> dict[str, Any]:
+        self.asked.set()
+        assert self.go.wait(timeout)
+        return dict.fromkeys(names)
+
+    def describe(self, names: list[str], timeout: float) -> dict[str, Any]:
+        return dict.fromkeys(names)
+
+    def close(self) -> None:
+        self.closed_in = threading.current_thread()
+
+
+class Node:
+    def __init__(self, client: SlowClient) -> None:
+        self.client = client
+
+    def create_parameter_client(self, name: str) -> SlowClient:
+        return self.client
+
+
+def test_a_question_on_its_way_holds_nothing_up(bench: Bench, wait: Any) -> None:
+    """The client is closed, and not by the GUI thread, which would wait for the question."""
+    client = SlowClient()
+    node: Any = Node(client)
+    link = ParameterLink.join(bench.session, node, "/arm", "it", lambda *_: None)
+    link.read("speed", lambda _: None)
+    wait(client.asked.is_set)
+    link.leave("it")
+    assert client.closed_in is None
+    client.go.set()
+    wait(lambda: client.closed_in is not None)
+    assert client.closed_in is not threading.main_thread()
