@@ -183,3 +183,20 @@ def test_logs_are_followed_on_rosout(live: Bench, wait: Any) -> None:
     assert found.name.strip("/").endswith("ui")
     assert found.file.endswith(".qml")
     assert found.line > 0
+
+
+def test_a_server_answers_in_the_words_of_its_module(live: Bench, wait: Any) -> None:
+    """Only ROS 1's headers have a counter, which an interface written for ROS 1 may set."""
+    live.module = "Ros 1.0"
+    live.load("""
+        QtObject {
+            property ServiceServer server: ServiceServer {
+                name: "/plan"; serviceType: "nav_msgs/GetPlan"
+                handler: function () { return {plan: {header: {seq: 7, frame_id: "map"}}} }
+            }
+        }
+    """)
+    client = live.robot.create_service_client("/plan", "nav_msgs/srv/GetPlan")
+    call = client.call_async({}, timeout=20)
+    wait(call.done)
+    assert call.result().plan.header.frame_id == "map"

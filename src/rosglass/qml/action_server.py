@@ -66,6 +66,8 @@ class ActionServer(Element):
     activeGoalsChanged = Signal()
     problemChanged = Signal()
 
+    _HOLDS = ("_accept", "_execute", "_cancel", "_offer")
+
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
@@ -180,12 +182,12 @@ class ActionServer(Element):
                     self._retry.start(RETRY)
             else:
                 offer.server = result
-                early, offer.early = offer.early, []
-                for job in early:
-                    job()
                 self._at_end["server"] = lambda: session.background(result.close)
                 self._say(result.problem)
                 self.readyChanged.emit()
+                early, offer.early = offer.early, []
+                for job in early:
+                    job()
 
         session.background(
             lambda: node.create_action_server(

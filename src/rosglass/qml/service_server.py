@@ -33,6 +33,8 @@ class ServiceServer(Element):
     readyChanged = Signal()
     problemChanged = Signal()
 
+    _HOLDS = ("_handler", "_answers", "_early")
+
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
@@ -118,12 +120,12 @@ class ServiceServer(Element):
                     self._retry.start(RETRY)
             else:
                 self._server = result
-                early, self._early = self._early, []
-                for answer in early:
-                    answer()
                 self._at_end["server"] = lambda: session.background(result.close)
                 self._say(result.problem)
                 self.readyChanged.emit()
+                early, self._early = self._early, []
+                for answer in early:
+                    answer()
 
         session.background(
             lambda: node.create_service_server(
@@ -152,7 +154,7 @@ class ServiceServer(Element):
                 raise ServiceError(f"the handler of service {self._name} returned false")
             if value.isUndefined() or value.isNull() or value.isBool():
                 return None
-            return fields_from_js(value, schema_of(kind.definition))
+            return fields_from_js(value, schema_of(kind.definition), dialect=self.DIALECT)
 
         return answers.ask(self._handler, [runtime.message(request, self.DIALECT)], take)
 
