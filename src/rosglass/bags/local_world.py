@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import threading
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import (
@@ -335,12 +334,6 @@ class LocalNode(Node):
     def status(self) -> Status:
         """Return the state of the connection."""
         return self._status
-
-    def set_detail(self, detail: str) -> None:
-        """Say what goes on, in one line."""
-        if detail != self._status.detail:
-            self._status = replace(self._status, detail=detail)
-            self._status_listeners.notify(self._status)
 
     def on_status_change(
         self, callback: Callable[[Status], None], executor: Executor | None = None

@@ -55,6 +55,7 @@ class HeldKeys(QtCore.QObject):
         """Forget all keys, without a word: their release may go to another window."""
         self._down.clear()
 
+    @QtCore.Slot()
     def _tick(self) -> None:
         gone = [key for key, ticks in self._leaving.items() if ticks == 1]
         self._leaving = {key: ticks - 1 for key, ticks in self._leaving.items() if ticks > 1}

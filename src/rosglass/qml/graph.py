@@ -7,7 +7,6 @@ import logging
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
-from rosglass.qml.dialect import Dialect
 from rosglass.qml.singleton import RosSingleton, full_type
 from rosglass.qt import QJSValue, Slot
 
@@ -168,10 +167,7 @@ class GraphSingleton(RosSingleton):
 
     def _spell(self, type: str) -> str:
         """Return a type's name as this module spells it."""
-        package, _, rest = type.partition("/")
-        if self.DIALECT is Dialect.ROS1 and rest:
-            return f"{package}/{rest.rpartition('/')[2]}"
-        return type
+        return self.DIALECT.type_name(type) if "/" in type else type
 
 
 def _shown(known: dict[str, list[str]]) -> dict[str, list[str]]:

@@ -14,23 +14,16 @@ if TYPE_CHECKING:
 
 
 __all__ = [
-    "LEVELS",
     "ROOT",
     "Caller",
     "LocationFormatter",
     "RateLimit",
     "install_message_handler",
     "log_from_qml",
+    "logger_name",
+    "plain_path",
 ]
 
-#: Ros2LoggerLevel -> Python's level.
-LEVELS = {
-    "debug": logging.DEBUG,
-    "info": logging.INFO,
-    "warn": logging.WARNING,
-    "error": logging.ERROR,
-    "fatal": logging.CRITICAL,
-}
 #: The logger of all that concerns QML.
 ROOT = "rosglass.qml"
 

@@ -52,7 +52,7 @@ def next_message(
         def tell(message: QJSValue | None) -> None:
             call_back(runtime, callback, QJSValue() if message is None else message)
 
-        wait_for_message(runtime, subscription, topic, "", milliseconds, tell)
+        wait_for_message(runtime, subscription, topic, milliseconds, tell)
         return QJSValue()
     if callback is not None:
         runtime.throw(f"waitForMessageAsync({topic!r}): the callback is not a function")
@@ -66,7 +66,7 @@ def next_message(
         else:
             deferred.resolve(message)
 
-    wait_for_message(runtime, subscription, topic, "", milliseconds, settle)
+    wait_for_message(runtime, subscription, topic, milliseconds, settle)
     return deferred.promise
 
 
@@ -74,7 +74,6 @@ def wait_for_message(
     runtime: Runtime,
     subscription: Subscription,
     topic: str,
-    type_name: str,
     milliseconds: float,
     done: Callable[[QJSValue | None], None],
 ) -> None:
@@ -84,12 +83,11 @@ def wait_for_message(
         runtime: The engine's runtime, which keeps the subscription.
         subscription: A new one, made for this.
         topic: Topic name.
-        type_name: Message type; empty takes the one that publishers announce.
         milliseconds: How long to wait, 0 or infinity for ever.
         done: Told the message; None when none came.
     """
     subscription.setParent(runtime)
-    subscription.configure(topic, type_name, QoS.best_available())
+    subscription.configure(topic, "", QoS.best_available())
     ended = False
 
     def end(message: QJSValue | None) -> None:

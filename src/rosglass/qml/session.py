@@ -210,9 +210,7 @@ class Session(QtCore.QObject):
         validate_namespace(namespace)
         if self.is_initialized:
             if (name, namespace) != (self.name, self.namespace):
-                _log.warning(
-                    "Ros2.init(%r) ignored: the node is already called %r", name, self.name
-                )
+                _log.warning("init(%r) ignored: the node is already called %r", name, self.name)
             return False
         if domain >= 0:
             self._url = _with_domain(self._url, domain)

@@ -3,14 +3,13 @@
 
 from __future__ import annotations
 
-import logging
-from dataclasses import replace
+from concurrent.futures import CancelledError
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.time import Time
 from rosglass.errors import ConversionError, Error, TransformException
 from rosglass.qml.element import Element
-from rosglass.qml.log import log_from_qml
 from rosglass.qml.times import time_from_js
 from rosglass.qml.waiting import wait_for
 from rosglass.qt import QJSValue, Slot
@@ -111,7 +110,7 @@ class TfQueries(Element):
             return promise.result(0)
         except TransformException as error:
             return _Missing(query.frames, type(error).__name__, str(error))
-        except Exception as error:
+        except (CancelledError, Error) as error:
             return _Missing(query.frames, "TransformException", str(error) or "given up")
 
     # The tree.
@@ -162,11 +161,6 @@ class TfQueries(Element):
     def _frame(self, name: str) -> FrameInfo | None:
         buffer = self.buffer
         return None if buffer is None else buffer.frame(name)
-
-    def _warn(self, text: str) -> None:
-        runtime = self._find_runtime()
-        if runtime is not None:
-            log_from_qml("", logging.WARNING, text, runtime.caller())
 
 
 class _Missing:
@@ -267,10 +261,8 @@ def _described(buffer: TransformBuffer, info: FrameInfo) -> dict[str, Any]:
 
     placed = Transform()
     if info.parent:
-        try:
+        with suppress(TransformException):
             placed = buffer.lookup_transform(info.parent, info.name)
-        except TransformException:
-            placed = replace(placed)
     return {
         "frameId": info.name,
         "parentId": info.parent,

@@ -55,6 +55,7 @@ class RosPublisher(Publisher):
 
     @Slot()
     def _on_tick(self) -> None:
+        super()._on_tick()
         before, self._subscribers = self._subscribers, self.getSubscriptionCount()
         for _ in range(self._subscribers - before):
             self.connected.emit()
