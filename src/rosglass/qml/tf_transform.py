@@ -60,7 +60,9 @@ class TfTransform(Element):
         self._transform: Transform | None = None
         self._exception, self._why = "Uninitialized", "nothing was looked up yet"
         self._shown: QJSValue | None = None
-        self._updated = self._arrived = 0.0
+        self._updated = 0.0
+        #: When it was seen to move; None before.
+        self._arrived: float | None = None
         self._valid, self._stale, self._age = False, True, -1.0
         self._timer = QtCore.QTimer(self)
         self._timer.setSingleShot(True)
@@ -193,7 +195,7 @@ class TfTransform(Element):
             want = (buffer, self._target, self._source)
         if want != self._have:
             self._unwatch()
-            self._have = want
+            self._have, self._arrived = want, None
             if want is not None and self._session is not None:
                 try:
                     watch = self._watch = want[0].on_change(
@@ -203,8 +205,8 @@ class TfTransform(Element):
                 except TransformException as error:
                     self._say(f"TfTransform: {error}")
         if want is not None:
-            self._arrived = time.monotonic()
-            self._refresh()
+            # What the buffer has already may be of a robot that is gone: it has to move first.
+            self._look(moved=False)
         elif buffer is None and self._enabled:
             self._take(None, "Uninitialized", "there is no node yet")
 
@@ -218,17 +220,25 @@ class TfTransform(Element):
     def _on_change(self) -> None:
         if not is_alive(self) or self._have is None:
             return
-        self._arrived = time.monotonic()
         if self._timer.isActive():
             return
-        wait = self._updated + 1 / self._rate - self._arrived if self._rate > 0 else 0.0
+        wait = self._updated + self._interval - time.monotonic()
         if wait > 0.0005:
             self._timer.start(math.ceil(wait * 1000))
         else:
             self._refresh()
 
+    @property
+    def _interval(self) -> float:
+        """Seconds between two updates at least."""
+        return 1 / self._rate if self._rate > 0 else 0.0
+
     @Slot()
     def _refresh(self) -> None:
+        self._look(moved=True)
+
+    def _look(self, *, moved: bool) -> None:
+        """Look the transform up; `moved` says whether one of its links came just now."""
         if self._have is None:
             return
         buffer, target, source = self._have
@@ -237,8 +247,11 @@ class TfTransform(Element):
             found = buffer.lookup_transform(target, source)
         except TransformException as error:
             self._take(None, type(error).__name__, str(error))
-        else:
-            self._take(found, "", "")
+            return
+        # Of a chain whose other links stand still, the newest that is known stays the same.
+        if moved and (self._transform is None or found.stamp != self._transform.stamp):
+            self._arrived = self._updated
+        self._take(found, "", "")
 
     def _take(self, found: Transform | None, exception: str, why: str) -> None:
         before, valid = self._transform, self._valid
@@ -263,12 +276,14 @@ class TfTransform(Element):
     def _judge(self) -> None:
         """Find out whether what is shown still moves, and tell when that changed."""
         moving = self._transform is not None and self._transform.stamp.nanoseconds > 0
-        age = time.monotonic() - self._arrived if moving else -1.0
+        arrived = self._arrived
+        age = time.monotonic() - arrived if moving and arrived is not None else -1.0
         if age != self._age:
             self._age = age
             self.ageChanged.emit()
         lost = self._session is None or self._session.state != "connected"
-        old = bool(self._timeout) and age > self._timeout / 1000
+        late = arrived is None or age > self._timeout / 1000 + self._interval
+        old = moving and self._timeout > 0 and late
         stale = self._transform is None or self._have is None or lost or old
         if stale != self._stale:
             self._stale = stale
