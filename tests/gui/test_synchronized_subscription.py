@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from rosglass.comm import QoS
+from rosglass.comm import ConnectionState, QoS
 
 if TYPE_CHECKING:
     from conftest import Bench
@@ -48,6 +48,11 @@ class Robot:
 
     def linked(self) -> None:
         self._wait(lambda: all(s.subscription_count() for s in self._senders), 30)
+
+    def hold_back(self, seconds: int) -> None:
+        """Let what is sent from now on have been on its way for so long; in memory only."""
+        for sender in self._senders:
+            sender.held_back = seconds * 1_000_000_000
 
     def send(self, topic: int, milliseconds: int, name: str) -> None:
         sec, rest = divmod(milliseconds, 1000)
@@ -157,3 +162,36 @@ def test_values_that_are_refused(live: Bench, caplog: Any) -> None:
     panel(live, "queueSize: 0; slop: -1; timeout: -5")
     for told in ("queueSize 0 is not", "slop -1 ms is not", "timeout -5 ms is negative"):
         assert told in caplog.text
+
+
+def test_a_set_that_a_silent_link_kept_back_is_stale(running: Bench, wait: Any) -> None:
+    robot = Robot(running, wait)
+    root = panel(running, 'topics: ["/a", "/b"]')
+    robot.linked()
+    robot.send(0, 0, "left")
+    robot.send(1, 0, "right")
+    wait(lambda: root.state().startswith("false"))
+    robot.hold_back(10)
+    robot.send(0, 500, "LEFT")
+    robot.send(1, 500, "RIGHT")
+    wait(lambda: root.latest() == "LEFT+RIGHT")
+    assert root.state().startswith("true")
+
+
+def test_a_set_from_before_an_outage_stays_stale(running: Bench, wait: Any) -> None:
+    robot = Robot(running, wait)
+    root = panel(running, 'timeout: 0; topics: ["/a", "/b"]')
+    robot.linked()
+    robot.send(0, 0, "left")
+    robot.send(1, 0, "right")
+    wait(lambda: root.state().startswith("false"))
+    node: Any = running.session.node
+    node.set_status(ConnectionState.LOST, "gone")
+    wait(lambda: root.state().startswith("true"))
+    node.set_status(ConnectionState.CONNECTED)
+    wait(lambda: running.session.state == "connected")
+    wait(300)
+    assert root.state().startswith("true")
+    robot.send(0, 500, "LEFT")
+    robot.send(1, 500, "RIGHT")
+    wait(lambda: root.state().startswith("false"))

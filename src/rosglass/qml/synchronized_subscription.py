@@ -96,6 +96,11 @@ class _Matcher:
             sets, self._sets = list(self._sets), deque()
         return sets
 
+    def lateness(self, samples: list[Sample]) -> float:
+        """Return by how many seconds a set was kept back on its way."""
+        pairs = zip(self.subscriptions, samples, strict=True)
+        return max(subscription.lateness(sample).seconds for subscription, sample in pairs)
+
     def close(self) -> None:
         """Receive no more."""
         for subscription in self.subscriptions:
@@ -178,6 +183,8 @@ class SynchronizedSubscription(Element):
         self._matcher: _Matcher | None = None
         self._have: tuple[Any, ...] | None = None
         self._stale, self._frequency, self._dropped = True, 0.0, 0
+        #: Seconds that the set was kept back on its way; whether the connection was lost since.
+        self._late, self._suspect = 0.0, False
         self._times: deque[float] = deque(maxlen=_MARKS)
         self._retry = QtCore.QTimer(self)
         self._retry.setSingleShot(True)
@@ -346,11 +353,12 @@ class SynchronizedSubscription(Element):
         for samples in sets:
             self._samples, self._value = samples, None
             self._times.append(time.monotonic())
-            was_stale, self._stale = self._stale, False
+            self._late, self._suspect = matcher.lateness(samples), False
+            was_stale, self._stale = self._stale, self._is_old()
             self.messagesChanged.emit()
             if not is_alive(self) or matcher is not self._matcher:
                 return
-            if was_stale:
+            if was_stale != self._stale:
                 self.staleChanged.emit()
             self.newMessages.emit(self._get_messages())
             if not is_alive(self) or matcher is not self._matcher:
@@ -393,11 +401,14 @@ class SynchronizedSubscription(Element):
             self._dropped = matcher.dropped
             self.droppedChanged.emit()
 
+    def _is_old(self) -> bool:
+        age = time.monotonic() - self._times[-1] + self._late if self._times else math.inf
+        return math.isinf(age) or (self._timeout > 0 and age > self._timeout / 1000)
+
     def _judge(self) -> None:
-        age = time.monotonic() - self._times[-1] if self._times else math.inf
-        connected = self._session is not None and self._session.state == "connected"
-        old = math.isinf(age) or (self._timeout > 0 and age > self._timeout / 1000)
-        stale = old or not connected
+        if self._session is None or self._session.state != "connected":
+            self._suspect = True
+        stale = self._suspect or self._is_old()
         if stale != self._stale:
             self._stale = stale
             self.staleChanged.emit()
