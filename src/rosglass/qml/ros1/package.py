@@ -6,6 +6,7 @@ from __future__ import annotations
 import logging
 import os
 import shlex
+import threading
 from typing import TYPE_CHECKING
 
 from rosglass.errors import Error
@@ -83,11 +84,15 @@ class Package(QtCore.QObject):
         printed: list[str | Error] = [""]
 
         def begin(end: Callable[[], None]) -> None:
-            def done(result: str | Error) -> None:
-                printed[0] = result
-                end()
+            def work() -> None:
+                try:
+                    printed[0] = _rospack(command)
+                except Error as error:
+                    printed[0] = error
+                session.executor.post(end)
 
-            session.background(lambda: _rospack(command), done)
+            # Not on the session's worker: whoever subscribes meanwhile would wait, too.
+            threading.Thread(target=work, name="rospack", daemon=True).start()
 
         if not wait_for(session, begin):
             printed[0] = Error(f"{MOST_WAITING} calls wait already")
