@@ -110,3 +110,23 @@ def test_nothing_is_pending_without_a_node(live: Bench, wait: Any) -> None:
     assert root.info().startswith("true,true")
     live.session.shutdown()
     wait(lambda: root.info().startswith("false,false"))
+
+
+@ROS2
+def test_ready_is_said_of_what_the_node_has_told(live: Bench, wait: Any) -> None:
+    """A node that was restarted must not be shown with the values of before as its own."""
+    root: Any = live.load("""
+        QtObject {
+            property var log: []
+            property Parameter p: Parameter {
+                nodeName: "/arm"; name: "speed"; onReadyChanged: log.push(ready + " " + value)
+            }
+            function told() { return log.join() }
+        }
+    """)
+    for value, told in ((3, "true 3"), (5, "true 3,false 3,true 5")):
+        arm = live.world.connect(None, "arm")
+        arm.parameters.declare("speed", value)
+        wait(lambda told=told: root.told() == told)
+        arm.close()
+        wait(lambda told=told: root.told().startswith(f"{told},false"))

@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 import logging
+import math
+import time
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import ConversionError, Error
-from rosglass.qml.element import Element
+from rosglass.qml.element import RETRY, Element
 from rosglass.qml.log import log_from_qml
 from rosglass.qml.plain import plain_from_js
 from rosglass.qml.to_js import exact
@@ -46,6 +48,8 @@ class Parameter(Element):
         self._ready, self._writes = False, 0
         #: Why there is no value although the node is there.
         self._missing = ""
+        #: When the node may be asked, monotonic; infinite while it is.
+        self._ask_at = 0.0
         self._link: ParameterLink | None = None
         self._have: tuple[Node, str, str] | None = None
 
@@ -158,7 +162,7 @@ class Parameter(Element):
         self._at_end.pop("link", None)
         if link is not None:
             link.leave(self)
-        self._missing = ""
+        self._missing, self._ask_at = "", 0.0
         self._set_ready(False)
         if self._writes:
             # Nobody will say what became of them.
@@ -171,23 +175,25 @@ class Parameter(Element):
     @Slot()
     def _on_tick(self) -> None:
         link = self._link
-        if link is not None:
-            self._say(link.problem or self._missing)
-            self._set_ready(link.ready)
+        if link is None:
+            return
+        self._say(link.problem or self._missing)
+        if not link.ready:
+            self._set_ready(False)
+        elif not self._ready and time.monotonic() >= self._ask_at:
+            # A node that came back may have other values than before.
+            self._read(link)
 
     def _set_ready(self, ready: bool) -> None:
-        if ready == self._ready:
-            return
-        self._ready = ready
-        self.readyChanged.emit()
-        # A node that came back may have other values than before.
-        if ready and self._link is not None:
-            self._read(self._link)
+        if ready != self._ready:
+            self._ready = ready
+            self.readyChanged.emit()
 
     def _read(self, link: ParameterLink) -> None:
         def done(result: tuple[Any, ParameterDescriptor] | Error) -> None:
             if not is_alive(self) or link is not self._link:
                 return
+            self._ask_at = time.monotonic() + RETRY / 1000
             if isinstance(result, Error):
                 self._missing = f"Parameter {self._name!r}: {result}"
                 self._say(self._missing)
@@ -197,7 +203,10 @@ class Parameter(Element):
             self._say(self._missing)
             self.descriptionChanged.emit()
             self._take(self._name, value)
+            if is_alive(self) and link is self._link:
+                self._set_ready(link.ready)
 
+        self._ask_at = math.inf
         link.read(self._name, done)
 
     def _take(self, name: str, value: Any) -> None:
