@@ -5,10 +5,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rosglass.errors import Error
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.image_subscription import ImageTransportSubscription
-from rosglass.qml.ros1.namespaces import within
+from rosglass.qml.ros1.namespaces import resolved, within
 from rosglass.qt import Property, QtCore, Signal
 
 if TYPE_CHECKING:
@@ -30,13 +29,6 @@ class ImageTransportSubscriber(ImageTransportSubscription):
         super().__init__(parent, runtime)
         self._namespace = ""
 
-    def _get_namespace(self) -> str:
-        node = self.node
-        try:
-            return node.resolve(self._namespace) if node and self._namespace else self._namespace
-        except Error:
-            return self._namespace
-
     def _set_namespace(self, namespace: str) -> None:
         if namespace != self._namespace:
             self._namespace, self._resolved = namespace, ""
@@ -47,4 +39,6 @@ class ImageTransportSubscriber(ImageTransportSubscription):
     def _resolve(self, topic: str) -> str:
         return super()._resolve(within(self._namespace, topic))
 
-    ns = Property(str, _get_namespace, _set_namespace, notify=nsChanged)
+    ns = Property(
+        str, lambda self: resolved(self.node, self._namespace), _set_namespace, notify=nsChanged
+    )

@@ -2,7 +2,22 @@
 
 from __future__ import annotations
 
-__all__ = ["within"]
+from typing import TYPE_CHECKING
+
+from rosglass.errors import Error
+
+if TYPE_CHECKING:
+    from rosglass.comm.node import Node
+
+__all__ = ["resolved", "within"]
+
+
+def resolved(node: Node | None, namespace: str) -> str:
+    """Return a namespace as a node resolves it; as it is without a node, or when it is wrong."""
+    try:
+        return node.resolve(namespace) if node is not None and namespace else namespace
+    except Error:
+        return namespace
 
 
 def within(namespace: str, name: str) -> str:

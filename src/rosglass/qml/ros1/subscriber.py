@@ -5,9 +5,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rosglass.errors import Error
 from rosglass.qml.dialect import Dialect
-from rosglass.qml.ros1.namespaces import within
+from rosglass.qml.ros1.namespaces import resolved, within
 from rosglass.qml.subscription import Subscription
 from rosglass.qt import Property, QtCore, Signal, Slot
 
@@ -32,13 +31,6 @@ class Subscriber(Subscription):
         self._namespace = ""
         self.enabledChanged.connect(self.runningChanged)
 
-    def _get_namespace(self) -> str:
-        node = self.node
-        try:
-            return node.resolve(self._namespace) if node and self._namespace else self._namespace
-        except Error:
-            return self._namespace
-
     def _set_namespace(self, namespace: str) -> None:
         if namespace != self._namespace:
             self._namespace, self._resolved = namespace, ""
@@ -55,7 +47,9 @@ class Subscriber(Subscription):
         lambda self, running: self._set_enabled(running),
         notify=runningChanged,
     )
-    ns = Property(str, _get_namespace, _set_namespace, notify=nsChanged)
+    ns = Property(
+        str, lambda self: resolved(self.node, self._namespace), _set_namespace, notify=nsChanged
+    )
 
     @Slot(result=int)
     def getNumPublishers(self) -> int:
