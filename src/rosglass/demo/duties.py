@@ -8,7 +8,7 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.parameters import ParameterDescriptor, Range
-from rosglass.errors import Error, TypeNotFoundError
+from rosglass.errors import Error, TypeNotFoundError, UnsupportedError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,7 +24,7 @@ _PERIOD = 0.1
 #: Radians per second, and how near is near enough.
 _TURN, _NEAR = 0.8, 0.03
 #: Metres per second.
-_FASTEST = 1.2
+_SLOWEST, _FASTEST = 0.1, 1.2
 
 
 class Duties:
@@ -46,13 +46,14 @@ class Duties:
     ) -> None:
         self._node, self._state, self._switch, self._drive = node, state, switch, drive
         self._ending = threading.Event()
-        node.parameters.declare(
-            "max_speed",
-            _FASTEST,
-            ParameterDescriptor(
-                description="Highest speed in metres per second", range=Range(0.1, _FASTEST)
-            ),
-        )
+        what, limits = "Highest speed in metres per second", Range(_SLOWEST, _FASTEST)
+        try:
+            node.parameters.declare(
+                "max_speed", _FASTEST, ParameterDescriptor(description=what, range=limits)
+            )
+        except UnsupportedError:
+            # ROS 1 knows no ranges.
+            node.parameters.declare("max_speed", _FASTEST, ParameterDescriptor(description=what))
         self._parts: list[Any] = [
             node.create_service_server("/flashlight/set", "std_srvs/srv/SetBool", self._on_switch)
         ]
@@ -64,8 +65,10 @@ class Duties:
 
     @property
     def max_speed(self) -> float:
-        """Highest speed in metres per second."""
-        return float(self._node.parameters.get("max_speed"))  # type: ignore[arg-type]
+        """Highest speed in metres per second; the slowest while it is set to nonsense."""
+        value = self._node.parameters.get("max_speed")
+        good = isinstance(value, (int, float)) and _SLOWEST <= value <= _FASTEST
+        return float(value) if good else _SLOWEST  # type: ignore[arg-type]
 
     def close(self) -> None:
         """Withdraw them; safe to call twice."""
