@@ -199,6 +199,21 @@ def test_lookups(live: Bench, robot: Robot, wait: Any) -> None:
     assert 0 < full["transform"]["translation"]["x"] < 0.2
 
 
+def test_the_reason_that_holds_now_is_told(live: Bench, wait: Any) -> None:
+    root: Any = live.load("""
+        QtObject {
+            property TfTransform tf: TfTransform { sourceFrame: "bace"; targetFrame: "map" }
+            function why() { return tf.message.message }
+        }
+    """)
+    wait(lambda: '"map" passed as target does not exist' in root.why())
+    robot = Robot(live.robot)
+    try:
+        wait(lambda: '"bace" passed as source does not exist' in root.why())
+    finally:
+        robot.close()
+
+
 def test_waiting_for_a_transform(live: Bench, wait: Any) -> None:
     live.run("TfTransformListener.initialize()")
     broadcaster = StaticTransformBroadcaster(live.robot)

@@ -24,6 +24,8 @@ __all__ = ["RosTfTransform", "TfTransform"]
 
 #: Updates a second unless another rate is asked for: one per 16 ms.
 _RATE = 62.5
+#: Seconds after which the reason why there is no transform is looked up again.
+_AGAIN = 1.0
 
 
 class TfTransform(Element):
@@ -291,6 +293,10 @@ class TfTransform(Element):
 
     @Slot()
     def _on_tick(self) -> None:
+        missing = self._have is not None and self._transform is None
+        if missing and not self._timer.isActive() and time.monotonic() - self._updated > _AGAIN:
+            # The reason may be another one by now: frames that are not asked for tell nobody.
+            self._refresh()
         self._judge()
 
     @Slot()
