@@ -194,6 +194,8 @@ def test_misuse_throws(live: Bench, counter: Counter, wait: Any) -> None:
         ("client.cancelGoalsBefore('noon')", "a time or a Date"),
         ("client.cancelGoalsBefore(new Date(-5000))", "after 1970"),
         ("Ros2.createActionClient('no good', 'a/B')", "no good"),
+        ("Ros2.createActionClient('a/B', '/count')", "Are name and type swapped?"),
+        ("Ros2.createServiceClient('a/B', '/count')", "Are name and type swapped?"),
     ):
         text = root.tried(script)
         assert text.startswith("Error:"), script

@@ -87,6 +87,27 @@ def test_nothing_is_lost_silently_before_and_after(
     assert "connection is lost: no router" in caplog.text
 
 
+def test_who_forgot_to_ask_for_a_node_is_told(
+    bench: Any, wait: Any, caplog: Any, monkeypatch: Any
+) -> None:
+    monkeypatch.setattr("rosglass.qml.session._FORGOTTEN", 20)
+    root = load(bench)
+    wait(lambda: "nothing is received or sent: no node was asked for" in caplog.text)
+    caplog.clear()
+    send(root, 1.0)
+    assert 'it is not advertised yet; no node was asked for: call Ros2.init("name")' in caplog.text
+
+
+def test_who_asked_for_a_node_is_told_nothing(
+    running: Any, wait: Any, caplog: Any, monkeypatch: Any
+) -> None:
+    monkeypatch.setattr("rosglass.qml.session._FORGOTTEN", 0)
+    root = load(running)
+    wait(lambda: root.property("advertised") == 1)
+    wait(50)
+    assert "no node was asked for" not in caplog.text
+
+
 def test_shutdown_withdraws_and_init_advertises_again(
     running: Any, received: list, wait: Any
 ) -> None:
@@ -144,6 +165,8 @@ def test_properties(running: Any, wait: Any, received: list) -> None:
         ('"bad topic", "std_msgs/msg/Bool"', "bad topic"),
         ('"", "std_msgs/msg/Bool"', "non-empty"),
         ('"/x", ""', "type of topic '/x' is empty"),
+        ('"/x", "Bool"', "'Bool' is not a type name"),
+        ('"std_msgs/msg/Bool", "/x"', "Are name and type swapped?"),
         ('"/x", "std_msgs/msg/Bool", 0', "an integer of 1 to"),
         ('"/x", "std_msgs/msg/Bool", 1.5', "an integer of 1 to"),
         ('"/x", "std_msgs/msg/Bool", "reliable"', "a queue size or Ros2.QoS"),

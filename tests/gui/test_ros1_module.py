@@ -119,6 +119,8 @@ def test_latched_publishers(up: Bench, wait: Any) -> None:
         'Ros.advertise("std_msgs/String", "/mode", "ten")',
         'Ros.advertise("", "/mode", 10)',
         'Ros.advertise("std_msgs/String", "no good", 10)',
+        'Ros.advertise("/mode", "std_msgs/String", 10)',
+        'Ros.createActionClient("/arm", "a/BAction")',
         "Ros.advertise(1, 2, 3)",
         'Ros.subscribe("no good", 1)',
         'Ros.subscribe("/x", 0)',

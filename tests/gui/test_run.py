@@ -44,6 +44,18 @@ def test_errors_are_listed_with_file_line_and_column(
     assert message in program.text
 
 
+def test_a_text_for_a_camera_is_explained(start: Any, file: Path) -> None:
+    pytest.importorskip("PySide6.QtMultimedia", reason="Qt 5's own VideoOutput says it itself")
+    file.write_text(
+        "import QtQuick 2.15\nimport Ros2 1.0\nItem { VideoOutput { source: 'front' } }"
+    )
+    program = start("run", file)
+    line = program.until("VideoOutput:")
+    assert "the id of a camera's element, without quotes; got front" in line
+    program.kill(signal.SIGTERM)
+    program.end()
+
+
 def test_errors_in_other_files_name_them(start: Any, file: Path) -> None:
     file.write_text("import QtQuick 2.15\nItem { Part {} }")
     file.with_name("Part.qml").write_text("import QtQuick 2.15\nItem {\n  oops: 1\n}")

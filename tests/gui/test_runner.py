@@ -326,6 +326,15 @@ def test_files_that_are_none(file: Path, world: MemoryWorld, place: str, message
         ("import Ros2 2.0\nimport QtQuick 2.15\nItem {}", "its version is 1.0: import Ros2 1.0"),
         ("import QtQuick 2.15\nimport No.Such 1.0\nItem {}", "-I FOLDER or in QML_IMPORT_PATH"),
         ("import QtQuick 7.0\nItem {}", "this Qt may have another version of it"),
+        ("import ROS2 1.0\nimport QtQuick 2.15\nItem {}", "it is written Ros2: import Ros2 1.0"),
+        (
+            "import Ros2 1.0\nSubscriber {}",
+            "Ros 1.0 has it; the other module calls it Subscription",
+        ),
+        (
+            "import Ros 1.0\nSubscription {}",
+            "Ros2 1.0 has it; the other module calls it Subscriber",
+        ),
     ],
 )
 def test_errors_say_what_to_do(

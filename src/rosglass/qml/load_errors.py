@@ -18,6 +18,14 @@ __all__ = ["error_list"]
 
 _MODULE = re.compile(r'module "([\w.]+)"(?: version ([\d.]+))?')
 _OURS = {"Ros", "Ros2"}
+_TYPE = re.compile(r"^(\w+) is not a type$")
+#: Types that only one of our modules has -> the module, and what the other one calls it.
+_ONLY_IN = {
+    "Subscriber": ("Ros 1.0", "Subscription"),
+    "ImageTransportSubscriber": ("Ros 1.0", "ImageTransportSubscription"),
+    "Subscription": ("Ros2 1.0", "Subscriber"),
+    "ImageTransportSubscription": ("Ros2 1.0", "ImageTransportSubscriber"),
+}
 #: Module -> what brings it, on Qt 6 and on Qt 5.
 _BROUGHT_BY = {
     "QtMultimedia": ('pip install "rosglass[camera]"', "apt install qml-module-qtmultimedia"),
@@ -60,12 +68,19 @@ def _advice(text: str) -> str:
     """Return what to do about an error; empty when it says it itself."""
     if "requires a version" in text:
         return "Qt 5 needs one after the module's name: import QtQuick 2.15"
+    kind = _TYPE.search(text)
+    if kind is not None and kind[1] in _ONLY_IN:
+        module, other = _ONLY_IN[kind[1]]
+        return f"{module} has it; the other module calls it {other}"
     found = _MODULE.search(text)
     if found is None:
         return ""
     module, version = found[1], found[2]
     if module in _OURS:
         return f"its version is 1.0: import {module} 1.0"
+    for ours in _OURS:
+        if module.lower() == ours.lower():
+            return f"it is written {ours}: import {ours} 1.0"
     if QT6 and module in _GONE:
         return f"Qt 6 has {_GONE[module]} instead"
     if version and "is not installed" in text and module.startswith("Qt"):

@@ -11,6 +11,7 @@ from rosglass.errors import ConversionError, Error, TypeNotFoundError
 from rosglass.qml.element import RETRY, Element
 from rosglass.qml.from_js import fields_from_js
 from rosglass.qml.log import log_from_qml
+from rosglass.qml.session import NOT_INITIALIZED
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
@@ -78,6 +79,8 @@ class Publisher(Element):
         sender, schema = self._sender, self._schema
         if sender is None or schema is None:
             reason = self._problem or "it is not advertised yet"
+            if self._session is not None and not self._session.is_initialized:
+                reason += f"; {NOT_INITIALIZED}"
             self._complain(f"nothing was published on {self._topic}: {reason}", logging.WARNING)
             return False
         try:

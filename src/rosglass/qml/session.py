@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rosglass.comm.node import Handle, Node
     from rosglass.ros2.arguments import Arguments
 
-__all__ = ["Session"]
+__all__ = ["NOT_INITIALIZED", "Session"]
 
 _log = logging.getLogger("rosglass.qml")
 _T = TypeVar("_T")
@@ -31,6 +31,13 @@ _T = TypeVar("_T")
 TICK = 100
 #: Milliseconds until connecting is tried again when this machine could not open a session.
 _RETRY = 1000
+#: Milliseconds that elements wait for a node before the author is told that nobody asked for one.
+_FORGOTTEN = 3000
+#: What is wrong while nobody has asked for a node, and what to do.
+NOT_INITIALIZED = (
+    'no node was asked for: call Ros2.init("name"), or Ros.init("name") with Ros 1.0, '
+    "e.g. in Component.onCompleted"
+)
 #: Seconds that the end of the program waits for the node to say goodbye, and for all threads.
 _PATIENCE = 1.2
 
@@ -121,6 +128,7 @@ class Session(QtCore.QObject):
         self._ticker = QtCore.QTimer(self)
         self._ticker.setInterval(TICK)
         self._ticker.timeout.connect(self.tick)
+        self._reminder: QtCore.QTimer | None = None
         self._handlers: dict[str, dict[int, tuple[QtCore.QObject, Callable[[], None]]]] = {}
         for signal in ("node_changed", "connection_changed", "graph_changed", "tick"):
             handlers = self._handlers[signal] = {}
@@ -316,10 +324,20 @@ class Session(QtCore.QObject):
     def use_ticks(self, wanted: bool) -> None:
         """Start or stop taking part in :attr:`tick`; an idle program has none."""
         self._ticking += 1 if wanted else -1
+        if wanted and self._reminder is None and not self.is_initialized:
+            self._reminder = QtCore.QTimer(self)
+            self._reminder.setSingleShot(True)
+            self._reminder.timeout.connect(self._remind)
+            self._reminder.start(_FORGOTTEN)
         if self._ticking > 0 and not self._ticker.isActive():
             self._ticker.start()
         elif self._ticking <= 0:
             self._ticker.stop()
+
+    def _remind(self) -> None:
+        """Tell once that elements wait for a node that nobody has asked for."""
+        if self._ticking > 0 and not self._closed and not self.is_initialized:
+            _log.warning("nothing is received or sent: %s", NOT_INITIALIZED)
 
     def _start(self) -> None:
         self._generation += 1

@@ -8,7 +8,7 @@ import os
 import re
 from typing import TYPE_CHECKING, ClassVar
 
-from rosglass.errors import Error
+from rosglass.errors import Error, InvalidNameError
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.log import log_from_qml
 from rosglass.qml.runtime import Runtime, own_runtime
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rosglass.comm.node import Node
     from rosglass.qml.session import Session
 
-__all__ = ["RosSingleton", "full_type", "is_list", "strings"]
+__all__ = ["RosSingleton", "check_type", "full_type", "is_list", "strings"]
 
 _log = logging.getLogger("rosglass.qml")
 _SHORT = re.compile(r"([A-Za-z]\w*)/([A-Za-z]\w*)\Z")
@@ -151,6 +151,27 @@ class RosSingleton(QtCore.QObject):
 
     def _log(self, level: int, message: str, name: str = "") -> None:
         log_from_qml(name, level, message, self._runtime.caller())
+
+
+def check_type(type_name: str, name: str) -> None:
+    """Raise InvalidNameError unless this can be a type's name; empty texts are the caller's.
+
+    Args:
+        type_name: What was given as the type.
+        name: What was given beside it, as the name of a topic, service or action.
+    """
+    from rosglass.interfaces.names import split_name  # noqa: PLC0415 - not needed at start-up
+
+    if not type_name:
+        return
+    try:
+        split_name(type_name)
+    except InvalidNameError as error:
+        try:
+            split_name(name)
+        except InvalidNameError:
+            raise error from None
+        raise InvalidNameError(f"{error}. Are name and type swapped?") from None
 
 
 def is_list(value: QJSValue | None) -> bool:

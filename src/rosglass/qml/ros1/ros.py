@@ -20,7 +20,7 @@ from rosglass.qml.ros1.package import Package
 from rosglass.qml.ros1.publisher import RosPublisher
 from rosglass.qml.ros1.service_server import RosServiceServer
 from rosglass.qml.ros1.subscriber import Subscriber
-from rosglass.qml.singleton import is_list, strings
+from rosglass.qml.singleton import check_type, is_list, strings
 from rosglass.qml.subscription import DEFAULT_QOS
 from rosglass.qml.value_functions import ValueFunctions
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot
@@ -110,6 +110,7 @@ class Ros(ValueFunctions, GraphSingleton):
             texts, rest = _split(given, "Ros.advertise([ns,] type, topic, queueSize, latch)")
             namespace, type_name, topic = texts
             size = qos_from_js(rest[0], DEFAULT_QOS).depth
+            check_type(type_name, topic)
             topic = within(namespace, topic)
             self._check_topic(topic)
         except Error as error:
@@ -186,6 +187,7 @@ class Ros(ValueFunctions, GraphSingleton):
         try:
             if len(texts) != len(given) or not texts[-2] or not texts[-1]:
                 raise InvalidNameError("write Ros.createActionClient([ns,] type, name)")
+            check_type(texts[-2], texts[-1])
             name = within(texts[0] if len(texts) > 2 else "", texts[-1])
             self._check_topic(name)
         except Error as error:

@@ -11,6 +11,7 @@ from rosglass.qml.dialect import Dialect
 from rosglass.qml.log import log_from_qml
 from rosglass.qml.runtime import own_runtime
 from rosglass.qml.service_client import ServiceClient
+from rosglass.qml.session import NOT_INITIALIZED
 from rosglass.qml.singleton import full_type
 from rosglass.qml.waiting import MOST_WAITING, wait_for
 from rosglass.qt import QJSValue, QtCore, Slot, is_alive
@@ -57,7 +58,8 @@ class Service(QtCore.QObject):
 
         caller = runtime.caller()
         if wait_for(runtime.session, begin):
-            result = answer[0] if answer else Error(f"{service} was not called to the end")
+            why = "" if runtime.session.is_initialized else f": {NOT_INITIALIZED}"
+            result = answer[0] if answer else Error(f"{service} was not called to the end{why}")
         else:
             result = Error(
                 f"{service} is called, but not waited for: {MOST_WAITING} calls wait already, for "

@@ -16,7 +16,7 @@ from rosglass.qml.profiles import qos_from_js
 from rosglass.qml.publisher import Publisher
 from rosglass.qml.service_client import ServiceClient
 from rosglass.qml.service_server import ServiceServer
-from rosglass.qml.singleton import full_type, is_list, strings
+from rosglass.qml.singleton import check_type, full_type, is_list, strings
 from rosglass.qml.subscription import DEFAULT_QOS, Subscription
 from rosglass.qml.value_functions import ValueFunctions
 from rosglass.qt import QJSValue, QtCore, Signal, Slot
@@ -123,6 +123,7 @@ class Ros2(ValueFunctions, GraphSingleton):
             self._check_topic(topic)
             if not type_name:
                 raise InvalidNameError(f"the message type of topic {topic!r} is empty")
+            check_type(type_name, topic)
             profile = qos_from_js(qos, QoS())
         except Error as error:
             self._runtime.throw(f"Ros2.createPublisher: {error}")
@@ -185,6 +186,7 @@ class Ros2(ValueFunctions, GraphSingleton):
         """
         try:
             self._check_topic(name)
+            check_type(type_name, name)
             profile = None if qos is None else qos_from_js(qos, QoS.services())
         except Error as error:
             self._runtime.throw(f"Ros2.createServiceClient: {error}")
@@ -227,6 +229,7 @@ class Ros2(ValueFunctions, GraphSingleton):
         """
         try:
             self._check_topic(name)
+            check_type(type_name, name)
         except Error as error:
             self._runtime.throw(f"Ros2.createActionClient: {error}")
             return None

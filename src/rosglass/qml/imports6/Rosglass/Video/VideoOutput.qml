@@ -14,7 +14,9 @@ Multimedia.VideoOutput {
         _bound = null
         if (!source)
             return
-        if (source.videoSink !== undefined) {
+        if (typeof source !== "object") {
+            console.error("VideoOutput: `source` is the id of a camera's element, without quotes; got", source)
+        } else if (source.videoSink !== undefined) {
             source.videoSink = videoSink
             _bound = source
         } else if ("videoOutput" in source) {
