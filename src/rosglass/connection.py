@@ -175,7 +175,10 @@ def default_url(env: Mapping[str, str]) -> str:
     programs, and a Zenoh session configuration implies Zenoh. Where ROS 2 is set up, or a domain is
     chosen, without any of these, it means DDS, ROS 2's default. ROS_MASTER_URI alone means ROS 1.
     """
-    choice = f"pass a URL to connect(), or set ROSGLASS_URL, e.g. to {_EXAMPLES}"
+    choice = (
+        "pass a URL to connect() (--url on the command line), or set ROSGLASS_URL, "
+        f"e.g. to {_EXAMPLES}"
+    )
     if env.get("ROSGLASS_URL"):
         return env["ROSGLASS_URL"]
     implementation = env.get("RMW_IMPLEMENTATION", "")
