@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -74,6 +75,32 @@ def test_no_server(live: Bench, wait: Any, caplog: Any) -> None:
     wait(lambda: root.property("called") is False and root.property("rejected"))
     assert "/none" in root.property("rejected")
     assert "no server" in caplog.text
+
+
+def test_a_request_does_not_outlast_its_server(live: Bench, wait: Any, monkeypatch: Any) -> None:
+    """One that was made while a dead server seemed to be there is not for the next one."""
+    monkeypatch.setattr("rosglass.qml.service_client._GRACE", 0.1)
+    go = threading.Event()
+    live.robot.create_service_server("/dock", "std_srvs/srv/Trigger", lambda _: go.wait(60))
+    root: Any = live.load("""
+        QtObject {
+            property var client: Ros2.createServiceClient("/dock", "std_srvs/Trigger")
+            property string rejected
+            function ready() { return client.ready }
+            function send() {
+                client.connectionTimeout = 100
+                client.call().catch(function (e) { rejected = e.message })
+            }
+        }
+    """)
+    wait(root.ready)
+    root.send()
+    wait(500)
+    # A server that is there may take as long as it likes.
+    assert root.property("rejected") == ""
+    root.property("client")._on_ready(False)
+    wait(lambda: "no server" in root.property("rejected"))
+    go.set()
 
 
 def test_the_robot_loses_its_server(live: Bench, wait: Any) -> None:

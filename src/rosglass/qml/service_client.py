@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeAlias
 
 from rosglass.errors import Error, ServiceUnavailableError
@@ -29,6 +30,9 @@ if TYPE_CHECKING:
 
 __all__ = ["ServiceClient"]
 
+#: Seconds in which a client that lost its server says itself what became of the requests.
+_GRACE = 4.0
+
 
 @dataclass(eq=False)
 class _Request:
@@ -37,6 +41,8 @@ class _Request:
     value: QJSValue
     done: Done
     call: Call | None = None
+    #: When it was made, monotonic.
+    made: float = field(default_factory=time.monotonic)
 
 
 class ServiceClient(ClientElement):
@@ -68,6 +74,8 @@ class ServiceClient(ClientElement):
         super().__init__(runtime, name, type_name, dialect)
         self._qos = qos
         self._requests: list[_Request] = []
+        #: When its server was lost, monotonic.
+        self._lost = 0.0
 
     # Properties.
 
@@ -238,7 +246,20 @@ class ServiceClient(ClientElement):
                 self._submit(request)
 
     def _ready_changed(self) -> None:
+        if not self._ready:
+            self._lost = time.monotonic()
         self.serviceReadyChanged.emit()
+
+    @Slot()
+    def _on_tick(self) -> None:
+        # A server that seemed to be there when the request was made may have been dead; the one
+        # that takes its place must not be told what was wanted long ago.
+        patience, now = self._patience / 1000, time.monotonic()
+        if not self._patience or self._ready or now - self._lost < _GRACE:
+            return
+        for request in list(self._requests):
+            if now - request.made > patience:
+                self._give_up(request)
 
     def _problem_changed(self) -> None:
         self.problemChanged.emit()
