@@ -8,6 +8,7 @@ import pytest
 from mcap import writer as mcap_writer
 
 from rosglass import load
+from rosglass.comm import ConnectionState
 from rosglass.interfaces import full_text
 
 if TYPE_CHECKING:
@@ -170,6 +171,25 @@ def test_to_the_robot_only_when_told(live: Bench, drive: Path, wait: Any) -> Non
     wait(lambda: root.property("ends") == 1)
     root.setFile("")
     wait(lambda: not live.robot.publishers("/chatter"), 30)
+
+
+def test_commands_do_not_go_on_after_an_outage(
+    running: Bench, drive: Path, wait: Any, caplog: Any
+) -> None:
+    root = panel(running, f'file: "{drive}"; toRobot: true; rate: 0.1; topics: ["/chatter"]')
+    wait(lambda: root.state() == "true,false,3.0")
+    root.play()
+    wait(lambda: root.state() == "true,true,3.0")
+    node: Any = running.session.node
+    node.set_status(ConnectionState.LOST, "gone")
+    wait(lambda: root.state() == "true,false,3.0")
+    assert "paused" in caplog.text
+    node.set_status(ConnectionState.CONNECTED)
+    wait(lambda: running.session.state == "connected")
+    wait(300)
+    assert root.state() == "true,false,3.0"
+    root.play()
+    wait(lambda: root.state() == "true,true,3.0")
 
 
 @pytest.mark.parametrize("more", ["", "; toRobot: true"])

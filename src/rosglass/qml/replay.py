@@ -271,6 +271,15 @@ class Replay(Element):
     # Watching.
 
     @Slot()
+    def _on_connection(self) -> None:
+        playback, session = self._playback, self._session
+        lost = session is not None and session.state != "connected"
+        if lost and self._to_robot and playback is not None and playback.is_playing:
+            # Nobody expects a robot that is back to go on with commands from a recording.
+            self._refuse("Replay: paused, as the connection with the robot was lost")
+            self.pause()
+
+    @Slot()
     def _on_tick(self) -> None:
         self._watch()
 
