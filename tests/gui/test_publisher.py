@@ -209,3 +209,18 @@ def test_keep_all_never_waits_on_the_gui_thread(running: Any, wait: Any) -> None
     root.send()
     wait(lambda: threads)
     assert threads[0] is not threading.main_thread()
+
+
+def test_what_keep_all_could_not_send_is_told(running: Any, wait: Any, caplog: Any) -> None:
+    root = running.load(
+        """QtObject {
+            property var qos: Ros2.QoS().reliable().keep_all()
+            property var pub: Ros2.createPublisher("/x", "std_msgs/msg/Bool", qos)
+            function ready() { return pub.isAdvertised }
+            function send() { return pub.publish({data: true}) }
+        }"""
+    )
+    wait(root.ready)
+    running.world.publishers[0].closed = True
+    root.send()
+    wait(lambda: "nothing was published on /x: closed" in caplog.text)

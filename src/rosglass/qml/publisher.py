@@ -88,7 +88,7 @@ class Publisher(Element):
             if self._qos.history is History.KEEP_ALL and self._session is not None:
                 # Who must not lose anything waits for a network that is stuck: not here.
                 data = sender.type.encode(fields)
-                self._session.background(lambda: sender.publish_serialized(data))
+                self._session.background(lambda: sender.publish_serialized(data), self._sent_late)
             else:
                 sender.publish(fields)
         except ConversionError as error:
@@ -106,6 +106,12 @@ class Publisher(Element):
             self._complain(text, logging.WARNING)
             return False
         return True
+
+    def _sent_late(self, result: Error | None) -> None:
+        """Tell that what waited for the network was not sent in the end."""
+        if result is not None and is_alive(self):
+            text = f"nothing was published on {self._resolved}: {result}"
+            self._complain(text, logging.ERROR)
 
     def _complain(self, text: str, level: int) -> None:
         """Log with the QML place, but not for every message of a stream."""
