@@ -171,7 +171,8 @@ def test_changing_the_topic_in_the_handler(running: Any, chat: Any, wait: Any) -
     wait(lambda: sub.property("subscribed"))
     for text in ("a", "b", "c"):
         chat.publish(data=text)
-    wait(lambda: sub.property("topic") == "/other" and sub.property("subscribed"))
+    # The topic is the new one at once; the old subscription is given up a little later.
+    wait(lambda: sub.property("topic") == "/other" and other.subscription_count())
     assert root.property("shown") == "none"
     assert "message undefined" in texts(root, "log")
     chat.publish(data="d")
@@ -507,3 +508,20 @@ def test_a_successor_that_has_said_nothing_is_not_trusted(live: Any, wait: Any) 
     successor.publish(data="armed")
     wait(lambda: not sub.property("stale"))
     robot.close()
+
+
+@pytest.mark.parametrize(("topic", "told"), [("/odomm", True), ("/odom", False)])
+def test_a_topic_that_nobody_publishes_is_told(
+    running: Any, wait: Any, caplog: Any, monkeypatch: Any, topic: str, told: bool
+) -> None:
+    monkeypatch.setattr("rosglass.qml.subscription._LONELY", 20)
+    caplog.set_level("INFO", "rosglass.qml")
+    running.robot.create_publisher("/odom", "std_msgs/msg/String")
+    root = running.load('Subscription { topic: "TOPIC" }'.replace("TOPIC", topic))
+    text = "/odomm: nobody publishes this topic; did you mean /odom?"
+    if told:
+        wait(lambda: text in caplog.text)
+    else:
+        wait(lambda: root.property("subscribed"))
+        wait(200)
+        assert "nobody publishes" not in caplog.text
