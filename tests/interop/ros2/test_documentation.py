@@ -276,6 +276,8 @@ class World:
 
     def connect(self, url: str, *arguments: Any, **options: Any) -> Any:
         """Connect to the robot instead of one that is somewhere else."""
+        if url.startswith("replay:"):
+            return self._connect(url, *arguments, **options)
         (DdsOptions if url.startswith("dds") else ZenohOptions).parse(url, {})
         node = self._connect(self._robot.base.url, *arguments, **options)
         subscribe = node.create_subscription

@@ -125,7 +125,7 @@ def test_a_recording_is_read_by_others_and_played_by_us(
         assert sample is not None
         assert list(sample.message().data) == [1, 2]
         until(lambda: secret.statistics().received == 10)
-        assert len(times) > 5
+        assert len(times) > 2
 
 
 def test_pausing_stepping_seeking_and_looping(join: Callable[..., Node], recording: Path) -> None:

@@ -19,10 +19,10 @@ def timers():
 
 def test_jobs_run_in_order_of_time_on_one_thread(timers):
     done = queue.Queue()
-    for delay in (0.06, 0.02, 0.04, 0.0):
+    for delay in (0.6, 0.2, 0.4, 0.0):
         timers.after(delay, lambda d=delay: done.put((d, threading.current_thread().name)))
     assert [done.get(timeout=30) for _ in range(4)] == [
-        (delay, "timers of the test") for delay in (0.0, 0.02, 0.04, 0.06)
+        (delay, "timers of the test") for delay in (0.0, 0.2, 0.4, 0.6)
     ]
 
 
