@@ -130,3 +130,17 @@ def test_ready_is_said_of_what_the_node_has_told(live: Bench, wait: Any) -> None
         wait(lambda told=told: root.told() == told)
         arm.close()
         wait(lambda told=told: root.told().startswith(f"{told},false"))
+
+
+@ROS2
+def test_a_change_that_went_unheard_is_found(ros2: Bench, wait: Any, monkeypatch: Any) -> None:
+    """The first moments after a node appears, its changes may be heard of by nobody."""
+    from rosglass.qml.parameter_link import ParameterLink
+
+    monkeypatch.setattr(ParameterLink, "_changed", lambda link, event: None)
+    # The change comes before it is asked again, however slow this machine is.
+    monkeypatch.setattr("rosglass.qml.parameter.RETRY", 3000)
+    root: Any = ros2.load(QML)
+    wait(lambda: root.shown() == "1.5")
+    ros2.robot.parameters.set({"speed": 0.25})
+    wait(lambda: root.shown() == "0.25")

@@ -50,6 +50,8 @@ class Parameter(Element):
         self._missing = ""
         #: When the node may be asked, monotonic; infinite while it is.
         self._ask_at = 0.0
+        #: Whether it was asked again: changes of the first moments may have gone unheard.
+        self._checked = False
         self._link: ParameterLink | None = None
         self._have: tuple[Node, str, str] | None = None
 
@@ -180,13 +182,13 @@ class Parameter(Element):
         self._say(link.problem or self._missing)
         if not link.ready:
             self._set_ready(False)
-        elif not self._ready and time.monotonic() >= self._ask_at:
+        elif not (self._ready and self._checked) and time.monotonic() >= self._ask_at:
             # A node that came back may have other values than before.
             self._read(link)
 
     def _set_ready(self, ready: bool) -> None:
         if ready != self._ready:
-            self._ready = ready
+            self._ready, self._checked = ready, False
             self.readyChanged.emit()
 
     def _read(self, link: ParameterLink) -> None:
@@ -198,6 +200,7 @@ class Parameter(Element):
                 self._missing = f"Parameter {self._name!r}: {result}"
                 self._say(self._missing)
                 return
+            self._checked = self._ready
             value, self._descriptor = result
             self._missing = "" if value is not None else f"{self._node_name} has no {self._name!r}"
             self._say(self._missing)
