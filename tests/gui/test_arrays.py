@@ -160,3 +160,26 @@ def test_empty_messages_have_the_same_arrays(bench: Any, module: str) -> None:
         m.name.append('a'); m.position.replace(1, 5);
         return [m.name.at(0), m.position.toArray(), m.effort.length]"""
     assert bench.run(script) == ["a", [0, 5], 0]
+
+
+@pytest.mark.parametrize("count", [3, 5000])
+def test_qml_files_see_the_length(running: Any, wait: Any, count: int) -> None:
+    """Qt 5 looks a Proxy's ``length`` up elsewhere where QML files ask."""
+    joints = running.robot.create_publisher("/joints", "sensor_msgs/msg/JointState")
+    root = running.load(
+        """QtObject {
+            property var sub: Subscription { topic: "/joints" }
+            function ready() { return sub.subscribed }
+            function lengths() {
+                const m = sub.message
+                if (!m) return ""
+                let n = 0
+                for (let i = 0; i < m.position.length; ++i) n += m.position[i]
+                m.velocity = [1, 2]
+                return [m.position.length, m.name.length, n, m.velocity.length].join()
+            }
+        }"""
+    )
+    wait(root.ready)
+    joints.publish(name=["a"] * count, position=[1.0] * count, velocity=[0.0] * count)
+    wait(lambda: root.lengths() == f"{count},{count},{count},2")

@@ -1,6 +1,9 @@
 // What message values are made of on the JavaScript side; evaluated once per QML engine.
-(function (makeTimes, makeArrays, host) {
+(function (makeTimes, makeArrays, host, qt5) {
     "use strict"
+
+    // Longer arrays take too long to be made whole.
+    const MOST_VALUES = 65536, MOST_MESSAGES = 1024
 
     function prototype(parent, members) {
         const made = Object.create(parent)
@@ -22,6 +25,19 @@
         return { proto: prototype(parent, members), fields: fields, id: id }
     }
 
+    // A long array that is made whole when it is read: QML files on Qt 5 see 0 as a Proxy's length.
+    function whenRead(value, name, source, index, length, kind, shape) {
+        function keep(array) {
+            Object.defineProperty(value, name, { value: array, writable: true, enumerable: true, configurable: true })
+            return array
+        }
+        function make() {
+            const array = arrays.lazy(source, index, length, kind, shape).toArray()
+            return keep(Object.setPrototypeOf(array, arrays.prototypeOf(kind, shape)))
+        }
+        Object.defineProperty(value, name, { get: make, set: keep, enumerable: true, configurable: true })
+    }
+
     function revive(value, shape, source) {
         Object.setPrototypeOf(value, shape.proto)
         for (const field of shape.fields) {
@@ -33,6 +49,8 @@
                 Object.setPrototypeOf(inner, arrays.prototypeOf(field[1], field[2]))
                 if (field[2])
                     for (const element of inner) revive(element, field[2], source)
+            } else if (qt5 && inner.length <= (field[2] ? MOST_MESSAGES : MOST_VALUES)) {
+                whenRead(value, name, source, inner["#at"], inner.length, field[1], field[2])
             } else {
                 value[name] = arrays.lazy(source, inner["#at"], inner.length, field[1], field[2])
             }

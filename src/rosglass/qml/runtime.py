@@ -13,7 +13,7 @@ from rosglass.qml.log import Caller, plain_path
 from rosglass.qml.session import Session
 from rosglass.qml.to_js import describe, reader, to_json
 from rosglass.qml.value_host import Host, LongArrays
-from rosglass.qt import QJSValue, QtCore, QtQml, is_alive
+from rosglass.qt import QT6, QJSValue, QtCore, QtQml, is_alive
 
 if TYPE_CHECKING:
     from rosglass.comm.qos import QoS
@@ -77,7 +77,7 @@ class Runtime(QtCore.QObject):
         """Functions of our scripts; read for the first value, which is after the first frame."""
         parts = [self._script(name) for name in ("times.js", "arrays.js")]
         host = self._engine.newQObject(self._host)
-        made = self._script("helpers.js").call([*parts, host])
+        made = self._script("helpers.js").call([*parts, host, QJSValue(not QT6)])
         found = {name: made.property(name) for name in _HELPERS}
         for name, helper in found.items():
             if not helper.isCallable():
