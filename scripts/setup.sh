@@ -14,7 +14,7 @@ fail() { printf '\nrosglass set-up stopped: %s\n' "$1" >&2; shift; printf '  %s\
 case $purpose in demo|test) ;; *) fail "unknown purpose '$purpose'" "use: scripts/setup.sh demo|test" ;; esac
 
 # What Qt's wheels expect from the system, a virtual screen, and a font.
-apt_demo=(xvfb libegl1 libgl1 libopengl0 libxkbcommon-x11-0 libdbus-1-3 libfontconfig1 libglib2.0-0
+apt_demo=(xvfb xauth libegl1 libgl1 libopengl0 libxkbcommon-x11-0 libdbus-1-3 libfontconfig1 libglib2.0-0
           libxcb-cursor0 libxcb-icccm4 libxcb-image0 libxcb-keysyms1 libxcb-randr0
           libxcb-render-util0 libxcb-shape0 libxcb-xinerama0 libxcb-xkb1 libpulse0
           libgl1-mesa-dri fonts-dejavu-core)
