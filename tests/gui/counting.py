@@ -29,9 +29,9 @@ class Counter:
         self.stop.set()
         self.server: Any = None
 
-    def offer(self) -> None:
+    def offer(self, **more: Any) -> None:
         self.server = self.robot.create_action_server(
-            "/count", self.type, self.count, accept=lambda goal: goal.order > 0
+            "/count", self.type, self.count, accept=lambda goal: goal.order > 0, **more
         )
 
     def count(self, goal: Any) -> Any:

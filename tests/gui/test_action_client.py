@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import json
 import threading
 import weakref
 from types import SimpleNamespace
@@ -170,6 +171,77 @@ def test_promises(live: Bench, counter: Counter, wait: Any) -> None:
     wait(lambda: root.property("done") == "true,true,4")
     wait(lambda: root.property("failed"))
     assert "accept" in root.property("failed") or counter.ros1
+
+
+WATCHED = """
+    QtObject {
+        property var client: NAME.createActionClient(GIVEN)
+        property var handle
+        property var failed: []
+        function ready() { return client.ready || client.connected }
+        function send() {
+            handle = client[client.sendGoalAsync ? "sendGoalAsync" : "sendGoal"]({order: 50})
+            handle.cancelFailed.connect(function (reason) { failed.push(["goal", reason]) })
+        }
+        function status() { return handle.status }
+        function cancel() { handle.cancel() }
+        function watch() {
+            client.cancelFailed.connect(function (reason) { failed.push(["client", reason]) })
+        }
+        function cancelAll() { client.cancelAllGoals() }
+        function told() { return JSON.stringify(failed) }
+    }
+"""
+
+
+def watched(live: Bench, counter: Counter, module: str) -> Any:
+    """A client of one of the modules, whose failures to cancel are kept."""
+    name = module.removesuffix(" 1.0")
+    given = ["/count", counter.type]
+    if name == "Ros":
+        given = [counter.type.replace("/action/", "/") + "Action", "/count"]
+        given[0] = given[0] if counter.ros1 else given[0].removesuffix("Action")
+    live.module = module
+    return live.load(WATCHED.replace("NAME", name).replace("GIVEN", json.dumps(given)[1:-1]))
+
+
+@pytest.mark.parametrize("module", ["Ros 1.0", "Ros2 1.0"])
+def test_cancelling_that_fails_is_told(
+    live: Bench, counter: Counter, wait: Any, module: str
+) -> None:
+    """Refused by the server; on ROS 1, where nobody can refuse, not answered in time."""
+    counter.offer(cancel=lambda _: False)
+    root = watched(live, counter, module)
+    wait(root.ready)
+    root.send()
+    wait(lambda: root.status() == 2)
+    root.cancel()
+    wait(lambda: root.told() != "[]")
+    ((who, reason),) = json.loads(root.told())
+    assert who == "goal"
+    assert ("did not tell within" if counter.ros1 else "refuses to cancel") in reason
+    assert root.status() in (2, 3)
+
+
+@pytest.mark.parametrize("module", ["Ros 1.0", "Ros2 1.0"])
+def test_cancelling_what_nobody_hears_of_any_more_is_told(
+    live: Bench, counter: Counter, wait: Any, module: str, caplog: Any
+) -> None:
+    counter.offer()
+    root = watched(live, counter, module)
+    root.watch()
+    wait(root.ready)
+    root.send()
+    wait(lambda: root.status() == 2)
+    live.session.shutdown()
+    wait(lambda: root.status() == 0)
+    root.cancel()
+    wait(lambda: live.session.node is None)
+    root.cancelAll()
+    told = json.loads(root.told())
+    assert [who for who, _ in told] == ["goal", "client"]
+    assert "nobody hears of it any more" in told[0][1]
+    assert told[0][1] in caplog.text
 
 
 def test_misuse_throws(live: Bench, counter: Counter, wait: Any) -> None:

@@ -7,7 +7,7 @@ import logging
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.comm.action import GoalStatus
-from rosglass.errors import Error
+from rosglass.errors import Error, NodeClosedError
 from rosglass.qml.callbacks import Deferred, call_back
 from rosglass.qml.client_element import ClientElement
 from rosglass.qml.goal_handle import GoalCallbacks, GoalHandle, tell_cancelling
@@ -38,6 +38,9 @@ class GoalSender(ClientElement):
         name: Action name, as in QML.
         type_name: Action type; empty takes the one that the server announces.
     """
+
+    #: With the reason: nothing is cancelled, although all goals, or those until a time, were to be.
+    cancelFailed = Signal(str)
 
     _HANDLE: ClassVar[type[GoalHandle]] = GoalHandle
     _client: Sender | None
@@ -72,13 +75,20 @@ class GoalSender(ClientElement):
         runtime, client, session = self._runtime, self._client, self._session
         assert runtime is not None
         caller, what = runtime.caller(), f"what {self._name} does"
-        if client is None or session is None:
-            text = f"{what} could not be cancelled: there is no connection with the robot"
-            log_from_qml("", logging.ERROR, text, caller)
-            return
-        ask(client).on_done(
-            lambda answer: tell_cancelling(answer, what, caller, logging.INFO), session.executor
-        )
+
+        def answered(answer: Promise[CancelAnswer]) -> None:
+            if is_alive(self):
+                reason = tell_cancelling(answer, what, caller, logging.INFO)
+                if reason:
+                    self.cancelFailed.emit(reason)
+
+        try:
+            if client is None or session is None:
+                raise NodeClosedError("there is no connection with the robot")
+            ask(client).on_done(answered, session.executor)
+        except NodeClosedError as error:
+            log_from_qml("", logging.ERROR, f"{what} could not be cancelled: {error}", caller)
+            self.cancelFailed.emit(str(error))
 
     # Sending.
 

@@ -73,6 +73,8 @@ class GoalHandle(QtCore.QObject):
     goalIdChanged = Signal()
     feedbackChanged = Signal()
     resultChanged = Signal()
+    #: With the reason: it was to be cancelled, and for all that is known it goes on.
+    cancelFailed = Signal(str)
 
     def __init__(
         self,
@@ -139,16 +141,23 @@ class GoalHandle(QtCore.QObject):
     @Slot()
     def cancel(self) -> None:
         """Ask the server to cancel it; a goal that was not sent yet is not sent at all."""
+        caller = self._runtime.caller()
+        if self._status is GoalStatus.LOST:
+            reason = f"nobody hears of it any more: {self._reason}"
+            log_from_qml("", logging.WARNING, f"{self._label} is not cancelled: {reason}", caller)
+            self.cancelFailed.emit(reason)
+            return
         if self._over:
             return
         if self._goal is None:
             self.end(GoalStatus.CANCELED, None, "it was cancelled before it was sent")
             return
-        caller = self._runtime.caller()
 
         def answered(answer: Promise[CancelAnswer]) -> None:
-            if is_alive(self) and not self._over:
-                tell_cancelling(answer, self._label, caller, logging.WARNING)
+            if is_alive(self) and (not self._over or self._status is GoalStatus.LOST):
+                reason = tell_cancelling(answer, self._label, caller, logging.WARNING)
+                if reason:
+                    self.cancelFailed.emit(reason)
 
         self._goal.cancel().on_done(answered, self._runtime.session.executor)
 
@@ -297,7 +306,7 @@ def let_go(state: dict[str, object], names: Iterable[str]) -> None:
         state.pop(name, None)
 
 
-def tell_cancelling(answer: Promise[CancelAnswer], what: str, caller: Caller, refused: int) -> None:
+def tell_cancelling(answer: Promise[CancelAnswer], what: str, caller: Caller, refused: int) -> str:
     """Log that a request to cancel failed, or was refused.
 
     Args:
@@ -305,10 +314,16 @@ def tell_cancelling(answer: Promise[CancelAnswer], what: str, caller: Caller, re
         what: What was to be cancelled.
         caller: Where in QML that was asked for.
         refused: The level at which refusals are logged.
+
+    Returns:
+        Why nothing is cancelled; empty when something is.
     """
     error = answer.exception(0)
     if error is not None:
         log_from_qml("", logging.ERROR, f"{what} could not be cancelled: {error}", caller)
-    elif not answer.result(0).accepted:
-        reason = answer.result(0).reason or "there is none"
-        log_from_qml("", refused, f"{what} is not cancelled: {reason}", caller)
+        return str(error)
+    if answer.result(0).accepted:
+        return ""
+    reason = answer.result(0).reason or "the server cancels nothing, and does not say why"
+    log_from_qml("", refused, f"{what} is not cancelled: {reason}", caller)
+    return reason

@@ -74,9 +74,6 @@ class RosGoalHandle(GoalHandle):
     @Slot()
     def cancel(self) -> None:
         """Ask the server to cancel it."""
-        if self._expired:
-            self._warn("cancel", "it has expired: its client is gone")
-            return
         super().cancel()
         if not self._native and not self._over:
             self._go(_Comm.WAITING_FOR_CANCEL_ACK)
