@@ -166,7 +166,7 @@ def test_pictures_are_counted_and_timed(wait: Callable[..., None]) -> None:
         wait(lambda count=count: len(figures.latencies) == count)
     assert figures.frames == 6
     assert figures.missing == 2, "1 and 2; then the robot was restarted"
-    assert figures.latencies == pytest.approx([0.05] * 6, abs=0.04)
+    assert list(figures.latencies) == pytest.approx([0.05] * 6, abs=0.04)
 
 
 def test_pictures_of_other_cameras_are_only_counted() -> None:
@@ -175,7 +175,7 @@ def test_pictures_of_other_cameras_are_only_counted() -> None:
     plain = QImage(320, 240, QImage.Format.Format_RGBX8888)
     plain.fill(QColor(Qt.GlobalColor.red))
     sink.setVideoFrame(multimedia.QVideoFrame(plain))
-    assert (figures.frames, figures.missing, figures.latencies) == (1, 0, [])
+    assert (figures.frames, figures.missing, list(figures.latencies)) == (1, 0, [])
 
 
 def test_latency_of_nothing_is_no_number() -> None:

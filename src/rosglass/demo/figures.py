@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
+from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
 _MULTIMEDIA: Any = optional("QtMultimedia")
 
 __all__ = ["CameraFigures", "Latency", "ProcessFigures", "table"]
+
+#: Pictures whose latency is remembered, five minutes of them: a cockpit may run for days.
+_NEWEST = 9000
 
 
 @dataclass(frozen=True)
@@ -68,8 +72,8 @@ class CameraFigures(QtCore.QObject):
         self._sink = sink
         self._waiting: framecode.FrameCode | None = None
         self._last = -1
-        #: Seconds from stamp to screen, picture by picture.
-        self.latencies: list[float] = []
+        #: Seconds from stamp to screen of the newest pictures.
+        self.latencies: deque[float] = deque(maxlen=_NEWEST)
         #: Pictures that reached the screen's video sink.
         self.frames = 0
         #: Pictures missing between the first and the last, by their running numbers.
