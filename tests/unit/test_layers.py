@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import subprocess
 import sys
 from pathlib import Path
@@ -80,6 +81,20 @@ def test_public_names_are_all_there() -> None:
     assert dir(rosglass) == sorted(rosglass.__all__)
     with pytest.raises(AttributeError, match="no attribute 'conect'"):
         rosglass.conect  # noqa: B018
+
+
+@pytest.mark.parametrize("package", ["comm", "ros2"])
+def test_public_names_of_a_package_are_all_there(package: str) -> None:
+    found = importlib.import_module(f"rosglass.{package}")
+    assert [name for name in found.__all__ if getattr(found, name, None) is None] == []
+    with pytest.raises(AttributeError, match="no attribute 'Nod'"):
+        found.Nod  # noqa: B018
+
+
+def test_names_of_nodes_are_valid_or_not_without_a_node() -> None:
+    # Ros2.init() asks before the first frame, on the thread that draws.
+    code = "import sys, rosglass.ros2.names; print('rosglass.comm.events' in sys.modules)"
+    assert run(code) == "False"
 
 
 def test_packages_are_attributes() -> None:

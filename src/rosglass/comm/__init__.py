@@ -1,54 +1,60 @@
 """What a robot offers: the abstract node and everything the worlds have in common."""
 
-from rosglass.comm.action import (
-    ActionClient,
-    ActionResult,
-    ActionServer,
-    CancelAnswer,
-    ClientGoal,
-    GoalStatus,
-    ServerGoal,
-)
-from rosglass.comm.anonymous import anonymous_name
-from rosglass.comm.clock import Clock, ClockChange, Jump, Timer
-from rosglass.comm.events import (
-    DeadlineMissed,
-    IncompatibleQoS,
-    LivelinessChanged,
-    LivelinessLost,
-    Matched,
-    PublisherEvents,
-    SamplesLost,
-    SubscriptionEvents,
-)
-from rosglass.comm.executor import IMMEDIATE, Dispatcher
-from rosglass.comm.graph import ConnectionState, EndpointInfo, EndpointKind, NodeName, Status
-from rosglass.comm.inbox import INBOX_LIMIT
-from rosglass.comm.lifecycle import LifecycleClient, State, Transition, TransitionEvent
-from rosglass.comm.listeners import Listeners
-from rosglass.comm.loop import LoopExecutor, executor_for
-from rosglass.comm.node import Answer, Executor, Handle, Node
-from rosglass.comm.parameters import (
-    ParameterClient,
-    ParameterDescriptor,
-    ParameterEvent,
-    Parameters,
-    ParameterType,
-    ParameterValue,
-    Range,
-    SetResult,
-)
-from rosglass.comm.promise import Promise
-from rosglass.comm.publisher import Publisher
-from rosglass.comm.qos import BEST_AVAILABLE, Durability, History, Liveliness, QoS, Reliability
-from rosglass.comm.sample import Sample
-from rosglass.comm.service import Call, ServiceClient, ServiceServer
-from rosglass.comm.source import Source
-from rosglass.comm.statistics import Statistics
-from rosglass.comm.subscription import Subscription
-from rosglass.comm.time import Duration, Time
-from rosglass.comm.timers import Timers
-from rosglass.comm.worker import Worker
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rosglass.comm.action import (
+        ActionClient,
+        ActionResult,
+        ActionServer,
+        CancelAnswer,
+        ClientGoal,
+        GoalStatus,
+        ServerGoal,
+    )
+    from rosglass.comm.anonymous import anonymous_name
+    from rosglass.comm.clock import Clock, ClockChange, Jump, Timer
+    from rosglass.comm.events import (
+        DeadlineMissed,
+        IncompatibleQoS,
+        LivelinessChanged,
+        LivelinessLost,
+        Matched,
+        PublisherEvents,
+        SamplesLost,
+        SubscriptionEvents,
+    )
+    from rosglass.comm.executor import IMMEDIATE, Dispatcher
+    from rosglass.comm.graph import ConnectionState, EndpointInfo, EndpointKind, NodeName, Status
+    from rosglass.comm.inbox import INBOX_LIMIT
+    from rosglass.comm.lifecycle import LifecycleClient, State, Transition, TransitionEvent
+    from rosglass.comm.listeners import Listeners
+    from rosglass.comm.loop import LoopExecutor, executor_for
+    from rosglass.comm.node import Answer, Executor, Handle, Node
+    from rosglass.comm.parameters import (
+        ParameterClient,
+        ParameterDescriptor,
+        ParameterEvent,
+        Parameters,
+        ParameterType,
+        ParameterValue,
+        Range,
+        SetResult,
+    )
+    from rosglass.comm.promise import Promise
+    from rosglass.comm.publisher import Publisher
+    from rosglass.comm.qos import BEST_AVAILABLE, Durability, History, Liveliness, QoS, Reliability
+    from rosglass.comm.sample import Sample
+    from rosglass.comm.service import Call, ServiceClient, ServiceServer
+    from rosglass.comm.source import Source
+    from rosglass.comm.statistics import Statistics
+    from rosglass.comm.subscription import Subscription
+    from rosglass.comm.time import Duration, Time
+    from rosglass.comm.timers import Timers
+    from rosglass.comm.worker import Worker
 
 __all__ = [
     "BEST_AVAILABLE",
@@ -118,3 +124,110 @@ __all__ = [
     "anonymous_name",
     "executor_for",
 ]
+
+_HOMES = {
+    "action": (
+        "ActionClient",
+        "ActionResult",
+        "ActionServer",
+        "CancelAnswer",
+        "ClientGoal",
+        "GoalStatus",
+        "ServerGoal",
+    ),
+    "anonymous": ("anonymous_name",),
+    "clock": (
+        "Clock",
+        "ClockChange",
+        "Jump",
+        "Timer",
+    ),
+    "events": (
+        "DeadlineMissed",
+        "IncompatibleQoS",
+        "LivelinessChanged",
+        "LivelinessLost",
+        "Matched",
+        "PublisherEvents",
+        "SamplesLost",
+        "SubscriptionEvents",
+    ),
+    "executor": (
+        "IMMEDIATE",
+        "Dispatcher",
+    ),
+    "graph": (
+        "ConnectionState",
+        "EndpointInfo",
+        "EndpointKind",
+        "NodeName",
+        "Status",
+    ),
+    "inbox": ("INBOX_LIMIT",),
+    "lifecycle": (
+        "LifecycleClient",
+        "State",
+        "Transition",
+        "TransitionEvent",
+    ),
+    "listeners": ("Listeners",),
+    "loop": (
+        "LoopExecutor",
+        "executor_for",
+    ),
+    "node": (
+        "Answer",
+        "Executor",
+        "Handle",
+        "Node",
+    ),
+    "parameters": (
+        "ParameterClient",
+        "ParameterDescriptor",
+        "ParameterEvent",
+        "Parameters",
+        "ParameterType",
+        "ParameterValue",
+        "Range",
+        "SetResult",
+    ),
+    "promise": ("Promise",),
+    "publisher": ("Publisher",),
+    "qos": (
+        "BEST_AVAILABLE",
+        "Durability",
+        "History",
+        "Liveliness",
+        "QoS",
+        "Reliability",
+    ),
+    "sample": ("Sample",),
+    "service": (
+        "Call",
+        "ServiceClient",
+        "ServiceServer",
+    ),
+    "source": ("Source",),
+    "statistics": ("Statistics",),
+    "subscription": ("Subscription",),
+    "time": (
+        "Duration",
+        "Time",
+    ),
+    "timers": ("Timers",),
+    "worker": ("Worker",),
+}
+_HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
+
+
+def __getattr__(name: str) -> object:
+    # Imported on first use: a program that shows an interface needs few of them before the screen.
+    if name not in _HOME_OF:
+        raise AttributeError(f"module 'rosglass.comm' has no attribute {name!r}")
+    value: object = getattr(import_module(f"rosglass.comm.{_HOME_OF[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -4,8 +4,30 @@ Import what you need from the modules: those of :mod:`rosglass.ros2.zenoh` bring
 ``eclipse-zenoh`` package, those of :mod:`rosglass.ros2.dds` ``cyclonedds``, the others neither.
 """
 
-from rosglass.ros2.graph import Graph
-from rosglass.ros2.middleware import Middleware, Writer
-from rosglass.ros2.node import Ros2Node
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rosglass.ros2.graph import Graph
+    from rosglass.ros2.middleware import Middleware, Writer
+    from rosglass.ros2.node import Ros2Node
 
 __all__ = ["Graph", "Middleware", "Ros2Node", "Writer"]
+
+_HOME_OF = {
+    "Graph": "graph",
+    "Middleware": "middleware",
+    "Ros2Node": "node",
+    "Writer": "middleware",
+}
+
+
+def __getattr__(name: str) -> object:
+    # Imported on first use: whoever only asks which names are valid waits for no node.
+    if name not in _HOME_OF:
+        raise AttributeError(f"module 'rosglass.ros2' has no attribute {name!r}")
+    value: object = getattr(import_module(f"rosglass.ros2.{_HOME_OF[name]}"), name)
+    globals()[name] = value
+    return value
