@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from rosglass.comm.node import Node
-    from rosglass.comm.publisher import Publisher
 
 __all__ = ["StaticTransformBroadcaster", "TransformBroadcaster"]
 
@@ -55,7 +54,7 @@ class TransformBroadcaster(Handle):
             ConversionError: A stamp does not fit into the message.
             NodeClosedError: The broadcaster is closed.
         """
-        _publish(self.publisher, _checked(transforms), self._ros)
+        self.publisher.publish(_fields(_checked(transforms), self._ros))
 
 
 class _Statics:
@@ -74,16 +73,37 @@ class _Statics:
         self._ros = 1 if is_ros1(node) else 2
         self._lock = threading.Lock()
         self._sent: dict[str, Transform] = {}
+        #: The newest message, until it is sent, by the thread that sends already if there is one.
+        self._next: bytes | None = None
+        self._sending = False
         #: How many broadcasters use it.
         self.users = 0
 
     def send(self, transforms: Iterable[Transform]) -> None:
         new = {transform.child_frame_id: transform for transform in transforms}
-        # Two threads must not overtake each other: the last message counts.
+        wire = "ros1" if self._ros == 1 else "cdr"
         with self._lock:
             known = {**self._sent, **new}
-            _publish(self.publisher, known.values(), self._ros)
-            self._sent = known
+            data = self.publisher.type.encode(_fields(known.values(), self._ros), wire=wire)
+            self._sent, self._next = known, data
+            # Two threads must not overtake each other: the last message counts.
+            if self._sending:
+                return
+            self._sending = True
+        try:
+            while (newest := self._take_next()) is not None:
+                self.publisher.publish_serialized(newest)
+        except BaseException:
+            with self._lock:
+                self._sending = False
+            raise
+
+    def _take_next(self) -> bytes | None:
+        """Return what is to be sent; who gets None sends no more."""
+        with self._lock:
+            data, self._next = self._next, None
+            self._sending = data is not None
+        return data
 
 
 _shared_lock = threading.Lock()
@@ -156,8 +176,8 @@ class StaticTransformBroadcaster(Handle):
         self._statics.send(checked)
 
 
-def _publish(publisher: Publisher, transforms: Iterable[Transform], ros: int) -> None:
-    publisher.publish(transforms=[transform.to_dict(ros) for transform in transforms])
+def _fields(transforms: Iterable[Transform], ros: int) -> dict[str, Any]:
+    return {"transforms": [transform.to_dict(ros) for transform in transforms]}
 
 
 def _checked(transforms: Transform | Iterable[Transform]) -> list[Transform]:

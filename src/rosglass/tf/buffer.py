@@ -161,6 +161,7 @@ class TransformBuffer(Handle):
             self.ignored.update(kind for kind, _, _ in refused)
             moved = store.version != tree
             disagreements, store.disagreements = store.disagreements, []
+            jumps, store.jumps = store.jumps, []
         # What is logged may go round the world, and may ask the graph who it was.
         for frame, first, second in disagreements:
             if self._complaints.fresh(("kind", frame)):
@@ -171,6 +172,14 @@ class TransformBuffer(Handle):
                     first,
                     second,
                 )
+        if jumps:
+            told = ", ".join(f"'{frame}' by {back / 1e9:.3f} s" for frame, back, _ in jumps)
+            _log.warning(
+                "time jumped back for %s (from %s): where they were before is forgotten; was a "
+                "clock set, or the robot started again?",
+                told,
+                str(jumps[-1][2]) or "an unnamed authority",
+            )
         for kind, child, told in refused:
             if self._complaints.fresh((kind, child, authority)):
                 level = logging.DEBUG if kind == "repeated" else logging.WARNING

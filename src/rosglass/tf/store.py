@@ -1,12 +1,14 @@
 """What a transform buffer holds, and what it takes in.
 
-Rules: tf2's ``BufferCore::setTransform``; but loops are refused when they would be closed, and a
-frame can change between static and moving.
+Rules: tf2's ``BufferCore::setTransform``; but loops are refused when they would be closed, a frame
+can change between static and moving, and one whose time jumped back is taken anew after a while.
 """
 
 from __future__ import annotations
 
 import math
+from time import monotonic
+from typing import NamedTuple
 
 from rosglass.comm.time import Time
 from rosglass.tf.cache import DynamicCache, Entry, StaticCache, clock_text
@@ -16,6 +18,8 @@ __all__ = ["FrameStore"]
 
 #: How far the squared length of a quaternion may be from 1, as in tf2.
 _TOLERANCE = 10e-3
+#: Seconds that a frame is only told of in times that are past before they count as the right ones.
+_DOUBT = 3.0
 _PREFIX = {
     "repeated": "TF_REPEATED_DATA ",
     "self": "TF_SELF_TRANSFORM ",
@@ -34,6 +38,13 @@ _WHY = {
 }
 
 
+class _Behind(NamedTuple):
+    """What is too old to be taken, since when (seconds, monotonic), and its first stamp."""
+
+    since: float
+    first: int
+
+
 class FrameStore:
     """The frames of a buffer, which locks it.
 
@@ -47,6 +58,8 @@ class FrameStore:
         version: Changes when frames come, go, or get another parent.
         disagreements: Frames that changed between static and moving, and by whom they were
             published before and now; for the buffer to tell people.
+        jumps: Frames whose time jumped back, by how many nanoseconds, and who published them; as
+            above.
     """
 
     def __init__(self, keep: int) -> None:
@@ -56,6 +69,8 @@ class FrameStore:
         self.authorities: dict[str, object] = {}
         self.version = 0
         self.disagreements: list[tuple[str, object, object]] = []
+        self.jumps: list[tuple[str, int, object]] = []
+        self._behind: dict[str, _Behind] = {}
 
     def put(
         self, child: str, stamp: int, entry: Entry, static: bool, authority: object
@@ -75,9 +90,28 @@ class FrameStore:
             kind = self._place(
                 child, stamp, (entry[0].removeprefix("/"), *entry[1:]), static, authority
             )
+        if kind == "old" and self._has_jumped(child, stamp):
+            self.jumps.append((child, self.caches[child].latest - stamp, authority))
+            self._remove(child)
+            entry = (entry[0].removeprefix("/"), *entry[1:])
+            kind = self._place(child, stamp, entry, static, authority)
+        elif self._behind and kind != "old":
+            # Somebody goes on in the time that was: what is old is just old.
+            self._behind.pop(child, None)
         if not kind:
             self.authorities[child] = authority
         return kind, child
+
+    def _has_jumped(self, child: str, stamp: int) -> bool:
+        """Whether a frame is told of in times that are past by now, and in no others any more."""
+        now, behind = monotonic(), self._behind.get(child)
+        if behind is None or stamp < behind.first:
+            self._behind[child] = _Behind(now, stamp)
+            return False
+        if now - behind.since < _DOUBT or stamp == behind.first:
+            return False
+        del self._behind[child]
+        return True
 
     def told(self, kind: str, child: str, stamp: int, entry: Entry) -> str:
         """Return in words why a transform was not taken."""
@@ -92,6 +126,7 @@ class FrameStore:
 
     def clear(self, static: bool) -> set[str]:
         """Forget what moves, and what does not if `static`; returns the frames."""
+        self._behind.clear()
         gone = {name for name, cache in self.caches.items() if static or not cache.static}
         for name in gone:
             self._remove(name)

@@ -295,3 +295,64 @@ def test_many_threads_at_once() -> None:
         thread.join()
     assert not faults
     assert len(buffer.tree()) == 5
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """The seconds that have gone by, to be set."""
+    now = [1000.0]
+    monkeypatch.setattr("rosglass.tf.store.monotonic", lambda: now[0])
+    return now
+
+
+def test_a_robot_whose_clock_went_back_is_believed(
+    clock: list[float], caplog: pytest.LogCaptureFixture
+) -> None:
+    buffer = TransformBuffer()
+    put(buffer, "map", "base", 500.0, authority="/robot")
+    put(buffer, "base", "lidar", 7.0, static=True)
+    for step in range(30):
+        clock[0] += 0.1
+        assert not put(buffer, "map", "base", 100.0 + step / 10, 2.0, authority="/robot")
+    assert buffer.lookup_transform("map", "lidar").stamp == at(500)
+    clock[0] += 0.2
+    assert put(buffer, "map", "base", 103.2, 3.0, authority="/restarted")
+    assert buffer.lookup_transform("map", "base").stamp == at(103.2)
+    assert buffer.lookup_transform("map", "lidar").translation == (4.0, 0.0, 0.0)
+    assert put(buffer, "map", "base", 103.3, 4.0)
+    text = "time jumped back for 'base' by 396.800 s (from /restarted)"
+    assert sum(text in record.getMessage() for record in caplog.records) == 1
+
+
+def test_a_frame_that_turned_round_with_its_clock(clock: list[float]) -> None:
+    buffer = TransformBuffer()
+    put(buffer, "map", "base", 500.0)
+    assert not put(buffer, "odom", "base", 100.0)
+    clock[0] += 3.0
+    assert put(buffer, "odom", "base", 103.0)
+    assert buffer.tree()["base"].parent == "odom"
+
+
+def test_who_is_late_among_those_in_time_does_not_turn_time_back(clock: list[float]) -> None:
+    """Two publishers of a frame, one of them with a clock that is behind, or an old message."""
+    buffer = TransformBuffer()
+    for step in range(20):
+        put(buffer, "map", "base", 500.0 + step, authority="/right")
+        for late in range(10):
+            clock[0] += 0.25
+            assert not put(buffer, "map", "base", 100.0 + step + late / 10, authority="/behind")
+    # Said again, and again, as what is latched is: no time goes by in it.
+    for _ in range(5):
+        clock[0] += 2.0
+        assert not put(buffer, "map", "base", 100.0)
+    assert buffer.lookup_transform("map", "base").stamp == at(519)
+
+
+def test_what_was_late_before_does_not_count_after_clearing(clock: list[float]) -> None:
+    buffer = TransformBuffer()
+    put(buffer, "map", "base", 500.0)
+    put(buffer, "map", "base", 100.0)
+    buffer.clear()
+    put(buffer, "map", "base", 700.0)
+    clock[0] += 5.0
+    assert not put(buffer, "map", "base", 600.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from types import SimpleNamespace
 from typing import Any
 
@@ -46,6 +47,8 @@ class Node:
         self.refused = ""
         self.state = ConnectionState.CONNECTED
         self.closed: list[str] = []
+        #: Called when something is sent, as subscriptions of the same program are.
+        self.receivers: list[Any] = []
 
     def status(self) -> Status:
         return Status(self.state, "")
@@ -66,10 +69,19 @@ class Node:
         if self.state is ConnectionState.CLOSED:
             raise NodeClosedError("closed")
         self.profiles[topic] = qos
-        send = lambda **fields: self.sent.append(  # noqa: E731
-            (topic, self.type.encode(fields, wire=self.wire))
+
+        def send(data: bytes) -> None:
+            self.sent.append((topic, data))
+            for told in self.receivers:
+                told()
+
+        return SimpleNamespace(
+            topic=topic,
+            type=self.type,
+            publish=lambda fields: send(self.type.encode(fields, wire=self.wire)),
+            publish_serialized=send,
+            close=lambda: self.closed.append(topic),
         )
-        return SimpleNamespace(topic=topic, publish=send, close=lambda: self.closed.append(topic))
 
     def publishers(self, topic: str) -> list[Any]:
         self.asked += 1
@@ -135,6 +147,51 @@ def test_several_broadcasters_of_a_node_tell_all_together(ros: int) -> None:
     node.state = ConnectionState.CLOSED
     with pytest.raises(NodeClosedError):
         StaticTransformBroadcaster(node)
+
+
+def test_who_receives_static_transforms_at_once_may_send_some() -> None:
+    """Also from another thread, and waiting for it: no lock is held while they are sent."""
+    node: Any = Node()
+    broadcaster = StaticTransformBroadcaster(node)
+    sent = threading.Event()
+
+    def answer() -> None:
+        node.receivers.clear()
+
+        def send() -> None:
+            broadcaster.send_transform(place("lidar"))
+            sent.set()
+
+        threading.Thread(target=send, daemon=True).start()
+        assert sent.wait(20)
+        broadcaster.send_transform(place("sonar"))
+
+    node.receivers.append(answer)
+    done = threading.Thread(target=lambda: broadcaster.send_transform(place("camera")), daemon=True)
+    done.start()
+    done.join(25)
+    assert not done.is_alive()
+    assert sent.is_set()
+    listener = TransformListener(node)
+    node.deliver(len(node.sent) - 1)
+    assert sorted(listener.buffer.tree()) == ["camera", "lidar", "map", "sonar"]
+
+
+def test_static_transforms_can_be_sent_after_one_that_failed() -> None:
+    node: Any = Node()
+    broadcaster = StaticTransformBroadcaster(node)
+
+    def fail() -> None:
+        node.receivers.clear()
+        raise NodeClosedError("the connection is gone")
+
+    node.receivers.append(fail)
+    with pytest.raises(NodeClosedError):
+        broadcaster.send_transform(place("camera"))
+    broadcaster.send_transform(place("lidar"))
+    listener = TransformListener(node)
+    node.deliver(1)
+    assert sorted(listener.buffer.tree()) == ["camera", "lidar", "map"]
 
 
 def test_the_name_of_a_publisher_is_asked_for_once() -> None:
