@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -21,21 +23,26 @@ START = 1_700_000_000 * SECOND
 STRING = "std_msgs/msg/String"
 
 
-@pytest.fixture
-def drive(tmp_path: Path) -> Path:
-    """A recording of 3 s: ``/chatter`` says 0 to 30, ``/other`` the same."""
-    path = tmp_path / "drive.mcap"
+def record(path: Path, lengths: dict[str, int]) -> Path:
+    """Record topics that count, ten times per second, for so many messages each."""
     writer = mcap_writer.Writer(str(path))
     writer.start("ros2")
     found = load(STRING)
     schema = writer.register_schema(STRING, "ros2msg", full_text(found.definition).encode())
-    topics = [writer.register_channel(t, "cdr", schema) for t in ("/chatter", "/other")]
-    for i in range(31):
+    topics = {name: writer.register_channel(name, "cdr", schema) for name in lengths}
+    for i in range(max(lengths.values())):
         at = START + i * SECOND // 10
-        for number in topics:
-            writer.add_message(number, at, found.encode({"data": str(i)}), at)
+        for name, number in topics.items():
+            if i < lengths[name]:
+                writer.add_message(number, at, found.encode({"data": str(i)}), at)
     writer.finish()
     return path
+
+
+@pytest.fixture
+def drive(tmp_path: Path) -> Path:
+    """A recording of 3 s: ``/chatter`` says 0 to 30, ``/other`` the same."""
+    return record(tmp_path / "drive.mcap", {"/chatter": 31, "/other": 31})
 
 
 PANEL = """
@@ -62,6 +69,7 @@ PANEL = """
         function problem() { return replay.problem }
         function subscribed() { return sub.subscribed }
         function stale() { return sub.stale }
+        function age() { return sub.age }
         function seconds() { return MODULE.now().sec }
         function play() { replay.play() }
         function pause() { replay.pause() }
@@ -97,8 +105,6 @@ def test_watching_a_recording_instead_of_the_robot(
     assert root.state() == "true,false,3.0"
     assert root.position() == pytest.approx(3.0)
     wait(lambda: root.seconds() == 1_700_000_003)
-    # At the end nothing moves any more, and what is shown says so.
-    wait(root.stale)
     root.setFile("")
     wait(lambda: live.session.url == robot and live.session.state == "connected", 30)
     assert root.state() == "false,false,0.0"
@@ -127,6 +133,100 @@ def test_time_under_control(live: Bench, drive: Path, wait: Any) -> None:
     root.forget()
     root.play()
     wait(lambda: root.all().count("30") >= 2)
+
+
+def test_a_paused_recording_shows_the_moment_it_is_paused_at(
+    live: Bench, tmp_path: Path, wait: Any
+) -> None:
+    path = record(tmp_path / "gap.mcap", {"/chatter": 20, "/other": 91})
+    root = panel(live, f'file: "{path}"')
+    wait(lambda: root.last() not in ("", "0"))
+    root.pause()
+    wait(lambda: root.state() == "true,false,9.0")
+    wait(300)
+    age = root.age()
+    wait(1500)
+    assert not root.stale()
+    assert root.age() == age
+    # Where the topic has nothing, what is shown is of another moment.
+    root.seek(8)
+    wait(root.stale)
+    assert root.age() > 5
+    root.seek(1)
+    wait(lambda: not root.stale())
+    # Time that is played passes, with or without messages.
+    root.seek(2)
+    root.play()
+    wait(root.stale)
+    # The robot's time passes.
+    root.pause()
+    root.seek(1)
+    wait(lambda: not root.stale())
+    root.setFile("")
+    wait(root.stale)
+
+
+def test_ages_follow_slow_time_but_not_fast_time(live: Bench, drive: Path, wait: Any) -> None:
+    root = panel(live, f'file: "{drive}"; rate: 0.05; loop: true')
+    wait(lambda: root.last() == "1", 30)
+    # Messages come every two seconds, which is a tenth of a second of the recording.
+    seen = [(wait(50), root.stale(), root.age())[1:] for _ in range(60)]
+    assert not any(stale for stale, _ in seen)
+    assert max(age for _, age in seen) < 0.5
+    steady: Any = live.session.steady
+    root.setRate(1000)
+    before, began = steady(), time.monotonic()
+    wait(200)
+    distance = steady() - before
+    # The recording begins again many times meanwhile, by its three seconds each.
+    assert distance % 3 < time.monotonic() - began + 0.5
+
+
+def test_the_robot_is_back_when_the_element_is_gone(live: Bench, drive: Path, wait: Any) -> None:
+    robot = live.session.url
+    root: Any = live.load(f"""
+        QtObject {{
+            id: root
+            property Component page: Component {{ Replay {{ file: "{drive}" }} }}
+            property var shown: page.createObject(root)
+            function leave() {{ shown.destroy() }}
+            function ready() {{ return shown.ready }}
+        }}
+    """)
+    wait(root.ready)
+    root.leave()
+    wait(lambda: live.session.url == robot and live.session.state == "connected", 30)
+
+
+def test_of_two_recordings_the_newer_wish_wins(
+    live: Bench, drive: Path, tmp_path: Path, wait: Any
+) -> None:
+    other = tmp_path / "other.mcap"
+    shutil.copy(drive, other)
+    root: Any = live.load(f"""
+        QtObject {{
+            property Replay a: Replay {{ file: "{drive}" }}
+            property Replay b: Replay {{}}
+            function setB(file) {{ b.file = file }}
+            function state() {{ return [a.ready, b.ready].join() }}
+            function problems() {{ return a.problem + b.problem }}
+        }}
+    """)
+    wait(lambda: root.state() == "true,true")
+    root.setB(str(other))
+    wait(lambda: "another Replay shows" in root.problems() and root.state() == "false,true")
+    assert live.session.url == f"replay:{other}"
+    root.setB("")
+    wait(lambda: live.session.url == f"replay:{drive}" and root.state() == "true,true")
+    assert root.problems() == ""
+
+
+def test_any_path_can_be_named(live: Bench, drive: Path, tmp_path: Path, wait: Any) -> None:
+    odd = tmp_path / "100% odd?#%41 ü.mcap"
+    shutil.copy(drive, odd)
+    root = panel(live, f'file: "{odd}"')
+    wait(lambda: root.state().startswith("true"))
+    assert live.session.url.endswith("100%25 odd%3F%23%2541 ü.mcap")
 
 
 def test_what_the_interface_publishes_goes_nowhere_and_says_so(

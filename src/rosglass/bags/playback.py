@@ -87,6 +87,11 @@ class Playback(Handle):
         return self._player.moment
 
     @property
+    def played(self) -> float:
+        """Seconds that passed for those who watch; see :class:`PlayedTime`."""
+        return self._player.played.now()
+
+    @property
     def is_playing(self) -> bool:
         """Whether time passes."""
         running = self._player.status().state in {PlayerState.STARTING, PlayerState.PLAYING}

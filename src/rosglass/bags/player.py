@@ -11,6 +11,7 @@ from enum import Enum
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
+from rosglass.bags.played_time import PlayedTime
 from rosglass.comm import Durability, Handle, QoS
 from rosglass.errors import BagError, Error, NodeClosedError
 
@@ -88,6 +89,7 @@ class Player(Handle):
     Attributes:
         channels: What is played.
         problems: What is not played and why, and what else publishes there, by topic.
+        played: How much time has passed for those who watch.
 
     Raises:
         BagError: An argument makes no sense, or nothing is left to play.
@@ -124,6 +126,7 @@ class Player(Handle):
         self._end = None if duration is None else self._begin + int(duration * _NS)
         self._delay, self._hold, self._context = delay, hold, int(context * _NS)
         self.problems: dict[str, str] = {}
+        self.played = PlayedTime()
         self.channels = self._choose(topics, exclude, clock)
         self._send: dict[Channel, Callable[[bytes], None]] = {}
         self._publishers: list[Publisher] = []
@@ -194,6 +197,7 @@ class Player(Handle):
         with self._lock:
             self._steps += 1
             self._paused = True
+            self._set_anchor(self._position)
             self._lock.notify_all()
 
     def set_rate(self, rate: float) -> None:
@@ -345,7 +349,7 @@ class Player(Handle):
             if place is None and self._loop and not self._closed:
                 place = self._begin
                 with self._lock:
-                    self._set_anchor(place)
+                    self._jump(place)
 
     def _pass(self, start: int) -> int | None:
         """Play from a place to the end; returns where to go on if there was a seek."""
@@ -358,6 +362,7 @@ class Player(Handle):
             if holds and self._target is None and not self._closed:
                 self._paused = True
                 self._position = self._bag.end if self._end is None else self._end
+                self._set_anchor(self._position)
         if holds and self._clock:
             self._tell_time()
         with self._lock:
@@ -379,8 +384,7 @@ class Player(Handle):
                 if self._paused:
                     if self._steps:
                         self._steps -= 1
-                        self._position = moment
-                        self._set_anchor(moment)
+                        self._jump(moment)
                         return True
                     self._lock.wait(_NAP)
                     self._set_anchor(self._position)
@@ -440,8 +444,7 @@ class Player(Handle):
         with self._lock:
             target, self._target = self._target, None
             if target is not None:
-                self._position = target
-                self._set_anchor(target)
+                self._jump(target)
             return None if self._closed else target
 
     def _change(self, paused: bool) -> None:
@@ -451,8 +454,14 @@ class Player(Handle):
             self._set_anchor(self._position)
             self._lock.notify_all()
 
+    def _jump(self, position: int) -> None:
+        self.played.jump((position - self._position) / _NS)
+        self._position = position
+        self._set_anchor(position)
+
     def _set_anchor(self, position: int) -> None:
         self._anchor = (time.monotonic(), position)
+        self.played.run(self._rate if self._started and not self._paused else 0.0)
 
     def _place(self, now: float) -> int:
         began, position = self._anchor

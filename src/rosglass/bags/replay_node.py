@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from typing import TYPE_CHECKING, Any
-from urllib.parse import parse_qsl
+from urllib.parse import parse_qsl, quote, unquote
 
 from rosglass.bags.bag import open_bag
 from rosglass.bags.local_world import LocalNode, LocalWorld
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rosglass.comm import NodeName, Sample
     from rosglass.messages import Message, MessageType
 
-__all__ = ["ReplayNode", "connect_replay"]
+__all__ = ["ReplayNode", "connect_replay", "replay_url"]
 
 #: How the address of a recording begins.
 _SCHEME = "replay:"
@@ -93,6 +93,10 @@ class ReplayNode(LocalNode):
         """Play these topics only; all when there are none."""
         self.world.choose(self.resolve(topic) for topic in topics)
 
+    def steady(self) -> float:
+        """Return seconds that pass only while the recording is played."""
+        return self.playback.played
+
     def create_publisher(
         self, topic: str, type: str | MessageType, qos: QoS | int = 10
     ) -> Publisher:
@@ -165,12 +169,14 @@ class _Nowhere(Publisher):
 def connect_replay(url: str, name: str, namespace: str) -> ReplayNode:
     """Connect to a recording: ``replay:drive.mcap``, ``replay:/data/drive.bag?rate=2&loop=true``.
 
+    In the path, ``%3F``, ``%23`` and ``%25`` are ``?``, ``#`` and ``%``, as in every URL.
+
     Raises:
         ConversionError: An option is not valid.
         BagError: The recording cannot be read.
     """
     path, _, query = url[len(_SCHEME) :].partition("?")
-    path = path.removeprefix("//")
+    path = unquote(path.removeprefix("//"))
     options: dict[str, Any] = {}
     for key, text in parse_qsl(query, keep_blank_values=True):
         if key == "rate":
@@ -185,3 +191,9 @@ def connect_replay(url: str, name: str, namespace: str) -> ReplayNode:
     if not path:
         raise ConversionError("url", url, "a recording such as replay:drive.mcap")
     return ReplayNode(path, url, name, namespace, **options)
+
+
+def replay_url(path: str) -> str:
+    """Return the address of a recording, whatever characters its path has."""
+    # What is no part of a URL's syntax stays readable.
+    return _SCHEME + "".join(quote(c, safe="") if c in "?#%" else c for c in path)

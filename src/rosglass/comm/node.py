@@ -6,6 +6,7 @@ package knows which one it talks to.
 
 from __future__ import annotations
 
+import time
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
@@ -402,3 +403,10 @@ class Node(Handle):
     @abstractmethod
     def now(self) -> Time:
         """Return the time of the node's clock."""
+
+    def steady(self) -> float:
+        """Return seconds by which the ages of messages are told; they never run back.
+
+        None pass while a recording that is shown in a robot's place is paused.
+        """
+        return time.monotonic()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import time
 from typing import TYPE_CHECKING, ClassVar
 
 from rosglass.errors import Error
@@ -81,6 +82,11 @@ class Element(QtCore.QObject):
         if self._session is None and not self._find_session():
             return
         self._update()
+
+    def _steady(self) -> float:
+        """Return the time by which ages are told, in seconds."""
+        session = self._session
+        return session.steady() if session is not None else time.monotonic()
 
     def _find_session(self) -> bool:
         runtime = self._find_runtime()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +10,7 @@ from rosglass.images import DEPTH_ENCODINGS, DepthColors, View, convert, reduce
 from rosglass.qml.frames import IMAGE_FORMATS, VIDEO_FORMATS, VideoFrame, to_image
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from rosglass.comm.time import Time
     from rosglass.images.frame import Frame, RawImage
@@ -63,7 +62,7 @@ class Picture:
         image: The ``QImage``; None when nobody wants one.
         received: When it arrived.
         late: Seconds that it was kept back on its way.
-        made: When it was ready, seconds of :func:`time.monotonic`.
+        made: When it was ready, seconds of the clock by which ages are told.
         whole: What was received, when `frame` is smaller.
     """
 
@@ -84,9 +83,14 @@ def whole_frame(picture: Picture, look: Look) -> Frame:
 
 
 class Renderer:
-    """Makes the pictures of one stream; used by its thread only."""
+    """Makes the pictures of one stream; used by its thread only.
 
-    def __init__(self) -> None:
+    Args:
+        clock: By which ages are told.
+    """
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
         #: The colours of depths follow the pictures: each setting has its own.
         self._colors: dict[Any, DepthColors] = {}
 
@@ -130,7 +134,7 @@ class Renderer:
                 video = (straight or VideoFrame()).finish(seen) if True in wanted else None
                 painted = to_image(seen) if False in wanted else None
                 whole = image if small is not image else None
-                picture = Picture(seen, video, painted, received, late, time.monotonic(), whole)
+                picture = Picture(seen, video, painted, received, late, self._clock(), whole)
                 made |= dict.fromkeys(members, picture)
         return made, failed
 

@@ -109,7 +109,7 @@ class SharedStream(QtCore.QObject):
         self._key = (node, topic, preferred)
         #: Replaced, never changed: the stream's thread reads it.
         self._channels: tuple[Channel, ...] = ()
-        self._renderer = Renderer()
+        self._renderer = Renderer(session.steady)
         self._lock = threading.Lock()
         self._pending: _Pending | None = None
         self._overtaken = 0

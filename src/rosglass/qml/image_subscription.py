@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import time
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
@@ -378,7 +377,7 @@ class ImageTransportSubscription(LookElement):
         return (self._timeout or DEFAULT_TIMEOUT) / 1000 + self._interval
 
     def _age(self, picture: Picture) -> float:
-        return time.monotonic() - picture.made + picture.late
+        return self._steady() - picture.made + picture.late
 
     def _is_old(self) -> bool:
         picture = self._picture

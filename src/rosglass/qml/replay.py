@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
 from rosglass.qml.element import Element
+from rosglass.qml.robot_place import RobotPlace
 from rosglass.qml.singleton import strings
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 
@@ -52,8 +53,8 @@ class Replay(Element):
         self._wish: bool | None = None
         self._place: float | None = None
         self._shown = (False, 0.0, 0.0)
-        #: Address of the robot that a recording takes the place of.
-        self._robot: str | None = None
+        #: What stands for it where it must not be kept alive.
+        self._user = object()
         self._playback: Playback | None = None
         self._have: tuple[Node, str, tuple[str, ...]] | None = None
 
@@ -176,11 +177,8 @@ class Replay(Element):
     # Finding what to control.
 
     def _update(self) -> None:
-        session, node = self._session, self.node
-        assert session is not None
-        if not self._to_robot:
-            self._change_address()
-            node = self.node
+        refused = self._take_place()
+        node = self.node
         shown = node is not None and node.url.lower().startswith(_SCHEME)
         if self._to_robot:
             key = (node, self._file, tuple(self._topics)) if node is not None else None
@@ -188,7 +186,9 @@ class Replay(Element):
             if shown:
                 self._say("Replay: toRobot: the interface shows a recording; there is no robot")
         else:
-            want = (node, "", ()) if node is not None and shown else None
+            want = (node, "", ()) if node is not None and shown and not refused else None
+            if refused:
+                self._say(f"Replay: {refused}")
         if want != self._have:
             self._let_go()
             self._have = want
@@ -199,24 +199,17 @@ class Replay(Element):
         if not self._to_robot and want is not None:
             self._choose(node)
 
-    def _change_address(self) -> None:
-        """Put the recording in the robot's place, or the robot back into its own."""
-        session = self._session
+    def _take_place(self) -> str:
+        """Put the recording in the robot's place, or let the robot back; returns why not."""
+        session, user = self._session, self._user
         assert session is not None
-        if self._file:
-            url = f"{_SCHEME}{self._file}"
-            if session.url == url:
-                return
-            if not session.owns_node:
-                self._say("Replay: the program brought its own node, which stays")
-                return
-            if not session.url.lower().startswith(_SCHEME):
-                self._robot = session.url
-            self._say("")
-            session.url = url
-        elif self._robot is not None:
-            robot, self._robot = self._robot, None
-            session.url = robot
+        place = RobotPlace.of(session)
+        if self._to_robot or not self._file:
+            self._at_end.pop("place", None)
+            place.leave(user)
+            return ""
+        self._at_end["place"] = lambda: place.leave_soon(user)
+        return place.take(user, self._file)
 
     def _choose(self, node: Any) -> None:
         try:

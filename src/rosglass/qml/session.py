@@ -119,6 +119,7 @@ class Session(QtCore.QObject):
         self._owns_node = True
         self._status = Status(ConnectionState.CLOSED)
         self._failed = False
+        self._steady: tuple[Callable[[], float], float] = (time.monotonic, 0.0)
         self._generation = 0
         self._closed = False
         self._handles: list[Handle] = []
@@ -184,6 +185,17 @@ class Session(QtCore.QObject):
     def owns_node(self) -> bool:
         """Whether it connects by itself, by :attr:`url`; not with a node that was adopted."""
         return self._owns_node
+
+    def steady(self) -> float:
+        """Return seconds by which ages are told, in any thread; see :meth:`Node.steady`.
+
+        They never run back, whatever node comes next.
+        """
+        clock, ahead = self._steady
+        return clock() + ahead
+
+    def _follow(self, clock: Callable[[], float]) -> None:
+        self._steady = (clock, self.steady() - clock())
 
     def init(
         self,
@@ -382,6 +394,7 @@ class Session(QtCore.QObject):
 
     def _take_node(self, node: Node) -> None:
         self.node = node
+        self._follow(node.steady)
         # The command line may have renamed it.
         self.name, self.namespace = node.name, node.namespace
         self._handles = [
@@ -400,6 +413,7 @@ class Session(QtCore.QObject):
         if self._rosout is not None:
             self._rosout.close()
         node, self.node = self.node, None
+        self._follow(time.monotonic)
         if node is not None:
             self.node_changed.emit()
             if self._owns_node:

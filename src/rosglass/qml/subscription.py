@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import logging
 import math
-import time
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
@@ -365,7 +364,7 @@ class Subscription(TopicElement):
             return
         wait = 0.0
         if self._throttle:
-            wait = self._shown_at + 1 / self._throttle - time.monotonic()
+            wait = self._shown_at + 1 / self._throttle - self._steady()
         if wait > 0.0005:
             self._timer.start(math.ceil(wait * 1000))
         else:
@@ -395,7 +394,7 @@ class Subscription(TopicElement):
         new_type = name != self._found_type and not self._wanted_type
         self._found_type = name
         self._sample, self._value, self._current = sample, None, True
-        self._shown_at = time.monotonic()
+        self._shown_at = self._steady()
         self._late = self._lateness(sample)
         self._age = 0.0
         self._suspect = False
@@ -441,7 +440,7 @@ class Subscription(TopicElement):
             return True
         timeout = self._get_timeout()
         # A link that was silent may hand on what is new only here.
-        return timeout > 0 and time.monotonic() - self._shown_at + self._late > timeout / 1000
+        return timeout > 0 and self._steady() - self._shown_at + self._late > timeout / 1000
 
     def _trust_again(self) -> None:
         # Who latched the message is there: had it changed, the new one would have come.
@@ -472,7 +471,7 @@ class Subscription(TopicElement):
     def _on_tick(self) -> None:
         super()._on_tick()
         if self._sample is not None:
-            self._age = time.monotonic() - self._shown_at
+            self._age = self._steady() - self._shown_at
             self.ageChanged.emit()
         subscription = self._feed.subscription if self._feed is not None else None
         frequency = bandwidth = 0.0

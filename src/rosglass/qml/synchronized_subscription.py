@@ -184,7 +184,8 @@ class SynchronizedSubscription(Element):
         self._have: tuple[Any, ...] | None = None
         self._stale, self._frequency, self._dropped = True, 0.0, 0
         #: Seconds that the set was kept back on its way; whether the connection was lost since.
-        self._late, self._suspect = 0.0, False
+        self._shown_at = self._late = 0.0
+        self._suspect = False
         self._times: deque[float] = deque(maxlen=_MARKS)
         self._retry = QtCore.QTimer(self)
         self._retry.setSingleShot(True)
@@ -353,6 +354,7 @@ class SynchronizedSubscription(Element):
         for samples in sets:
             self._samples, self._value = samples, None
             self._times.append(time.monotonic())
+            self._shown_at = self._steady()
             self._late, self._suspect = matcher.lateness(samples), False
             was_stale, self._stale = self._stale, self._is_old()
             self.messagesChanged.emit()
@@ -402,7 +404,7 @@ class SynchronizedSubscription(Element):
             self.droppedChanged.emit()
 
     def _is_old(self) -> bool:
-        age = time.monotonic() - self._times[-1] + self._late if self._times else math.inf
+        age = self._steady() - self._shown_at + self._late if self._times else math.inf
         return math.isinf(age) or (self._timeout > 0 and age > self._timeout / 1000)
 
     def _judge(self) -> None:

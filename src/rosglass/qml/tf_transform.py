@@ -252,7 +252,7 @@ class TfTransform(Element):
             return
         # Of a chain whose other links stand still, the newest that is known stays the same.
         if moved and (self._transform is None or found.stamp != self._transform.stamp):
-            self._arrived = self._updated
+            self._arrived = self._steady()
         self._take(found, "", "")
 
     def _take(self, found: Transform | None, exception: str, why: str) -> None:
@@ -279,7 +279,7 @@ class TfTransform(Element):
         """Find out whether what is shown still moves, and tell when that changed."""
         moving = self._transform is not None and self._transform.stamp.nanoseconds > 0
         arrived = self._arrived
-        age = time.monotonic() - arrived if moving and arrived is not None else -1.0
+        age = self._steady() - arrived if moving and arrived is not None else -1.0
         if age != self._age:
             self._age = age
             self.ageChanged.emit()
