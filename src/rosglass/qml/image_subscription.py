@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 __all__ = ["ImageTransportSubscription"]
 
+#: Importing it on the GUI thread would stop the screen for a tenth of a second: it brings numpy.
+_HEAVY = "rosglass.images"
 #: Read-only properties that are looked at ten times per second, as they are without a stream.
 _START: dict[str, Any] = {
     "subscribed": False,
@@ -270,6 +272,8 @@ class ImageTransportSubscription(LookElement):
         want = None
         if node is not None and self._enabled and not self._paused and resolved and self._sink:
             want = (node, resolved, self._preferred)
+        if want and self._session and not self._session.is_loaded(_HEAVY, self._schedule_again):
+            return
         if want != self._have:
             self._leave()
             self._have = want
@@ -286,6 +290,10 @@ class ImageTransportSubscription(LookElement):
             self._follow(self._stream)
         if not (self._enabled or self._blank):
             self._clear_sink()
+
+    def _schedule_again(self) -> None:
+        if is_alive(self):
+            self._schedule()
 
     def _join(self, node: Node, topic: str, preferred: str) -> None:
         from rosglass.qml.image_stream import SharedStream as Stream  # noqa: PLC0415 - brings numpy

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import logging
 import re
 import threading
@@ -38,6 +39,8 @@ NOT_INITIALIZED = (
     'no node was asked for: call Ros2.init("name"), or Ros.init("name") with Ros 1.0, '
     "e.g. in Component.onCompleted"
 )
+#: Milliseconds that connecting is put off at most; an interface without a window has no frame.
+_LONGEST_PUT_OFF = 1000
 #: Seconds that the end of the program waits for the node to say goodbye, and for all threads.
 _PATIENCE = 1.2
 
@@ -121,10 +124,12 @@ class Session(QtCore.QObject):
         self._failed = False
         self._steady: tuple[Callable[[], float], float] = (time.monotonic, 0.0)
         self._generation = 0
+        self._put_off = False
         self._closed = False
         self._handles: list[Handle] = []
         self._rosout: QmlRosout | None = None
         self._worker = Dispatcher("rosglass-qml")
+        self._loaded: set[str] = set()
         self._ticking = 0
         self._ticker = QtCore.QTimer(self)
         self._ticker.setInterval(TICK)
@@ -240,6 +245,21 @@ class Session(QtCore.QObject):
         self.initialized.emit()
         return True
 
+    def put_off(self) -> None:
+        """Have the node that is asked for wait for :meth:`go_on`, a second at most.
+
+        Connecting keeps Python busy, which the first frame of an interface needs, too.
+        """
+        if not self.is_initialized:
+            self._put_off = True
+            QtCore.QTimer.singleShot(_LONGEST_PUT_OFF, self.go_on)
+
+    def go_on(self) -> None:
+        """Connect, if that was put off; safe to call at any time."""
+        put_off, self._put_off = self._put_off, False
+        if put_off and self.is_initialized and self._owns_node:
+            self._start()
+
     def adopt(self, node: Node) -> None:
         """Use a node that Python made, and leave it open at the end.
 
@@ -310,6 +330,23 @@ class Session(QtCore.QObject):
 
         self._worker.post(run)
 
+    def is_loaded(self, module: str, then: Callable[[], object]) -> bool:
+        """Return whether a module is there without delay; if not, import it on the worker thread.
+
+        Args:
+            module: Its full name; one that needs no Qt.
+            then: Called on the GUI thread when it is there.
+        """
+        if module in self._loaded:
+            return True
+
+        def done(_: object) -> None:
+            self._loaded.add(module)
+            then()
+
+        self.background(lambda: importlib.import_module(module), done)
+        return False
+
     def attach(self, item: QtCore.QObject, **handlers: Callable[[], None]) -> Callable[[], None]:
         """Have signals handled for an object.
 
@@ -360,6 +397,8 @@ class Session(QtCore.QObject):
             connect = partial(connect, arguments=arguments)
         self._failed = False
         self._set_status(Status(ConnectionState.CONNECTING, f"connecting to {url or 'the robot'}"))
+        if self._put_off:
+            return
 
         def work() -> Node:
             try:
