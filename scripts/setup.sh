@@ -30,8 +30,10 @@ apt_test=(python3 python3-venv python3-genpy python3-genmsg xdotool x11-apps
           python3-shape-msgs python3-stereo-msgs python3-map-msgs python3-pcl-msgs python3-bond
           libroscpp-dev libactionlib-dev libstd-msgs-dev
           libstd-srvs-dev libgeometry-msgs-dev libsensor-msgs-dev)
-# Qt 5 in Debian's own Python, as RViz has it.
-apt_test+=(python3-pyside2.qtcore python3-pyside2.qtgui python3-pyside2.qtqml python3-pyside2.qtquick
+# RViz, its renderer and Qt 5 in Debian's own Python.
+apt_test+=(rviz python3-rviz python3-ogre-1.12 python3-pyqt5.qtquick python3-pyqt5.qtopengl
+           python3-pyside2.qtopengl python3-pyside2.qtmultimediawidgets python3-pyside2.qtquickwidgets
+           python3-pyside2.qtcore python3-pyside2.qtgui python3-pyside2.qtqml python3-pyside2.qtquick
            python3-pyside2.qtmultimedia python3-pyside2.qtwidgets python3-pyside2.qttest
            qml-module-qtquick2 qml-module-qtquick-window2 qml-module-qtquick-layouts
            qml-module-qtquick-controls2 qml-module-qtmultimedia)

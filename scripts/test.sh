@@ -20,7 +20,7 @@ scripts/check_wheel.sh
 side_by_side=(-n 3 --dist loadfile --max-worker-restart=0 --reruns 1 --rerun-show-tracebacks)
 say "tests on Debian's own Python and Qt 5 ($(.venv-system/bin/python -V))"
 scripts/private_network.sh .venv-system/bin/python -m pytest -q "${side_by_side[@]}" \
-  tests/unit tests/gui "$@"
+  tests/unit tests/gui tests/rviz "$@"
 say "tests, standalone ($(.venv/bin/python -V))"
 # Coverage slows tight loops tenfold: what compares every type ran above, without it.
 scripts/private_network.sh .venv/bin/python -m pytest -q "${side_by_side[@]}" -m "not exhaustive" \

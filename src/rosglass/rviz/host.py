@@ -1,0 +1,101 @@
+"""RViz's and Ogre's own bindings: the one place that imports them, and converts their objects.
+
+RViz's bindings are made for PyQt5, our interfaces for PySide2; both use the same Qt, and an object
+of one is wrapped anew for the other (reference: docs/architecture.md, section 6).
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from functools import cache
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from rosglass.errors import UnsupportedError
+from rosglass.qt import BINDING, QtCore
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+__all__ = ["as_pyqt", "as_pyside", "ogre", "ogre_overlay", "pyqt", "require_rviz", "rviz"]
+
+_T = TypeVar("_T", bound=QtCore.QObject)
+_PACKAGES = (
+    "rviz python3-rviz python3-ogre-1.12 python3-pyqt5 python3-pyside2.qtopengl "
+    "python3-pyside2.qtwidgets python3-pyside2.qtquick"
+)
+_ADVICE = (
+    "RViz and its bindings come with the system's own Python; on Debian 12: "
+    f"sudo apt install --no-install-recommends {_PACKAGES}; then run rosglass in an environment "
+    "made from it: /usr/bin/python3 -m venv --system-site-packages rviz-env"
+)
+
+
+def require_rviz() -> None:
+    """Load the bindings.
+
+    Raises:
+        UnsupportedError: They are missing, or this process uses another Qt than RViz; the message
+            says what to install.
+    """
+    if BINDING != "PySide2":
+        raise UnsupportedError(
+            f"RViz uses Qt 5, and this process {BINDING}: set ROSGLASS_QT=pyside2. {_ADVICE}"
+        )
+    rviz()
+    ogre_overlay()
+
+
+def _load(name: str) -> ModuleType:
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise UnsupportedError(f"{sys.executable} has no {name}: {error}. {_ADVICE}") from None
+
+
+@cache
+def rviz() -> Any:
+    """Return RViz's bindings (``rviz.bindings``)."""
+    return _load("rviz").bindings
+
+
+@cache
+def pyqt(module: str = "QtCore") -> Any:
+    """Return a module of PyQt5, which RViz's bindings take and give."""
+    return _load(f"PyQt5.{module}")
+
+
+@cache
+def ogre() -> Any:
+    """Return Ogre's bindings; its singletons are RViz's once RViz has made its renderer."""
+    return _load("Ogre")
+
+
+@cache
+def ogre_overlay() -> Any:
+    """Return the bindings of Ogre's overlays."""
+    _load("Ogre")
+    return _load("Ogre.Overlay")
+
+
+def as_pyside(item: Any, kind: type[_T]) -> _T:
+    """Return the PySide2 wrapper of an object that RViz's bindings gave.
+
+    Args:
+        item: The object.
+        kind: What it is for us, e.g. ``QtWidgets.QWidget``.
+    """
+    shiboken = importlib.import_module("shiboken2")
+    wrapped: _T = shiboken.wrapInstance(int(pyqt("sip").unwrapinstance(item)), kind)
+    return wrapped
+
+
+def as_pyqt(item: QtCore.QObject, kind: Any) -> Any:
+    """Return the PyQt5 wrapper of one of our objects, e.g. to give it to RViz.
+
+    Args:
+        item: The object.
+        kind: PyQt5's class for it.
+    """
+    shiboken = importlib.import_module("shiboken2")
+    return pyqt("sip").wrapinstance(int(shiboken.getCppPointer(item)[0]), kind)

@@ -1,0 +1,170 @@
+"""A picture that Ogre blends over RViz's 3D view, on panels no larger than what is on it."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rosglass.rviz.host import ogre, ogre_overlay
+from rosglass.rviz.tiles import Rect, changed_tiles, cover, covered_tiles
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["HIGHEST_Z", "Layer"]
+
+#: Ogre draws overlays of higher order later, and knows no higher order than this.
+HIGHEST_Z = 650
+_numbers = itertools.count()
+_GROUP = "General"
+
+
+class Layer:
+    """One texture, shown by panels over the whole 3D view.
+
+    Made and used in the GUI thread, between two frames of RViz. Ogre owns what is made, and it is
+    let go by :meth:`close`.
+
+    Args:
+        name: For Ogre's messages.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = f"rosglass/{next(_numbers)}/{name}"
+        self._manager = ogre_overlay().OverlayManager.getSingleton()
+        self._overlay = self._manager.create(self._name)
+        self._texture: Any = None
+        self._material: Any = None
+        self._panels: list[Any] = []
+        self._before: NDArray[np.uint32] | None = None
+        self._covered: NDArray[np.bool_] | None = None
+        self._shown = 0
+        self._visible = True
+        self._closed = False
+
+    def set_z(self, z: int) -> None:
+        """Draw it after the layers of lower `z`, from 0 to :data:`HIGHEST_Z`."""
+        self._overlay.setZOrder(z)
+
+    def set_visible(self, visible: bool) -> None:
+        """Show or hide it."""
+        self._visible = visible
+        self._show()
+
+    @property
+    def rectangles(self) -> int:
+        """How many panels show it now."""
+        return self._shown
+
+    def update(self, pixels: NDArray[np.uint32]) -> list[Rect]:
+        """Show a picture.
+
+        Args:
+            pixels: Shape (height, width) of the view, each pixel 0xAARRGGBB with premultiplied
+                colours.
+
+        Returns:
+            What has changed since the last picture, and was given to the graphics card.
+        """
+        height, width = pixels.shape
+        if self._before is None or self._before.shape != pixels.shape:
+            self._make_texture(width, height)
+            self._before = np.zeros_like(pixels)
+            changed = np.ones_like(covered_tiles(pixels))
+        else:
+            changed = changed_tiles(pixels, self._before)
+        rects = cover(changed, width, height, most=12)
+        for rect in rects:
+            self._upload(pixels, rect)
+        if rects:
+            covered = covered_tiles(pixels)
+            if self._covered is None or not np.array_equal(covered, self._covered):
+                self._covered = covered
+                self._place(cover(covered, width, height), width, height)
+        return rects
+
+    def close(self) -> None:
+        """Take it off the view and let its texture go; safe to call twice."""
+        if self._closed:
+            return
+        self._closed = True
+        self._overlay.hide()
+        self._drop_panels()
+        self._manager.destroy(self._name)
+        self._drop_texture()
+
+    def _make_texture(self, width: int, height: int) -> None:
+        o = ogre()
+        self._drop_panels()
+        self._drop_texture()
+        name = f"{self._name}/{width}x{height}"
+        # Without depth 1, the call is taken for another overload, which makes a texture of depth 0.
+        self._texture = o.TextureManager.getSingleton().createManual(
+            name, _GROUP, o.TEX_TYPE_2D, width, height, 1, 0, o.PF_A8R8G8B8, o.TU_DYNAMIC_WRITE_ONLY
+        )
+        self._material = o.MaterialManager.getSingleton().create(name, _GROUP)
+        render = self._material.getTechnique(0).getPass(0)
+        render.setLightingEnabled(False)
+        render.setDepthCheckEnabled(False)
+        render.setDepthWriteEnabled(False)
+        # Qt gives colours that are multiplied with their alpha already.
+        render.setSceneBlending(o.SBF_ONE, o.SBF_ONE_MINUS_SOURCE_ALPHA)
+        unit = render.createTextureUnitState(name)
+        unit.setTextureFiltering(o.TFO_NONE)
+        unit.setTextureAddressingMode(o.TextureUnitState.TAM_CLAMP)
+
+    def _upload(self, pixels: NDArray[np.uint32], rect: Rect) -> None:
+        o = ogre()
+        assert self._before is not None
+        # Ogre wants memory that it could write to.
+        part = np.ascontiguousarray(pixels[rect.top : rect.bottom, rect.left : rect.right])
+        self._before[rect.top : rect.bottom, rect.left : rect.right] = part
+        height, width = part.shape
+        source = o.PixelBox(width, height, 1, o.PF_A8R8G8B8, part.view(np.uint8).reshape(-1))
+        self._texture.getBuffer().blitFromMemory(
+            source, o.Box(rect.left, rect.top, rect.right, rect.bottom)
+        )
+
+    def _place(self, rects: list[Rect], width: int, height: int) -> None:
+        o = ogre_overlay()
+        while len(self._panels) < len(rects):
+            name = f"{self._name}/panel{len(self._panels)}"
+            panel = self._manager.createOverlayElement("Panel", name).castPanelOverlayElement()
+            panel.setMetricsMode(getattr(o, "GMM_RELATIVE", 0))
+            panel.setMaterialName(self._material.getName(), _GROUP)
+            self._overlay.add2D(panel)
+            self._panels.append(panel)
+        for panel, rect in zip(self._panels, rects, strict=False):
+            left, right = rect.left / width, rect.right / width
+            top, bottom = rect.top / height, rect.bottom / height
+            panel.setPosition(left, top)
+            panel.setDimensions(right - left, bottom - top)
+            panel.setUV(left, top, right, bottom)
+            panel.show()
+        for panel in self._panels[len(rects) :]:
+            panel.hide()
+        self._shown = len(rects)
+        self._show()
+
+    def _show(self) -> None:
+        if self._visible and self._shown:
+            self._overlay.show()
+        else:
+            self._overlay.hide()
+
+    def _drop_panels(self) -> None:
+        for panel in self._panels:
+            self._overlay.remove2D(panel)
+            self._manager.destroyOverlayElement(panel)
+        self._panels.clear()
+        self._covered = None
+        self._shown = 0
+
+    def _drop_texture(self) -> None:
+        if self._texture is not None:
+            o = ogre()
+            o.MaterialManager.getSingleton().remove(self._material.getName(), _GROUP)
+            o.TextureManager.getSingleton().remove(self._texture.getName(), _GROUP)
+            self._texture = self._material = None

@@ -1,0 +1,134 @@
+"""The overlays of an RViz: which is above which, and when each is drawn."""
+
+from __future__ import annotations
+
+import logging
+import time
+from typing import TYPE_CHECKING
+
+from rosglass.errors import Error
+from rosglass.qt import QtCore, Signal
+from rosglass.rviz.layer import HIGHEST_Z, Layer
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from rosglass.rviz.overlay import Overlay
+    from rosglass.rviz.window import Window
+
+__all__ = ["Stack"]
+
+_log = logging.getLogger("rosglass.rviz")
+
+
+class Entry:
+    """An overlay with the layer that shows it.
+
+    Args:
+        overlay: The overlay.
+    """
+
+    def __init__(self, overlay: Overlay) -> None:
+        self.overlay = overlay
+        self.layer = Layer(overlay.name)
+        self.dirty = True
+        self.size = (0, 0, 0.0)
+
+
+class Stack(QtCore.QObject):
+    """Draws the overlays of one RViz, right before each of its frames.
+
+    Args:
+        window: RViz.
+    """
+
+    #: Overlays came, went, or changed places.
+    changed = Signal()
+    #: Milliseconds that overlays took before a frame in which any was drawn: drawing, uploading.
+    drawn = Signal(float, float)
+
+    def __init__(self, window: Window) -> None:
+        super().__init__()
+        self._window = window
+        self._entries: list[Entry] = []
+        window.before_frame.connect(self._before_frame)
+
+    def add(self, overlay: Overlay) -> None:
+        """Show an overlay above those of lower or equal `z`.
+
+        Raises:
+            Error: There is one of this name.
+        """
+        if self.find(overlay.name) is not None:
+            raise Error(f"there is an overlay {overlay.name!r} already; give this one another name")
+        entry = Entry(overlay)
+        self._entries.append(entry)
+        overlay.changed.connect(lambda: self._mark(entry))
+        overlay.arranged.connect(self._arrange)
+        self._arrange()
+
+    def remove(self, overlay: Overlay) -> None:
+        """Take an overlay away and close it; does nothing when it is not there."""
+        for entry in self._entries:
+            if entry.overlay is overlay:
+                self._entries.remove(entry)
+                overlay.arranged.disconnect(self._arrange)
+                entry.layer.close()
+                overlay.close()
+                self.changed.emit()
+                return
+
+    def find(self, name: str) -> Overlay | None:
+        """Return the overlay of a name."""
+        return next((o for o in self if o.name == name), None)
+
+    def __iter__(self) -> Iterator[Overlay]:
+        """Iterate over the overlays, the lowest first."""
+        return iter([entry.overlay for entry in self._entries])
+
+    def topmost_first(self) -> list[Overlay]:
+        """Return the overlays that are shown, in the order in which they get input."""
+        return [o for o in reversed(list(self)) if o.visible and o.opacity > 0]
+
+    def close(self) -> None:
+        """Take every overlay away."""
+        for overlay in list(self):
+            self.remove(overlay)
+
+    @staticmethod
+    def _mark(entry: Entry) -> None:
+        entry.dirty = True
+
+    def _arrange(self) -> None:
+        self._entries.sort(key=lambda entry: (entry.overlay.is_popup, entry.overlay.z))
+        for number, entry in enumerate(self._entries):
+            entry.layer.set_z(max(HIGHEST_Z - len(self._entries) + number, 0))
+            entry.layer.set_visible(entry.overlay.visible)
+        self.changed.emit()
+
+    def _before_frame(self) -> None:
+        drawing = uploading = 0.0
+        width, height, ratio = self._window.view_size()
+        if not width or not height:
+            return
+        for entry in list(self._entries):
+            overlay = entry.overlay
+            if not overlay.visible:
+                continue
+            size = (width, height, ratio * overlay.scale)
+            if entry.size != size:
+                entry.size = size
+                overlay.resize(*size)
+                entry.dirty = True
+            if not entry.dirty:
+                continue
+            entry.dirty = False
+            started = time.perf_counter()
+            pixels = overlay.draw()
+            drawn = time.perf_counter()
+            drawing += drawn - started
+            if pixels is not None:
+                entry.layer.update(pixels)
+                uploading += time.perf_counter() - drawn
+        if drawing:
+            self.drawn.emit(drawing * 1e3, uploading * 1e3)

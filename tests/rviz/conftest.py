@@ -1,0 +1,145 @@
+"""A real RViz in the test's own process, on a real X server and a real ROS master."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import time
+import xmlrpc.client
+from contextlib import suppress
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from rosglass.rviz import Application
+
+# RViz's own Python has Qt 5 alone; anywhere else, there is nothing to test.
+HAVE_RVIZ = find_spec("PySide6") is None and find_spec("rviz") is not None
+if HAVE_RVIZ:
+    os.environ.setdefault("ROSGLASS_QT", "pyside2")
+SCREEN = (1280, 800)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    here = str(Path(__file__).parent)
+    for item in items:
+        if str(item.path).startswith(here) and not HAVE_RVIZ:
+            item.add_marker(pytest.mark.skip("RViz's bindings need the system's own Python"))
+
+
+@pytest.fixture(scope="session")
+def screen() -> str:
+    """A display of the test's own."""
+    read, write = os.pipe()
+    command = ["Xvfb", "-displayfd", str(write), "-screen", "0", f"{SCREEN[0]}x{SCREEN[1]}x24"]
+    subprocess.Popen(
+        # It ends with its last client, which is this process: Qt would end the tests otherwise.
+        [*command, "-nolisten", "tcp", "-terminate"],
+        pass_fds=[write],
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(write)
+    with os.fdopen(read) as told:
+        return f":{told.readline().strip()}"
+
+
+@pytest.fixture(scope="session")
+def master(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The URI of a rosmaster of the test's own."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    home = str(tmp_path_factory.mktemp("ros_home"))
+    env = {"PATH": "/usr/bin:/bin", "HOME": home, "ROS_HOME": home, "ROS_IP": "127.0.0.1"}
+    server = subprocess.Popen(
+        ["/usr/bin/rosmaster", "--core", "-p", str(port)],
+        env=env,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    uri = f"http://127.0.0.1:{port}"
+    until = time.monotonic() + 30
+    while time.monotonic() < until:
+        with suppress(OSError, xmlrpc.client.Error), xmlrpc.client.ServerProxy(uri) as proxy:
+            proxy.getPid("/test")
+            break
+        time.sleep(0.05)
+    else:
+        pytest.fail("rosmaster does not answer")
+    yield uri
+    server.kill()
+    server.wait()
+
+
+@pytest.fixture(scope="session")
+def app(
+    screen: str, master: str, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Application]:
+    """RViz, once per process: Ogre can be started only once. Its window fills the screen."""
+    home = tmp_path_factory.mktemp("home")
+    os.environ.update(
+        DISPLAY=screen,
+        QT_QPA_PLATFORM="xcb",
+        ROS_MASTER_URI=master,
+        ROS_IP="127.0.0.1",
+        HOME=str(home),
+        XDG_RUNTIME_DIR=str(home),
+    )
+    sys.argv[:] = ["rosglass"]
+    from rosglass.rviz import Application
+
+    app = Application()
+    app.window.widget.setGeometry(0, 0, *SCREEN)
+    app.window.widget.show()
+    yield app
+    app.close()
+
+
+@pytest.fixture
+def wait(app: Application) -> Callable[..., None]:
+    """Run the event loop until a condition holds; without one, for some milliseconds."""
+    from rosglass.qt import QtCore, send_deferred_deletes
+
+    def wait_until(condition: Callable[[], Any] | int, timeout: float = 30.0) -> None:
+        fixed = isinstance(condition, int)
+        until = time.monotonic() + (condition / 1000 if isinstance(condition, int) else timeout)
+        while fixed or not condition():  # type: ignore[operator]
+            if time.monotonic() > until:
+                assert fixed, "did not happen in time"
+                return
+            app.qt.processEvents(QtCore.QEventLoop.AllEvents, 10)
+            send_deferred_deletes()
+            time.sleep(0.001)
+
+    return wait_until
+
+
+@pytest.fixture
+def grab(app: Application, wait: Callable[..., None]) -> Callable[[], Any]:
+    """Return a picture of the 3D view after RViz has drawn two more frames; QImage."""
+
+    def grab() -> Any:
+        frames: list[int] = []
+        count = frames.append
+        app.window.before_frame.connect(lambda: count(1))
+        wait(lambda: len(frames) >= 3)
+        view = app.window.panel
+        handle = app.qt.primaryScreen()
+        return handle.grabWindow(view.winId()).toImage()
+
+    return grab
+
+
+@pytest.fixture(autouse=True)
+def clean(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Take every overlay away after each test."""
+    yield
+    if "app" in request.fixturenames:
+        request.getfixturevalue("app").overlays.close()
