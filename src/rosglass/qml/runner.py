@@ -15,7 +15,16 @@ from rosglass.qml.modules import install
 from rosglass.qml.places import import_folder, interface_file
 from rosglass.qml.runtime import runtime_of
 from rosglass.qml.watcher import Watcher
-from rosglass.qt import QT6, QtCore, QtGui, QtQml, QtQuick, is_alive, send_deferred_deletes
+from rosglass.qt import (
+    QT6,
+    QtCore,
+    QtGui,
+    QtQml,
+    QtQuick,
+    Slot,
+    is_alive,
+    send_deferred_deletes,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -86,6 +95,8 @@ class Runner(QtCore.QObject):
         self.engine.exit.connect(self.exit)
         #: The window the interface is in, or the first of those it opens; None while it has none.
         self.window: QtQuick.QQuickWindow | None = None
+        #: The window whose first frame has not been seen yet.
+        self._awaited: QtQuick.QQuickWindow | None = None
         #: What the program is to end with, once something has asked for its end.
         self.exit_code: int | None = None
         #: Whether `window` is ours, around an interface that is no window itself.
@@ -113,9 +124,12 @@ class Runner(QtCore.QObject):
         Raises:
             QmlError: The file has errors; the message lists them.
         """
+        self.session.put_off()
         try:
             self._show(*self._create())
+            self._await_frame()
         except QmlError as error:
+            self.session.go_on()
             if self._watcher is None:
                 raise
             _log.error("%s", error)
@@ -199,6 +213,20 @@ class Runner(QtCore.QObject):
                 item.deleteLater()
         self._component = self._overlay_component = None
         send_deferred_deletes()
+
+    def _await_frame(self) -> None:
+        if self.window is not None and self.window.isVisible():
+            self._awaited = self.window
+            self._awaited.frameSwapped.connect(self._on_frame)
+        else:
+            self.session.go_on()
+
+    @Slot()
+    def _on_frame(self) -> None:
+        self.session.go_on()
+        window, self._awaited = self._awaited, None
+        if window is not None and is_alive(window):
+            window.frameSwapped.disconnect(self._on_frame)
 
     def _create(self) -> tuple[QtCore.QObject, QtQml.QQmlComponent]:
         if not os.path.isfile(self.file):  # noqa: PTH113 - pathlib's may raise

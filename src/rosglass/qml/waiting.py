@@ -66,6 +66,8 @@ def wait_for(session: Session, begin: Callable[[Callable[[], None]], None]) -> b
         ended = True
         loop.quit()
 
+    # Nothing is drawn before this call returns.
+    session.go_on()
     begin(end)
     if ended:
         return True
