@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from memory_world import MemoryWorld
+from memory_world import MemoryNode, MemoryWorld
 
 from rosglass.errors import QmlError
 from rosglass.qml import Session
 from rosglass.qml.runner import Runner, needs_widgets
-from rosglass.qt import is_alive
+from rosglass.qml.waiting import wait_for
+from rosglass.qt import QtCore, is_alive
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -397,4 +398,69 @@ def test_a_kiosk_stays_open_and_hides_the_pointer(
     assert runner.window.isVisible()
     runner.close()
     assert app.overrideCursor() is None
+    session.close()
+
+
+def test_connecting_waits_for_the_first_frame(
+    app: Any, file: Path, world: MemoryWorld, wait: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    order: list[str] = []
+    monkeypatch.setattr("rosglass.qml.session._LONGEST_PUT_OFF", 60_000)
+
+    def connect(*arguments: Any) -> MemoryNode:
+        order.append("connected")
+        return world.connect(*arguments)
+
+    session = Session(connect=connect)
+    runner = Runner(file, session)
+    runner.load()
+    assert (session.state, order) == ("connecting", [])
+    runner.window.afterRendering.connect(
+        lambda: order.append("drawn"), QtCore.Qt.ConnectionType.DirectConnection
+    )
+    wait(lambda: session.node is not None)
+    assert order.index("drawn") < order.index("connected")
+    runner.close()
+    session.close()
+
+
+def test_connecting_does_not_wait_for_a_window_that_nobody_sees(
+    app: Any, file: Path, world: MemoryWorld, wait: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rosglass.qml.session._LONGEST_PUT_OFF", 60_000)
+    file.write_text(
+        """import QtQuick 2.15
+        import QtQuick.Window 2.15
+        import Ros2 1.0
+        Window { Component.onCompleted: Ros2.init("ui") }"""
+    )
+    session = Session(connect=world.connect)
+    runner = Runner(file, session)
+    runner.load()
+    wait(lambda: session.node is not None)
+    runner.close()
+    session.close()
+
+
+def test_connecting_waits_for_a_frame_that_never_comes_only_so_long(
+    app: Any, world: MemoryWorld, wait: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rosglass.qml.session._LONGEST_PUT_OFF", 50)
+    session = Session(connect=world.connect)
+    session.put_off()
+    session.init("ui")
+    assert session.state == "connecting"
+    wait(lambda: session.node is not None)
+    session.close()
+
+
+def test_connecting_does_not_wait_while_a_call_of_qml_does(
+    app: Any, world: MemoryWorld, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rosglass.qml.session._LONGEST_PUT_OFF", 60_000)
+    session = Session(connect=world.connect)
+    session.put_off()
+    session.init("ui")
+    assert wait_for(session, session.node_changed.connect)
+    assert session.node is not None
     session.close()
