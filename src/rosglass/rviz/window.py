@@ -1,46 +1,82 @@
-"""RViz itself: its window, its displays, and when it draws."""
+"""RViz itself: its window, its config file, and when it draws."""
 
 from __future__ import annotations
 
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from rosglass.errors import Error
+from rosglass.qml.places import locate
 from rosglass.qt import QtCore, Signal
-from rosglass.rviz.host import as_pyside, rviz
+from rosglass.rviz.host import as_pyside, pyqt, rviz
 from rosglass.rviz.qt5 import QtCore as Qt5Core
 from rosglass.rviz.qt5 import QtWidgets
 
-__all__ = ["Window"]
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Callable
+
+__all__ = ["Window", "config_file"]
+
+#: What RViz says right before it makes the displays of a config file.
+_LOADING = "Creating displays"
+#: Where a config file has the displays.
+_CONTENT = "Visualization Manager"
 
 
 class Window(QtCore.QObject):
-    """RViz's window, made in this process.
+    """RViz's window, made in this process; once, for its renderer cannot be started again.
 
     RViz registers with the ROS master while it is made, and waits for it without end: find out
     before whether it answers.
 
     Args:
         config: The ``.rviz`` file; empty for RViz's default one.
+        splash: Show RViz's splash screen meanwhile.
+
+    Raises:
+        Error: The file is missing or is no config of RViz.
     """
 
     #: RViz is about to draw.
     before_frame = Signal()
+    #: RViz is about to throw all its displays away, and to make those of a config file.
+    config_loading = Signal()
+    #: A config file was loaded: every display, view and tool is another one now. Its path.
+    config_loaded = Signal(str)
+    #: RViz is in full screen now, or no longer.
+    fullscreen_changed = Signal(bool)
+    #: The window was closed, or is taken down: the last moment to let go of what is RViz's.
+    closing = Signal()
 
-    def __init__(self, config: str = "") -> None:
+    def __init__(self, config: str | os.PathLike[str] = "", *, splash: bool = False) -> None:
         super().__init__()
+        file = str(config_file(config)) if config else ""
+        self._closing = False
         bindings = rviz()
         #: RViz's ``VisualizationFrame``, as its own bindings know it.
-        self.frame: Any = bindings.VisualizationFrame()
-        self.frame.setSplashPath("")
-        self.frame.initialize(config) if config else self.frame.initialize()
+        self.frame: Any = _frame(bindings.VisualizationFrame, self._tell_closing)
+        if not splash:
+            self.frame.setSplashPath("")
+        self.frame.initialize(file)
         #: RViz's ``VisualizationManager``.
         self.manager: Any = self.frame.getManager()
         #: The window, as PySide2 knows it.
         self.widget = as_pyside(self.frame, QtWidgets.QMainWindow)
         #: The widget with the 3D view.
         self.panel = self._find_panel(QtWidgets.QWidget)
-        manager = as_pyside(self.manager, QtCore.QObject)
-        self._wrapped = manager
-        Qt5Core.QObject.connect(manager, Qt5Core.SIGNAL("preUpdate()"), self.before_frame.emit)
+        self._wrapped = as_pyside(self.manager, QtCore.QObject)
+        self._loading = False
+        self._config = file
+        self._menus: dict[str, Any] = {}
+        self._connect(self._wrapped, "preUpdate()", self.before_frame.emit)
+        self._connect(self._wrapped, "statusUpdate(QString)", self._on_status)
+        self._connect(self.widget, "displayConfigFileChanged(QString)", self._on_config)
+        self._connect(self.widget, "fullScreenChange(bool)", self.fullscreen_changed.emit)
+
+    @staticmethod
+    def _connect(sender: Any, signal: str, slot: Any) -> None:
+        Qt5Core.QObject.connect(sender, Qt5Core.SIGNAL(signal), slot)
 
     def _find_panel(self, kind: Any) -> Any:
         found = self.widget.findChildren(kind)
@@ -50,3 +86,131 @@ class Window(QtCore.QObject):
         """Return width and height of the 3D view in pixels of the screen, and its pixel ratio."""
         ratio = self.panel.devicePixelRatioF()
         return round(self.panel.width() * ratio), round(self.panel.height() * ratio), ratio
+
+    @property
+    def config(self) -> str:
+        """Path of the config file that is loaded; empty for RViz's default one."""
+        return self._config
+
+    @property
+    def modified(self) -> bool:
+        """Whether something has changed that the config file does not know."""
+        return bool(self.widget.isWindowModified())
+
+    def load_config(self, config: str | os.PathLike[str]) -> None:
+        """Load a config file; what has changed since the last one was saved is lost.
+
+        Args:
+            config: A path, or ``package://name/path``.
+
+        Raises:
+            Error: The file is missing or is no config of RViz.
+        """
+        file = str(config_file(config))
+        self.widget.setWindowModified(False)
+        self.frame.loadDisplayConfig(file)
+
+    def save_config(self, config: str | os.PathLike[str] = "") -> None:
+        """Save displays, views, tools and panels.
+
+        Args:
+            config: Where to; empty for the file that is loaded.
+
+        Raises:
+            Error: There is no such folder, or writing failed.
+        """
+        file = str(Path(config).absolute() if config else self._config)
+        if not self.frame.saveDisplayConfig(file):
+            raise Error(f"{file}: RViz could not save its config: {self.frame.getErrorMessage()}")
+
+    @property
+    def fullscreen(self) -> bool:
+        """Whether RViz fills the screen, without its menus and tool bars."""
+        return bool(self.widget.isFullScreen())
+
+    @fullscreen.setter
+    def fullscreen(self, fullscreen: bool) -> None:
+        if fullscreen != self.fullscreen:
+            core = pyqt()
+            core.QMetaObject.invokeMethod(
+                self.frame, "setFullScreen", core.Qt.DirectConnection, core.Q_ARG(bool, fullscreen)
+            )
+
+    def menu(self, title: str) -> Any:
+        """Return the menu of a title in RViz's menu bar, made when there is none yet.
+
+        Args:
+            title: As it is shown; ``&`` marks the key that opens it.
+        """
+        bar = self.widget.menuBar()
+        menus = {_plain(menu.title()): menu for menu in bar.findChildren(QtWidgets.QMenu)}
+        found = self._menus.get(_plain(title)) or menus.get(_plain(title))
+        if found is None:
+            found = QtWidgets.QMenu(title, bar)
+            help_menu = menus.get("Help")
+            if help_menu is None:
+                bar.addMenu(found)
+            else:
+                bar.insertMenu(help_menu.menuAction(), found)
+        # PySide2 takes the menu for gone as soon as nobody in Python knows it.
+        self._menus[_plain(title)] = found
+        return found
+
+    def close(self) -> None:
+        """Take the window down, without asking for unsaved changes; safe to call twice."""
+        self._tell_closing()
+        self.widget.hide()
+
+    def _tell_closing(self) -> None:
+        told, self._closing = self._closing, True
+        if not told:
+            self.closing.emit()
+
+    def _on_status(self, status: str) -> None:
+        if status == _LOADING:
+            self._loading = True
+            self.config_loading.emit()
+
+    def _on_config(self, path: str) -> None:
+        self._config = path
+        loading, self._loading = self._loading, False
+        if loading:
+            self.config_loaded.emit(path)
+
+
+def _plain(title: str) -> str:
+    return title.replace("&", "")
+
+
+def _frame(base: Any, closed: Callable[[], None]) -> Any:
+    class Frame(base):  # type: ignore[misc]
+        def closeEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
+            super().closeEvent(event)
+            # The user may have said no when asked about unsaved changes.
+            if event.isAccepted():
+                closed()
+
+    return Frame()
+
+
+def config_file(place: str | os.PathLike[str]) -> Path:
+    """Return the path of a config file of RViz.
+
+    Args:
+        place: A path, or ``package://name/path``.
+
+    Raises:
+        Error: There is no such file, it cannot be read, or it is something else.
+    """
+    path = locate(place)
+    if not path.is_file():
+        wrong = "is a folder" if path.is_dir() else "does not exist"
+        raise Error(f"{path} {wrong}; expected a config file of RViz (.rviz)")
+    bindings = rviz()
+    reader, config = bindings.YamlConfigReader(), bindings.Config()
+    reader.readFile(config, str(path))
+    if reader.error():
+        raise Error(f"{path}: RViz cannot read it: {reader.errorMessage()}")
+    if not config.mapGetChild(_CONTENT).isValid():
+        raise Error(f"{path} is no config file of RViz: it has no {_CONTENT!r}")
+    return path
