@@ -4,8 +4,29 @@ Needs RViz 1 with its Python bindings, and the Python they are made for: on Debi
 ``/usr/bin/python3`` or a virtual environment made from it with ``--system-site-packages``.
 """
 
-from rosglass.rviz.application import Application
-from rosglass.rviz.overlay import Overlay
-from rosglass.rviz.qml_overlay import QmlOverlay
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rosglass.rviz.application import Application
+    from rosglass.rviz.overlay import Overlay
+    from rosglass.rviz.qml_overlay import QmlOverlay
 
 __all__ = ["Application", "Overlay", "QmlOverlay"]
+
+_HOMES = {"Application": "application", "Overlay": "overlay", "QmlOverlay": "qml_overlay"}
+
+
+def __getattr__(name: str) -> object:
+    # Imported on first use: what has nothing to do with Qt can be imported without RViz.
+    if name not in _HOMES:
+        raise AttributeError(f"module 'rosglass.rviz' has no attribute {name!r}")
+    value: object = getattr(import_module(f"rosglass.rviz.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
