@@ -1,8 +1,9 @@
 """Take the pictures of the examples that the documentation shows.
 
-    xvfb-run -s "-screen 0 1280x800x24" python scripts/example_pictures.py
+    xvfb-run -s "-screen 0 1280x800x24" python scripts/example_pictures.py [NAME ...]
 
-Starts a Zenoh router, the simulated robot and what an example needs besides.
+Starts a Zenoh router, the simulated robot and what an example needs besides. Pictures get few
+colours, and so few bytes.
 """
 
 from __future__ import annotations
@@ -11,18 +12,27 @@ import subprocess
 import sys
 from pathlib import Path
 
+from PIL import Image, ImageChops
+
 from rosglass.ros2.zenoh.router import Router
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES, TARGET = ROOT / "examples", ROOT / "docs" / "images" / "examples"
 PARTNERS = {"figure4": "pose_prediction.py", "figure5": "humanoid.py"}
+#: Seconds until an example shows what it is about, where it is more than usual.
+AFTER = {"replay": 12, "image_publisher": 8, "camera": 8}
 ROSGLASS = [sys.executable, "-m", "rosglass.cli"]
+#: Pixels left below what an example shows.
+MARGIN = 20
+#: Bytes that a picture may have; those of cameras are made smaller until they fit.
+MOST = 40_000
 
 
-def main() -> None:
-    """Take them all."""
+def main(names: list[str]) -> None:
+    """Take these pictures; all without names."""
     TARGET.mkdir(parents=True, exist_ok=True)
-    files = [*sorted(EXAMPLES.glob("*.qml")), *sorted(EXAMPLES.glob("paper/figure*.qml"))]
+    patterns = ("*.qml", "ros1/*.qml", "paper/figure*.qml")
+    files = [file for pattern in patterns for file in sorted(EXAMPLES.glob(pattern))]
     with Router("tcp/127.0.0.1:0") as router:
         commands = [[*ROSGLASS, "robot", "--url", router.url]]
         commands += [
@@ -32,13 +42,35 @@ def main() -> None:
         partners = [subprocess.Popen(command) for command in commands]
         try:
             for file in files:
-                picture = ["--screenshot", str(TARGET / f"{file.stem}.png"), "--after", "4"]
+                if names and file.stem not in names:
+                    continue
+                target, after = TARGET / f"{file.stem}.png", AFTER.get(file.stem, 4)
+                picture = ["--screenshot", str(target), "--after", str(after)]
                 command = [*ROSGLASS, "run", str(file), "--url", router.url, *picture]
                 subprocess.run(command, check=True)
+                shrink(target)
         finally:
             for partner in partners:
                 partner.kill()
 
 
+def shrink(file: Path) -> None:
+    """Write a picture anew without what is empty below, with 64 colours, as small as it must be."""
+    whole = Image.open(file).convert("RGB")
+    corner = whole.getpixel((whole.width - 1, whole.height - 1))
+    assert corner is not None
+    content = ImageChops.difference(whole, Image.new("RGB", whole.size, corner)).getbbox()
+    if content is not None:
+        whole = whole.crop((0, 0, whole.width, min(whole.height, content[3] + MARGIN)))
+    scale = 1.0
+    while True:
+        size = (round(whole.width * scale), round(whole.height * scale))
+        small = whole if scale == 1 else whole.resize(size, Image.Resampling.LANCZOS)
+        small.quantize(64, dither=Image.Dither.NONE).save(file, optimize=True)
+        if file.stat().st_size <= MOST:
+            return
+        scale *= 0.9
+
+
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

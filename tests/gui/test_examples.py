@@ -17,7 +17,11 @@ pytestmark = pytest.mark.xvfb
 EXAMPLES = Path(__file__).parents[2] / "examples"
 #: The paper's figures, and the programs that they are shown beside.
 PARTNERS = {"figure4": "pose_prediction.py", "figure5": "humanoid.py"}
-FILES = [*sorted(EXAMPLES.glob("*.qml")), *sorted(EXAMPLES.glob("paper/figure*.qml"))]
+FILES = [
+    file
+    for pattern in ("*.qml", "ros1/*.qml", "paper/figure*.qml")
+    for file in sorted(EXAMPLES.glob(pattern))
+]
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,53 @@
+// Publishes what an item shows as camera pictures, and shows them as any robot would receive them.
+import QtQuick 2.15
+import QtQuick.Controls 2.15
+import Ros2 1.0
+
+Row {
+    padding: 20; spacing: 20
+    property string title: "Image publisher"
+    Component.onCompleted: Ros2.init("image_publisher_example")
+
+    Subscription { id: battery; topic: "/battery_state" }
+
+    Column {
+        spacing: 8
+        Rectangle {
+            id: gauge
+            width: 240; height: 180; color: "midnightblue"
+            Rectangle {
+                anchors.bottom: parent.bottom
+                width: parent.width
+                height: battery.message ? parent.height * battery.message.percentage : 0
+                color: "seagreen"
+            }
+            Text {
+                anchors.centerIn: parent
+                color: "white"; font.pixelSize: 32
+                text: battery.message ? (battery.message.percentage * 100).toFixed(1) + " %" : "?"
+            }
+        }
+        Label { text: "the item" }
+    }
+
+    ImagePublisher {
+        id: sender
+        source: gauge
+        topic: "/panel/gauge"
+        rate: 5
+        frameId: "panel"
+        cameraInfo: ({})          // an uncalibrated camera: sent on /panel/camera_info
+    }
+
+    Column {
+        spacing: 8
+        ImageItem {
+            width: 240; height: 180
+            source: ImageTransportSubscription { id: receiver; topic: "/panel/gauge"; defaultTransport: "raw" }
+        }
+        Label {
+            text: receiver.stale ? "no picture " + sender.problem
+                                 : "the picture, " + sender.frequency.toFixed(0) + " Hz"
+        }
+    }
+}

@@ -1,0 +1,32 @@
+// One after the other, without waiting: a message, then a service, then the robot's new state.
+import QtQuick 2.15
+import QtQuick.Controls 2.15
+import Ros2 1.0
+
+Column {
+    width: 480; height: 180; padding: 20; spacing: 8
+    property string title: "Promises"
+    property var steps: []
+    property var client: Ros2.createServiceClient("/flashlight/set", "std_srvs/srv/SetBool")
+    Component.onCompleted: { Ros2.init("promises_example"); run() }
+
+    function tell(text) { steps = steps.concat([text]) }
+    function run() {
+        steps = []
+        // 5000: reject, or give undefined, when nothing has come after so many ms.
+        Ros2.waitForMessageAsync("/battery_state", 5000).then(function (battery) {
+            tell("the battery has " + (battery.percentage * 100).toFixed(0) + " %")
+            return client.call({data: true})
+        }).then(function (response) {
+            tell("the robot answers: " + response.message)
+            return Ros2.waitForMessageAsync("/odom", 5000)
+        }).then(function (odom) {
+            tell("and stands at x = " + odom.pose.pose.position.x.toFixed(2) + " m")
+        }).catch(function (error) {
+            tell("failed: " + error.message)       // of whichever step
+        })
+    }
+
+    Button { text: "Again"; onClicked: run() }
+    Repeater { model: steps; Label { text: (index + 1) + ". " + modelData } }
+}

@@ -1,0 +1,32 @@
+// Profiles: what a topic offers, what is asked for, and whether they match.
+import QtQuick 2.15
+import QtQuick.Controls 2.15
+import Ros2 1.0
+
+Column {
+    width: 480; height: 180; padding: 20; spacing: 8
+    property string title: "Profiles (QoS)"
+    Component.onCompleted: Ros2.init("qos_example")
+
+    // Latched: who comes late gets the last message, too.
+    Subscription { id: map; topic: "/map"; qos: Ros2.QoS().reliable().transient_local() }
+    // The laser offers best effort only: to ask for reliable() would be told in scan.problem.
+    Subscription { id: scan; topic: "/scan"; qos: Ros2.SensorDataQoS() }
+
+    property string mapOffer: ""
+    property string scanOffer: ""
+    Connections {
+        target: Ros2
+        function onGraphChanged() { mapOffer = offered(map.topic); scanOffer = offered(scan.topic) }
+    }
+    function offered(topic) {
+        return Ros2.getPublishersInfo(topic).map(function (one) {
+            return one.qos.reliability + ", " + one.qos.durability
+        }).join("; ")
+    }
+
+    Label { text: map.topic + " offers " + mapOffer; font.bold: true }
+    Label { text: map.message ? map.message.info.width + " x " + map.message.info.height + " cells" : "no map yet" }
+    Label { text: scan.topic + " offers " + scanOffer; font.bold: true }
+    Label { text: scan.problem || (scan.message ? scan.frequency.toFixed(0) + " Hz" : "nothing yet") }
+}
