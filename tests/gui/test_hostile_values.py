@@ -10,6 +10,9 @@ from values import convert, show
 from rosglass.errors import ConversionError
 
 SCAN, HEADER = "sensor_msgs/msg/LaserScan", "std_msgs/msg/Header"
+#: A few values, each in the next one twice: who follows them all never comes to the end.
+WEB = "(() => { let a = [1]; for (let i = 0; i < 60; i++) a = [a, a]; return a })()"
+OBJECTS = "(() => { let a = {x: 1}; for (let i = 0; i < 60; i++) a = {x: a, y: a}; return a })()"
 
 
 @pytest.mark.parametrize(
@@ -36,6 +39,14 @@ SCAN, HEADER = "sensor_msgs/msg/LaserScan", "std_msgs/msg/Header"
         (HEADER, "{stamp: {'#kind': 'time', toString: 5, valueOf: 5, x: 1}}"),
         (HEADER, "{stamp: {sec: 1, get nanosec() { return '5' }}}"),
         (HEADER, "(() => { const a = {}; a.stamp = a; return a })()"),
+        (SCAN, f"{{ranges: {WEB}}}"),
+        (SCAN, f"{{ranges: Array(50).fill({WEB})}}"),
+        (SCAN, f"{{ranges: {OBJECTS}}}"),
+        (SCAN, f"{{unknown: {WEB}}}"),
+        (HEADER, f"{{frame_id: {WEB}}}"),
+        (HEADER, WEB),
+        (HEADER, f"{{stamp: {WEB}}}"),
+        ("geometry_msgs/msg/Quaternion", f"{{scalar: {OBJECTS}}}"),
         (HEADER, "{frame_id: {toString: () => 'map'}}"),
         (HEADER, "{__proto__: {frame_id: 5}, frame_id: []}"),
     ],
@@ -109,3 +120,18 @@ def test_text_from_the_network_stays_text(running: Any, wait: Any, text: str) ->
     publisher.publish(header={"frame_id": text}, status=[{"name": text, "values": [pair]}])
     wait(lambda: root.property("bound"))
     assert root.same(text) is True
+
+
+@pytest.mark.parametrize("value", [WEB, f"({{a: {OBJECTS}}})"])
+def test_what_would_take_for_ever_is_refused(bench: Any, tmp_path: Any, value: str) -> None:
+    text = bench.run(
+        f"try {{ Ros2.io.writeYaml('{tmp_path}/web.yaml', {value}) }} catch (e) {{ return '' + e }}"
+    )
+    assert text is None or "at most 262144 values in all" in text
+    assert not (tmp_path / "web.yaml").exists()
+
+
+def test_what_is_used_twice_is_written_twice(bench: Any, tmp_path: Any) -> None:
+    file = tmp_path / "twice.yaml"
+    assert bench.run(f"const a = {{x: [1]}}; return Ros2.io.writeYaml('{file}', [a, {{b: a}}])")
+    assert bench.run(f"return Ros2.io.readYaml('{file}')") == [{"x": [1]}, {"b": {"x": [1]}}]

@@ -125,7 +125,7 @@ class _Conversion:
         if not found and value.toString() != "[object Object]":
             # A Map, a Set, a url: their content would silently be lost.
             raise _no_message(value, schema, path)
-        if "scalar" in found and "scalar" not in schema.by_name:
+        if value.property("scalar").isNumber() and "scalar" not in schema.by_name:
             held = value.toVariant()
             if isinstance(held, QtGui.QQuaternion):
                 return {"x": held.x(), "y": held.y(), "z": held.z(), "w": held.scalar()}
@@ -178,7 +178,9 @@ class _Conversion:
         if constructor == "DataView":
             wanted = f"an array ({member.field.type}); pass the DataView's .buffer"
             raise ConversionError(path, Shown("a DataView"), wanted)
-        held = value.toVariant() if value.isObject() and not value.isCallable() else None
+        # Objects of JavaScript may be a web that Qt would follow for ever.
+        strange = value.isObject() and not value.isCallable() and constructor != "Object"
+        held = value.toVariant() if strange else None
         if isinstance(held, list):
             # A list of C++ or Python, which JavaScript does not call an array.
             return [
@@ -197,7 +199,8 @@ class _Conversion:
         if value.property("#index").isNumber():
             value = value.property("toArray").callWithInstance(value)
         length = _length(value, path)
-        if length > _BULK and member.struct is None:
+        # As above: elements that are objects are looked at one by one.
+        if length > _BULK and member.struct is None and not value.property(0).isObject():
             items = value.toVariant()
             if None not in items:
                 return [

@@ -78,9 +78,11 @@ def shown(value: QJSValue) -> Any:
         return value.toBool()
     if value.isCallable():
         return Shown("a function")
-    if value.isArray() and value.property("length").toNumber() > _SHOWN:
-        # ``a.length = 4e9`` is written in a moment, and its text never is.
-        return Shown(f"an array of {value.property('length').toNumber():.0f} elements")
+    if value.isArray():
+        length = value.property("length").toNumber()
+        # ``a.length = 4e9`` is written in a moment, and its text never is; nor that of a web.
+        if length > _SHOWN or any(value.property(at).isObject() for at in range(int(length))):
+            return Shown(f"an array of {length:.0f} elements")
     return value.toString() if value.isString() else Shown(value.toString())
 
 

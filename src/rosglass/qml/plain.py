@@ -13,99 +13,130 @@ from rosglass.qt import QJSValue, QtCore
 __all__ = ["plain_from_js"]
 
 _DEEPEST = 100
-_LONGEST = 1 << 24
+#: Values in all that are read one by one: what shares its parts can have more than atoms there are.
+_MOST = 1 << 18
 
 
-def plain_from_js(value: QJSValue, path: str = "", depth: int = 0) -> Any:
+def plain_from_js(value: QJSValue) -> Any:
     """Return a value as None, bool, int, float, str, list, dict, bytes, QDateTime, Time, Duration.
 
     Objects of QML give the properties that their own class declares, item models a list of their
     rows, as dicts by role.
 
     Raises:
-        ConversionError: It is a function, refers to itself, or is nested too deeply.
+        ConversionError: It is a function, refers to itself, is nested too deeply, or has more than
+            2^18 values; received arrays and typed arrays of numbers count as one.
     """
-    if depth > _DEEPEST:
-        wanted = f"values nested at most {_DEEPEST} deep, not referring to themselves"
-        raise ConversionError(path[:60], Shown("more"), wanted)
-    if value.isUndefined() or value.isNull():
-        return None
-    if value.isBool():
-        return value.toBool()
-    if value.isNumber():
-        number = value.toNumber()
-        return integral(number) if abs(number) < 2**53 else number
-    if value.isString():
-        return value.toString()
-    if value.isDate():
-        return value.toDateTime()
-    if value.isCallable():
-        raise ConversionError(path, Shown("a function"), "a value")
-    kind = value.property("#kind").toString()
-    if kind in {"time", "duration"} and not value.isQObject():
-        return time_from_js(value, path) if kind == "time" else duration_from_js(value, path)
-    if value.isArray() or value.property("#index").isNumber():
-        return _array(value, path, depth)
-    if is_model(value):
-        return _rows(object_of(value), path, depth)
-    if value.isQObject():
-        meta = object_of(value).metaObject()
-        own = range(meta.propertyOffset(), meta.propertyCount())
-        names = [str(meta.property(at).name()) for at in own]
-        return {name: _inner(value, name, path, depth) for name in names}
-    numbers = typed_array(value)
-    if numbers is not None:
-        return numbers.tolist()
-    return _object(value, path, depth)
+    return _Reader().read(value, "", 0)
 
 
-def _inner(value: QJSValue, name: str, path: str, depth: int) -> Any:
-    return plain_from_js(value.property(name), f"{path}.{name}" if path else name, depth + 1)
+def _number(number: float) -> float:
+    return integral(number) if abs(number) < 2**53 else number
 
 
-def _array(value: QJSValue, path: str, depth: int) -> list[Any]:
-    if value.property("#index").isNumber():
-        value = value.property("toArray").callWithInstance(value)
-    length = value.property("length").toNumber()
-    if length > _LONGEST:
-        raise ConversionError(path, Shown(f"{length:.0f} elements"), f"at most {_LONGEST}")
-    return [
-        plain_from_js(value.property(index), f"{path}[{index}]", depth + 1)
-        for index in range(int(length))
-    ]
+class _Reader:
+    """Reads one value and all that is in it."""
 
+    def __init__(self) -> None:
+        self._left = _MOST
 
-def _object(value: QJSValue, path: str, depth: int) -> Any:
-    names = properties_of(value)
-    if not names and value.toString() != "[object Object]":
-        return _python(value.toVariant(), path, depth)
-    return {name: _inner(value, name, path, depth) for name in names if name != "#messageType"}
+    def read(self, value: QJSValue, path: str, depth: int) -> Any:
+        """Return a value; `path` is where it is."""
+        self._count(path, depth)
+        if value.isUndefined() or value.isNull():
+            return None
+        if value.isBool():
+            return value.toBool()
+        if value.isNumber():
+            return _number(value.toNumber())
+        if value.isString():
+            return value.toString()
+        if value.isDate():
+            return value.toDateTime()
+        if value.isCallable():
+            raise ConversionError(path, Shown("a function"), "a value")
+        kind = value.property("#kind").toString()
+        if kind in {"time", "duration"} and not value.isQObject():
+            return time_from_js(value, path) if kind == "time" else duration_from_js(value, path)
+        if value.isArray() or value.property("#index").isNumber():
+            return self._array(value, path, depth)
+        if is_model(value):
+            return self._rows(object_of(value), path, depth)
+        if value.isQObject():
+            meta = object_of(value).metaObject()
+            own = range(meta.propertyOffset(), meta.propertyCount())
+            names = [str(meta.property(at).name()) for at in own]
+            return {name: self._inner(value, name, path, depth) for name in names}
+        numbers = typed_array(value)
+        if numbers is not None:
+            return numbers.tolist()
+        return self._object(value, path, depth)
 
+    def _count(self, path: str, depth: int) -> None:
+        if depth > _DEEPEST:
+            wanted = f"values nested at most {_DEEPEST} deep, not referring to themselves"
+            raise ConversionError(path[:60], Shown("more"), wanted)
+        self._left -= 1
+        if self._left < 0:
+            wanted = (
+                f"at most {_MOST} values in all, counting again what appears twice; numbers in a "
+                "typed array count as one"
+            )
+            raise ConversionError(path[:60], Shown("more"), wanted)
 
-def _rows(model: Any, path: str, depth: int) -> list[Any]:
-    roles = roles_of(model)
-    found = []
-    for row in range(model.rowCount()):
-        index, here = model.index(row, 0), f"{path}[{row}]"
-        items = {name: model.data(index, number) for name, number in roles.items()}
-        found.append({name: _python(item, here, depth + 1) for name, item in items.items()})
-    return found
+    def _inner(self, value: QJSValue, name: str, path: str, depth: int) -> Any:
+        here = f"{path}.{name}" if path else name
+        return self.read(value.property(name), here, depth + 1)
 
+    def _array(self, value: QJSValue, path: str, depth: int) -> list[Any]:
+        if value.property("#index").isNumber():
+            value = value.property("toArray").callWithInstance(value)
+            if value.property(0).isNumber():
+                return [_number(number) for number in value.toVariant()]
+        length = value.property("length").toNumber()
+        if length > self._left:
+            told = f"at most {_MOST} values in all; numbers in a typed array count as one"
+            raise ConversionError(path, Shown(f"{length:.0f} elements"), told)
+        return [
+            self.read(value.property(index), f"{path}[{index}]", depth + 1)
+            for index in range(int(length))
+        ]
 
-def _python(value: Any, path: str, depth: int) -> Any:
-    """Return a value that Qt has made a Python value of."""
-    if isinstance(value, QJSValue):
-        return plain_from_js(value, path, depth)
-    if isinstance(value, (bool, float, int, str, type(None), QtCore.QDateTime)):
-        return value
-    if isinstance(value, QtCore.QUrl):
-        return value.toString()
-    if isinstance(value, QtCore.QByteArray):
-        return bytes(value.data())
-    if isinstance(value, QtCore.QAbstractItemModel):
-        return _rows(value, path, depth)
-    if isinstance(value, dict):
-        return {name: _python(inner, f"{path}.{name}", depth + 1) for name, inner in value.items()}
-    if isinstance(value, list):
-        return [_python(inner, f"{path}[{at}]", depth + 1) for at, inner in enumerate(value)]
-    raise ConversionError(path, Shown(repr(value)), "a value of JavaScript")
+    def _object(self, value: QJSValue, path: str, depth: int) -> Any:
+        names = properties_of(value)
+        if not names and value.toString() != "[object Object]":
+            return self._python(value.toVariant(), path, depth)
+        found = (name for name in names if name != "#messageType")
+        return {name: self._inner(value, name, path, depth) for name in found}
+
+    def _rows(self, model: Any, path: str, depth: int) -> list[Any]:
+        roles = roles_of(model)
+        found = []
+        for row in range(model.rowCount()):
+            index, here = model.index(row, 0), f"{path}[{row}]"
+            items = {name: model.data(index, number) for name, number in roles.items()}
+            made = {name: self._python(item, here, depth + 1) for name, item in items.items()}
+            found.append(made)
+        return found
+
+    def _python(self, value: Any, path: str, depth: int) -> Any:
+        """Return a value that Qt has made a Python value of."""
+        if isinstance(value, QJSValue):
+            return self.read(value, path, depth)
+        self._count(path, depth)
+        if isinstance(value, (bool, float, int, str, type(None), QtCore.QDateTime)):
+            return value
+        if isinstance(value, QtCore.QUrl):
+            return value.toString()
+        if isinstance(value, QtCore.QByteArray):
+            return bytes(value.data())
+        if isinstance(value, QtCore.QAbstractItemModel):
+            return self._rows(value, path, depth)
+        if isinstance(value, dict):
+            items = value.items()
+            return {name: self._python(inner, f"{path}.{name}", depth + 1) for name, inner in items}
+        if isinstance(value, list):
+            return [
+                self._python(inner, f"{path}[{at}]", depth + 1) for at, inner in enumerate(value)
+            ]
+        raise ConversionError(path, Shown(repr(value)), "a value of JavaScript")

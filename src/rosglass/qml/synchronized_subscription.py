@@ -14,6 +14,7 @@ from rosglass.comm.executor import Dispatcher
 from rosglass.errors import ConversionError, DecodeError, Error, TypeNotFoundError
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.element import DEFAULT_TIMEOUT, RETRY, Element, changed_enough
+from rosglass.qml.js_values import shown
 from rosglass.qml.profiles import qos_from_js
 from rosglass.qml.subscription import DEFAULT_QOS, Subscription
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
@@ -285,7 +286,7 @@ class SynchronizedSubscription(Element):
                 qos = qos_from_js(item.property("qos"), DEFAULT_QOS)
             else:
                 told = 'a topic, {topic: "/scan", type: "...", qos: ...}, or a Subscription'
-                raise ConversionError(f"topics[{at}]", item.toString(), told)
+                raise ConversionError(f"topics[{at}]", shown(item), told)
             if not topic:
                 return ()
             found.append((node.resolve(topic), type_name, qos))
@@ -424,7 +425,7 @@ def _items(value: QJSValue, name: str) -> list[QJSValue]:
         return []
     length = value.property("length")
     if value.isString() or not length.isNumber():
-        raise ConversionError(name, value.toString(), "an array")
+        raise ConversionError(name, shown(value), "an array")
     return [value.property(at) for at in range(length.toInt())]
 
 
