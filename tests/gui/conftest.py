@@ -157,6 +157,17 @@ def running(bench: Bench, wait: Callable[..., None]) -> Bench:
     return bench
 
 
+@pytest.fixture
+def messages(app: QCoreApplication) -> Iterator[None]:
+    """Have Qt's own messages logged, as the runner does."""
+    from rosglass.qml.log import install_message_handler
+    from rosglass.qt import QtCore
+
+    install_message_handler()
+    yield
+    QtCore.qInstallMessageHandler(None)
+
+
 class RealWorld:
     """Nodes on a real middleware."""
 

@@ -330,3 +330,17 @@ def test_pictures_that_a_silent_link_kept_back_are_not_live(
     camera.held_back = 0
     camera.publish(picture(BLUE))
     wait(lambda: colour(root) == BLUE and not sub.property("stale"))
+
+
+def test_a_camera_that_nobody_publishes_is_told(
+    running: Any, camera: Any, wait: Any, caplog: Any, monkeypatch: Any
+) -> None:
+    monkeypatch.setattr("rosglass.qml.element._LONELY", 20)
+    caplog.set_level("INFO", "rosglass.qml")
+    root = load(running, 'topic: "/camm"')
+    wait(lambda: "/camm: nobody publishes this topic; did you mean /cam?" in caplog.text)
+    caplog.clear()
+    root.property("sub").setProperty("topic", "/cam")
+    wait(lambda: root.property("sub").property("subscribed"))
+    wait(200)
+    assert "nobody publishes" not in caplog.text

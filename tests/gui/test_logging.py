@@ -7,22 +7,13 @@ from typing import Any
 
 import pytest
 
-from rosglass.qml.log import LocationFormatter, RateLimit, install_message_handler
+from rosglass.qml.log import LocationFormatter, RateLimit
 
 
 @pytest.fixture
 def records(caplog: Any) -> Any:
     caplog.set_level(logging.DEBUG, "rosglass.qml")
     return caplog
-
-
-@pytest.fixture
-def messages(app: Any) -> Any:
-    from rosglass.qt import QtCore
-
-    install_message_handler()
-    yield
-    QtCore.qInstallMessageHandler(None)
 
 
 LEVELS = {

@@ -49,7 +49,7 @@ def test_a_failure_is_false_and_logged(live: Bench, told: list[Any], caplog: Any
         assert "/lift" in caplog.text
 
 
-def test_a_wrong_field_throws_its_path(live: Bench, told: list[Any]) -> None:
+def test_a_wrong_field_throws_its_path(live: Bench, told: list[Any], caplog: Any) -> None:
     script = """
         Service.call("/lamp", "std_srvs/SetBool", {data: true})
         try { Service.call("/lamp", "std_srvs/SetBool", {data: "yes"}) }
@@ -58,6 +58,8 @@ def test_a_wrong_field_throws_its_path(live: Bench, told: list[Any]) -> None:
     """
     assert "data" in live.run(script)
     assert told == [True]
+    # Nothing was wrong with the first call, and the second one tells its caller.
+    assert not [record for record in caplog.records if record.levelname in ("WARNING", "ERROR")]
 
 
 def test_an_unknown_type_calls_back_with_false(live: Bench, told: list[Any], wait: Any) -> None:

@@ -13,6 +13,7 @@ from rosglass import load as load_type
 from rosglass.comm import ConnectionState, QoS, Sample
 from rosglass.comm.qos import Durability, Reliability
 from rosglass.messages import OpaqueType
+from rosglass.qml.log import LocationFormatter
 
 TEXT = "std_msgs/msg/String"
 
@@ -514,7 +515,7 @@ def test_a_successor_that_has_said_nothing_is_not_trusted(live: Any, wait: Any) 
 def test_a_topic_that_nobody_publishes_is_told(
     running: Any, wait: Any, caplog: Any, monkeypatch: Any, topic: str, told: bool
 ) -> None:
-    monkeypatch.setattr("rosglass.qml.subscription._LONELY", 20)
+    monkeypatch.setattr("rosglass.qml.element._LONELY", 20)
     caplog.set_level("INFO", "rosglass.qml")
     running.robot.create_publisher("/odom", "std_msgs/msg/String")
     root = running.load('Subscription { topic: "TOPIC" }'.replace("TOPIC", topic))
@@ -525,3 +526,25 @@ def test_a_topic_that_nobody_publishes_is_told(
         wait(lambda: root.property("subscribed"))
         wait(200)
         assert "nobody publishes" not in caplog.text
+
+
+def test_a_name_that_is_none_is_told_with_its_file(running: Any, wait: Any, caplog: Any) -> None:
+    root = running.load('Subscription { topic: "no good" }')
+    wait(lambda: root.property("problem"))
+    (record,) = [one for one in caplog.records if "no good" in one.getMessage()]
+    assert record.pathname.endswith("Test1.qml")
+    assert LocationFormatter().format(record).startswith(f"{record.pathname}: WARNING: ")
+
+
+def test_what_a_function_made_is_told_with_its_line(running: Any, wait: Any, caplog: Any) -> None:
+    root = running.load("""QtObject {
+        property var sub
+        function go() {
+            sub = Ros2.createPublisher("/chatter", "std_msgs/msg/Nothing")
+        }
+    }""")
+    root.go()
+    wait(lambda: "Nothing" in caplog.text)
+    record = next(one for one in caplog.records if "Nothing" in one.getMessage())
+    assert record.pathname.endswith("Test1.qml")
+    assert record.lineno == 7

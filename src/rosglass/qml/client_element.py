@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from abc import abstractmethod
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,8 @@ __all__ = ["PATIENCE", "ClientElement", "given_fields", "named"]
 
 #: Milliseconds that is waited for a server.
 PATIENCE = 10_000
+#: Milliseconds in which looking for a server is not worth a warning.
+_LOOKING = 2000
 
 
 class ClientElement(Element):
@@ -111,9 +114,16 @@ class ClientElement(Element):
         self._client = client
         self._watch = client.on_ready_change(self._on_ready, session.executor)
         self._at_end["client"] = lambda: session.background(client.close)
-        self._say("")
+        # What has just begun to look for its server need not have found it.
+        self._say(client.problem, logging.DEBUG)
+        QtCore.QTimer.singleShot(_LOOKING, lambda: self._insist(client))
         self._on_ready(client.ready)
         self._submit_waiting()
+
+    def _insist(self, client: Any) -> None:
+        """Log what keeps it from its server, unless that was found soon."""
+        if is_alive(self) and self._client is client:
+            self._tell(self._problem, logging.WARNING)
 
     def _on_ready(self, ready: bool) -> None:
         if not is_alive(self) or self._client is None:

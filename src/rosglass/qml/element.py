@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import logging
 import time
+from contextlib import suppress
 from typing import TYPE_CHECKING, ClassVar
 
+from rosglass.comm.similar import similar
 from rosglass.errors import Error
 from rosglass.qml.dialect import Dialect
-from rosglass.qml.log import Caller, RateLimit, log_from_qml
+from rosglass.qml.log import Caller, RateLimit, log_from_qml, plain_path
 from rosglass.qml.runtime import UNPREPARED, runtime_of
-from rosglass.qt import QtCore, Slot, is_alive
+from rosglass.qt import QtCore, QtQml, Slot, is_alive
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -21,7 +23,8 @@ if TYPE_CHECKING:
 
 __all__ = ["DEFAULT_TIMEOUT", "RETRY", "Element", "TopicElement", "changed_enough"]
 
-_log = logging.getLogger("rosglass.qml")
+#: Milliseconds without a publisher after which the name may be a mistake.
+_LONELY = 5000
 #: Milliseconds until something that is missing is looked for again.
 RETRY = 1000
 #: Milliseconds without data after which it counts as stale.
@@ -55,6 +58,8 @@ class Element(QtCore.QObject):
     ) -> None:
         super().__init__(parent)
         self._runtime = runtime
+        #: Where a function made it.
+        self._origin = runtime.caller() if runtime is not None else None
         self._session: Session | None = None
         self._scheduled = False
         self._problem = ""
@@ -150,14 +155,24 @@ class Element(QtCore.QObject):
     def _problem_changed(self) -> None:
         """Tell QML that the problem changed."""
 
-    def _say(self, problem: str) -> None:
+    def _say(self, problem: str, level: int = logging.WARNING) -> None:
         """Set the problem; a new one is logged, the same one not more often than every 5 s."""
         if problem == self._problem:
             return
         self._problem = problem
-        if problem and self._limit.allows(problem):
-            _log.warning("%s", problem)
+        self._tell(problem, level)
         self._problem_changed()
+
+    def _tell(self, text: str, level: int) -> None:
+        """Log something that comes from no line of QML, with the file that the object is in."""
+        if not text or not self._limit.allows((text, level)):
+            return
+        origin = self._origin
+        if origin is None:
+            context = QtQml.QQmlEngine.contextForObject(self)
+            file = context.baseUrl().toString() if context is not None else ""
+            origin = Caller(plain_path(file) or "<python>", 0, "")
+        log_from_qml("", level, text, origin)
 
     def _refuse(self, message: str) -> None:
         """Log that a property was given an impossible value, with the QML place if there is one."""
@@ -178,6 +193,25 @@ class TopicElement(Element):
         self._stale = True
         self._suspect = False
         self._publishers = 0
+        self._lonely = QtCore.QTimer(self)
+        self._lonely.setSingleShot(True)
+        self._lonely.timeout.connect(self._wonder)
+
+    def _expect_publishers(self) -> None:
+        """Tell it after a while if nobody publishes the topic."""
+        self._lonely.start(_LONELY)
+
+    @Slot()
+    def _wonder(self) -> None:
+        """Log that nobody publishes the topic, for who looks for a mistake in its name."""
+        node, session = self.node, self._session
+        connected = session is not None and session.state == "connected"
+        if node is None or not connected or self._count_publishers():
+            return
+        # A node that has just been closed answers nothing.
+        with suppress(Error):
+            hint = similar(self._resolved, node.topics())
+            self._tell(f"{self._resolved}: nobody publishes this topic{hint}", logging.INFO)
 
     def _resolve(self, topic: str) -> str:
         """Return the absolute name of a topic; empty, with a problem said, when it is invalid."""

@@ -308,6 +308,7 @@ class ImageTransportSubscription(LookElement):
             return
         self._stream, self._has_look = stream, look
         self._publishers = self._count_publishers()
+        self._expect_publishers()
         self._at_end["stream"] = lambda: stream.leave(self)
         channel = stream.channel(self)
         if channel is not None and channel.last is not None and not self._suspect:
@@ -337,6 +338,7 @@ class ImageTransportSubscription(LookElement):
         return look
 
     def _leave(self) -> None:
+        self._lonely.stop()
         stream, self._stream = self._stream, None
         self._at_end.pop("stream", None)
         if stream is not None:

@@ -103,11 +103,11 @@ class LocationFormatter(logging.Formatter):
 
     def format(self, record: logging.LogRecord) -> str:
         """Return the line for a record."""
-        if not record.name.startswith(ROOT) or record.pathname.endswith(".py"):
+        if not record.name.startswith(ROOT) or record.pathname.endswith((".py", "<python>")):
             return super().format(record)
         name = record.name.removeprefix(ROOT).lstrip(".")
         logger = f" {name}" if name else ""
-        place = f"{record.pathname}:{record.lineno}"
+        place = f"{record.pathname}:{record.lineno}" if record.lineno else record.pathname
         return f"{place}: {record.levelname}{logger}: {record.getMessage()}"
 
 

@@ -92,10 +92,9 @@ class Publisher(Element):
             else:
                 sender.publish(fields)
         except ConversionError as error:
-            text = f"nothing was published on {self._resolved}: {error}"
-            self._complain(text, logging.ERROR)
+            # Logged by Qt, with the place, unless somebody catches it.
             if self._runtime is not None:
-                self._runtime.throw(text)
+                self._runtime.throw(f"nothing was published on {self._resolved}: {error}")
             return False
         except Error as error:
             self._complain(f"nothing was published on {self._resolved}: {error}", logging.ERROR)

@@ -5,12 +5,10 @@ from __future__ import annotations
 
 import logging
 import math
-from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rosglass.comm.node import Executor
 from rosglass.comm.qos import Durability, QoS, Reliability
-from rosglass.comm.similar import similar
 from rosglass.errors import ConversionError, DecodeError, Error, TypeNotFoundError
 from rosglass.qml.element import DEFAULT_TIMEOUT, RETRY, TopicElement, changed_enough
 from rosglass.qml.profiles import qos_from_js
@@ -31,8 +29,6 @@ __all__ = ["DEFAULT_QOS", "Subscription"]
 _log = logging.getLogger("rosglass.qml")
 #: A topic that comes so much faster than it is shown is received some messages at a time.
 _MUCH_FASTER, _HARDLY_FASTER = 3.0, 1.5
-#: Milliseconds without a publisher after which the name may be a mistake.
-_LONELY = 5000
 #: What ``Ros2.QoS()`` gives: matches every publisher, keeps only the newest message.
 DEFAULT_QOS = QoS(depth=1, reliability=Reliability.BEST_EFFORT)
 
@@ -120,9 +116,6 @@ class Subscription(TopicElement):
         self._retry = QtCore.QTimer(self)
         self._retry.setSingleShot(True)
         self._retry.timeout.connect(self._attach_again)
-        self._lonely = QtCore.QTimer(self)
-        self._lonely.setSingleShot(True)
-        self._lonely.timeout.connect(self._wonder)
 
     def configure(self, topic: str, type_name: str, qos: QoS) -> None:
         """Set what ``Ros2.createSubscription`` was given."""
@@ -320,19 +313,7 @@ class Subscription(TopicElement):
         self._say("")
         self.subscribedChanged.emit()
         if is_alive(self):
-            self._lonely.start(_LONELY)
-
-    @Slot()
-    def _wonder(self) -> None:
-        """Log that nobody publishes the topic, for who looks for a mistake in its name."""
-        node, session = self.node, self._session
-        connected = session is not None and session.state == "connected"
-        if node is None or not connected or self._count_publishers():
-            return
-        # A node that has just been closed answers nothing.
-        with suppress(Error):
-            hint = similar(self._resolved, node.topics())
-            _log.info("%s: nobody publishes this topic%s", self._resolved, hint)
+            self._expect_publishers()
 
     def _detach(self) -> None:
         self._timer.stop()

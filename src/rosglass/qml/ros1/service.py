@@ -46,6 +46,7 @@ class Service(QtCore.QObject):
         """
         runtime = self._runtime()
         answer: list[Message | Error] = []
+        refused = False
         client = self._client(runtime, service, type_name)
 
         def begin(end: Callable[[], None]) -> None:
@@ -53,11 +54,16 @@ class Service(QtCore.QObject):
                 answer.append(result)
                 end()
 
-            if not client.send(QJSValue() if request is None else request, done):
+            nonlocal refused
+            refused = not client.send(QJSValue() if request is None else request, done)
+            if refused:
                 end()
 
         caller = runtime.caller()
         if wait_for(runtime.session, begin):
+            if refused and not answer:
+                # It throws what does not fit.
+                return QJSValue()
             why = "" if runtime.session.is_initialized else f": {NOT_INITIALIZED}"
             result = answer[0] if answer else Error(f"{service} was not called to the end{why}")
         else:
