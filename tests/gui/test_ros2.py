@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from typing import Any
@@ -299,3 +300,38 @@ def test_packages_of_install_spaces(bench: Any, tmp_path: Any, monkeypatch: Any)
                 a.getPackagePrefix("../packages")]
     """)
     assert shown == [["arm_ui"], str(tmp_path), f"{tmp_path}/share/arm_ui", "", ""]
+
+
+def test_install_spaces_that_cannot_be_read(
+    bench: Any, tmp_path: Any, monkeypatch: Any, caplog: Any
+) -> None:
+    listed = tmp_path / "share/ament_index/resource_index/packages"
+    listed.mkdir(parents=True)
+    (listed / "arm_ui").touch()
+    locked, read = "/locked/share/ament_index/resource_index/packages", os.listdir
+
+    def list_folder(path: str) -> list[str]:
+        if path == locked:
+            raise PermissionError(13, "Permission denied", path)
+        return read(path)
+
+    monkeypatch.setattr("os.listdir", list_folder)
+    monkeypatch.setenv("AMENT_PREFIX_PATH", f"/locked:{tmp_path}")
+    script = "return [AmentIndex.getPackages(), AmentIndex.getPackagePrefix('x'.repeat(5000))]"
+    assert bench.run(script) == [["arm_ui"], ""]
+    assert f"{locked} cannot be read: Permission denied" in caplog.text
+
+
+def test_folders_that_do_not_answer(bench: Any, monkeypatch: Any, caplog: Any) -> None:
+    asked = threading.Event()
+
+    def wait_for_ever(path: str) -> list[str]:
+        asked.wait(60)
+        return []
+
+    monkeypatch.setattr("os.listdir", wait_for_ever)
+    monkeypatch.setattr("rosglass.qml.ros2.ament_index.FOLDER_PATIENCE", 0.1)
+    monkeypatch.setenv("AMENT_PREFIX_PATH", "/far/away")
+    assert bench.run("return AmentIndex.getPackages()") == []
+    assert "AMENT_PREFIX_PATH did not answer within 0.1 s" in caplog.text
+    asked.set()

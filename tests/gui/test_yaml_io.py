@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import threading
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -169,3 +170,14 @@ def test_what_cannot_be_written_leaves_the_file_alone(
 
 def test_wrong_arguments_throw_or_are_refused(bench: Any) -> None:
     assert bench.run("return [Ros2.io.readYaml(5), Ros2.io.readYaml({})]") == [False, False]
+
+
+def test_a_drive_that_does_not_answer(bench: Any, tmp_path: Path, monkeypatch: Any) -> None:
+    go = threading.Event()
+    for name in ("_read", "_replace"):
+        monkeypatch.setattr(f"rosglass.qml.yaml_io.{name}", lambda *_: go.wait(60))
+    monkeypatch.setattr("rosglass.qml.yaml_io.FILE_PATIENCE", 0.1)
+    file = tmp_path / "far.yaml"
+    assert read(bench, file) is False
+    assert write(bench, file, "{a: 1}") is False
+    go.set()

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rosglass.comm.time import Duration, Time
 from rosglass.errors import Error, UnsupportedError
 from rosglass.qml.dialect import Dialect
+from rosglass.qml.file_access import FILE_PATIENCE, within
 from rosglass.qml.log import log_from_qml
 from rosglass.qml.plain import plain_from_js
 from rosglass.qml.to_js import exact
@@ -61,11 +62,7 @@ class Io(QtCore.QObject):
         """
         try:
             file = _local(path)
-            if not file.is_file():
-                raise UnsupportedError(f"{file}: there is no such file")
-            if file.stat().st_size > _LARGEST:
-                raise UnsupportedError(f"{file}: larger than {_LARGEST >> 20} MiB")
-            text = file.read_text(encoding="utf-8")
+            text = within(FILE_PATIENCE, str(file), lambda: _read(file))
             return _Reader(self._runtime, self._dialect).value(_load(text, file), 0)
         except (OSError, UnicodeError, RecursionError, Error) as error:
             return self._failed("readYaml", error)
@@ -79,7 +76,8 @@ class Io(QtCore.QObject):
         """
         try:
             file = _local(path)
-            _replace(file, _dump(plain_from_js(value), self._dialect))
+            text = _dump(plain_from_js(value), self._dialect)
+            within(FILE_PATIENCE, str(file), lambda: _replace(file, text))
         except (OSError, UnicodeError, RecursionError, Error) as error:
             self._failed("writeYaml", error)
             return False
@@ -106,6 +104,14 @@ def _local(path: Any) -> Path:
     if not url.isLocalFile() or url.host():
         raise UnsupportedError(f"{text}: only local files can be read and written (file://)")
     return Path(url.toLocalFile())
+
+
+def _read(file: Path) -> str:
+    if not file.is_file():
+        raise UnsupportedError(f"{file}: there is no such file")
+    if file.stat().st_size > _LARGEST:
+        raise UnsupportedError(f"{file}: larger than {_LARGEST >> 20} MiB")
+    return file.read_text(encoding="utf-8")
 
 
 def _replace(file: Path, text: str) -> None:

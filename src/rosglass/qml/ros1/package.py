@@ -7,9 +7,10 @@ import logging
 import os
 import shlex
 import threading
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from rosglass.errors import Error
+from rosglass.qml.file_access import FOLDER_PATIENCE, within
 from rosglass.qml.log import log_from_qml
 from rosglass.qml.waiting import MOST_WAITING, wait_for
 from rosglass.qt import QJSValue, QtCore, Slot
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime
 
 __all__ = ["Package"]
+
+_T = TypeVar("_T")
 
 #: Seconds that the program ``rospack`` is given.
 _PATIENCE = 10
@@ -39,22 +42,32 @@ class Package(QtCore.QObject):
         self._runtime = runtime
         self._found: Folders | None = None
 
-    def _folders(self, *, again: bool = False) -> Folders:
-        if self._found is None or again:
-            from rosglass.interfaces.folders import workspace  # noqa: PLC0415 - few need it
+    def _look(self, search: Callable[[Folders], _T], otherwise: _T, *, again: bool = False) -> _T:
+        """Return what is found in the folders, which are searched once."""
 
-            self._found = workspace(os.environ)
-        return self._found
+        def look() -> _T:
+            if self._found is None or again:
+                from rosglass.interfaces.folders import workspace  # noqa: PLC0415 - few need it
+
+                self._found = workspace(os.environ)
+            return search(self._found)
+
+        try:
+            return within(FOLDER_PATIENCE, "a folder of packages", look)
+        except Error as error:
+            text = f"Ros.package: {error}"
+            log_from_qml("", logging.ERROR, text, self._runtime.caller())
+            return otherwise
 
     @Slot(str, result=str)
     def getPath(self, package: str) -> str:
         """Return a package's folder; empty when there is no such package."""
-        return self._folders().package(package)
+        return self._look(lambda folders: folders.package(package), "")
 
     @Slot(result="QStringList")
     def getAll(self) -> list[str]:
         """Return the names of all packages, sorted."""
-        return sorted(self._folders().packages())
+        return self._look(lambda folders: sorted(folders.packages()), [])
 
     @Slot(str, str, result=QJSValue)
     @Slot(str, str, bool, result=QJSValue)
@@ -69,13 +82,16 @@ class Package(QtCore.QObject):
         Returns:
             An object from names of packages to lists of values; ``${prefix}`` is their folder.
         """
-        packages = self._folders(again=force_recrawl).packages()
-        found = {
-            package: values
-            for package, folder in sorted(packages.items())
-            if (values := _exports(folder, name, attribute))
-        }
-        return self._runtime.value(found)
+
+        def search(folders: Folders) -> dict[str, list[str]]:
+            return {
+                package: values
+                for package, folder in sorted(folders.packages().items())
+                if (values := _exports(folder, name, attribute))
+            }
+
+        nothing: dict[str, list[str]] = {}
+        return self._runtime.value(self._look(search, nothing, again=force_recrawl))
 
     @Slot(str, result=str)
     def command(self, command: str) -> str:

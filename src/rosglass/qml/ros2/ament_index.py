@@ -3,13 +3,21 @@
 
 from __future__ import annotations
 
+import logging
 import os
-from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
 
+from rosglass.errors import Error
+from rosglass.qml.file_access import FOLDER_PATIENCE, within
 from rosglass.qt import QtCore, Slot
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 __all__ = ["AmentIndex"]
 
+_T = TypeVar("_T")
+_log = logging.getLogger("rosglass.qml")
 #: Where an install space lists its packages; ament's resource index, section "File System Index".
 _LIST = "share/ament_index/resource_index/packages"
 
@@ -17,29 +25,57 @@ _LIST = "share/ament_index/resource_index/packages"
 class AmentIndex(QtCore.QObject):
     """The packages in the install spaces that ``AMENT_PREFIX_PATH`` names, the first one winning.
 
-    Without ROS 2 there are none.
+    Without ROS 2 there are none. Install spaces that cannot be read are named in the log.
     """
 
     @Slot(str, result=str)
     def getPackageShareDirectory(self, package: str) -> str:
         """Return a package's folder of shared files; empty when there is no such package."""
         prefix = self.getPackagePrefix(package)
-        return str(Path(prefix, "share", package)) if prefix else ""
+        return os.path.join(prefix, "share", package) if prefix else ""  # noqa: PTH118
 
     @Slot(str, result=str)
     def getPackagePrefix(self, package: str) -> str:
         """Return the install space that a package is in; empty when there is none."""
         if not package or "/" in package or package.startswith("."):
             return ""
-        found = (prefix for prefix in _prefixes() if Path(prefix, _LIST, package).is_file())
-        return next(found, "")
+        return _look(lambda: _prefix(package), "")
 
     @Slot(result="QStringList")
     def getPackages(self) -> list[str]:
         """Return the names of all packages, sorted."""
-        lists = [path for prefix in _prefixes() if (path := Path(prefix, _LIST)).is_dir()]
-        names = {entry.name for path in lists for entry in path.iterdir()}
-        return sorted(name for name in names if not name.startswith("."))
+        return _look(_packages, [])
+
+
+def _look(search: Callable[[], _T], otherwise: _T) -> _T:
+    try:
+        return within(FOLDER_PATIENCE, "a folder in AMENT_PREFIX_PATH", search)
+    except Error as error:
+        _log.error("AmentIndex: %s", error)
+        return otherwise
+
+
+def _prefix(package: str) -> str:
+    # Unlike pathlib's, this never raises.
+    found = (
+        prefix
+        for prefix in _prefixes()
+        if os.path.isfile(os.path.join(prefix, _LIST, package))  # noqa: PTH113, PTH118
+    )
+    return next(found, "")
+
+
+def _packages() -> list[str]:
+    names: set[str] = set()
+    for prefix in _prefixes():
+        folder = os.path.join(prefix, _LIST)  # noqa: PTH118
+        try:
+            names.update(os.listdir(folder))  # noqa: PTH208
+        except (FileNotFoundError, NotADirectoryError):
+            continue
+        except OSError as error:
+            _log.warning("AmentIndex: %s cannot be read: %s", folder, error.strerror)
+    return sorted(name for name in names if not name.startswith("."))
 
 
 def _prefixes() -> list[str]:
