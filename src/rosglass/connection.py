@@ -79,7 +79,8 @@ def connect(
 
             ``replay:drive.mcap`` plays a recording (MCAP file, ROS 2 bag, ROS 1 bag) to the node's
             subscriptions, without a robot. Options follow as in ``replay:/data/drive.bag?rate=2``:
-            ``rate``, ``loop=true`` (else it pauses at the end), ``paused=true``. See
+            ``rate``, ``loop=true`` (else it pauses at the end), ``paused=true``. In the path,
+            ``%3F``, ``%23`` and ``%25`` stand for ``?``, ``#`` and ``%``. See
             :class:`rosglass.bags.ReplayNode`.
 
             None asks the environment: ROSGLASS_URL, then RMW_IMPLEMENTATION,

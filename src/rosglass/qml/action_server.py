@@ -54,7 +54,7 @@ class _Offer:
 
 
 class ActionServer(Element):
-    """Offers an action while it is enabled. See ``docs/qml.md`` for every property."""
+    """Offers an action while it is enabled. See its page in ``docs/elements``."""
 
     nameChanged = Signal()
     actionTypeChanged = Signal()

@@ -37,7 +37,7 @@ _MARKS = 30
 
 
 class ImagePublisher(Element):
-    """Publishes an item as pictures. See ``docs/qml.md`` for every property."""
+    """Publishes an item as pictures. See its page in ``docs/elements``."""
 
     sourceChanged = Signal()
     topicChanged = Signal()

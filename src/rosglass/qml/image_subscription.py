@@ -41,7 +41,7 @@ _START: dict[str, Any] = {
 
 
 class ImageTransportSubscription(LookElement):
-    """Shows a camera. See ``docs/qml.md`` for every property."""
+    """Shows a camera. See its page in ``docs/elements``."""
 
     @QtCore.QEnum
     class PlaybackState(IntEnum):

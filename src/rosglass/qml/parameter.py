@@ -26,7 +26,7 @@ __all__ = ["Parameter"]
 
 
 class Parameter(Element):
-    """One parameter of a node. See ``docs/qml.md`` for every property."""
+    """One parameter of a node. See its page in ``docs/elements``."""
 
     nodeNameChanged = Signal()
     nameChanged = Signal()

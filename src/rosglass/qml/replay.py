@@ -23,7 +23,7 @@ _MOST_TOPICS = 10_000
 
 
 class Replay(Element):
-    """Controls the recording that an interface shows. See ``docs/qml.md`` for every property."""
+    """Controls the recording that an interface shows. See its page in ``docs/elements``."""
 
     fileChanged = Signal()
     rateChanged = Signal()

@@ -24,7 +24,7 @@ __all__ = ["ServiceServer"]
 
 
 class ServiceServer(Element):
-    """Offers a service while it is enabled. See ``docs/qml.md`` for every property."""
+    """Offers a service while it is enabled. See its page in ``docs/elements``."""
 
     nameChanged = Signal()
     serviceTypeChanged = Signal()

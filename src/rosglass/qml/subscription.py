@@ -71,7 +71,7 @@ class _Feed(Executor):
 
 
 class Subscription(TopicElement):
-    """Receives a topic. See ``docs/qml.md`` for every property."""
+    """Receives a topic. See its page in ``docs/elements``."""
 
     topicChanged = Signal()
     messageTypeChanged = Signal()

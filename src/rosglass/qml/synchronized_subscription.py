@@ -154,7 +154,7 @@ class _Matcher:
 
 
 class SynchronizedSubscription(Element):
-    """Receives topics in sets of messages. See ``docs/qml.md`` for every property."""
+    """Receives topics in sets of messages. See its page in ``docs/elements``."""
 
     topicsChanged = Signal()
     subscriptionsChanged = Signal()

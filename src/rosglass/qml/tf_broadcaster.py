@@ -21,7 +21,7 @@ __all__ = ["RosTfBroadcaster", "TfBroadcaster"]
 
 
 class TfBroadcaster(Element):
-    """Publishes a transform, again and again or once for all. See ``docs/qml.md``."""
+    """Publishes a transform, again and again or once for all. See its page in ``docs/elements``."""
 
     frameIdChanged = Signal()
     childFrameIdChanged = Signal()

@@ -105,7 +105,7 @@ class TfTransformListener(_Listening):
 
 
 class TfBuffer(_Listening):
-    """Transforms below one namespace, apart from all others. See ``docs/qml.md``."""
+    """Transforms below one namespace, apart from all others. See its page in ``docs/elements``."""
 
     nsChanged = Signal()
 

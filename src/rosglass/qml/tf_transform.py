@@ -29,7 +29,7 @@ _AGAIN = 1.0
 
 
 class TfTransform(Element):
-    """Follows a transform. See ``docs/qml.md`` for every property."""
+    """Follows a transform. See its page in ``docs/elements``."""
 
     sourceFrameChanged = Signal()
     targetFrameChanged = Signal()
