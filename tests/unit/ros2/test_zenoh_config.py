@@ -53,6 +53,15 @@ def test_a_session_is_a_client_of_another_machine(host):
     assert setting(session_config(ZenohOptions(host, mode="peer"))[0], "mode") == "peer"
 
 
+def test_parts_of_messages_wait_on_links_of_this_machine_only() -> None:
+    waiting = "transport/link/tx/queue/size/data"
+    usual = setting(zenoh.Config(), waiting)
+    assert setting(session_config(ZenohOptions())[0], waiting) > usual
+    for mode in ("client", "peer"):
+        elsewhere, _ = session_config(ZenohOptions("192.168.1.5", mode=mode))
+        assert setting(elsewhere, waiting) == usual
+
+
 def test_clients_do_not_listen():
     config, _ = session_config(ZenohOptions(mode="client"))
     assert setting(config, "mode") == "client"

@@ -41,6 +41,10 @@ _RETRY = {"period_init_ms": 250, "period_max_ms": 500, "period_increase_factor":
 #: Longest time for opening a link, in milliseconds: closing a session waits for an attempt under
 #: way, and three round trips over a satellite have to fit.
 _OPEN_TIMEOUT_MS = 3000
+#: How many parts of 64 kB of a message wait for a link of this machine to take them. Zenoh's own 2
+#: make sender and link wait for each other: a 6 MB picture takes a quarter longer, and is dropped
+#: where other programs need the processor. Elsewhere what waits grows old.
+_WAITING = 16
 #: Of two peers only one opens the link, so that their attempts do not cross (rmw_zenoh's choice).
 _STRATEGY = {"peer": {"to_router": "always", "to_peer": "greater-zid"}}
 
@@ -65,6 +69,8 @@ def session_config(options: ZenohOptions) -> tuple[zenoh.Config, str]:
         config = zenoh.Config()
         settings["mode"] = options.mode or ("peer" if is_local(options.host) else "client")
         settings["listen/endpoints"] = ["tcp/127.0.0.1:0"] if settings["mode"] == "peer" else []
+        if is_local(options.host):
+            settings["transport/link/tx/queue/size/data"] = _WAITING
         settings["scouting/multicast/enabled"] = False
         settings["scouting/gossip/enabled"] = True
         settings["scouting/gossip/autoconnect_strategy"] = _STRATEGY
