@@ -14,10 +14,11 @@ that the C++ plugin for ROS 1 was measured with on the same kind of machine. `pl
 program with the same items that makes the same pictures itself, in a thread, and pushes them into
 a QVideoSink: no robot, no network. Pictures travel over TCP once, from node to node, as those of
 ROS 2 do on one machine; with `ros1` they do so as ROS 1 has it, with Debian's rosmaster. With
-`shm`, Zenoh hands them over in shared memory, which both sides have to ask for. `one preview` and `eight previews` show
-one camera once, and eight times (three by three, less one), in a 640x480 window. `cockpit` is the
-demo's whole screen, 1340x800, with the simulated robot. Contenders take turns, round by round;
-figures are medians of the rounds. Exits 1 when a target is missed or a picture is missing.
+`shm`, Zenoh hands them over in shared memory, which both sides have to ask for. `one preview` and
+`eight previews` show one camera once, and eight times (three by three, less one), in a 640x480
+window. `cockpit` is the demo's whole screen, 1340x800, with the simulated robot. Contenders take
+turns, round by round; figures are medians of the rounds. Exits 1 when a target is missed or a
+picture is missing.
 """
 
 from __future__ import annotations
