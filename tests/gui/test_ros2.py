@@ -335,3 +335,22 @@ def test_folders_that_do_not_answer(bench: Any, monkeypatch: Any, caplog: Any) -
     assert bench.run("return AmentIndex.getPackages()") == []
     assert "AMENT_PREFIX_PATH did not answer within 0.1 s" in caplog.text
     asked.set()
+
+
+def test_a_graph_that_is_there_already_and_one_that_is_gone_are_told(bench: Any, wait: Any) -> None:
+    bench.robot.create_publisher("/chatter", "std_msgs/msg/String")
+    root: Any = bench.load("""
+        QtObject {
+            property var topics: []
+            property Connections c: Connections {
+                target: Ros2
+                function onGraphChanged() { topics = Ros2.queryTopics() }
+            }
+            function names() { return topics.join() }
+        }
+    """)
+    wait(50)
+    bench.session.init("ui")
+    wait(lambda: "/chatter" in root.names())
+    bench.session.shutdown()
+    assert root.names() == ""

@@ -443,6 +443,8 @@ class Session(QtCore.QObject):
         self._rosout = QmlRosout(node)
         self._set_status(node.status())
         self.node_changed.emit()
+        # What it saw before anybody listened is told to nobody else.
+        self.graph_changed.emit()
 
     def _drop_node(self) -> None:
         self._generation += 1
@@ -455,6 +457,7 @@ class Session(QtCore.QObject):
         self._follow(time.monotonic)
         if node is not None:
             self.node_changed.emit()
+            self.graph_changed.emit()
             if self._owns_node:
                 self.background(node.close)
 
