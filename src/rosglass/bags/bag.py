@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from rosglass.comm import Handle, QoS, Reliability
+from rosglass.comm import Handle, QoS
 from rosglass.errors import BagError, DefinitionError, Error
 from rosglass.messages import MessageType, OpaqueType, load
 
@@ -88,11 +88,6 @@ class Channel:
         return QoS.best_available(max(qos.depth for qos in self.offered)).for_subscription(
             self.offered
         )
-
-    @property
-    def is_reliable(self) -> bool:
-        """Whether the recorded publishers were reliable."""
-        return self.profile().reliability is Reliability.RELIABLE
 
 
 class BagMessage(NamedTuple):

@@ -9,20 +9,18 @@ from concurrent.futures import wait
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from rosglass.bridge.status import RelayStatus
-from rosglass.comm import IMMEDIATE, GoalStatus
+from rosglass.bridge.offered_relay import OfferedRelay
+from rosglass.comm import IMMEDIATE, ActionClient, ActionServer, GoalStatus
 from rosglass.errors import Error, GoalRejectedError, NodeClosedError
 from rosglass.errors import TimeoutError as LateError
-from rosglass.messages import ActionTranslation
+from rosglass.messages import ActionTranslation, ActionType
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from rosglass.bridge.side import Side
-    from rosglass.comm import ActionClient, ActionServer, ClientGoal, ServerGoal
-    from rosglass.messages import ActionType, Message
+    from rosglass.comm import ClientGoal, ServerGoal
+    from rosglass.messages import Message
 
-__all__ = ["ActionRelay", "action_notes"]
+__all__ = ["ActionRelay"]
 
 _log = logging.getLogger("rosglass.bridge")
 #: Seconds that a goal may hold up others until its server has decided; then it counts as accepted,
@@ -51,70 +49,45 @@ class _Goal:
         self.stopped = False
 
 
-class ActionRelay:
+class ActionRelay(OfferedRelay[ActionClient, ActionServer, ActionType, ActionTranslation]):
     """Offers in one world an action that a server in the other offers.
 
     Requests to cancel are passed on and count as accepted; the end is what the server makes of it.
     When the relay ends, its goals are cancelled: nobody could watch them any more.
 
-    Args:
-        source: Where the server is.
-        target: Where goals are to be sent.
-        action: Its name at the source.
-        other: Its name at the target.
-        kind: Name of its type at the source, when it is not told there; empty to be told.
-        timeout: Seconds that the server has to accept or reject a goal.
+    Arguments as for :class:`OfferedRelay`; the time is for accepting or rejecting a goal.
     """
+
+    KIND = "action"
+    PARTS = ("goal", "result", "feedback")
 
     def __init__(
         self,
         source: Side,
         target: Side,
-        action: str,
+        name: str,
         other: str,
         *,
         kind: str = "",
         timeout: float = 10.0,
     ) -> None:
-        self._source, self._target = source, target
-        self.action, self.other = action, other
-        self._kind, self._timeout = kind, timeout
-        self._client: ActionClient | None = None
-        self._server: ActionServer | None = None
-        self._translation: ActionTranslation | None = None
-        self._type: ActionType | None = None
+        super().__init__(source, target, name, other, kind=kind, timeout=timeout)
         self._lock = threading.Lock()
         #: By the message that its client sent, which accepting and executing it have in common.
         self._goals: dict[int, tuple[Message, _Goal]] = {}
-        self._problem = ""
-        self._count = self._refused = 0
 
-    def follow(self, wake: Callable[[], None]) -> None:
-        """Do what is to be done; on the bridge's thread."""
-        try:
-            if self._client is None:
-                self._client = self._source.node.create_action_client(
-                    self.action, self._kind or None
-                )
-                self._client.on_ready_change(lambda _: wake(), IMMEDIATE)
-            if self._server is None and self._client.type is not None and not self._problem:
-                self._serve(self._client.type)
-        except NodeClosedError:
-            return
-        except Error as error:
-            if str(error) != self._problem:
-                self._problem = str(error)
-                _log.warning("%s is not relayed: %s", self.action, error)
+    def _ask(self) -> ActionClient:
+        return self._source.node.create_action_client(self.name, self._kind or None)
 
-    def _serve(self, kind: ActionType) -> None:
-        offered = kind
-        if self._source.node.wire != self._target.node.wire:
-            self._translation = ActionTranslation(kind)
-            self._target.teach(self._translation)
-            offered = self._translation.type
-        self._type = kind
-        self._server = self._target.node.create_action_server(
-            self.other, offered, self._execute, accept=self._accept, cancel=self._cancel
+    def _type_of(self, client: ActionClient) -> ActionType | None:
+        return client.type
+
+    def _translate(self, kind: ActionType) -> ActionTranslation:
+        return ActionTranslation(kind)
+
+    def _offer(self, kind: ActionType) -> ActionServer:
+        return self._target.node.create_action_server(
+            self.other, kind, self._execute, accept=self._accept, cancel=self._cancel
         )
 
     # -- from the client to the server -----------------------------------------------------------
@@ -227,26 +200,7 @@ class ActionRelay:
         return False
 
     def _complain(self, error: Error) -> None:
-        _log.warning("%s: a goal is not relayed: %s", self.action, error)
-
-    def status(self) -> RelayStatus:
-        """Return how it is doing."""
-        kind, translation = self._type, self._translation
-        problem = self._problem
-        if not problem and self._client is not None:
-            problem = self._client.problem
-        return RelayStatus(
-            "action",
-            self.action,
-            self.other,
-            "->" if self._source.number == 0 else "<-",
-            "" if kind is None else kind.name,
-            translation.type.name if translation is not None else kind.name if kind else "",
-            count=self._count,
-            refused=self._refused,
-            notes=() if translation is None else action_notes(translation),
-            problem=problem,
-        )
+        _log.warning("%s: a goal is not relayed: %s", self.name, error)
 
     def close(self) -> None:
         """Stop relaying; goals are cancelled, and their clients told. Safe to call twice."""
@@ -260,14 +214,3 @@ class ActionRelay:
             client.close()
         if self._server is not None:
             self._server.close()
-
-
-def action_notes(translation: ActionTranslation) -> tuple[str, ...]:
-    """Say what a translation loses, and makes up."""
-    told = []
-    for name in ("goal", "result", "feedback"):
-        part = getattr(translation, name)
-        told += [f"left out of the {name}: {path}" for path in part.left_out]
-    if translation.derived:
-        told.append(f"ROS {translation.type.ros} has no such type of its own")
-    return tuple(told)

@@ -7,9 +7,10 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rosglass.bridge.action_relay import action_notes
+from rosglass.bridge.action_relay import ActionRelay
+from rosglass.bridge.offered_relay import notes as offered_notes
 from rosglass.bridge.rules import Rules
-from rosglass.bridge.service_relay import notes as service_notes
+from rosglass.bridge.service_relay import ServiceRelay
 from rosglass.bridge.side import Side
 from rosglass.bridge.topic_relay import notes
 from rosglass.errors import Error, UnsupportedError
@@ -144,6 +145,6 @@ def _translated(kind: MessageType | ServiceType | ActionType) -> tuple[str, tupl
         return made.type.name, notes(made)
     if isinstance(kind, ActionType):
         action = ActionTranslation(kind)
-        return action.type.name, action_notes(action)
+        return action.type.name, offered_notes(action, ActionRelay.PARTS)
     service = ServiceTranslation(kind)
-    return service.type.name, service_notes(service)
+    return service.type.name, offered_notes(service, ServiceRelay.PARTS)
