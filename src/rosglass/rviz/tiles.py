@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
     from numpy.typing import NDArray
 
-__all__ = ["TILE", "Rect", "changed_tiles", "cover", "covered_tiles"]
+__all__ = ["TILE", "Rect", "changed_tiles", "cover", "covered_tiles", "uncovered"]
 
 #: Pixels of a tile's edge.
 TILE = 16
@@ -23,15 +25,28 @@ class Rect(NamedTuple):
     right: int
     bottom: int
 
+    @property
+    def area(self) -> int:
+        """How many pixels it has."""
+        return (self.right - self.left) * (self.bottom - self.top)
 
-def _any_per_tile(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return for each tile whether any of its pixels is set."""
-    height, width = mask.shape
-    rows, columns = -(-height // TILE), -(-width // TILE)
-    across = np.logical_or.reduceat(mask, np.arange(0, width, TILE), axis=1)
-    tiles: NDArray[np.bool_] = np.logical_or.reduceat(across, np.arange(0, height, TILE), axis=0)
-    assert tiles.shape == (rows, columns)
-    return tiles
+    def meets(self, other: Rect) -> bool:
+        """Return whether both have a pixel in common."""
+        return (
+            self.left < other.right
+            and other.left < self.right
+            and self.top < other.bottom
+            and other.top < self.bottom
+        )
+
+    def around(self, other: Rect) -> Rect:
+        """Return the smallest rectangle with both in it."""
+        return Rect(
+            min(self.left, other.left),
+            min(self.top, other.top),
+            max(self.right, other.right),
+            max(self.bottom, other.bottom),
+        )
 
 
 def covered_tiles(pixels: NDArray[np.uint32]) -> NDArray[np.bool_]:
@@ -41,15 +56,37 @@ def covered_tiles(pixels: NDArray[np.uint32]) -> NDArray[np.bool_]:
         pixels: Shape (height, width), each pixel 0xAARRGGBB with premultiplied colours; a colour
             without alpha shines, and is seen as well.
     """
-    return _any_per_tile(pixels != 0)
+    return _per_tile(pixels.shape, lambda rows: np.bitwise_or.reduce(pixels[rows], axis=0))
 
 
 def changed_tiles(pixels: NDArray[np.uint32], before: NDArray[np.uint32]) -> NDArray[np.bool_]:
     """Return for each tile whether two pictures of one size differ in it."""
-    return _any_per_tile(pixels != before)
+
+    def changed(rows: slice) -> NDArray[np.uint32] | None:
+        now, then = pixels[rows], before[rows]
+        # Most of a picture stays as it is, which is found out faster than what is another.
+        return np.bitwise_or.reduce(now ^ then, axis=0) if (now != then).any() else None
+
+    return _per_tile(pixels.shape, changed)
 
 
-def cover(tiles: NDArray[np.bool_], width: int, height: int, most: int = 48) -> list[Rect]:
+def _per_tile(
+    shape: tuple[int, ...], bits: Callable[[slice], NDArray[np.uint32] | None]
+) -> NDArray[np.bool_]:
+    """Ask for each row of tiles which of its columns have bits; None means none."""
+    height, width = shape
+    tiles = np.zeros((-(-height // TILE), -(-width // TILE)), np.bool_)
+    starts = np.arange(0, width, TILE)
+    for row, top in enumerate(range(0, height, TILE)):
+        columns = bits(slice(top, top + TILE))
+        if columns is not None:
+            tiles[row] = np.bitwise_or.reduceat(columns, starts) != 0
+    return tiles
+
+
+def cover(
+    tiles: NDArray[np.bool_], width: int, height: int, *, most: int = 48, worth: int = 0
+) -> list[Rect]:
     """Return rectangles that together cover all tiles that are set, and do not overlap.
 
     Args:
@@ -57,17 +94,29 @@ def cover(tiles: NDArray[np.bool_], width: int, height: int, most: int = 48) -> 
         width: Pixels of the picture; no rectangle reaches over its edges.
         height: Pixels.
         most: Rectangles; above that, larger ones are taken that cover more than is needed.
+        worth: Pixels that a rectangle less may cost more.
     """
     step = TILE
     while True:
         rects = [
             Rect(left * step, top * step, min(right * step, width), min(bottom * step, height))
-            for left, top, right, bottom in _merge(tiles)
+            for left, top, right, bottom in _runs_below_each_other(tiles)
         ]
         if len(rects) <= most:
-            return rects
+            return _joined(rects, worth) if worth else rects
         step *= 2
         tiles = _halved(tiles)
+
+
+def uncovered(tiles: NDArray[np.bool_], rects: list[Rect]) -> int | None:
+    """Return how many tiles of rectangles are not set; None if set ones are in no rectangle."""
+    inside = np.zeros_like(tiles)
+    for rect in rects:
+        rows = slice(rect.top // TILE, -(-rect.bottom // TILE))
+        inside[rows, rect.left // TILE : -(-rect.right // TILE)] = True
+    if (tiles & ~inside).any():
+        return None
+    return int(inside.sum()) - int(tiles.sum())
 
 
 def _halved(tiles: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -77,7 +126,7 @@ def _halved(tiles: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return half
 
 
-def _merge(tiles: NDArray[np.bool_]) -> list[Rect]:
+def _runs_below_each_other(tiles: NDArray[np.bool_]) -> list[Rect]:
     """Return runs of tiles, those that stand alike in rows below each other as one."""
     done: list[Rect] = []
     growing: dict[tuple[int, int], int] = {}
@@ -93,3 +142,32 @@ def _merge(tiles: NDArray[np.bool_]) -> list[Rect]:
 def _runs(row: NDArray[np.bool_]) -> list[tuple[int, int]]:
     edges = np.flatnonzero(np.diff(row, prepend=False, append=False))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+
+
+def _joined(rects: list[Rect], worth: int) -> list[Rect]:
+    """Join neighbours as long as each rectangle less costs no more than `worth` pixels."""
+    while True:
+        outer = next((o for o in _around_neighbours(rects, worth) if _saves(o, rects, worth)), None)
+        if outer is None:
+            return rects
+        rects = [*(rect for rect in rects if not rect.meets(outer)), outer]
+
+
+def _around_neighbours(rects: list[Rect], worth: int) -> Iterator[Rect]:
+    """Iterate over what is around two that stand close together, the closest first."""
+    left, top, right, bottom = np.array(rects, np.int64).reshape(-1, 4).T
+    width = np.maximum.outer(right, right) - np.minimum.outer(left, left)
+    height = np.maximum.outer(bottom, bottom) - np.minimum.outer(top, top)
+    area = (right - left) * (bottom - top)
+    between = width * height - np.add.outer(area, area)
+    ones, others = np.nonzero(np.triu(between <= 4 * worth, 1))
+    for number in np.argsort(between[ones, others], kind="stable"):
+        yield rects[ones[number]].around(rects[others[number]])
+
+
+def _saves(outer: Rect, rects: list[Rect], worth: int) -> bool:
+    inside = [rect for rect in rects if rect.meets(outer)]
+    # One that is cut by the edge would be blended twice.
+    if any(outer.around(rect) != outer for rect in inside):
+        return False
+    return outer.area - sum(rect.area for rect in inside) <= worth * (len(inside) - 1)
