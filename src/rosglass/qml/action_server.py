@@ -173,10 +173,7 @@ class ActionServer(Element):
         node, name, type_name = offer.want
 
         def done(result: Server | Error) -> None:
-            if not is_alive(self) or self._offer is not offer:
-                if not isinstance(result, Error):
-                    session.background(result.close)
-            elif isinstance(result, Error):
+            if isinstance(result, Error):
                 self._say(f"action {name}: {result}")
                 if isinstance(result, TypeNotFoundError):
                     self._retry.start(RETRY)
@@ -189,7 +186,7 @@ class ActionServer(Element):
                 for job in early:
                     job()
 
-        session.background(
+        self._make(
             lambda: node.create_action_server(
                 name,
                 type_name,
@@ -198,6 +195,7 @@ class ActionServer(Element):
                 cancel=lambda goal: self._allows(offer, goal),
                 executor=session.executor,
             ),
+            lambda: self._offer is offer,
             done,
         )
 

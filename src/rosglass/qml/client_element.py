@@ -69,17 +69,11 @@ class ClientElement(Element):
         self._withdraw()
         self._have = node
         if node is not None:
-            self._make(node, self._type or None)
+            self._connect(node, self._type or None)
 
-    def _make(self, node: Node, type_name: str | None) -> None:
-        session = self._session
-        assert session is not None
-
+    def _connect(self, node: Node, type_name: str | None) -> None:
         def done(result: Any) -> None:
-            if not is_alive(self) or self._have is not node:
-                if not isinstance(result, Error):
-                    session.background(result.close)
-            elif isinstance(result, TypeNotFoundError):
+            if isinstance(result, TypeNotFoundError):
                 self._say(f"{self._name}: {result}")
                 self._fetch(node)
             elif isinstance(result, Error):
@@ -88,7 +82,7 @@ class ClientElement(Element):
             else:
                 self._made(result)
 
-        session.background(lambda: self._create(node, type_name), done)
+        self._make(lambda: self._create(node, type_name), lambda: self._have is node, done)
 
     def _fetch(self, node: Node) -> None:
         """Ask the robot for a type that nobody here knows."""
@@ -97,7 +91,7 @@ class ClientElement(Element):
 
         def again() -> None:
             if is_alive(self) and self._have is node and self._client is None:
-                self._make(node, self._type)
+                self._connect(node, self._type)
 
         try:
             promise = node.fetch_type_async(self._type)

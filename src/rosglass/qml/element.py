@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from contextlib import suppress
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar
 
 from rosglass.comm.similar import similar
 from rosglass.errors import Error
@@ -23,6 +23,12 @@ if TYPE_CHECKING:
 
 __all__ = ["DEFAULT_TIMEOUT", "RETRY", "Element", "TopicElement", "changed_enough"]
 
+
+class _Closable(Protocol):
+    def close(self) -> None: ...
+
+
+_T = TypeVar("_T", bound=_Closable)
 #: Milliseconds without a publisher after which the name may be a mistake.
 _LONELY = 5000
 #: Milliseconds until something that is missing is looked for again.
@@ -127,6 +133,30 @@ class Element(QtCore.QObject):
         if self._runtime is None:
             self._runtime = runtime_of(self)
         return self._runtime
+
+    def _make(
+        self,
+        work: Callable[[], _T],
+        is_wanted: Callable[[], bool],
+        done: Callable[[_T | Error], None],
+    ) -> None:
+        """Make something that can be closed, on the worker.
+
+        Args:
+            work: Makes it.
+            is_wanted: Whether it is wanted still; it is closed otherwise.
+            done: Told what was made, or why it was not, on the GUI thread.
+        """
+        session = self._session
+        assert session is not None
+
+        def made(result: _T | Error) -> None:
+            if is_alive(self) and is_wanted():
+                done(result)
+            elif not isinstance(result, Error):
+                session.background(result.close)
+
+        session.background(work, made)
 
     def _update(self) -> None:
         """Bring about what the properties ask for."""

@@ -131,18 +131,14 @@ class Publisher(Element):
 
     @Slot()
     def _advertise(self) -> None:
-        node, session = self._have, self._session
-        if node is None or session is None or self._sender is not None:
+        node = self._have
+        if node is None or self._session is None or self._sender is not None:
             return
-
-        def done(result: Sender | Error) -> None:
-            if not is_alive(self) or self._have is not node:
-                if not isinstance(result, Error):
-                    session.background(result.close)
-                return
-            self._advertised(result)
-
-        session.background(lambda: node.create_publisher(self._topic, self._type, self._qos), done)
+        self._make(
+            lambda: node.create_publisher(self._topic, self._type, self._qos),
+            lambda: self._have is node,
+            self._advertised,
+        )
 
     def _advertised(self, result: Sender | Error) -> None:
         if isinstance(result, Error):

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rosglass.messages import Message
     from rosglass.qml.runtime import Runtime
 
-__all__ = ["ServiceServer"]
+__all__ = ["ServiceServer", "server_function"]
 
 
 class ServiceServer(Element):
@@ -111,10 +111,7 @@ class ServiceServer(Element):
         self._at_end["answers"] = answers.give_up
 
         def done(result: Server | Error) -> None:
-            if not is_alive(self) or self._have is not want:
-                if not isinstance(result, Error):
-                    session.background(result.close)
-            elif isinstance(result, Error):
+            if isinstance(result, Error):
                 self._say(f"service {name}: {result}")
                 if isinstance(result, TypeNotFoundError):
                     self._retry.start(RETRY)
@@ -127,10 +124,11 @@ class ServiceServer(Element):
                 for answer in early:
                     answer()
 
-        session.background(
+        self._make(
             lambda: node.create_service_server(
                 name, type_name, self._on_request, executor=session.executor
             ),
+            lambda: self._have is want,
             done,
         )
 
@@ -172,3 +170,14 @@ class ServiceServer(Element):
 
     def _problem_changed(self) -> None:
         self.problemChanged.emit()
+
+
+def server_function(given: QJSValue) -> QJSValue:
+    """Return the function that ``createServiceServer`` was given.
+
+    Raises:
+        Error: It is none.
+    """
+    if not given.isCallable():
+        raise Error("the handler is not a function")
+    return given

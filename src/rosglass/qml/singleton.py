@@ -6,7 +6,8 @@ from __future__ import annotations
 import logging
 import os
 import re
-from typing import TYPE_CHECKING, ClassVar
+from abc import abstractmethod
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.errors import Error, InvalidNameError
 from rosglass.qml.dialect import Dialect
@@ -15,6 +16,8 @@ from rosglass.qml.runtime import Runtime, own_runtime
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rosglass.comm.node import Node
     from rosglass.qml.session import Session
 
@@ -148,6 +151,37 @@ class RosSingleton(QtCore.QObject):
     def fatal(self, message: QJSValue, name: str = "") -> None:
         """Log an error after which the program is of no use."""
         self._log(logging.CRITICAL, message.toString(), name)
+
+    @abstractmethod
+    def _check_topic(self, topic: str) -> None:
+        """Raise InvalidNameError unless this can be the name of a topic, service or action."""
+
+    def _offer(
+        self,
+        function: str,
+        kind: type[Any],
+        name: str,
+        type_name: str,
+        given: Callable[[], object],
+    ) -> QtCore.QObject | None:
+        """Return a server that lives as long as JavaScript holds it; what is wrong throws.
+
+        Args:
+            function: What QML calls.
+            kind: The server's class.
+            name: Name of the service or action.
+            type_name: Its type.
+            given: Returns the functions that answer.
+        """
+        try:
+            self._check_topic(name)
+            functions = given()
+        except Error as error:
+            self._runtime.throw(f"{self.NAME}.{function}: {error}")
+            return None
+        server = kind(None, self._runtime)
+        server.configure(name, type_name, functions)
+        return self._runtime.keep(server)
 
     def _log(self, level: int, message: str, name: str = "") -> None:
         log_from_qml(name, level, message, self._runtime.caller())

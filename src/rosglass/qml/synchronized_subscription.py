@@ -318,10 +318,7 @@ class SynchronizedSubscription(Element):
             return
 
         def done(result: _Matcher | Error) -> None:
-            if not is_alive(self) or self._have is not want:
-                if not isinstance(result, Error):
-                    session.background(result.close)
-            elif isinstance(result, Error):
+            if isinstance(result, Error):
                 self._say(f"SynchronizedSubscription: {result}")
                 if isinstance(result, TypeNotFoundError):
                     self._retry.start(RETRY)
@@ -333,8 +330,10 @@ class SynchronizedSubscription(Element):
 
         arrived, executor = self._on_arrival, session.executor
         node, wanted, size, slop, headerless = want
-        session.background(
-            lambda: _Matcher(node, wanted, size, slop, headerless, arrived, executor), done
+        self._make(
+            lambda: _Matcher(node, wanted, size, slop, headerless, arrived, executor),
+            lambda: self._have is want,
+            done,
         )
 
     def _detach(self) -> None:

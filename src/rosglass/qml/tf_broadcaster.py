@@ -10,7 +10,7 @@ from rosglass.errors import Error
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.element import Element
 from rosglass.qml.from_js import fields_from_js
-from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
+from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot
 
 if TYPE_CHECKING:
     from rosglass.comm.node import Node
@@ -228,10 +228,7 @@ class TfBroadcaster(Element):
             return kind(node, namespace)
 
         def done(result: TransformBroadcaster | StaticTransformBroadcaster | Error) -> None:
-            if not is_alive(self) or self._have is not want:
-                if not isinstance(result, Error):
-                    session.background(result.close)
-            elif isinstance(result, Error):
+            if isinstance(result, Error):
                 self._say(f"TfBroadcaster: {result}")
             else:
                 self._sender = result
@@ -240,7 +237,7 @@ class TfBroadcaster(Element):
                 self._run_timer()
                 self._send_current()
 
-        session.background(work, done)
+        self._make(work, lambda: self._have is want, done)
 
     def _run_timer(self) -> None:
         if self._sender is None or self._static or not self._rate:

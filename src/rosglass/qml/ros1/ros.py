@@ -20,6 +20,7 @@ from rosglass.qml.ros1.package import Package
 from rosglass.qml.ros1.publisher import RosPublisher
 from rosglass.qml.ros1.service_server import RosServiceServer
 from rosglass.qml.ros1.subscriber import Subscriber
+from rosglass.qml.service_server import server_function
 from rosglass.qml.singleton import check_type, is_list, strings
 from rosglass.qml.subscription import DEFAULT_QOS
 from rosglass.qml.value_functions import ValueFunctions
@@ -163,16 +164,9 @@ class Ros(ValueFunctions, GraphSingleton):
             name: Service name.
             handler: Told the request; returns the response, or a promise of it.
         """
-        try:
-            self._check_topic(name)
-            if not handler.isCallable():
-                raise InvalidNameError("the handler is not a function")
-        except Error as error:
-            self._runtime.throw(f"Ros.advertiseService: {error}")
-            return None
-        server = RosServiceServer(None, self._runtime)
-        server.configure(name, type_name, handler)
-        return self._runtime.keep(server)
+        return self._offer(
+            "advertiseService", RosServiceServer, name, type_name, lambda: server_function(handler)
+        )
 
     # Actions.
 
@@ -210,17 +204,12 @@ class Ros(ValueFunctions, GraphSingleton):
                 nothing, and ends the goal by its handle. Or an object of ``execute``, ``accept``
                 and ``cancel``.
         """
-        try:
-            self._check_topic(name)
-            functions = server_functions(execute)
-        except Error as error:
-            self._runtime.throw(f"Ros.advertiseAction: {error}")
-            return None
-        server = RosActionServer(None, self._runtime)
-        server.configure(name, type_name, functions)
-        return self._runtime.keep(server)
+        return self._offer(
+            "advertiseAction", RosActionServer, name, type_name, lambda: server_functions(execute)
+        )
 
     def _check_topic(self, topic: str) -> None:
+        """Raise InvalidNameError unless ROS 1 takes this for a name."""
         from rosglass.ros1.names import expand  # noqa: PLC0415 - not needed at start-up
 
         expand(topic, "node", "/")

@@ -15,7 +15,7 @@ from rosglass.qml.message_waiting import next_message
 from rosglass.qml.profiles import qos_from_js
 from rosglass.qml.publisher import Publisher
 from rosglass.qml.service_client import ServiceClient
-from rosglass.qml.service_server import ServiceServer
+from rosglass.qml.service_server import ServiceServer, server_function
 from rosglass.qml.singleton import check_type, full_type, is_list, strings
 from rosglass.qml.subscription import DEFAULT_QOS, Subscription
 from rosglass.qml.value_functions import ValueFunctions
@@ -206,16 +206,9 @@ class Ros2(ValueFunctions, GraphSingleton):
             type_name: Service type, ``pkg/srv/Type`` or ``pkg/Type``.
             handler: Told the request; returns the response, or a promise of it.
         """
-        try:
-            self._check_topic(name)
-            if not handler.isCallable():
-                raise InvalidNameError("the handler is not a function")
-        except Error as error:
-            self._runtime.throw(f"Ros2.createServiceServer: {error}")
-            return None
-        server = ServiceServer(None, self._runtime)
-        server.configure(name, type_name, handler)
-        return self._runtime.keep(server)
+        return self._offer(
+            "createServiceServer", ServiceServer, name, type_name, lambda: server_function(handler)
+        )
 
     # Actions.
 
@@ -251,15 +244,9 @@ class Ros2(ValueFunctions, GraphSingleton):
                 nothing, and ends the goal by its handle. Or an object of ``execute``, ``accept``
                 and ``cancel``.
         """
-        try:
-            self._check_topic(name)
-            functions = server_functions(execute)
-        except Error as error:
-            self._runtime.throw(f"Ros2.createActionServer: {error}")
-            return None
-        server = ActionServer(None, self._runtime)
-        server.configure(name, type_name, functions)
-        return self._runtime.keep(server)
+        return self._offer(
+            "createActionServer", ActionServer, name, type_name, lambda: server_functions(execute)
+        )
 
     @Slot(str, result=bool)
     def isValidTopic(self, topic: str) -> bool:
@@ -285,6 +272,7 @@ class Ros2(ValueFunctions, GraphSingleton):
         return types
 
     def _check_topic(self, topic: str) -> None:
+        """Raise InvalidNameError unless ROS 2 takes this for a name."""
         from rosglass.ros2.names import expand  # noqa: PLC0415 - not needed at start-up
 
         session = self._session
