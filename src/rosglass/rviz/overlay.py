@@ -53,6 +53,8 @@ class Overlay(QtCore.QObject):
         self._problem = ""
         #: Above all overlays that are no popups.
         self.is_popup = False
+        #: While it is shown, nothing below it gets any input, RViz's view included.
+        self.is_modal = False
         self.z, self.scale, self.opacity = z, scale, opacity
 
     @property
@@ -143,7 +145,7 @@ class Overlay(QtCore.QObject):
         return False
 
     def leave(self) -> None:
-        """Be told that the mouse is over it no longer."""
+        """Be told that the mouse is over it no longer, and a press has ended without effect."""
 
     def set_focus(self, focus: bool) -> None:
         """Be told that keys come here from now on, or no longer."""

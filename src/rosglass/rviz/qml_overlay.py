@@ -13,6 +13,7 @@ from rosglass.qml.places import interface_file
 from rosglass.qt import QtQml, is_alive
 from rosglass.rviz.gl import keep_context, read_pixels
 from rosglass.rviz.overlay import Overlay
+from rosglass.rviz.qml_input import QmlInput
 from rosglass.rviz.qt5 import QtCore, QtGui, QtQuick
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["QmlOverlay"]
 
 
-class QmlOverlay(Overlay):
+class QmlOverlay(QmlInput, Overlay):
     """A QML file over RViz's 3D view.
 
     Args:
@@ -115,9 +116,3 @@ class QmlOverlay(Overlay):
             self._buffer.bind()
             read_pixels(width, height, self._pixels)
         return self._pixels[::-1]
-
-    def deliver(self, event: QtCore.QEvent) -> bool:
-        """Give the event to the item it is for."""
-        event.setAccepted(False)
-        QtCore.QCoreApplication.sendEvent(self._window, event)
-        return bool(event.isAccepted())

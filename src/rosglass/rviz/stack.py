@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 from rosglass.errors import Error
 from rosglass.qt import QtCore, Signal
+from rosglass.rviz.input import Input
 from rosglass.rviz.layer import HIGHEST_Z, Layer
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from rosglass.rviz.overlay import Overlay
     from rosglass.rviz.window import Window
@@ -52,6 +53,8 @@ class Stack(QtCore.QObject):
         self._window = window
         self._entries: list[Entry] = []
         window.before_frame.connect(self._before_frame)
+        #: Who gets the mouse and the keys.
+        self.input = Input(window, self)
 
     def add(self, overlay: Overlay) -> None:
         """Show an overlay above those of lower or equal `z`.
@@ -74,7 +77,9 @@ class Stack(QtCore.QObject):
                 self._entries.remove(entry)
                 overlay.arranged.disconnect(self._arrange)
                 entry.layer.close()
-                overlay.close()
+                self.input.forget(overlay)
+                # It may be handling the very event that had it removed.
+                self.input.after_event(overlay.close)
                 self.changed.emit()
                 return
 
@@ -89,6 +94,29 @@ class Stack(QtCore.QObject):
     def topmost_first(self) -> list[Overlay]:
         """Return the overlays that are shown, in the order in which they get input."""
         return [o for o in reversed(list(self)) if o.visible and o.opacity > 0]
+
+    def clicked(self, overlay: Overlay) -> None:
+        """Raise a popup that is pressed on above all others; does nothing to other overlays."""
+        if overlay.is_popup:
+            self.to_front(overlay)
+
+    def to_front(self, overlay: Overlay) -> None:
+        """Put an overlay above all others of its kind, popups or not."""
+        self._to_end(overlay, -1, max)
+
+    def to_back(self, overlay: Overlay) -> None:
+        """Put an overlay below all others of its kind, popups or not."""
+        self._to_end(overlay, 0, min)
+
+    def _to_end(self, overlay: Overlay, end: int, outermost: Callable[..., int]) -> None:
+        alike = [e for e in self._entries if e.overlay.is_popup == overlay.is_popup]
+        entry = next((e for e in alike if e.overlay is overlay), None)
+        if entry is None or alike[end] is entry:
+            return
+        self._entries.remove(entry)
+        self._entries.insert(0 if end == 0 else len(self._entries), entry)
+        # Setting it puts all in order, equal ones as they stand now.
+        overlay.z = outermost(e.overlay.z for e in alike)
 
     def close(self) -> None:
         """Take every overlay away."""

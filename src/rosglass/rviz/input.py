@@ -1,0 +1,398 @@
+"""Who gets the mouse, the wheel, touch and the keys: an overlay, or RViz's view below it."""
+
+from __future__ import annotations
+
+import enum
+from typing import TYPE_CHECKING, Any
+
+from rosglass.qt import QtCore, is_alive
+from rosglass.rviz.events import DRAG, KEYS, PRESS, TOUCH, scaled
+from rosglass.rviz.guard import guarded
+from rosglass.rviz.qt5 import QtCore as Qt5Core
+from rosglass.rviz.qt5 import QtGui, QtWidgets
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rosglass.rviz.overlay import Overlay
+    from rosglass.rviz.stack import Stack
+    from rosglass.rviz.window import Window
+
+__all__ = ["Input"]
+
+_E = Qt5Core.QEvent
+_NONE = Qt5Core.Qt.NoButton
+#: RViz tells its tools where the mouse is this often, even while it stands still.
+_REMIND = 33
+
+
+class Owner(enum.Enum):
+    """Who has the mouse until its buttons are up, other than an overlay."""
+
+    RVIZ = 1
+    #: It went with an overlay, or belongs to what lies below a modal popup.
+    NOBODY = 2
+
+
+class Input(QtCore.QObject):
+    """Routes the events of RViz's 3D view.
+
+    The topmost overlay is asked first, popups before all others. The one that takes a button has
+    the mouse until every button is up, and the keys from then on. What no overlay takes is RViz's,
+    unless a modal popup is shown.
+
+    Args:
+        window: RViz.
+        stack: Its overlays.
+    """
+
+    def __init__(self, window: Window, stack: Stack) -> None:
+        super().__init__()
+        self._window, self._stack = window, stack
+        self._panel = window.panel
+        self._owner: Overlay | Owner | None = None
+        self._touched: Overlay | None = None
+        self._hovered: Overlay | None = None
+        self._dragged: Overlay | None = None
+        self._focused: Overlay | None = None
+        self._depth = 0
+        self._later: list[Callable[[], None]] = []
+        self._routes: dict[Any, Callable[[Any], bool]] = {
+            **dict.fromkeys(KEYS | {_E.InputMethod, _E.InputMethodQuery}, self._key),
+            **dict.fromkeys(TOUCH, self._touch),
+            **dict.fromkeys(DRAG | {_E.DragLeave}, self._drag),
+            **dict.fromkeys(PRESS, self._press),
+            _E.MouseMove: self._move,
+            _E.MouseButtonRelease: self._release,
+            _E.Wheel: self._wheel,
+            _E.ContextMenu: self._offer_to_owner,
+            _E.ToolTip: self._offer_to_owner,
+            _E.Leave: self._left,
+            _E.FocusIn: self._focus_event,
+            _E.FocusOut: self._focus_event,
+        }
+        self._panel.setAttribute(Qt5Core.Qt.WA_AcceptTouchEvents)
+        self._panel.setAcceptDrops(True)
+        self._panel.installEventFilter(self)
+        window.widget.installEventFilter(self)
+        stack.changed.connect(self._overlays_changed)
+        self._reminder = Qt5Core.QTimer()
+        self._reminder.timeout.connect(self._remind)
+        self._watch = _TimerWatch(self._panel, lambda: self._reminder.start(_REMIND))
+
+    @property
+    def focused(self) -> Overlay | None:
+        """The overlay that gets the keys; None where RViz does."""
+        return self._focused
+
+    def focus(self, overlay: Overlay | None) -> None:
+        """Have an overlay get the keys, or RViz."""
+        before, self._focused = self._focused, overlay
+        self._panel.setAttribute(Qt5Core.Qt.WA_InputMethodEnabled, overlay is not None)
+        if overlay is not None and not self._panel.hasFocus():
+            self._panel.setFocus(Qt5Core.Qt.MouseFocusReason)
+        if before is overlay:
+            return
+        for which in (before, overlay):
+            if which is not None:
+                with guarded(which, "getting or losing the keys"):
+                    which.set_focus(which is overlay)
+
+    def forget(self, overlay: Overlay) -> None:
+        """End everything that an overlay has of the mouse and the keys."""
+        if self._owner is overlay:
+            self._owner = Owner.NOBODY
+            self._leave(overlay)
+        if self._touched is overlay:
+            self._touched = None
+            self._leave(overlay)
+        if self._hovered is overlay:
+            self._hovered = None
+            self._leave(overlay)
+            self._panel.unsetCursor()
+        if self._dragged is overlay:
+            self._dragged = None
+        if self._focused is overlay:
+            self.focus(None)
+
+    def after_event(self, call: Callable[[], None]) -> None:
+        """Call when no overlay handles an event any more; at once if none does."""
+        if self._depth:
+            self._later.append(call)
+        else:
+            call()
+
+    def close(self) -> None:
+        """Leave all events to RViz."""
+        self._reminder.stop()
+        self._watch.close()
+        for watched in (self._panel, self._window.widget):
+            if is_alive(watched):
+                watched.removeEventFilter(self)
+
+    def eventFilter(self, watched: Any, event: Any) -> bool:  # noqa: N802 - Qt's name
+        """Return whether an event is for an overlay, and RViz is to hear nothing of it."""
+        if watched is not self._panel:
+            if event.type() == _E.WindowDeactivate:
+                self._deactivated()
+            return False
+        route = self._routes.get(event.type())
+        # Without overlays, RViz is as if this were not here.
+        if route is None or not (self._owner or self._stack.topmost_first()):
+            return False
+        self._depth += 1
+        try:
+            taken = route(event)
+        finally:
+            self._depth -= 1
+            if not self._depth:
+                later, self._later = self._later, []
+                for call in later:
+                    call()
+        if event.type() not in DRAG:
+            # What is left to RViz arrives there as it came: accepted, unless RViz says otherwise.
+            event.setAccepted(True)
+        return taken
+
+    # Offering
+
+    def _offer(self, event: Any) -> tuple[Overlay | None, bool]:
+        """Return the overlay that takes an event, and whether RViz may have it otherwise."""
+        for overlay in self._stack.topmost_first():
+            if self._deliver(overlay, event):
+                return overlay, False
+            if overlay.is_modal:
+                return None, False
+        return None, True
+
+    def _deliver(self, overlay: Overlay, event: Any) -> bool:
+        with guarded(overlay, "handling input"):
+            return overlay.deliver(scaled(event, 1 / overlay.scale))
+        return False
+
+    @staticmethod
+    def _leave(overlay: Overlay) -> None:
+        with guarded(overlay, "hearing that the mouse is gone"):
+            overlay.leave()
+
+    # Mouse
+
+    def _press(self, event: Any) -> bool:
+        if event.buttons() == event.button():
+            # The one before may have ended in another window, unheard.
+            self._end_capture()
+        if self._owner is None:
+            overlay, open_to_rviz = self._offer(event)
+            if overlay is not None and overlay not in self._stack.topmost_first():
+                self._owner = Owner.NOBODY
+            elif overlay is not None:
+                self._owner = overlay
+                self._stack.clicked(overlay)
+                self.focus(overlay)
+            else:
+                self._owner = Owner.RVIZ if open_to_rviz else Owner.NOBODY
+                if open_to_rviz:
+                    self.focus(None)
+                    self._hover(None)
+        elif not isinstance(self._owner, Owner):
+            self._deliver(self._owner, event)
+        return self._owner is not Owner.RVIZ
+
+    def _release(self, event: Any) -> bool:
+        owner = self._owner
+        if owner is None:
+            return False
+        if not isinstance(owner, Owner):
+            self._deliver(owner, event)
+        if event.buttons() == _NONE:
+            self._owner = None
+            if owner is not Owner.RVIZ:
+                self._move(_moved(event))
+        return owner is not Owner.RVIZ
+
+    def _move(self, event: Any) -> bool:
+        if event.buttons() == _NONE:
+            self._end_capture()
+        elif self._owner is None:
+            return False
+        if self._owner is None:
+            overlay, open_to_rviz = self._offer(event)
+            self._hover(overlay)
+            if overlay is None and not open_to_rviz:
+                self._panel.setCursor(Qt5Core.Qt.ArrowCursor)
+            return not (overlay is None and open_to_rviz)
+        if not isinstance(self._owner, Owner):
+            self._deliver(self._owner, event)
+            if not isinstance(self._owner, Owner):
+                self._show_cursor(self._owner)
+        return self._owner is not Owner.RVIZ
+
+    def _end_capture(self) -> None:
+        owner, self._owner = self._owner, None
+        if owner is not None and not isinstance(owner, Owner):
+            self._leave(owner)
+
+    def _hover(self, overlay: Overlay | None) -> None:
+        before, self._hovered = self._hovered, overlay
+        if before is not None and before is not overlay:
+            self._leave(before)
+            # RViz sets its tool's shape with the next event that it gets.
+            self._panel.unsetCursor()
+        if overlay is not None:
+            self._show_cursor(overlay)
+
+    def _show_cursor(self, overlay: Overlay) -> None:
+        with guarded(overlay, "choosing the mouse's shape"):
+            self._panel.setCursor(overlay.cursor() or QtGui.QCursor(Qt5Core.Qt.ArrowCursor))
+
+    def _left(self, event: Any) -> bool:
+        del event
+        if self._owner is None:
+            self._hover(None)
+        return False
+
+    def _wheel(self, event: Any) -> bool:
+        if self._owner is None:
+            overlay, open_to_rviz = self._offer(event)
+            return overlay is not None or not open_to_rviz
+        if not isinstance(self._owner, Owner):
+            self._deliver(self._owner, event)
+        return self._owner is not Owner.RVIZ
+
+    def _offer_to_owner(self, event: Any) -> bool:
+        """Handle what only follows from where the mouse is."""
+        if self._owner is Owner.RVIZ:
+            return False
+        which = self._owner or self._hovered
+        if which is not None and not isinstance(which, Owner):
+            self._deliver(which, event)
+        return which is not None
+
+    def _remind(self) -> None:
+        """Have RViz's tools see what moves below a still mouse; not when it is over an overlay."""
+        over_rviz = self._hovered is None and self._owner in (None, Owner.RVIZ)
+        modal = any(overlay.is_modal for overlay in self._stack.topmost_first())
+        if over_rviz and not modal and is_alive(self._panel):
+            Qt5Core.QMetaObject.invokeMethod(self._panel, "sendMouseMoveEvent")
+
+    # Touch and drags
+
+    def _touch(self, event: Any) -> bool:
+        if event.type() == _E.TouchBegin:
+            self._touched, open_to_rviz = self._offer(event)
+            if self._touched is not None:
+                self._stack.clicked(self._touched)
+                self.focus(self._touched)
+            # What is not taken, Qt offers anew as the mouse.
+            return self._touched is not None or not open_to_rviz
+        touched = self._touched
+        if touched is None:
+            return False
+        if event.type() in (_E.TouchEnd, _E.TouchCancel):
+            self._touched = None
+        self._deliver(touched, event)
+        return True
+
+    def _drag(self, event: Any) -> bool:
+        before, over = self._dragged, None
+        for overlay in [] if event.type() == _E.DragLeave else self._stack.topmost_first():
+            sent = scaled(event, 1 / overlay.scale)
+            taken = False
+            with guarded(overlay, "handling a drag"):
+                taken = overlay.deliver(sent)
+            if taken:
+                over = overlay
+                event.setDropAction(sent.dropAction())
+            if taken or overlay.is_modal:
+                break
+        self._dragged = None if event.type() == _E.Drop else over
+        if before is not None and before is not over:
+            self._deliver(before, QtGui.QDragLeaveEvent())
+        # Only who lets it enter hears of it when it comes to a place that wants it.
+        event.setAccepted(over is not None or event.type() in (_E.DragEnter, _E.DragLeave))
+        return True
+
+    # Keys
+
+    def _key(self, event: Any) -> bool:
+        focused = self._focused
+        if focused is None:
+            return any(overlay.is_modal for overlay in self._stack.topmost_first())
+        if self._deliver(focused, event):
+            return True
+        if event.type() == _E.KeyPress and event.key() == Qt5Core.Qt.Key_Escape:
+            self.focus(None)
+        return focused.is_modal
+
+    def _focus_event(self, event: Any) -> bool:
+        focused = self._focused
+        if focused is not None and event.reason() != Qt5Core.Qt.PopupFocusReason:
+            with guarded(focused, "getting or losing the keys"):
+                focused.set_focus(event.type() == _E.FocusIn)
+        return False
+
+    # What happens around
+
+    def _deactivated(self) -> None:
+        if self._owner is not None and not isinstance(self._owner, Owner):
+            owner, self._owner = self._owner, Owner.NOBODY
+            self._leave(owner)
+        self._hover(None)
+
+    def _overlays_changed(self) -> None:
+        shown = self._stack.topmost_first()
+        for which in (self._owner, self._touched, self._hovered, self._focused):
+            if which is not None and not isinstance(which, Owner) and which not in shown:
+                self.forget(which)
+
+
+def _moved(event: Any) -> Any:
+    """Return the move that tells what is below the mouse after a release."""
+    made = QtGui.QMouseEvent(
+        _E.MouseMove,
+        event.localPos(),
+        event.windowPos(),
+        event.screenPos(),
+        _NONE,
+        _NONE,
+        event.modifiers(),
+    )
+    made.setTimestamp(event.timestamp())
+    return made
+
+
+class _TimerWatch(QtCore.QObject):
+    """Stops the timer by which RViz sees the mouse through overlays.
+
+    RViz's RenderPanel calls itself with the mouse's place 30 times per second, as no filter of
+    events can see (render_panel.cpp, sendMouseMoveEvent). Its timer belongs to nobody that could be
+    asked for it, but it tells itself by its own events.
+    """
+
+    def __init__(self, panel: Any, found: Callable[[], None]) -> None:
+        super().__init__()
+        self._panel, self._found = panel, found
+        self._left = 300
+        self._app = QtWidgets.QApplication.instance()
+        self._app.installEventFilter(self)
+
+    def eventFilter(self, watched: Any, event: Any) -> bool:  # noqa: N802 - Qt's name
+        """Look at the timers that go off: each of RViz's does so some 30 times per second."""
+        if event.type() == _E.Timer and watched.metaObject().className() == "QTimer":
+            self._try(watched)
+        return False
+
+    def _try(self, timer: Any) -> None:
+        self._left -= 1
+        ends = Qt5Core.SIGNAL("timeout()"), Qt5Core.SLOT("sendMouseMoveEvent()")
+        if is_alive(self._panel) and Qt5Core.QObject.disconnect(
+            timer, ends[0], self._panel, ends[1]
+        ):
+            self.close()
+            self._found()
+        elif not self._left:
+            self.close()
+
+    def close(self) -> None:
+        """Look no longer."""
+        self._app.removeEventFilter(self)

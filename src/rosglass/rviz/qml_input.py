@@ -1,0 +1,168 @@
+"""How a scene of QML, which no window of its own shows, gets its mouse, touch and keys."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+from rosglass.qt import is_alive
+from rosglass.rviz.events import DRAG, KEYS, PRESS, TOUCH, position, scaled
+from rosglass.rviz.qt5 import QtCore, QtGui
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+__all__ = ["QmlInput"]
+
+_E = QtCore.QEvent
+_TAKING = ("QQuickTapHandler", "QQuickDragHandler", "QQuickPointHandler", "QQuickPinchHandler")
+_INPUT_METHOD = frozenset({_E.InputMethod, _E.InputMethodQuery})
+_FOR_SCENE = PRESS | TOUCH | DRAG | KEYS | _INPUT_METHOD
+_FOR_SCENE |= {_E.MouseMove, _E.MouseButtonRelease, _E.Wheel, _E.DragLeave}
+#: Seconds for which the list of items that take note of the mouse is kept.
+_KEPT = 0.25
+
+
+class QmlInput:
+    """Input of a QQuickWindow, for the class that has ``_window`` and ``_ratio``.
+
+    Qt tells by ``accepted`` whether an item took a button, a key or the wheel. It does not for
+    hovering, for what pointer handlers wait for, and for touch, so the items are asked.
+    """
+
+    _window: Any
+    #: Units of the window for one of the overlay.
+    _ratio = 1.0
+    _pressed = False
+    _hoverable: Sequence[Any] = ()
+    _listed = 0.0
+
+    def deliver(self, event: Any) -> bool:
+        """Give the event to the item it is for."""
+        window, kind = self._window, event.type()
+        if kind not in _FOR_SCENE or not is_alive(window):
+            return False
+        if kind in _INPUT_METHOD:
+            return _send(window.focusObject() or window, event)
+        at = position(event)
+        at = None if at is None else at * self._ratio
+        if kind == _E.TouchBegin and not _takes_touch(window, at):
+            return False
+        if kind == _E.MouseButtonDblClick:
+            # A window gets the second press as such before it hears that it is a double click.
+            taken = self._deliver(_pressing(event), at)
+            return self._deliver(event, at) or taken if taken else False
+        return self._deliver(event, at)
+
+    def _deliver(self, event: Any, at: Any) -> bool:
+        window, kind = self._window, event.type()
+        taken = _send(window, scaled(event, self._ratio))
+        if not is_alive(window):
+            return taken
+        if kind in PRESS:
+            taken = taken or any(_takes_press(h, event.button()) for h in _handlers(window, at))
+            self._pressed = taken
+        elif kind == _E.MouseMove:
+            taken = taken or self._is_hovered(at) or self.cursor() is not None
+        elif kind == _E.Wheel and not taken:
+            taken = any(
+                h.metaObject().className() == "QQuickWheelHandler" and h.property("active")
+                for h in _handlers(window, at)
+            )
+        return taken
+
+    def leave(self) -> None:
+        """End hovering, and let go without effect of what is pressed."""
+        window = self._window
+        if not is_alive(window):
+            return
+        if self._pressed:
+            self._pressed = False
+            window.contentItem().setEnabled(False)
+            window.contentItem().setEnabled(True)
+        QtCore.QCoreApplication.sendEvent(window, QtCore.QEvent(_E.Leave))
+        window.unsetCursor()
+
+    def set_focus(self, focus: bool) -> None:
+        """Give keys to the item that has the focus in its scope, or take them away."""
+        if is_alive(self._window):
+            event = QtGui.QFocusEvent(_E.FocusIn if focus else _E.FocusOut)
+            QtCore.QCoreApplication.sendEvent(self._window, event)
+
+    def cursor(self) -> Any:
+        """Return the shape that the item under the mouse wants; None for none in particular."""
+        cursor = self._window.cursor()
+        return None if cursor.shape() == QtCore.Qt.ArrowCursor else cursor
+
+    def _is_hovered(self, at: Any) -> bool:
+        now = time.monotonic()
+        if now - self._listed > _KEPT:
+            self._listed = now
+            self._hoverable = [i for i in _items(self._window) if i.acceptHoverEvents()]
+        return any(is_alive(item) and _is_over(item, at) for item in self._hoverable)
+
+
+def _send(receiver: Any, event: Any) -> bool:
+    event.setAccepted(False)
+    QtCore.QCoreApplication.sendEvent(receiver, event)
+    return bool(event.isAccepted())
+
+
+def _pressing(event: Any) -> Any:
+    made = QtGui.QMouseEvent(
+        _E.MouseButtonPress,
+        event.localPos(),
+        event.windowPos(),
+        event.screenPos(),
+        event.button(),
+        event.buttons(),
+        event.modifiers(),
+        event.source(),
+    )
+    made.setTimestamp(event.timestamp())
+    return made
+
+
+def _items(window: Any) -> Iterator[Any]:
+    """Iterate over all items that are shown."""
+    waiting = list(window.contentItem().childItems())
+    while waiting:
+        item = waiting.pop()
+        if item.isVisible():
+            yield item
+            waiting += item.childItems()
+
+
+def _is_over(item: Any, at: Any) -> bool:
+    """Return whether a place of the window is inside an item and in what its parents show."""
+    if not (item.isVisible() and item.isEnabled() and item.contains(item.mapFromScene(at))):
+        return False
+    parent = item.parentItem()
+    while parent is not None:
+        if parent.clip() and not parent.contains(parent.mapFromScene(at)):
+            return False
+        parent = parent.parentItem()
+    return True
+
+
+def _handlers(window: Any, at: Any) -> Iterator[Any]:
+    """Iterate over the enabled pointer handlers of the items at a place."""
+    for item in _items(window):
+        found = [c for c in item.children() if c.metaObject().className().endswith("Handler")]
+        if found and _is_over(item, at):
+            yield from (handler for handler in found if handler.property("enabled"))
+
+
+def _takes_press(handler: Any, button: Any) -> bool:
+    name = handler.metaObject().className()
+    buttons = handler.property("acceptedButtons")
+    return name in _TAKING and bool(int(buttons) & int(button))
+
+
+def _takes_touch(window: Any, at: Any) -> bool:
+    left = QtCore.Qt.LeftButton
+    return any(
+        (item.acceptTouchEvents() or int(item.acceptedMouseButtons()) & int(left))
+        and _is_over(item, at)
+        for item in _items(window)
+    ) or any(_takes_press(handler, left) for handler in _handlers(window, at))
