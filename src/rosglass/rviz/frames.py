@@ -1,0 +1,88 @@
+"""Where the robot's frames are, in RViz's fixed frame."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rosglass.errors import Error, LookupException
+from rosglass.qml.tf_link import TfLink
+from rosglass.qt import QtCore, Signal
+
+if TYPE_CHECKING:
+    from rosglass.comm.node import Node
+    from rosglass.comm.time import Time
+    from rosglass.qml.session import Session
+    from rosglass.rviz.window import Window
+    from rosglass.tf import Transform, TransformBuffer
+
+__all__ = ["FIXED_FRAME", "Frames"]
+
+#: How RViz's properties name the fixed frame.
+FIXED_FRAME = "<Fixed Frame>"
+
+
+class Frames(QtCore.QObject):
+    """The transforms that our own node receives: RViz does not share its own with Python.
+
+    Args:
+        session: Whose node receives them.
+        window: Tells which frame is the fixed one.
+    """
+
+    #: The frames are received now, or no longer.
+    available_changed = Signal()
+
+    def __init__(self, session: Session, window: Window) -> None:
+        super().__init__()
+        self._session, self._window = session, window
+        self._link: TfLink | None = None
+        self._node: Node | None = None
+        session.node_changed.connect(self._follow)
+        self._follow()
+
+    @property
+    def buffer(self) -> TransformBuffer | None:
+        """The transforms; None while there is no node."""
+        return None if self._link is None else self._link.buffer
+
+    @property
+    def fixed(self) -> str:
+        """RViz's fixed frame."""
+        return str(self._window.manager.getFixedFrame())
+
+    def locate(self, frame: str, time: Time | None = None) -> Transform:
+        """Return where a frame is, in RViz's fixed frame.
+
+        Args:
+            frame: Its name; empty or :data:`FIXED_FRAME` for the fixed frame itself.
+            time: When; None for the newest.
+
+        Raises:
+            Error: The frame is not known, or nothing connects the two; the message says which.
+        """
+        from rosglass.tf import Transform  # noqa: PLC0415 - only once somebody asks
+
+        frame, fixed = frame.lstrip("/"), self.fixed.lstrip("/")
+        if frame in ("", FIXED_FRAME, fixed):
+            return Transform(frame_id=fixed, child_frame_id=fixed)
+        if self._link is None:
+            raise LookupException(f"{frame}: no transforms yet, there is no connection to a robot")
+        if self._link.problem:
+            raise Error(f"{frame}: {self._link.problem}")
+        return self._link.buffer.lookup_transform(fixed, frame, time)
+
+    def close(self) -> None:
+        """Let the transforms go; safe to call twice."""
+        link, self._link, self._node = self._link, None, None
+        if link is not None:
+            link.leave(self)
+
+    def _follow(self) -> None:
+        node = self._session.node
+        if node is self._node:
+            return
+        self.close()
+        self._node = node
+        if node is not None:
+            self._link = TfLink.join(self._session, node, "/", self)
+        self.available_changed.emit()
