@@ -1,6 +1,6 @@
 """What it costs to show a fast topic in QML, and to hand long arrays to JavaScript.
 
-    python benchmarks/qml_values.py [seconds]
+    python benchmarks/qml_values.py [seconds] [--rounds N]
 
 A robot in a process of its own publishes a message of 100 numbers at 1 kHz over Zenoh. Ours shows
 five of them by bindings to a Subscription at its default 20 Hz; the peer does the same in plain
@@ -8,9 +8,11 @@ PySide6: bare zenoh keeps the newest bytes, a timer decodes them 20 times a seco
 into a property of type QVariant, to which the same five bindings are bound. Each runs alone, in
 turns, without a screen. "Zenoh alone" receives as the peer does and shows nothing.
 
-The share of a core is that of the whole process, all threads, Zenoh's too. Work is the longest
-that the GUI thread computed without getting back to its event loop; the pause is the same by the
-clock, other programs of the machine included.
+The share of a core is that of the whole process, all threads; of these, those of Zenoh's runtime
+are told apart: what reading 1000 messages a second from a socket costs there is the same for
+everybody, and more than the target. What is left is Python's and Qt's. Work is the longest that the
+GUI thread computed without getting back to its event loop; the pause is the same by the clock,
+other programs of the machine included.
 
 The second part makes a Float32Array of 10,000 numbers of a message that has just been decoded.
 Exits 1 when a target is missed.
@@ -18,6 +20,7 @@ Exits 1 when a target is missed.
 
 from __future__ import annotations
 
+import argparse
 import itertools
 import json
 import os
@@ -31,15 +34,17 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-#: At most this share of a core, or this much more than Zenoh alone where that takes as much.
+#: At most this share of a core without Zenoh's own threads, and with them this much more than Zenoh
+#: alone takes.
 CPU, EXTRA = 0.05, 0.04
+#: How the names of the threads of Zenoh's runtime begin.
+_ZENOH = ("rx-", "tx-", "acc-", "net-", "app-")
 #: Milliseconds of the GUI thread's longest work, and for 10,000 numbers.
 WORK, ARRAY = 5.0, 0.3
 TYPE, TOPIC = "bench_msgs/msg/Hundred", "/bench"
 _GROUP = "".join(f"float64 f{i}\n" for i in range(10))
 _TEXT = "".join(f"Group g{i}\n" for i in range(10)) + f"{'=' * 80}\nMSG: bench_msgs/Group\n{_GROUP}"
 _SETTLE, _TICK = 3.0, 2
-_ROUNDS = 3
 INTERFACE = """import QtQml
 IMPORT
 QtObject {
@@ -155,9 +160,10 @@ def show(way: str, port: int, seconds: float) -> None:
 
     run(_SETTLE)
     changes = root.property("changes")
-    before, began = time.process_time(), time.monotonic()
+    before, before_zenoh, began = time.process_time(), zenoh_seconds(), time.monotonic()
     run(seconds)
-    cpu = (time.process_time() - before) / (time.monotonic() - began)
+    taken = time.monotonic() - began
+    cpu, native = (time.process_time() - before) / taken, (zenoh_seconds() - before_zenoh) / taken
     shown = (root.property("changes") - changes) / seconds
 
     ticks: list[tuple[float, float]] = []
@@ -170,8 +176,18 @@ def show(way: str, port: int, seconds: float) -> None:
     pairs = list(itertools.pairwise(ticks))
     pause = 1000 * max(b[0] - a[0] for a, b in pairs)
     work = 1000 * max(b[1] - a[1] for a, b in pairs)
-    print(json.dumps({"cpu": cpu, "shown": shown, "pause": pause, "work": work}), flush=True)
+    figures = {"cpu": cpu, "rest": cpu - native, "shown": shown, "pause": pause, "work": work}
+    print(json.dumps(figures), flush=True)
     os._exit(0)
+
+
+def zenoh_seconds() -> float:
+    """Return the processor time that the threads of Zenoh's runtime took so far."""
+    total = 0
+    for task in Path("/proc/self/task").iterdir():
+        if (task / "comm").read_text().startswith(_ZENOH):
+            total += int((task / "schedstat").read_text().split()[0])
+    return total / 1e9
 
 
 def arrays() -> tuple[float, float, float]:
@@ -214,7 +230,11 @@ def arrays() -> tuple[float, float, float]:
 
 
 def main() -> int:
-    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 6.0
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n", maxsplit=1)[0])
+    parser.add_argument("seconds", type=float, nargs="?", default=6.0, help="default: 6")
+    parser.add_argument("--rounds", type=int, default=3, help="default: 3")
+    args = parser.parse_args()
+    seconds = args.seconds
     from rosglass.ros2.zenoh.router import Router
 
     found: dict[str, list[dict[str, float]]] = {"native": [], "plain": [], "ours": []}
@@ -223,7 +243,7 @@ def main() -> int:
         port = router.listen.rpartition(":")[2]
         robot = subprocess.Popen([sys.executable, __file__, "publish", port], stdin=subprocess.PIPE)
         try:
-            for _ in range(_ROUNDS):
+            for _ in range(args.rounds):
                 for way, results in found.items():
                     command = [sys.executable, __file__, "show", way, port, str(seconds)]
                     told = subprocess.run(
@@ -248,29 +268,45 @@ def main() -> int:
         for way, results in found.items()
     }
     names = {"native": "Zenoh alone", "plain": "plain PySide6", "ours": "ours"}
-    print(f"100 numbers at 1 kHz, five bindings, {seconds:g} s, best of {_ROUNDS}")
-    print(f"{'':14}{'of a core':>10}{'shown/s':>9}{'work ms':>9}{'pause ms':>10}")
+    print(f"100 numbers at 1 kHz, five bindings, {seconds:g} s, best of {args.rounds}")
+    print(f"{'':14}{'of a core':>10}{'no Zenoh':>10}{'shown/s':>9}{'work ms':>9}{'pause ms':>10}")
     for way, figures in best.items():
         print(
-            f"{names[way]:14}{figures['cpu']:10.1%}{figures['shown']:9.1f}"
+            f"{names[way]:14}{figures['cpu']:10.1%}{figures['rest']:10.1%}{figures['shown']:9.1f}"
             f"{figures['work']:9.2f}{figures['pause']:10.2f}"
         )
     ours, listed, bare = arrays()
     print(f"10,000 numbers to a Float32Array: {ours:.3f} ms; a dict with a list {listed:.3f} ms")
     print(f"({listed / ours:.1f} times as long), bare bytes {bare:.3f} ms")
-    limit = max(CPU, best["native"]["cpu"] + EXTRA)
-    missed = []
-    if best["ours"]["cpu"] > limit:
-        missed.append(f"{best['ours']['cpu']:.1%} of a core, wanted {limit:.1%}")
-    if best["ours"]["work"] > WORK:
-        missed.append(f"{best['ours']['work']:.2f} ms without the event loop, wanted {WORK:g}")
-    if best["ours"]["shown"] < 15:
-        missed.append(f"{best['ours']['shown']:.1f} shown per second, wanted 20")
-    if ours > ARRAY:
-        missed.append(f"{ours:.3f} ms for an array, wanted {ARRAY:g}")
-    for problem in missed:
-        print(f"MISSED: {problem}")
-    return bool(missed)
+    mine, plain, alone = best["ours"], best["plain"], 100 * best["native"]["cpu"]
+    if alone > 100 * CPU:
+        print(f"the whole process cannot stay below {CPU:.0%} of a core: Zenoh takes {alone:.1f} %")
+    print()
+    met = [
+        judge("Python and Qt", 100 * mine["rest"], 100 * CPU, " %", 100 * plain["rest"]),
+        judge(
+            "the whole process",
+            100 * mine["cpu"],
+            max(100 * CPU, alone + 100 * EXTRA),
+            " %",
+            100 * plain["cpu"],
+        ),
+        judge("longest work", mine["work"], WORK, " ms", plain["work"]),
+        judge("10,000 numbers", ours, ARRAY, " ms", listed),
+    ]
+    if mine["shown"] < 15:
+        met.append(False)
+        print(f"shown per second: {mine['shown']:.1f}, target 20: MISSED")
+    return int(not all(met))
+
+
+def judge(what: str, figure: float, target: float, unit: str, plain: float) -> bool:
+    """Print a figure, its ratio to the peer's and its target; returns whether it is met."""
+    met = figure <= target
+    ratio = f"{figure / plain:.2f}x plain PySide6" if plain > 0 else "plain PySide6 0"
+    verdict = "met" if met else "MISSED"
+    print(f"{what:18}{figure:6.2f}{unit:3}  {ratio}, target {target:.2f}{unit}: {verdict}")
+    return met
 
 
 if __name__ == "__main__":
