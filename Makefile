@@ -33,7 +33,7 @@ docs: ## build the documentation into site/
 wheel: ## build the wheel into dist/
 	@$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist . && ls dist/*.whl
 
-bench: ## run every benchmark (some minutes)
+bench: ## run every benchmark (an hour, half of it watching memory)
 	@scripts/bench.sh
 
 clean: ## remove everything that set-up and builds made
