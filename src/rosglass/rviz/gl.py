@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rosglass.errors import UnsupportedError
+from rosglass.rviz.qt5 import QtGui
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
-__all__ = ["keep_context", "read_depth", "read_pixels"]
+__all__ = ["Offscreen", "keep_context", "offscreen", "read_depth", "read_pixels"]
 
 # OpenGL 1.2, "New Tokens".
 _BGRA, _UNSIGNED_INT_8_8_8_8_REV = 0x80E1, 0x8367
@@ -48,6 +49,66 @@ def keep_context() -> Iterator[None]:
     finally:
         if display and context:
             library.glXMakeCurrent(display, drawable, context)
+
+
+class Offscreen:
+    """An OpenGL context that draws where nobody sees it, for all scenes of the process.
+
+    Raises:
+        UnsupportedError: This screen has no OpenGL that Qt can use.
+    """
+
+    def __init__(self) -> None:
+        self._depth = 0
+        wanted = QtGui.QSurfaceFormat.defaultFormat()
+        # Qt Quick sorts what is opaque by depth, and clips with the stencil.
+        wanted.setDepthBufferSize(24)
+        wanted.setStencilBufferSize(8)
+        with keep_context():
+            #: Qt's context.
+            self.context = QtGui.QOpenGLContext()
+            self.context.setFormat(wanted)
+            made = self.context.create()
+            self._surface = QtGui.QOffscreenSurface()
+            self._surface.setFormat(self.context.format())
+            self._surface.create()
+            if not (made and self.context.makeCurrent(self._surface)):
+                raise UnsupportedError(
+                    "Qt can make no OpenGL context here; QT_QUICK_BACKEND=software draws without"
+                )
+            self.context.doneCurrent()
+
+    @contextlib.contextmanager
+    def current(self) -> Iterator[None]:
+        """Make it the current context meanwhile; may be nested.
+
+        Raises:
+            UnsupportedError: The graphics driver has lost it.
+        """
+        if self._depth:
+            yield
+            return
+        with keep_context():
+            if not self.context.makeCurrent(self._surface):
+                raise UnsupportedError(
+                    "the graphics driver has lost the OpenGL context of overlays"
+                )
+            self._depth += 1
+            try:
+                yield
+            finally:
+                self._depth -= 1
+                self.context.doneCurrent()
+
+
+@cache
+def offscreen() -> Offscreen:
+    """Return the context of this process, made at the first call.
+
+    Raises:
+        UnsupportedError: This screen has no OpenGL that Qt can use.
+    """
+    return Offscreen()
 
 
 def read_pixels(width: int, height: int, into: NDArray[np.uint32]) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import itertools
+import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rosglass.rviz.host import ogre, ogre_overlay
-from rosglass.rviz.tiles import Rect, changed_tiles, cover, covered_tiles
+from rosglass.rviz.tiles import Rect, changed_tiles, cover, covered_tiles, uncovered
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,6 +20,10 @@ __all__ = ["HIGHEST_Z", "Layer"]
 HIGHEST_Z = 650
 _numbers = itertools.count()
 _GROUP = "General"
+#: Pixels that are blended in the time that a panel takes to be drawn.
+_PANEL = 2000
+#: Tiles that panels may cover without need before they are placed anew.
+_SLACK = 32
 
 
 class Layer:
@@ -37,26 +42,44 @@ class Layer:
         self._overlay = self._manager.create(self._name)
         self._texture: Any = None
         self._material: Any = None
+        self._unit: Any = None
         self._panels: list[Any] = []
         self._before: NDArray[np.uint32] | None = None
-        self._covered: NDArray[np.bool_] | None = None
-        self._shown = 0
+        self._rects: list[Rect] = []
+        self._waste = 0
+        self._opacity = 1.0
         self._visible = True
+        #: Seconds that the last picture took: finding out what is another, and uploading that.
+        self.compared = self.uploaded = 0.0
         self._closed = False
 
     def set_z(self, z: int) -> None:
         """Draw it after the layers of lower `z`, from 0 to :data:`HIGHEST_Z`."""
-        self._overlay.setZOrder(z)
+        if not self._closed:
+            self._overlay.setZOrder(z)
 
     def set_visible(self, visible: bool) -> None:
         """Show or hide it."""
-        self._visible = visible
-        self._show()
+        if visible != self._visible and not self._closed:
+            self._visible = visible
+            self._show()
+
+    def set_opacity(self, opacity: float) -> None:
+        """Blend it more faintly, from 0 to 1; the picture stays as it is."""
+        if opacity != self._opacity:
+            self._opacity = opacity
+            self._blend()
 
     @property
     def rectangles(self) -> int:
         """How many panels show it now."""
-        return self._shown
+        return len(self._rects)
+
+    @property
+    def covered(self) -> float:
+        """Share of the view that panels cover, and RViz has to blend."""
+        whole = 1 if self._before is None else self._before.size
+        return sum(rect.area for rect in self._rects) / max(whole, 1)
 
     def update(self, pixels: NDArray[np.uint32]) -> list[Rect]:
         """Show a picture.
@@ -68,21 +91,25 @@ class Layer:
         Returns:
             What has changed since the last picture, and was given to the graphics card.
         """
+        if self._closed:
+            return []
         height, width = pixels.shape
+        started = time.perf_counter()
         if self._before is None or self._before.shape != pixels.shape:
             self._make_texture(width, height)
             self._before = np.zeros_like(pixels)
-            changed = np.ones_like(covered_tiles(pixels))
+            changed = np.ones_like(covered_tiles(self._before))
         else:
             changed = changed_tiles(pixels, self._before)
         rects = cover(changed, width, height, most=12)
+        compared = time.perf_counter()
         for rect in rects:
             self._upload(pixels, rect)
+        uploaded = time.perf_counter()
         if rects:
-            covered = covered_tiles(pixels)
-            if self._covered is None or not np.array_equal(covered, self._covered):
-                self._covered = covered
-                self._place(cover(covered, width, height), width, height)
+            self._place(covered_tiles(self._before), width, height)
+        self.compared = compared - started + time.perf_counter() - uploaded
+        self.uploaded = uploaded - compared
         return rects
 
     def close(self) -> None:
@@ -111,9 +138,21 @@ class Layer:
         render.setDepthWriteEnabled(False)
         # Qt gives colours that are multiplied with their alpha already.
         render.setSceneBlending(o.SBF_ONE, o.SBF_ONE_MINUS_SOURCE_ALPHA)
-        unit = render.createTextureUnitState(name)
-        unit.setTextureFiltering(o.TFO_NONE)
-        unit.setTextureAddressingMode(o.TextureUnitState.TAM_CLAMP)
+        self._unit = render.createTextureUnitState(name)
+        self._unit.setTextureFiltering(o.TFO_NONE)
+        self._unit.setTextureAddressingMode(o.TextureUnitState.TAM_CLAMP)
+        self._blend()
+
+    def _blend(self) -> None:
+        if self._unit is None:
+            return
+        o, part = ogre(), self._opacity
+        # Both, for colours are multiplied with their alpha already.
+        faint = o.ColourValue(part, part, part, part)
+        self._unit.setColourOperationEx(
+            o.LBX_MODULATE, o.LBS_TEXTURE, o.LBS_MANUAL, o.ColourValue(1, 1, 1, 1), faint
+        )
+        self._unit.setAlphaOperation(o.LBX_MODULATE, o.LBS_TEXTURE, o.LBS_MANUAL, 1.0, part)
 
     def _upload(self, pixels: NDArray[np.uint32], rect: Rect) -> None:
         o = ogre()
@@ -127,29 +166,34 @@ class Layer:
             source, o.Box(rect.left, rect.top, rect.right, rect.bottom)
         )
 
-    def _place(self, rects: list[Rect], width: int, height: int) -> None:
+    def _place(self, covered: NDArray[np.bool_], width: int, height: int) -> None:
+        """Put panels where there is something, unless those that stand fit well enough."""
+        waste = uncovered(covered, self._rects)
+        if waste is not None and waste - self._waste <= _SLACK:
+            return
         o = ogre_overlay()
-        while len(self._panels) < len(rects):
+        self._rects = cover(covered, width, height, worth=_PANEL)
+        self._waste = uncovered(covered, self._rects) or 0
+        while len(self._panels) < len(self._rects):
             name = f"{self._name}/panel{len(self._panels)}"
             panel = self._manager.createOverlayElement("Panel", name).castPanelOverlayElement()
-            panel.setMetricsMode(getattr(o, "GMM_RELATIVE", 0))
+            panel.setMetricsMode(o.GMM_RELATIVE)
             panel.setMaterialName(self._material.getName(), _GROUP)
             self._overlay.add2D(panel)
             self._panels.append(panel)
-        for panel, rect in zip(self._panels, rects, strict=False):
+        for panel, rect in zip(self._panels, self._rects, strict=False):
             left, right = rect.left / width, rect.right / width
             top, bottom = rect.top / height, rect.bottom / height
             panel.setPosition(left, top)
             panel.setDimensions(right - left, bottom - top)
             panel.setUV(left, top, right, bottom)
             panel.show()
-        for panel in self._panels[len(rects) :]:
+        for panel in self._panels[len(self._rects) :]:
             panel.hide()
-        self._shown = len(rects)
         self._show()
 
     def _show(self) -> None:
-        if self._visible and self._shown:
+        if self._visible and self._rects:
             self._overlay.show()
         else:
             self._overlay.hide()
@@ -159,12 +203,12 @@ class Layer:
             self._overlay.remove2D(panel)
             self._manager.destroyOverlayElement(panel)
         self._panels.clear()
-        self._covered = None
-        self._shown = 0
+        self._rects = []
+        self._waste = 0
 
     def _drop_texture(self) -> None:
         if self._texture is not None:
             o = ogre()
             o.MaterialManager.getSingleton().remove(self._material.getName(), _GROUP)
             o.TextureManager.getSingleton().remove(self._texture.getName(), _GROUP)
-            self._texture = self._material = None
+            self._texture = self._material = self._unit = None

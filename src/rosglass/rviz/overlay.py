@@ -55,6 +55,8 @@ class Overlay(QtCore.QObject):
         self.is_popup = False
         #: While it is shown, nothing below it gets any input, RViz's view included.
         self.is_modal = False
+        #: Seconds of the last :meth:`draw` that went into reading back what OpenGL drew.
+        self.read_back = 0.0
         self.z, self.scale, self.opacity = z, scale, opacity
 
     @property

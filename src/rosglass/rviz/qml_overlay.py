@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from rosglass.errors import QmlError
 from rosglass.qml.load_errors import error_list
 from rosglass.qml.modules import install
 from rosglass.qml.places import interface_file
 from rosglass.qt import QtQml, is_alive
-from rosglass.rviz.gl import keep_context, read_pixels
 from rosglass.rviz.overlay import Overlay
 from rosglass.rviz.qml_input import QmlInput
-from rosglass.rviz.qt5 import QtCore, QtGui, QtQuick
+from rosglass.rviz.qt5 import QtCore, QtQuick
+from rosglass.rviz.scene import make_scene
 
 if TYPE_CHECKING:
     import os
 
+    import numpy as np
     from numpy.typing import NDArray
 
     from rosglass.qml.session import Session
@@ -37,6 +36,7 @@ class QmlOverlay(QmlInput, Overlay):
 
     Raises:
         QmlError: There is no such file.
+        UnsupportedError: Neither OpenGL nor Qt's software renderer can draw here.
     """
 
     def __init__(
@@ -45,25 +45,14 @@ class QmlOverlay(QmlInput, Overlay):
         self.file = interface_file(file)
         super().__init__(name or self.file.stem, **options)
         self.session = session
-        self._pixels = np.zeros((0, 0), np.uint32)
-        with keep_context():
-            self._surface = QtGui.QOffscreenSurface()
-            self._context = QtGui.QOpenGLContext()
-            self._context.create()
-            self._surface.setFormat(self._context.format())
-            self._surface.create()
-            self._control = QtQuick.QQuickRenderControl()
-            self._window = QtQuick.QQuickWindow(self._control)
-            self._window.setColor(QtGui.QColor(0, 0, 0, 0))
-            self._context.makeCurrent(self._surface)
-            self._control.initialize(self._context)
-        self._buffer: Any = None
         self.engine = QtQml.QQmlEngine()
         install(self.engine, session)
+        self._scene = make_scene()
+        self._window = self._scene.window
+        self._scene.changed.connect(self.changed)
         self._component: QtQml.QQmlComponent | None = None
         self._root: Any = None
-        self._control.sceneChanged.connect(self.changed)
-        self._control.renderRequested.connect(self.changed)
+        self._closed = False
 
     def load(self) -> None:
         """Show the file.
@@ -79,40 +68,35 @@ class QmlOverlay(QmlInput, Overlay):
             raise QmlError(
                 f"{self.file}:0:0: the root of an overlay must be an Item, e.g. Item {{}}"
             )
+        before = (self._root, self._component)
         self._component, self._root = component, root
-        root.setParentItem(self._window.contentItem())
-        self._fit()
-        self.changed.emit()
+        self._scene.show_item(root)
+        _delete_later(*before)
 
     def resize(self, width: int, height: int, ratio: float) -> None:
         """Fit the interface to the 3D view."""
-        self._size, self._ratio = (width, height), ratio
-        self._window.setGeometry(0, 0, width, height)
-        self._pixels = np.zeros((height, width), np.uint32)
-        with keep_context():
-            self._context.makeCurrent(self._surface)
-            self._buffer = QtGui.QOpenGLFramebufferObject(
-                QtCore.QSize(width, height),
-                QtGui.QOpenGLFramebufferObject.CombinedDepthStencil,
-            )
-            self._window.setRenderTarget(self._buffer)
-        self._fit()
-
-    def _fit(self) -> None:
-        if is_alive(self._root) and self._pixels.size:
-            height, width = self._pixels.shape
-            self._root.setTransformOrigin(QtQuick.QQuickItem.TopLeft)
-            self._root.setScale(self._ratio)
-            self._root.setSize(QtCore.QSizeF(width / self._ratio, height / self._ratio))
+        self._scene.resize(width, height, ratio)
+        self._ratio = self._scene.factor
 
     def draw(self) -> NDArray[np.uint32] | None:
         """Render the scene, and read it back."""
-        height, width = self._pixels.shape
-        with keep_context():
-            self._context.makeCurrent(self._surface)
-            self._control.polishItems()
-            self._control.sync()
-            self._control.render()
-            self._buffer.bind()
-            read_pixels(width, height, self._pixels)
-        return self._pixels[::-1]
+        pixels = self._scene.draw()
+        self.read_back = self._scene.read_back
+        return pixels
+
+    def close(self) -> None:
+        """Let the interface, its engine and all its memory go; safe to call twice."""
+        if self._closed:
+            return
+        self._closed = True
+        self._scene.changed.disconnect(self.changed)
+        _delete_later(self._root, self._component)
+        self._scene.close()
+        _delete_later(self.engine)
+        self._component = self._root = None
+
+
+def _delete_later(*items: Any) -> None:
+    for item in items:
+        if is_alive(item):
+            item.deleteLater()

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import logging
-import time
 from typing import TYPE_CHECKING
 
 from rosglass.errors import Error
-from rosglass.qt import QtCore, Signal
+from rosglass.qt import QtCore, Signal, is_alive
+from rosglass.rviz.drawing import Drawing, Work
 from rosglass.rviz.input import Input
-from rosglass.rviz.layer import HIGHEST_Z, Layer
+from rosglass.rviz.layer import HIGHEST_Z
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -18,22 +17,6 @@ if TYPE_CHECKING:
     from rosglass.rviz.window import Window
 
 __all__ = ["Stack"]
-
-_log = logging.getLogger("rosglass.rviz")
-
-
-class Entry:
-    """An overlay with the layer that shows it.
-
-    Args:
-        overlay: The overlay.
-    """
-
-    def __init__(self, overlay: Overlay) -> None:
-        self.overlay = overlay
-        self.layer = Layer(overlay.name)
-        self.dirty = True
-        self.size = (0, 0, 0.0)
 
 
 class Stack(QtCore.QObject):
@@ -45,13 +28,15 @@ class Stack(QtCore.QObject):
 
     #: Overlays came, went, or changed places.
     changed = Signal()
-    #: Milliseconds that overlays took before a frame in which any was drawn: drawing, uploading.
-    drawn = Signal(float, float)
+    #: What overlays took before a frame in which any was drawn, a `drawing.Work`.
+    drawn = Signal(object)
 
     def __init__(self, window: Window) -> None:
         super().__init__()
         self._window = window
-        self._entries: list[Entry] = []
+        self._entries: list[Drawing] = []
+        self._drawing = False
+        self._later: list[Callable[[], None]] = []
         window.before_frame.connect(self._before_frame)
         #: Who gets the mouse and the keys.
         self.input = Input(window, self)
@@ -64,9 +49,9 @@ class Stack(QtCore.QObject):
         """
         if self.find(overlay.name) is not None:
             raise Error(f"there is an overlay {overlay.name!r} already; give this one another name")
-        entry = Entry(overlay)
+        entry = Drawing(overlay)
         self._entries.append(entry)
-        overlay.changed.connect(lambda: self._mark(entry))
+        overlay.changed.connect(entry.mark)
         overlay.arranged.connect(self._arrange)
         self._arrange()
 
@@ -75,11 +60,15 @@ class Stack(QtCore.QObject):
         for entry in self._entries:
             if entry.overlay is overlay:
                 self._entries.remove(entry)
+                overlay.changed.disconnect(entry.mark)
                 overlay.arranged.disconnect(self._arrange)
-                entry.layer.close()
+                entry.close()
                 self.input.forget(overlay)
-                # It may be handling the very event that had it removed.
-                self.input.after_event(overlay.close)
+                if self._drawing:
+                    self._later.append(overlay.close)
+                else:
+                    # It may be handling the very event that had it removed.
+                    self.input.after_event(overlay.close)
                 self.changed.emit()
                 return
 
@@ -118,45 +107,36 @@ class Stack(QtCore.QObject):
         # Setting it puts all in order, equal ones as they stand now.
         overlay.z = outermost(e.overlay.z for e in alike)
 
+    @property
+    def covered(self) -> float:
+        """Share of the 3D view that RViz blends overlays over; above 1 where several lie."""
+        return sum(entry.layer.covered for entry in self._entries if entry.shown)
+
     def close(self) -> None:
         """Take every overlay away."""
         for overlay in list(self):
             self.remove(overlay)
 
-    @staticmethod
-    def _mark(entry: Entry) -> None:
-        entry.dirty = True
-
     def _arrange(self) -> None:
         self._entries.sort(key=lambda entry: (entry.overlay.is_popup, entry.overlay.z))
         for number, entry in enumerate(self._entries):
             entry.layer.set_z(max(HIGHEST_Z - len(self._entries) + number, 0))
-            entry.layer.set_visible(entry.overlay.visible)
         self.changed.emit()
 
     def _before_frame(self) -> None:
-        drawing = uploading = 0.0
+        panel = self._window.panel
+        if not is_alive(panel) or not panel.isVisible() or panel.window().isMinimized():
+            return
         width, height, ratio = self._window.view_size()
         if not width or not height:
             return
-        for entry in list(self._entries):
-            overlay = entry.overlay
-            if not overlay.visible:
-                continue
-            size = (width, height, ratio * overlay.scale)
-            if entry.size != size:
-                entry.size = size
-                overlay.resize(*size)
-                entry.dirty = True
-            if not entry.dirty:
-                continue
-            entry.dirty = False
-            started = time.perf_counter()
-            pixels = overlay.draw()
-            drawn = time.perf_counter()
-            drawing += drawn - started
-            if pixels is not None:
-                entry.layer.update(pixels)
-                uploading += time.perf_counter() - drawn
-        if drawing:
-            self.drawn.emit(drawing * 1e3, uploading * 1e3)
+        # What is drawn may have overlays come and go, itself included.
+        self._drawing = True
+        works = [entry.before_frame(width, height, ratio) for entry in list(self._entries)]
+        self._drawing = False
+        later, self._later = self._later, []
+        for close in later:
+            close()
+        done = [work for work in works if work is not None]
+        if done:
+            self.drawn.emit(Work(*map(sum, zip(*done, strict=True))))
