@@ -1,0 +1,372 @@
+"""Kinds of registered properties: which values each takes, and how a ``.rviz`` file keeps them."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any, ClassVar
+
+import numpy as np
+
+from rosglass.errors import Error
+from rosglass.qt import QtGui
+
+__all__ = ["KINDS", "Kind"]
+
+_INT32 = (-(2**31), 2**31 - 1)
+_TOPIC = re.compile(r"([~/]?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*|/)?\Z")
+_CONTROL = re.compile(r"[\0-\x08\x0b-\x1f\x7f\ud800-\udfff]")
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+class Kind:
+    """What a property holds.
+
+    Args:
+        options: What narrows its values, by the names of :attr:`OPTIONS`.
+
+    Raises:
+        Error: An option does not fit.
+    """
+
+    #: What the `kind` of a property says.
+    NAME: ClassVar[str] = ""
+    #: The value of a property without a default.
+    DEFAULT: ClassVar[Any] = None
+    #: What it takes, in words.
+    WANTED: ClassVar[str] = "no value"
+    #: Names of its options.
+    OPTIONS: ClassVar[tuple[str, ...]] = ()
+    #: Whether properties may stand below one of this kind.
+    HOLDS_OTHERS: ClassVar[bool] = True
+
+    def __init__(self, **options: Any) -> None:
+        self.options = options
+
+    @property
+    def default(self) -> Any:
+        """The value of a property without a default."""
+        return self.DEFAULT
+
+    def read(self, value: Any) -> Any:
+        """Return a value as the property holds it.
+
+        Raises:
+            Error: The property cannot hold it.
+        """
+        if value is not None:
+            raise self._refusal(value)
+        return None
+
+    def saved(self, value: Any) -> Any:
+        """Return what a ``.rviz`` file keeps of a value: text, number, bool, or a flat dict."""
+        return value
+
+    def restore(self, saved: Any) -> Any:
+        """Return the value that a file keeps, where every scalar is text.
+
+        Raises:
+            Error: The property cannot hold it.
+        """
+        return self.read(saved)
+
+    def _refusal(self, value: Any) -> Error:
+        return Error(f"expected {self.WANTED}, got {_shown(value)}")
+
+
+class _Container(Kind):
+    NAME = "container"
+
+
+class _Bool(Kind):
+    NAME, DEFAULT, WANTED = "bool", False, "true or false"
+
+    def read(self, value: Any) -> bool:
+        if not isinstance(value, bool):
+            raise self._refusal(value)
+        return value
+
+    def restore(self, saved: Any) -> bool:
+        if isinstance(saved, str) and saved.lower() in {"true", "false"}:
+            return saved.lower() == "true"
+        return self.read(saved)
+
+
+class _Number(Kind):
+    """A number between the options `min` and `max`, which editors change by `step`."""
+
+    DEFAULT: ClassVar[Any] = 0
+    OPTIONS = ("min", "max", "step")
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        low, high = self._limits()
+        self.min, self.max = low, high
+        for name, value in options.items():
+            given = self._number(value)
+            if given is None:
+                raise Error(f"{name}: expected {self.WANTED}, got {_shown(value)}")
+            setattr(self, name, given)
+        if self.min > self.max:
+            raise Error(f"min {self.min} is above max {self.max}; exchange them")
+        self.step = self._number(options.get("step", 1))
+        if self.step is None or self.step <= 0:
+            raise Error(f"step {options['step']!r} is not above 0")
+
+    @property
+    def default(self) -> Any:
+        return min(max(self.DEFAULT, self.min), self.max)
+
+    def _limits(self) -> tuple[Any, Any]:
+        raise NotImplementedError
+
+    def _number(self, value: Any) -> Any:
+        raise NotImplementedError
+
+    def read(self, value: Any) -> Any:
+        number = self._number(value)
+        if number is None:
+            raise self._refusal(value)
+        if not self.min <= number <= self.max:
+            raise Error(f"{number} is not from {self.min} to {self.max}")
+        return number
+
+
+class _Int(_Number):
+    NAME, WANTED = "int", "a whole number"
+
+    def _limits(self) -> tuple[int, int]:
+        return _INT32
+
+    def _number(self, value: Any) -> int | None:
+        if isinstance(value, float) and value.is_integer():
+            value = int(value)
+        if isinstance(value, bool) or not isinstance(value, int):
+            return None
+        return value if _INT32[0] <= value <= _INT32[1] else None
+
+    def restore(self, saved: Any) -> Any:
+        try:
+            return self.read(int(saved) if isinstance(saved, str) else saved)
+        except ValueError:
+            raise self._refusal(saved) from None
+
+
+class _Float(_Number):
+    NAME, DEFAULT, WANTED = "float", 0.0, "a finite number"
+
+    def _limits(self) -> tuple[float, float]:
+        return -math.inf, math.inf
+
+    def _number(self, value: Any) -> float | None:
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            return None
+        try:
+            return float(value) if math.isfinite(value) else None
+        except OverflowError:
+            return None
+
+    def restore(self, saved: Any) -> Any:
+        try:
+            return self.read(float(saved) if isinstance(saved, str) else saved)
+        except ValueError:
+            raise self._refusal(saved) from None
+
+
+class _String(Kind):
+    NAME, DEFAULT, WANTED = "string", "", "a text without control characters"
+
+    def read(self, value: Any) -> str:
+        if not isinstance(value, str) or _CONTROL.search(value):
+            raise self._refusal(value)
+        return value
+
+    def restore(self, saved: Any) -> str:
+        return self.read("" if saved is None else saved)
+
+
+class _Path(_String):
+    """A file; `filter` is what its chooser shows, e.g. ``QML files (*.qml)``."""
+
+    NAME, OPTIONS = "path", ("filter",)
+
+
+class _Topic(_String):
+    NAME, OPTIONS = "topic", ("messageType",)
+    WANTED = "the name of a topic, e.g. '/robot/scan'"
+
+    def read(self, value: Any) -> str:
+        text = super().read(value)
+        if not _TOPIC.match(text):
+            raise self._refusal(value)
+        return text
+
+
+class _Frame(_String):
+    NAME, OPTIONS = "frame", ("includeFixedFrame",)
+    WANTED = "the name of a frame, e.g. 'base_link'"
+
+
+class _Enum(_String):
+    NAME, OPTIONS = "enum", ("choices",)
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        choices = options.get("choices")
+        if not isinstance(choices, (list, tuple)) or not choices:
+            raise Error(
+                f"choices: expected a list of texts, e.g. ['slow', 'fast'], got {choices!r}"
+            )
+        self.choices = [super(_Enum, self).read(choice) for choice in choices]
+        if len(set(self.choices)) < len(self.choices):
+            raise Error(f"choices: {_shown(choices)} has one of them twice")
+
+    @property
+    def default(self) -> str:
+        return self.choices[0]
+
+    def read(self, value: Any) -> str:
+        if value not in self.choices:
+            raise Error(f"expected one of {', '.join(self.choices)}, got {_shown(value)}")
+        return str(value)
+
+
+class _Color(Kind):
+    NAME, WANTED = "color", "a colour, e.g. '#ff8800', '#80ff8800' or 'orange'"
+
+    @property
+    def default(self) -> QtGui.QColor:
+        return QtGui.QColor("white")
+
+    def read(self, value: Any) -> QtGui.QColor:
+        if isinstance(value, (QtGui.QColor, str)):
+            colour = QtGui.QColor(value)
+            if colour.isValid():
+                # Another way of writing the same colour is no other value.
+                return QtGui.QColor(colour.name(QtGui.QColor.NameFormat.HexArgb))
+        raise self._refusal(value)
+
+    def saved(self, value: QtGui.QColor) -> str:
+        whole = value.alpha() == 255
+        form = QtGui.QColor.NameFormat
+        return str(value.name(form.HexRgb if whole else form.HexArgb))
+
+
+class _Parts(Kind):
+    """Numbers with names; kept as RViz keeps its own vectors: ``X: 1, Y: 2, Z: 3``."""
+
+    HOLDS_OTHERS = False
+    NAMES: ClassVar[tuple[str, ...]] = ()
+
+    def _make(self, parts: list[float]) -> Any:
+        raise NotImplementedError
+
+    def parts(self, value: Any) -> dict[str, float]:
+        """Return the numbers by name, in capitals."""
+        # Qt keeps 32 bits of each; these are the fewest digits that mean the same.
+        numbers = [float(str(np.float32(getattr(value, name)()))) for name in self.NAMES]
+        return dict(zip((name.upper() for name in self.NAMES), numbers, strict=True))
+
+    def with_part(self, value: Any, name: str, number: float) -> Any:
+        """Return a value with one of its numbers changed."""
+        return self._from({**self.parts(value), name: number})
+
+    def _from(self, named: dict[str, Any]) -> Any:
+        if {name.lower() for name in named} != set(self.NAMES) or len(named) != len(self.NAMES):
+            raise self._refusal(named)
+        by_name = {name.lower(): value for name, value in named.items()}
+        parts = []
+        for name in self.NAMES:
+            try:
+                number = float("nan") if isinstance(by_name[name], bool) else float(by_name[name])
+            except (TypeError, ValueError, OverflowError):
+                number = math.nan
+            with np.errstate(over="ignore"):
+                narrow = np.float32(number)
+            if not np.isfinite(narrow):
+                raise Error(f"{name}: expected a finite number, got {_shown(by_name[name])}")
+            parts.append(number)
+        return self._make(parts)
+
+    def saved(self, value: Any) -> dict[str, float]:
+        return self.parts(value)
+
+    def restore(self, saved: Any) -> Any:
+        if not isinstance(saved, dict):
+            raise self._refusal(saved)
+        return self._from(saved)
+
+
+class _Vector(_Parts):
+    NAME, NAMES = "vector", ("x", "y", "z")
+    WANTED = "a vector, e.g. Qt.vector3d(1, 2, 3), {x: 1, y: 2, z: 3} or [1, 2, 3]"
+
+    @property
+    def default(self) -> QtGui.QVector3D:
+        return QtGui.QVector3D()
+
+    def read(self, value: Any) -> QtGui.QVector3D:
+        found: Any = None
+        if isinstance(value, QtGui.QVector3D):
+            found = self._from(self.parts(value))
+        elif isinstance(value, (list, tuple)) and len(value) == 3:
+            found = self._from(dict(zip(self.NAMES, value, strict=True)))
+        elif isinstance(value, dict):
+            found = self._from(value)
+        else:
+            raise self._refusal(value)
+        vector: QtGui.QVector3D = found
+        return vector
+
+    def _make(self, parts: list[float]) -> QtGui.QVector3D:
+        return QtGui.QVector3D(*parts)
+
+
+class _Quaternion(_Parts):
+    NAME, NAMES = "quaternion", ("x", "y", "z", "w")
+    WANTED = "a quaternion, e.g. Qt.quaternion(1, 0, 0, 0) or {x: 0, y: 0, z: 0, w: 1}"
+
+    @property
+    def default(self) -> QtGui.QQuaternion:
+        return QtGui.QQuaternion()
+
+    def parts(self, value: Any) -> dict[str, float]:
+        vector = _Vector().parts(value.vector())
+        return {**vector, "W": float(str(np.float32(value.scalar())))}
+
+    def read(self, value: Any) -> QtGui.QQuaternion:
+        if isinstance(value, QtGui.QQuaternion):
+            value = self.parts(value)
+        # Four numbers in a row: Qt has w first, ROS has it last.
+        if not isinstance(value, dict):
+            raise self._refusal(value)
+        quaternion: QtGui.QQuaternion = self._from(value)
+        return quaternion
+
+    def _make(self, parts: list[float]) -> QtGui.QQuaternion:
+        x, y, z, w = parts
+        return QtGui.QQuaternion(w, x, y, z)
+
+
+#: The kinds by name.
+KINDS: dict[str, type[Kind]] = {
+    kind.NAME: kind
+    for kind in (
+        _Container,
+        _Bool,
+        _Int,
+        _Float,
+        _String,
+        _Path,
+        _Topic,
+        _Frame,
+        _Enum,
+        _Color,
+        _Vector,
+        _Quaternion,
+    )
+}
