@@ -97,11 +97,10 @@ class Layer:
         started = time.perf_counter()
         if self._before is None or self._before.shape != pixels.shape:
             self._make_texture(width, height)
-            self._before = np.zeros_like(pixels)
-            changed = np.ones_like(covered_tiles(self._before))
+            self._before = np.empty_like(pixels, order="C")
+            rects = [Rect(0, 0, width, height)]
         else:
-            changed = changed_tiles(pixels, self._before)
-        rects = cover(changed, width, height, most=12)
+            rects = cover(changed_tiles(pixels, self._before), width, height, most=12)
         compared = time.perf_counter()
         for rect in rects:
             self._upload(pixels, rect)

@@ -41,8 +41,6 @@ class Scene(QtCore.QObject):
         #: The window; its coordinates, and so those of its events, are units times `factor`.
         self.window: Any = QtQuick.QQuickWindow(self._control)
         self.window.setColor(QtGui.QColor(0, 0, 0, 0))
-        # PySide2 takes items for gone as soon as nobody in Python knows what they were put into.
-        self._content = self.window.contentItem()
         #: What to multiply units with for the window's events.
         self.factor = 1.0
         #: Seconds that reading the last picture back took.
@@ -58,6 +56,8 @@ class Scene(QtCore.QObject):
         if is_alive(self._item):
             self._item.setParentItem(None)
         self._item = item
+        # PySide2 takes it for gone as soon as nobody in Python knows what it was put into.
+        self._content = self.window.contentItem()
         item.setParentItem(self._content)
         item.setSize(self._units)
         self.changed.emit()
@@ -72,8 +72,9 @@ class Scene(QtCore.QObject):
         """
         self._units = Qt5Core.QSizeF(width / ratio, height / ratio)
         self._make_room(width, height, ratio)
-        self._content.setTransformOrigin(QtQuick.QQuickItem.TopLeft)
-        self._content.setScale(self.factor)
+        content = self.window.contentItem()
+        content.setTransformOrigin(QtQuick.QQuickItem.TopLeft)
+        content.setScale(self.factor)
         if is_alive(self._item):
             self._item.setSize(self._units)
 

@@ -1,0 +1,392 @@
+"""What overlays look like over RViz's 3D view, and that drawing them stops when nothing changes."""
+
+from __future__ import annotations
+
+import gc
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+GREY = (48, 48, 48)
+BLUE = (0, 128, 255)
+IMPORTS = "import QtQuick 2.15\nimport QtQuick.Controls 2.15\nimport QtQuick.Window 2.15\n"
+
+
+@pytest.fixture
+def show(app: Any, tmp_path: Path) -> Callable[..., Any]:
+    """Show QML text over the 3D view."""
+
+    def show(text: str, name: str = "Test", **options: Any) -> Any:
+        file = tmp_path / f"{name}.qml"
+        file.write_text(IMPORTS + text)
+        return app.add_qml(file, **options)
+
+    return show
+
+
+@pytest.fixture
+def drawn(app: Any) -> Iterator[list[Any]]:
+    """What overlays took in each frame in which any was drawn."""
+    works: list[Any] = []
+    app.overlays.drawn.connect(works.append)
+    yield works
+    app.overlays.drawn.disconnect(works.append)
+
+
+@pytest.fixture
+def frames(app: Any, wait: Callable[..., None]) -> Callable[[int], None]:
+    """Wait for some frames of RViz."""
+
+    def frames(count: int) -> None:
+        seen: list[int] = []
+        slot = lambda: seen.append(1)  # noqa: E731
+        app.window.before_frame.connect(slot)
+        wait(lambda: len(seen) >= count)
+        app.window.before_frame.disconnect(slot)
+
+    return frames
+
+
+def colour(picture: Any, x: float, y: float) -> tuple[int, int, int]:
+    return tuple(picture.pixelColor(round(x), round(y)).getRgb()[:3])
+
+
+def close_to(one: tuple[int, ...], other: tuple[int, ...], by: int = 2) -> bool:
+    return all(abs(a - b) <= by for a, b in zip(one, other, strict=True))
+
+
+def square(x: int, y: int, fill: str, size: int = 60) -> str:
+    return f'Rectangle {{ x: {x}; y: {y}; width: {size}; height: {size}; color: "{fill}" }}\n'
+
+
+def test_overlays_lie_above_each_other_by_z_and_popups_above_all(
+    app: Any, show: Any, grab: Any
+) -> None:
+    low = show(f"Item {{ {square(40, 40, 'red')} }}", "Low", z=1)
+    high = show(f"Item {{ {square(70, 70, 'lime')} }}", "High", z=2)
+    assert colour(grab(), 85, 85) == (0, 255, 0)
+    low.z = 3
+    picture = grab()
+    assert colour(picture, 85, 85) == (255, 0, 0)
+    assert colour(picture, 115, 115) == (0, 255, 0)
+    high.is_popup = True
+    high.z = 0
+    assert colour(grab(), 85, 85) == (0, 255, 0)
+    app.overlays.remove(high)
+    picture = grab()
+    assert colour(picture, 85, 85) == (255, 0, 0)
+    assert colour(picture, 115, 115) == GREY
+
+
+def test_opacity_is_blended_without_drawing_anew(
+    show: Any, grab: Any, drawn: list[Any], frames: Any
+) -> None:
+    overlay = show(f"Item {{ {square(40, 40, '#0080ff')} {square(140, 40, '#800080ff')} }}")
+    assert colour(grab(), 70, 70) == BLUE
+    count = len(drawn)
+    overlay.opacity = 0.5
+    picture = grab()
+    assert close_to(colour(picture, 70, 70), (24, 88, 152))
+    # A quarter of it is left where it is half transparent itself.
+    assert close_to(colour(picture, 170, 70), (36, 68, 100))
+    overlay.opacity = 0
+    assert colour(grab(), 70, 70) == GREY
+    overlay.opacity = 1
+    assert colour(grab(), 70, 70) == BLUE
+    assert len(drawn) == count
+
+
+def test_hidden_overlays_are_not_drawn_and_show_the_newest_when_shown_again(
+    show: Any, grab: Any, drawn: list[Any], frames: Any
+) -> None:
+    overlay = show(
+        f"Rectangle {{ width: 9; height: 9; color: 'transparent'; {square(40, 40, 'red')} }}"
+    )
+    rectangle = overlay._root.childItems()[0]
+    grab()
+    for hide, back in (({"visible": False}, {"visible": True}), ({"opacity": 0}, {"opacity": 1.0})):
+        for name, value in hide.items():
+            setattr(overlay, name, value)
+        frames(1)
+        count = len(drawn)
+        for fill in ("blue", "yellow", "lime"):
+            rectangle.setProperty("color", fill)
+            frames(2)
+        assert len(drawn) == count
+        assert colour(grab(), 70, 70) == GREY
+        for name, value in back.items():
+            setattr(overlay, name, value)
+        assert colour(grab(), 70, 70) == (0, 255, 0)
+        rectangle.setProperty("color", "red")
+        assert colour(grab(), 70, 70) == (255, 0, 0)
+
+
+def test_nothing_is_drawn_when_nothing_changes_and_little_uploaded_when_little_does(
+    app: Any, show: Any, drawn: list[Any], frames: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.rviz.layer import Layer
+
+    uploads: list[list[Any]] = []
+    update = Layer.update
+    monkeypatch.setattr(Layer, "update", lambda *a: uploads.append(update(*a)) or uploads[-1])
+    overlay = show(f"Item {{ {square(0, 0, 'red', 400)} {square(500, 500, 'blue', 10)} }}")
+    frames(5)
+    count = len(drawn)
+    frames(10)
+    assert len(drawn) == count
+    overlay._root.childItems()[1].setProperty("color", "lime")
+    frames(3)
+    assert len(drawn) == count + 1
+    assert [tuple(rect) for rect in uploads[-1]] == [(496, 496, 512, 512)]
+    assert drawn[-1].render > 0
+    assert drawn[-1].read_back > 0
+    width, height, _ = app.window.view_size()
+    assert app.overlays.covered == pytest.approx((400 * 400 + 16 * 16) / (width * height), rel=0.02)
+
+
+def test_scaled_overlays_have_as_many_units_less(show: Any, grab: Any, app: Any) -> None:
+    width, height, _ = app.window.view_size()
+    overlay = show(
+        "Item { property var window: Window.width\n"
+        'Text { x: 20; y: 20; text: "|||||"; font.pixelSize: 40; color: "white" }\n'
+        f"{square(40, 100, '#0080ff')} }}",
+        scale=2.0,
+    )
+    picture = grab()
+    root = overlay._root
+    assert (root.width(), root.height()) == (width / 2, height / 2)
+    assert abs(root.property("window") - width / 2) <= 1
+    assert colour(picture, 81, 201) == BLUE
+    assert colour(picture, 199, 319) == BLUE
+    assert colour(picture, 201, 319) != BLUE
+    overlay.scale = 0.5
+    picture = grab()
+    assert colour(picture, 21, 51) == BLUE
+    assert colour(picture, 51, 51) == GREY
+    assert (root.width(), root.height()) == (width * 2, height * 2)
+
+
+def test_texts_are_sharp_at_any_scale(show: Any, grab: Any) -> None:
+    """A letter of twice the size is not one whose pixels are twice as large."""
+    text = 'Item { Text { x: %s; y: %s; text: "Wik"; font.pixelSize: %s; color: "white" } }'
+
+    def edges(picture: Any) -> float:
+        region = picture.copy(20, 20, 200, 120)
+        words = np.array(
+            [[region.pixel(x, y) & 255 for x in range(200)] for y in range(120)], float
+        )
+        return float(np.abs(np.diff(words, axis=1)).max(axis=1).mean())
+
+    plain = show(text % (40, 40, 64), "Plain")
+    wanted = edges(grab())
+    plain.visible = False
+    scaled = show(text % (10, 10, 16), "Scaled", scale=4.0)
+    sharp = edges(grab())
+    scaled.visible = False
+    show(text % (100, 100, 160), "Small", scale=0.4)
+    small = edges(grab())
+    assert sharp > 0.8 * wanted
+    assert small > 0.8 * wanted
+
+
+def test_resized_views_show_no_stretched_picture(app: Any, show: Any, grab: Any, wait: Any) -> None:
+    overlay = show(
+        "Item {\n"
+        "Rectangle { width: 50; height: 50; anchors { right: parent.right; bottom: parent.bottom }"
+        ' color: "#0080ff" } }'
+    )
+    grab()
+    window = app.window.widget
+    before = window.size()
+    try:
+        for size in ((900, 700), (1100, 640), (before.width(), before.height())):
+            window.resize(*size)
+            wait(lambda size=size: (window.width(), window.height()) == size)
+            picture = grab()
+            width, height, _ = app.window.view_size()
+            assert (picture.width(), picture.height()) == (width, height)
+            assert (overlay._root.width(), overlay._root.height()) == (width, height)
+            assert colour(picture, width - 49, height - 49) == BLUE
+            assert colour(picture, width - 2, height - 2) == BLUE
+            assert colour(picture, width - 52, height - 2) != BLUE
+            assert colour(picture, width - 2, height - 52) != BLUE
+    finally:
+        window.resize(before)
+
+
+def test_minimised_rviz_draws_no_overlay(
+    app: Any, show: Any, drawn: list[Any], frames: Any
+) -> None:
+    overlay = show(f"Item {{ {square(40, 40, 'red')} }}")
+    frames(3)
+    window = app.window.widget
+    state = window.windowState()
+    try:
+        window.showMinimized()
+        frames(1)
+        count = len(drawn)
+        overlay._root.childItems()[0].setProperty("color", "lime")
+        frames(3)
+        assert len(drawn) == count
+    finally:
+        window.setWindowState(state)
+        window.show()
+    frames(3)
+    assert len(drawn) > count
+
+
+def test_an_overlay_that_raises_is_told_of_once_and_hurts_no_other(
+    app: Any, show: Any, grab: Any, frames: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    from rosglass.rviz import Overlay
+
+    class Broken(Overlay):
+        answer: Any = None
+        size = (0, 0)
+
+        def resize(self, width: int, height: int, ratio: float) -> None:
+            self.size = (height, width)
+
+        def draw(self) -> Any:
+            if isinstance(self.answer, Exception):
+                raise self.answer
+            return self.answer
+
+    broken = Broken("Broken")
+    broken.answer = ZeroDivisionError("no robot")
+    app.add(broken)
+    show(f"Item {{ {square(40, 40, '#0080ff')} }}")
+    for _ in range(3):
+        broken.changed.emit()
+        frames(2)
+    assert "no robot" in broken.problem
+    errors = [r for r in caplog.records if r.levelname == "ERROR" and "no robot" in r.getMessage()]
+    assert len(errors) == 1
+    broken.answer = np.zeros((3, 3), np.uint32)
+    broken.changed.emit()
+    frames(2)
+    assert "shape" in broken.problem
+    assert "(3, 3)" in broken.problem
+    broken.answer = np.full(broken.size, 0xFF00FF00, np.uint32)
+    broken.changed.emit()
+    assert colour(grab(), 300, 30) == (0, 255, 0)
+    assert broken.problem == ""
+    broken.answer = ValueError("again")
+    broken.changed.emit()
+    picture = grab()
+    # What it showed before is true no longer.
+    assert colour(picture, 300, 30) != (0, 255, 0)
+    assert colour(picture, 70, 70) == BLUE
+
+
+def test_an_overlay_may_be_removed_while_it_draws(
+    app: Any, frames: Any, show: Any, grab: Any
+) -> None:
+    from rosglass.rviz import Overlay
+
+    closed: list[str] = []
+
+    class Leaving(Overlay):
+        def resize(self, width: int, height: int, ratio: float) -> None:
+            self.size = (height, width)
+
+        def draw(self) -> Any:
+            app.overlays.remove(self)
+            assert not closed
+            return np.full(self.size, 0xFFFF0000, np.uint32)
+
+        def close(self) -> None:
+            closed.append(self.name)
+
+    app.add(Leaving("Leaving"))
+    show(f"Item {{ {square(40, 40, '#0080ff')} }}")
+    picture = grab()
+    assert closed == ["Leaving"]
+    assert colour(picture, 70, 70) == BLUE
+    assert colour(picture, 10, 70) == GREY
+
+
+def test_controls_popups_canvas_and_shaders_are_drawn(
+    show: Any, grab: Any, wait: Any, app: Any
+) -> None:
+    overlay = show(
+        """Item {
+        property bool opened: popup.opened
+        property bool wanted: false
+        Popup { id: popup; visible: parent.wanted; x: 300; y: 40; width: 80; height: 60; padding: 0
+            background: Rectangle { color: "#0080ff" } }
+        TextField { id: field; x: 40; y: 140; width: 200; height: 40; text: "hello"
+            background: Rectangle { color: "white" } }
+        Canvas { x: 40; y: 200; width: 60; height: 60
+            onPaint: { var c = getContext("2d"); c.fillStyle = "red"; c.fillRect(0, 0, 60, 60) } }
+        ShaderEffect { x: 140; y: 200; width: 60; height: 60
+            fragmentShader: "varying highp vec2 qt_TexCoord0; uniform lowp float qt_Opacity;
+                void main() { gl_FragColor = vec4(0.0, 1.0, 0.0, 1.0) * qt_Opacity; }" }
+        Rectangle { x: 240; y: 200; width: 60; height: 60; color: "#ff0000"; layer.enabled: true }
+        Item { x: 340; y: 200; width: 60; height: 60; clip: true; rotation: 45
+            Rectangle { width: 200; height: 200; color: "#ff0000" } }
+        }"""
+    )
+    overlay._root.setProperty("wanted", True)
+    wait(lambda: overlay._root.property("opened"))
+    picture = grab()
+    assert colour(picture, 340, 70) == BLUE
+    assert colour(picture, 230, 160) == (255, 255, 255)
+    letters = {colour(picture, x, y) for x in range(45, 120) for y in range(145, 175)}
+    assert min(letters) < (100, 100, 100)
+    assert colour(picture, 70, 230) == (255, 0, 0)
+    assert colour(picture, 170, 230) == (0, 255, 0)
+    assert colour(picture, 270, 230) == (255, 0, 0)
+    assert colour(picture, 370, 230) == (255, 0, 0)
+    assert colour(picture, 345, 205) == GREY
+
+
+def test_items_without_a_size_fill_the_view(show: Any, app: Any, frames: Any) -> None:
+    overlay = show("Item { }")
+    frames(2)
+    width, height, _ = app.window.view_size()
+    assert (overlay._root.width(), overlay._root.height()) == (width, height)
+    assert app.overlays.covered == 0
+
+
+def memory() -> int:
+    status = Path("/proc/self/status").read_text(encoding="ascii")
+    return int(status.split("VmRSS:")[1].split()[0])
+
+
+def test_overlays_that_come_and_go_leave_nothing_behind(
+    app: Any, show: Any, frames: Any, wait: Any, grab: Any
+) -> None:
+    from rosglass.rviz.host import ogre
+
+    text = f"""Item {{ {square(40, 40, "#0080ff")}
+        Text {{ y: 200; text: "native"; renderType: Text.NativeRendering; color: "white" }}
+        Button {{ y: 300; text: "stop" }} }}"""
+    textures = ogre().TextureManager.getSingleton().getMemoryUsage
+    steady = show(text, "Steady")
+
+    def cycle(number: int) -> None:
+        overlay = show(text.replace("stop", f"stop {number}"), "Passing", scale=1 + number % 3)
+        frames(1)
+        overlay.scale = 0.7
+        frames(1)
+        app.overlays.remove(overlay)
+        wait(5)
+
+    for number in range(5):
+        cycle(number)
+    gc.collect()
+    used, before = textures(), memory()
+    for number in range(30):
+        cycle(number)
+    gc.collect()
+    assert textures() == used
+    # One picture of the view alone has 4 MB.
+    assert memory() - before < 20_000
+    steady._root.childItems()[1].setProperty("text", "QWERTZ")
+    assert colour(grab(), 70, 70) == BLUE

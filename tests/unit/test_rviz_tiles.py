@@ -1,0 +1,102 @@
+"""Where a picture over RViz's view has something on it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rosglass.rviz.tiles import Rect, changed_tiles, cover, covered_tiles, uncovered
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+def picture(width: int, height: int, *rects: tuple[int, int, int, int]) -> NDArray[np.uint32]:
+    pixels = np.zeros((height, width), np.uint32)
+    for left, top, right, bottom in rects:
+        pixels[top:bottom, left:right] = 0xFF00FF00
+    return pixels
+
+
+def painted(rects: list[Rect], width: int, height: int) -> NDArray[np.int64]:
+    """How often each pixel is in a rectangle."""
+    times = np.zeros((height, width), np.int64)
+    for rect in rects:
+        assert 0 <= rect.left < rect.right <= width
+        assert 0 <= rect.top < rect.bottom <= height
+        times[rect.top : rect.bottom, rect.left : rect.right] += 1
+    return times
+
+
+def test_a_tile_is_covered_by_one_pixel_and_by_colours_without_alpha() -> None:
+    pixels = picture(50, 40)
+    pixels[39, 49] = 0x000001
+    covered = covered_tiles(pixels)
+    assert covered.shape == (3, 4)
+    assert covered.sum() == 1
+    assert covered[2, 3]
+
+
+def test_changed_tiles_are_those_that_differ() -> None:
+    before = picture(100, 70, (0, 0, 100, 70))
+    now = before.copy()
+    assert not changed_tiles(now, before).any()
+    now[16, 47] ^= 1
+    assert np.argwhere(changed_tiles(now, before)).tolist() == [[1, 2]]
+    # The bottom row comes first, as OpenGL gives it.
+    assert np.argwhere(changed_tiles(now[::-1], before[::-1])).tolist() == [[3, 2]]
+
+
+def test_a_panel_is_one_rectangle_cut_at_the_edge() -> None:
+    pixels = picture(100, 70, (32, 48, 100, 70))
+    assert cover(covered_tiles(pixels), 100, 70) == [(32, 48, 100, 70)]
+    assert cover(covered_tiles(picture(100, 70)), 100, 70) == []
+
+
+@given(
+    st.integers(1, 200),
+    st.integers(1, 200),
+    st.lists(st.tuples(*[st.integers(0, 199)] * 4), max_size=12),
+    st.integers(1, 20),
+    st.sampled_from([0, 300, 5000]),
+)
+def test_rectangles_cover_everything_once_and_are_few(
+    width: int, height: int, places: list[tuple[int, int, int, int]], most: int, worth: int
+) -> None:
+    pixels = picture(width, height, *places)
+    tiles = covered_tiles(pixels)
+    rects = cover(tiles, width, height, most=most, worth=worth)
+    times = painted(rects, width, height)
+    assert times.max(initial=0) <= 1
+    assert (times[pixels != 0] == 1).all()
+    assert len(rects) <= most
+    more = uncovered(tiles, rects)
+    assert more is not None
+    assert more >= 0
+
+
+def test_neighbours_are_joined_where_that_is_cheaper_but_never_over_a_third() -> None:
+    pixels = picture(320, 320, (0, 0, 32, 32), (48, 0, 80, 32), (240, 240, 272, 272))
+    tiles = covered_tiles(pixels)
+    assert len(cover(tiles, 320, 320)) == 3
+    assert sorted(cover(tiles, 320, 320, worth=600)) == [(0, 0, 80, 32), (240, 240, 272, 272)]
+    assert len(cover(tiles, 320, 320, worth=500)) == 3
+
+
+def test_uncovered_tells_waste_and_what_is_left_out() -> None:
+    tiles = covered_tiles(picture(64, 64, (0, 0, 16, 16)))
+    assert uncovered(tiles, [Rect(0, 0, 32, 32)]) == 3
+    assert uncovered(tiles, [Rect(16, 0, 32, 32)]) is None
+    assert uncovered(tiles, []) is None
+    assert uncovered(tiles & False, []) == 0
+
+
+def test_it_needs_neither_qt_nor_rviz() -> None:
+    program = "import sys, rosglass.rviz.tiles; print([m for m in sys.modules if 'Side' in m])"
+    loaded = subprocess.check_output([sys.executable, "-c", program], text=True)
+    assert loaded.strip() == "[]"
