@@ -2,53 +2,180 @@
 
 from __future__ import annotations
 
+import logging
 import os
+import signal
+import sys
+import threading
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rosglass.comm import anonymous_name
+from rosglass.errors import ConnectionLostError, Error, InvalidNameError, UnsupportedError
 from rosglass.qml.display import require_display
 from rosglass.qml.interrupt import QuitOnSignal, end_process_within
+from rosglass.qml.places import import_folder
 from rosglass.qml.session import Session
 from rosglass.qt import QtCore, run_event_loop
+from rosglass.ros1.arguments import Arguments
+from rosglass.ros1.options import Ros1Options
+from rosglass.ros2.names import validate_node_name
+from rosglass.rviz import roscpp
 from rosglass.rviz.host import require_rviz
+from rosglass.rviz.master import MasterWatch, wait_for_master
 from rosglass.rviz.qml_overlay import QmlOverlay
-from rosglass.rviz.qt5 import QtWidgets
+from rosglass.rviz.qt5 import QtGui, QtWidgets
 from rosglass.rviz.stack import Stack
-from rosglass.rviz.window import Window
+from rosglass.rviz.window import Window, config_file
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from types import TracebackType
+
+    from rosglass.comm.node import Node
     from rosglass.rviz.overlay import Overlay
 
 __all__ = ["Application"]
 
+_log = logging.getLogger("rosglass.rviz")
+#: Seconds after which a program ends that was told to, whatever RViz is doing.
 _PATIENCE = 1.7
+#: Milliseconds between two looks whether somebody has shut RViz's node down.
+_LOOK = 300
 
 
 class Application:
     """RViz with its overlays, and the node that they talk through.
 
+    ::
+
+        with Application("robot.rviz", url="ros1://robot:11311") as app:
+            app.add_qml("dashboard.qml")
+            sys.exit(app.run())
+
+    Must be made in the main thread, once per process: RViz's renderer cannot be started again.
+    Makes the Qt application unless there is one, PySide2's or PyQt5's. Making it waits for the
+    master, and says so in the log and in a window.
+
     Args:
-        config: The ``.rviz`` file; empty for RViz's default one.
-        url: The ROS 1 master of RViz and of the overlays; empty for ``ROS_MASTER_URI``.
-        session: The node that overlays talk through, instead of one of its own.
+        config: The ``.rviz`` file, ``package://name/path`` for one in a ROS package; empty for
+            RViz's default one.
+        url: The ROS 1 master of RViz and of the overlays, e.g. ``ros1://robot:11311``; empty for
+            ``ROS_MASTER_URI``.
+        name: Name of RViz's node; empty for ``rviz`` with what makes it unique, as RViz does.
+        session: The node that overlays talk through, instead of one of its own; it is left open at
+            the end.
+        fixed_frame: The frame that RViz shows everything in, instead of the one in the config.
+        fullscreen: Fill the screen.
+        splash: Show RViz's splash screen.
+        timeout: Seconds to wait for the master; None for as long as it takes.
+        import_paths: Further folders with QML modules; ``package://`` as well.
+        arguments: What QML finds in ``Qt.application.arguments``.
+        ros_arguments: Remappings such as ``scan:=/robot/scan``, as RViz's own command line has
+            them; for the overlays' node as well, its name excepted.
 
     Raises:
-        UnsupportedError: RViz, its bindings or a display are missing.
+        UnsupportedError: RViz, its bindings or a display are missing; the message says what to
+            install.
+        ConnectionLostError: The master does not answer in time.
+        RosArgumentError: One of `ros_arguments` is not valid.
+        Error: A file is missing or broken, a name or an address is not valid, this is not the main
+            thread, or there is an RViz in this process already.
+        KeyboardInterrupt: Ctrl-C was pressed meanwhile.
     """
 
-    def __init__(self, config: str = "", *, url: str = "", session: Session | None = None) -> None:
+    _made = False
+
+    def __init__(
+        self,
+        config: str | os.PathLike[str] = "",
+        *,
+        url: str = "",
+        name: str = "",
+        session: Session | None = None,
+        fixed_frame: str = "",
+        fullscreen: bool = False,
+        splash: bool = False,
+        timeout: float | None = None,
+        import_paths: Sequence[str | os.PathLike[str]] = (),
+        arguments: Sequence[str] = (),
+        ros_arguments: Sequence[str] = (),
+    ) -> None:
+        if threading.current_thread() is not threading.main_thread():
+            raise Error("RViz must be made in the main thread of the program")
+        if Application._made:
+            raise Error("there was an RViz in this process: its renderer cannot be started again")
+        if url and not url.startswith("ros1:"):
+            raise Error(f"RViz is a program of ROS 1: expected its master, ros1://..., got {url}")
+        told = Arguments.parse(ros_arguments)
+        options = Ros1Options.parse(url or "ros1://", os.environ, told)
+        options.namespace(None)
+        if name:
+            validate_node_name(name)
+        self._import_paths = [import_folder(path) for path in import_paths]
         require_rviz()
-        connected = require_display()
+        if config:
+            config_file(config)
         #: The Qt application.
-        self.qt: Any = QtCore.QCoreApplication.instance() or QtWidgets.QApplication(["rosglass"])
-        connected()
+        self.qt: Any = _qt_application(arguments)
+        self._excepthook = _log_what_is_raised()
+        self._closed = self._running = self._fullscreen = False
+        self._fullscreen = fullscreen
+        received: list[int] = []
+        with QuitOnSignal(received.append, _PATIENCE):
+            answers = wait_for_master(options.master, timeout, lambda: bool(received))
+            if answers:
+                _name_node(name or told.name, options)
+                Application._made = True
+                #: RViz.
+                self.window = Window(config, splash=splash)
+        if received:
+            _raise_signal(received[0])
+        if not answers:
+            raise ConnectionLostError(f"the ROS master at {options.master} is not waited for")
         self._owns_session = session is None
         #: The node that QML talks through.
-        self.session = session or Session(url or os.environ.get("ROS_MASTER_URI", ""))
-        #: RViz.
-        self.window = Window(config)
+        self.session = session or Session(
+            url or "ros1://",
+            connect=_connect_beside_rviz,
+            arguments=_shared_arguments(options),
+        )
         #: The overlays, the lowest first.
         self.overlays = Stack(self.window)
-        self._closed = False
+        #: Whether the master of RViz is there.
+        self.master = MasterWatch(options.master)
+        self.master.problem_changed.connect(self._show_problem)
+        self._problem: Any = None
+        self._timer = QtCore.QTimer()
+        self._timer.timeout.connect(self._look_at_node)
+        self._timer.start(_LOOK)
+        self.window.closing.connect(self._on_closing)
+        if fixed_frame:
+            self.fixed_frame = fixed_frame
+
+    @property
+    def node_name(self) -> str:
+        """Full name of RViz's own node."""
+        return roscpp.node_name()
+
+    @property
+    def fixed_frame(self) -> str:
+        """The frame that RViz shows everything in; one that does not exist is told by RViz."""
+        return str(self.window.manager.getFixedFrame())
+
+    @fixed_frame.setter
+    def fixed_frame(self, frame: str) -> None:
+        if not frame or frame != frame.strip() or frame.startswith("/"):
+            raise Error(f"fixed_frame: {frame!r} is no name of a frame; expected e.g. 'map'")
+        self.window.manager.setFixedFrame(frame)
+
+    def load_config(self, config: str | os.PathLike[str]) -> None:
+        """Load a ``.rviz`` file; see :meth:`Window.load_config`."""
+        self.window.load_config(config)
+
+    def save_config(self, config: str | os.PathLike[str] = "") -> None:
+        """Save what RViz shows into a ``.rviz`` file; see :meth:`Window.save_config`."""
+        self.window.save_config(config)
 
     def add(self, overlay: Overlay) -> Overlay:
         """Show an overlay.
@@ -62,33 +189,210 @@ class Application:
     def add_qml(self, file: str | os.PathLike[str], name: str = "", **options: Any) -> QmlOverlay:
         """Show a QML file over the 3D view.
 
+        Args:
+            file: The file; ``package://name/path`` for one in a ROS package.
+            name: The overlay's name; empty for the file's, with a number if that is taken.
+            options: Of :class:`QmlOverlay`.
+
         Raises:
             QmlError: The file is missing or has errors.
+            Error: There is an overlay of this name.
         """
         overlay = QmlOverlay(file, self.session, name, **options)
-        overlay.load()
-        self.add(overlay)
+        if not name:
+            overlay.name = self._free_name(overlay.name)
+        try:
+            for path in self._import_paths:
+                overlay.engine.addImportPath(str(path))
+            overlay.load()
+            self.add(overlay)
+        except Error:
+            overlay.close()
+            raise
         return overlay
 
-    def run(self, *, end_process: bool = False) -> int:
-        """Show RViz until it is closed; returns the exit code."""
+    def _free_name(self, wanted: str) -> str:
+        name, number = wanted, 2
+        while self.overlays.find(name) is not None:
+            name, number = f"{wanted} {number}", number + 1
+        return name
+
+    def show(self) -> None:
+        """Show RViz; :meth:`run` does it when this was not called."""
         self.window.widget.show()
+        if self._fullscreen:
+            self.window.fullscreen = True
+        self._fullscreen = False
+
+    def run(self, *, end_process: bool = False) -> int:
+        """Show RViz until it is closed.
+
+        Args:
+            end_process: End the process soon after, whatever still runs in it.
+
+        Returns:
+            The exit code: 0, what :meth:`quit` was given, 130 after Ctrl-C, 143 after SIGTERM.
+        """
+        self.show()
+        self._running = True
         with QuitOnSignal(lambda number: self.quit(128 + number), _PATIENCE):
             code = run_event_loop(self.qt)
+            self._running = False
             if end_process:
                 end_process_within(_PATIENCE, code)
             self.close()
         return code
 
     def quit(self, code: int = 0) -> None:
-        """Have :meth:`run` return; from any thread."""
+        """Have :meth:`run` return, without asking for unsaved changes; from any thread."""
         self.session.executor.post(lambda: QtCore.QCoreApplication.exit(code))
 
+    def screenshot(self, file: str | os.PathLike[str]) -> None:
+        """Save a picture of RViz's window as it is on the screen, 3D view and overlays included.
+
+        Args:
+            file: PNG or JPEG, by the end of its name.
+
+        Raises:
+            Error: The window is not shown, or the picture cannot be written.
+        """
+        widget = self.window.widget
+        if not widget.isVisible() or widget.isMinimized():
+            raise Error(f"{file}: RViz's window is not shown; there is nothing to take")
+        image = widget.windowHandle().screen().grabWindow(widget.winId()).toImage()
+        target = Path(file)
+        if image.isNull() or not QtGui.QImage(image).save(str(target)):
+            raise Error(
+                f"{target}: the picture could not be written; its folder must exist and its name "
+                "end in .png or .jpg"
+            )
+
     def close(self) -> None:
-        """Take the overlays down and close the node; safe to call twice."""
+        """Take RViz and its overlays down, and close the node; safe to call twice."""
         if self._closed:
             return
         self._closed = True
+        self._timer.stop()
+        self.master.close()
+        self.window.close()
         self.overlays.close()
         if self._owns_session:
             self.session.close()
+        roscpp.shut_down()
+        self.window.destroy()
+        if sys.excepthook is _tell_raised:
+            sys.excepthook = self._excepthook
+
+    def __enter__(self) -> Application:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _on_closing(self) -> None:
+        if self._running:
+            QtCore.QCoreApplication.exit(0)
+        elif not self._closed:
+            # RViz itself is still handling the event.
+            QtCore.QTimer.singleShot(0, self.close)
+
+    def _look_at_node(self) -> None:
+        if roscpp.is_running():
+            return
+        self._timer.stop()
+        _log.error(
+            "the node %s was shut down, by rosnode kill or another node of its name: RViz ends",
+            self.node_name,
+        )
+        self.quit()
+
+    def _show_problem(self, problem: str) -> None:
+        if self._problem is None:
+            self._problem = QtWidgets.QLabel()
+            self._problem.setStyleSheet("color: white; background: #a02020; padding: 2px")
+            self.window.widget.statusBar().insertWidget(0, self._problem)
+        self._problem.setText("No ROS master" if "anew" not in problem else "Restart RViz")
+        self._problem.setToolTip(problem)
+        self._problem.setVisible(bool(problem))
+
+
+def _qt_application(arguments: Sequence[str]) -> Any:
+    """Return the process's Qt application, made if need be.
+
+    Raises:
+        UnsupportedError: There is no display that RViz can draw on.
+    """
+    existing = QtCore.QCoreApplication.instance()
+    if existing is not None:
+        if not existing.inherits("QApplication") or QtGui.QGuiApplication.platformName() != "xcb":
+            raise UnsupportedError(
+                "RViz needs a QApplication on X11: make one, with QT_QPA_PLATFORM=xcb on Wayland"
+            )
+        return existing
+    platform = os.environ.setdefault("QT_QPA_PLATFORM", "xcb")
+    if platform != "xcb":
+        # On Wayland, RViz draws through XWayland.
+        raise UnsupportedError(
+            f"RViz draws on X11 only, and QT_QPA_PLATFORM is {platform}: unset it; without a "
+            "screen, use a virtual one: xvfb-run -s '-screen 0 1280x800x24' rosglass rviz ..."
+        )
+    connected = require_display()
+    made = QtWidgets.QApplication(["rosglass", *arguments])
+    connected()
+    return made
+
+
+def _name_node(name: str, options: Ros1Options) -> None:
+    """Make RViz's node, unless the program has one of roscpp already."""
+    # Plugins of RViz may ask for it, too.
+    os.environ["ROS_MASTER_URI"] = options.master
+    if not roscpp.is_initialized():
+        roscpp.set_log_level(_log.getEffectiveLevel())
+        roscpp.initialize(name or anonymous_name("rviz"), _shared_arguments(options))
+
+
+def _shared_arguments(options: Ros1Options) -> list[str]:
+    """Return what was told to both nodes, for each has a name of its own."""
+    told = options.arguments
+    words = [f"{old}:={new}" for old, new in told.rules]
+    words += [f"_{key}:={value}" for key, value in told.parameters.items()]
+    words += [f"__ns:={told.namespace}"] if told.namespace else []
+    words += [f"__hostname:={options.address}"] if options.address else []
+    return words
+
+
+def _connect_beside_rviz(
+    url: str | None, name: str, namespace: str, arguments: Sequence[str] = ()
+) -> Node:
+    from rosglass.connection import connect  # noqa: PLC0415 - not before someone connects
+
+    full = f"{namespace.rstrip('/')}/{name}"
+    if full == roscpp.node_name():
+        raise InvalidNameError(
+            f"{full} is RViz's own node, which the master would end for a second one of its name; "
+            "give the overlays' node or RViz another name"
+        )
+    return connect(url, name, namespace, arguments=arguments)
+
+
+def _log_what_is_raised() -> Any:
+    """Keep PyQt5 from aborting the process when something raises in a slot or virtual function."""
+    before = sys.excepthook
+    if before is sys.__excepthook__:
+        sys.excepthook = _tell_raised
+    return before
+
+
+def _tell_raised(kind: type[BaseException], error: BaseException, trace: Any) -> None:
+    _log.error("%s: %s", kind.__name__, error, exc_info=(kind, error, trace))
+
+
+def _raise_signal(number: int) -> None:
+    if number == signal.SIGINT:
+        raise KeyboardInterrupt
+    raise SystemExit(128 + number)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,13 +15,13 @@ from rosglass.rviz.qt5 import QtCore as Qt5Core
 from rosglass.rviz.qt5 import QtWidgets
 
 if TYPE_CHECKING:
-    import os
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
 __all__ = ["Window", "config_file"]
 
 #: What RViz says right before it makes the displays of a config file.
 _LOADING = "Creating displays"
+_PATHS = "ROS_PACKAGE_PATH"
 #: Where a config file has the displays.
 _CONTENT = "Visualization Manager"
 
@@ -58,7 +60,8 @@ class Window(QtCore.QObject):
         self.frame: Any = _frame(bindings.VisualizationFrame, self._tell_closing)
         if not splash:
             self.frame.setSplashPath("")
-        self.frame.initialize(file)
+        with _without_noise():
+            self.frame.initialize(file)
         #: RViz's ``VisualizationManager``.
         self.manager: Any = self.frame.getManager()
         #: The window, as PySide2 knows it.
@@ -161,6 +164,12 @@ class Window(QtCore.QObject):
         self._tell_closing()
         self.widget.hide()
 
+    def destroy(self) -> None:
+        """Delete RViz, right before the program ends; nothing of it may be used any more."""
+        sip = pyqt("sip")
+        if not sip.isdeleted(self.frame):
+            sip.delete(self.frame)
+
     def _tell_closing(self) -> None:
         told, self._closing = self._closing, True
         if not told:
@@ -176,6 +185,21 @@ class Window(QtCore.QObject):
         loading, self._loading = self._loading, False
         if loading:
             self.config_loaded.emit(path)
+
+
+@contextlib.contextmanager
+def _without_noise() -> Iterator[None]:
+    """Keep RViz from complaining that it does not find a package which it can do without."""
+    before = os.environ.get(_PATHS)
+    stand_in = str(Path(__file__).with_name("media_export"))
+    os.environ[_PATHS] = os.pathsep.join(filter(None, [before, stand_in]))
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[_PATHS]
+        else:
+            os.environ[_PATHS] = before
 
 
 def _plain(title: str) -> str:

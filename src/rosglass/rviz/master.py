@@ -1,0 +1,174 @@
+"""The ROS master of an RViz: waiting for it, and telling when it is gone."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+from rosglass.errors import ConnectionLostError, Error
+from rosglass.qml.executor import GuiExecutor
+from rosglass.qt import QtCore, Signal, run_event_loop
+from rosglass.ros1.master import call_node
+from rosglass.rviz.qt5 import QtWidgets
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+__all__ = ["MasterWatch", "wait_for_master"]
+
+_log = logging.getLogger("rosglass.rviz")
+#: Seconds between two questions to the master, and how long it may take to answer.
+_WAITING, _WATCHING, _TIMEOUT = 0.25, 2.0, 2.0
+#: Milliseconds after which a window says what is waited for.
+_PATIENCE = 700
+
+
+class _Asker:
+    """Asks a master for its process number, again and again, in a thread of its own.
+
+    Args:
+        uri: The master's.
+        every: Seconds between two questions.
+        answered: Called in the GUI thread with the number, or with what went wrong.
+    """
+
+    def __init__(self, uri: str, every: float, answered: Callable[[Any], None]) -> None:
+        self._uri, self._every, self._answered = uri, every, answered
+        self._executor = GuiExecutor()
+        self._end = threading.Event()
+        self._thread = threading.Thread(target=self._ask, name="master", daemon=True)
+        self._thread.start()
+
+    def _ask(self) -> None:
+        while not self._end.is_set():
+            answer: Any
+            try:
+                answer = call_node(self._uri, "getPid", "/rviz", timeout=_TIMEOUT)
+            except Error as error:
+                answer = error
+            self._executor.post(lambda answer=answer: self._tell(answer))  # type: ignore[misc]
+            self._end.wait(self._every)
+
+    def _tell(self, answer: Any) -> None:
+        if not self._end.is_set():
+            self._answered(answer)
+
+    def close(self) -> None:
+        """Ask no more; safe to call twice."""
+        self._end.set()
+        self._thread.join(_TIMEOUT / 4)
+        self._executor.close()
+
+
+def wait_for_master(uri: str, timeout: float | None, ended: Callable[[], bool]) -> bool:
+    """Wait until a master answers, and show that it is waited for.
+
+    Args:
+        uri: The master's.
+        timeout: Seconds to wait; None for as long as it takes.
+        ended: Whether the program is to end.
+
+    Returns:
+        Whether it answers; not when the program is to end, or the user does not want to wait.
+
+    Raises:
+        ConnectionLostError: It did not answer in time.
+    """
+    started = time.monotonic()
+    loop = QtCore.QEventLoop()
+    window: list[Any] = []
+    outcome: list[Any] = []
+    problems: list[str] = []
+
+    def finish(result: Any) -> None:
+        outcome.append(result)
+        loop.quit()
+
+    def on_answer(answer: Any) -> None:
+        if not isinstance(answer, Error):
+            finish(True)
+            return
+        problem = f"{answer}; start one: roscore"
+        if timeout is not None and time.monotonic() - started >= timeout:
+            finish(ConnectionLostError(problem))
+        elif problem not in problems:
+            problems.append(problem)
+            _log.warning("waiting for the ROS master: %s", problem)
+
+    def look() -> None:
+        if ended():
+            finish(False)
+        elif problems and not window and time.monotonic() - started > _PATIENCE / 1000:
+            window.append(_waiting_window(uri, lambda: finish(False)))
+
+    asker = _Asker(uri, _WAITING, on_answer)
+    timer = QtCore.QTimer()
+    timer.timeout.connect(look)
+    timer.start(50)
+    run_event_loop(loop)
+    timer.stop()
+    asker.close()
+    for box in window:
+        box.blockSignals(True)
+        box.close()
+    if isinstance(outcome[0], Error):
+        raise outcome[0]
+    return bool(outcome[0])
+
+
+def _waiting_window(uri: str, cancel: Callable[[], None]) -> Any:
+    box = QtWidgets.QMessageBox()
+    box.setWindowTitle("RViz")
+    box.setText(f"Waiting for the ROS master at {uri}")
+    box.setInformativeText("RViz starts as soon as it answers. To start one: roscore")
+    box.setStandardButtons(QtWidgets.QMessageBox.Cancel)
+    box.rejected.connect(cancel)
+    box.finished.connect(lambda _: cancel())
+    box.show()
+    return box
+
+
+class MasterWatch(QtCore.QObject):
+    """Notices that the master of a running RViz is gone, and that another one took its place.
+
+    Args:
+        uri: The master's.
+    """
+
+    #: What is wrong with the master; empty when it is all right.
+    problem_changed = Signal(str)
+
+    def __init__(self, uri: str) -> None:
+        super().__init__()
+        self._uri, self._number, self._problem = uri, -1, ""
+        self._asker = _Asker(uri, _WATCHING, self._on_answer)
+
+    @property
+    def problem(self) -> str:
+        """What is wrong with the master; empty when it is all right."""
+        return self._problem
+
+    def close(self) -> None:
+        """Watch no more."""
+        self._asker.close()
+
+    def _on_answer(self, answer: Any) -> None:
+        problem = ""
+        if isinstance(answer, Error):
+            problem = f"{answer}; what is received already goes on, nothing new is found"
+        elif self._number not in (-1, answer):
+            problem = (
+                f"the ROS master at {self._uri} was started anew and knows nothing of this RViz: "
+                "its displays find no new topics until RViz is started again"
+            )
+        else:
+            self._number = answer
+        if problem != self._problem:
+            self._problem = problem
+            if problem:
+                _log.error("%s", problem)
+            else:
+                _log.warning("the ROS master at %s answers again", self._uri)
+            self.problem_changed.emit(problem)

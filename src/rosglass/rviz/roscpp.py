@@ -1,0 +1,115 @@
+"""RViz's own node, made with roscpp before RViz would: so it has a name, and leaves Ctrl-C alone.
+
+RViz asks roscpp for a node of a name made up at random, whose Ctrl-C handler takes the place of
+Python's. Where roscpp is initialized already, RViz leaves it as it is; there are no bindings of it,
+so its C++ functions are called by their names in the library (Itanium C++ ABI, libstdc++'s
+``std::string``; https://docs.ros.org/en/noetic/api/roscpp/html/init_8h.html).
+"""
+
+from __future__ import annotations
+
+import ctypes
+import logging
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rosglass.errors import UnsupportedError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+__all__ = ["initialize", "is_initialized", "is_running", "node_name", "set_log_level", "shut_down"]
+
+_STRING = "NSt7__cxx1112basic_stringIcSt11char_traitsIcESaIcEEE"
+_INIT = f"_ZN3ros4initERiPPcRK{_STRING}j"
+_SET_LEVEL = f"_ZN3ros7console16set_logger_levelERK{_STRING}NS0_6levels5LevelE"
+#: ros/init.h, "init_options".
+_NO_SIGINT_HANDLER = 1
+#: Python's levels and ros/console.h, "levels".
+_LEVELS = ((logging.DEBUG, 0), (logging.INFO, 1), (logging.WARNING, 2), (logging.ERROR, 3))
+_FATAL = 4
+
+
+class _String(ctypes.Structure):
+    """A ``std::string``."""
+
+    _fields_ = (
+        ("data", ctypes.c_char_p),
+        ("size", ctypes.c_size_t),
+        ("local", ctypes.c_char * 16),
+    )
+
+
+def _string(text: str) -> _String:
+    data = text.encode()
+    return _String(data, len(data))
+
+
+@cache
+def _library(name: str) -> ctypes.CDLL:
+    """Return a library that RViz has loaded.
+
+    Raises:
+        UnsupportedError: It has not.
+    """
+    for line in Path("/proc/self/maps").read_text().splitlines():
+        file = line.split(maxsplit=5)[-1]
+        if Path(file).name.startswith(f"{name}.so"):
+            return ctypes.CDLL(file)
+    raise UnsupportedError(f"RViz's bindings come without {name}: they are none of RViz 1")
+
+
+def _function(library: str, symbol: str, result: Any = None) -> Any:
+    try:
+        found = _library(library)[symbol]
+    except AttributeError:
+        raise UnsupportedError(
+            f"{library} has no {symbol}: it was built for another C++ library than GNU's"
+        ) from None
+    found.restype = result
+    return found
+
+
+def is_initialized() -> bool:
+    """Return whether this process has a node of roscpp already."""
+    return bool(_function("libroscpp", "_ZN3ros13isInitializedEv", ctypes.c_bool)())
+
+
+def is_running() -> bool:
+    """Return whether nobody has shut the node down, as another one of its name does."""
+    return bool(_function("libroscpp", "_ZN3ros2okEv", ctypes.c_bool)())
+
+
+def initialize(name: str, arguments: Sequence[str]) -> None:
+    """Say what RViz's node is to be; nothing is told to the master yet.
+
+    Args:
+        name: Its base name; must be valid, for roscpp would end the process.
+        arguments: ``old:=new``, ``__ns:=...`` and the like; must be valid as well.
+    """
+    words = [b"rviz", *(argument.encode() for argument in arguments)]
+    argv = (ctypes.c_char_p * (len(words) + 1))(*words)
+    count = ctypes.c_int(len(words))
+    init = _function("libroscpp", _INIT)
+    init(ctypes.byref(count), argv, ctypes.byref(_string(name)), _NO_SIGINT_HANDLER)
+
+
+def node_name() -> str:
+    """Return the full name of RViz's node."""
+    get = _function("libroscpp", "_ZN3ros9this_node7getNameB5cxx11Ev", ctypes.POINTER(_String))
+    return str(get().contents.data.decode())
+
+
+def set_log_level(level: int) -> None:
+    """Let RViz write what it logs from a level of Python's logging on."""
+    _function("librosconsole", "_ZN3ros7console10initializeEv")()
+    set_level = _function("librosconsole", _SET_LEVEL)
+    cpp_level = next((ours for theirs, ours in _LEVELS if level <= theirs), _FATAL)
+    set_level(ctypes.byref(_string("ros")), cpp_level)
+    _function("librosconsole", "_ZN3ros7console25notifyLoggerLevelsChangedEv")()
+
+
+def shut_down() -> None:
+    """End RViz's node: it says goodbye to the master."""
+    _function("libroscpp", "_ZN3ros8shutdownEv")()
