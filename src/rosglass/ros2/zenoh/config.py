@@ -42,9 +42,9 @@ _RETRY = {"period_init_ms": 250, "period_max_ms": 500, "period_increase_factor":
 #: way, and three round trips over a satellite have to fit.
 _OPEN_TIMEOUT_MS = 3000
 #: How many parts of 64 kB of a message wait for a link of this machine to take them. Zenoh's own 2
-#: make sender and link wait for each other: a 6 MB picture takes a quarter longer, and is dropped
+#: make sender and link wait for each other: a 6 MB picture takes a fifth longer, and is dropped
 #: where other programs need the processor. Elsewhere what waits grows old.
-_WAITING = 16
+_WAITING = 8
 #: Of two peers only one opens the link, so that their attempts do not cross (rmw_zenoh's choice).
 _STRATEGY = {"peer": {"to_router": "always", "to_peer": "greater-zid"}}
 
