@@ -10,7 +10,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rosglass.rviz.tiles import Rect, changed_tiles, cover, covered_tiles, uncovered
+from rosglass.rviz.tiles import Rect, changed_tiles, cover, covered_tiles, uncovered, update_covered
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -86,6 +86,19 @@ def test_neighbours_are_joined_where_that_is_cheaper_but_never_over_a_third() ->
     assert len(cover(tiles, 320, 320)) == 3
     assert sorted(cover(tiles, 320, 320, worth=600)) == [(0, 0, 80, 32), (240, 240, 272, 272)]
     assert len(cover(tiles, 320, 320, worth=500)) == 3
+
+
+@given(
+    st.lists(st.tuples(*[st.integers(0, 99)] * 4), max_size=5),
+    st.lists(st.tuples(*[st.integers(0, 99)] * 4), max_size=5),
+)
+def test_coverage_is_kept_up_to_date(
+    first: list[tuple[int, int, int, int]], second: list[tuple[int, int, int, int]]
+) -> None:
+    before, now = picture(99, 90, *first), picture(99, 90, *second)
+    covered = covered_tiles(before)
+    update_covered(covered, now, cover(changed_tiles(now, before), 99, 90, most=3))
+    assert (covered == covered_tiles(now)).all()
 
 
 def test_uncovered_tells_waste_and_what_is_left_out() -> None:

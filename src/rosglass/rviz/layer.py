@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rosglass.rviz.host import ogre, ogre_overlay
-from rosglass.rviz.tiles import Rect, changed_tiles, cover, covered_tiles, uncovered
+from rosglass.rviz.tiles import TILE, Rect, changed_tiles, cover, uncovered, update_covered
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -45,6 +45,7 @@ class Layer:
         self._unit: Any = None
         self._panels: list[Any] = []
         self._before: NDArray[np.uint32] | None = None
+        self._covered = np.zeros((0, 0), np.bool_)
         self._rects: list[Rect] = []
         self._waste = 0
         self._opacity = 1.0
@@ -98,6 +99,7 @@ class Layer:
         if self._before is None or self._before.shape != pixels.shape:
             self._make_texture(width, height)
             self._before = np.empty_like(pixels, order="C")
+            self._covered = np.zeros((-(-height // TILE), -(-width // TILE)), np.bool_)
             rects = [Rect(0, 0, width, height)]
         else:
             rects = cover(changed_tiles(pixels, self._before), width, height, most=12)
@@ -106,7 +108,8 @@ class Layer:
             self._upload(pixels, rect)
         uploaded = time.perf_counter()
         if rects:
-            self._place(covered_tiles(self._before), width, height)
+            update_covered(self._covered, self._before, rects)
+            self._place(width, height)
         self.compared = compared - started + time.perf_counter() - uploaded
         self.uploaded = uploaded - compared
         return rects
@@ -165,8 +168,9 @@ class Layer:
             source, o.Box(rect.left, rect.top, rect.right, rect.bottom)
         )
 
-    def _place(self, covered: NDArray[np.bool_], width: int, height: int) -> None:
+    def _place(self, width: int, height: int) -> None:
         """Put panels where there is something, unless those that stand fit well enough."""
+        covered = self._covered
         waste = uncovered(covered, self._rects)
         if waste is not None and waste - self._waste <= _SLACK:
             return

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["TILE", "Rect", "changed_tiles", "cover", "covered_tiles", "uncovered"]
+__all__ = ["TILE", "Rect", "changed_tiles", "cover", "covered_tiles", "uncovered", "update_covered"]
 
 #: Pixels of a tile's edge.
 TILE = 16
@@ -57,6 +57,14 @@ def covered_tiles(pixels: NDArray[np.uint32]) -> NDArray[np.bool_]:
             without alpha shines, and is seen as well.
     """
     return _per_tile(pixels.shape, lambda rows: np.bitwise_or.reduce(pixels[rows], axis=0))
+
+
+def update_covered(
+    covered: NDArray[np.bool_], pixels: NDArray[np.uint32], rects: list[Rect]
+) -> None:
+    """Bring what :func:`covered_tiles` told of a picture up to date where it has changed since."""
+    for first, last in {(rect.top // TILE, -(-rect.bottom // TILE)) for rect in rects}:
+        covered[first:last] = covered_tiles(pixels[first * TILE : last * TILE])
 
 
 def changed_tiles(pixels: NDArray[np.uint32], before: NDArray[np.uint32]) -> NDArray[np.bool_]:

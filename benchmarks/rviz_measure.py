@@ -1,0 +1,187 @@
+"""What an RViz with overlays costs: for the benchmarks of rosglass.rviz, in RViz's own process.
+
+A measured process gets its orders as JSON in its arguments and prints its figures as JSON.
+"""
+
+from __future__ import annotations
+
+import gc
+import itertools
+import json
+import os
+import statistics
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+__all__ = ["fit_view", "memory", "processor", "run_for", "uncapped", "works_during"]
+
+VIEW = (1280, 800)
+QML = Path(__file__).with_name("rviz_overlay.qml")
+
+
+def memory(pid: int | str = "self") -> float:
+    """Return the resident memory of a process in MiB."""
+    status = Path(f"/proc/{pid}/status").read_text(encoding="ascii")
+    return int(status.split("VmRSS:")[1].split()[0]) / 1024
+
+
+def processor(seconds: float, run: Callable[[float], None]) -> float:
+    """Return the percentage of a core that this process takes while something runs."""
+    before, started = time.process_time(), time.perf_counter()
+    run(seconds)
+    return 100 * (time.process_time() - before) / (time.perf_counter() - started)
+
+
+def run_for(seconds: float, app: Any) -> None:
+    """Run the event loop."""
+    from rosglass.qt import QtCore, run_event_loop
+
+    loop = QtCore.QEventLoop()
+    QtCore.QTimer.singleShot(round(seconds * 1000), loop.quit)
+    run_event_loop(loop)
+    del app
+
+
+def fit_view(app: Any, width: int = VIEW[0], height: int = VIEW[1]) -> None:
+    """Leave RViz nothing but its 3D view, of a size in pixels."""
+    from rosglass.rviz.qt5 import QtWidgets
+
+    widget = app.window.widget
+    for kind in (QtWidgets.QDockWidget, QtWidgets.QToolBar):
+        for child in widget.findChildren(kind):
+            child.hide()
+    widget.menuBar().hide()
+    widget.statusBar().hide()
+    for _ in range(4):
+        panel = app.window.panel
+        widget.resize(
+            widget.width() + width - panel.width(), widget.height() + height - panel.height()
+        )
+        app.qt.processEvents()
+
+
+def uncapped(app: Any, seconds: float) -> tuple[float, float]:
+    """Have RViz draw as fast as it can; returns frames per second and a frame's median in ms."""
+    from rosglass.qt import QtCore
+    from rosglass.rviz.host import pyqt
+
+    core = pyqt()
+    manager = app.window.manager
+    manager.stopUpdate()
+    ends: list[float] = [time.perf_counter()]
+
+    def draw() -> None:
+        core.QMetaObject.invokeMethod(manager, "onUpdate", core.Qt.DirectConnection)
+        ends.append(time.perf_counter())
+
+    timer = QtCore.QTimer()
+    timer.timeout.connect(draw)
+    timer.start(0)
+    run_for(seconds, app)
+    timer.stop()
+    manager.startUpdate()
+    frames = [after - before for before, after in itertools.pairwise(ends)]
+    return len(frames) / (ends[-1] - ends[0]), 1000 * statistics.median(frames)
+
+
+def works_during(app: Any, run: Callable[[], Any]) -> list[Any]:
+    """Return what overlays took before each frame in which any was drawn, while something runs."""
+    works: list[Any] = []
+    app.overlays.drawn.connect(works.append)
+    run()
+    app.overlays.drawn.disconnect(works.append)
+    return works
+
+
+def medians(works: list[Any]) -> dict[str, float]:
+    """Return the medians of each part in ms; empty when nothing was drawn."""
+    if not works:
+        return {}
+    parts = {name: statistics.median(getattr(w, name) for w in works) for name in works[0]._fields}
+    return {**parts, "total": statistics.median(work.total for work in works)}
+
+
+def measure(order: dict[str, Any]) -> dict[str, Any]:
+    """Measure RViz without overlay, with a static or with an animated one."""
+    from rosglass.qt import QtCore
+    from rosglass.rviz import Application
+
+    app = Application()
+    app.window.widget.setGeometry(0, 0, *VIEW)
+    overlay = app.add_qml(QML) if order["what"] != "without" else None
+    first: list[float] = []
+
+    def drawn() -> None:
+        if overlay is None or app.overlays.covered:
+            first.append(time.time())
+
+    def before() -> None:
+        # Comes when RViz has drawn the frame that it is about to draw now.
+        QtCore.QTimer.singleShot(0, drawn)
+
+    app.window.before_frame.connect(before)
+    app.window.widget.show()
+    fit_view(app)
+    run_for(2.0, app)
+    if order["what"] == "animated":
+        overlay._root.setProperty("animated", True)
+        run_for(0.5, app)
+    seconds = order["seconds"]
+    figures: dict[str, Any] = {"start": 1000 * (first[0] - order["started"])}
+    figures["view"] = app.window.view_size()[:2]
+    figures["cpu"] = processor(seconds, lambda s: run_for(s, app))
+    done: list[tuple[float, float]] = []
+    figures["work"] = medians(works_during(app, lambda: done.append(uncapped(app, seconds))))
+    figures["fps"], figures["frame"] = done[0]
+    figures["covered"] = app.overlays.covered
+    gc.collect()
+    figures["memory"] = memory()
+    app.close()
+    return figures
+
+
+def cycles(order: dict[str, Any]) -> dict[str, Any]:
+    """Add, resize, reload and remove overlays again and again; return the memory meanwhile."""
+    from rosglass.rviz import Application
+
+    app = Application()
+    app.window.widget.setGeometry(0, 0, 640, 480)
+    app.window.widget.show()
+    steady = app.add_qml(QML, "steady")
+    run_for(1.0, app)
+    used: list[float] = []
+    for number in range(order["cycles"]):
+        overlay = app.add_qml(QML, "passing")
+        run_for(0.04, app)
+        overlay.scale = 0.5 + number % 3
+        app.window.widget.resize(640 + number % 7 * 8, 480 + number % 5 * 8)
+        steady.load()
+        run_for(0.04, app)
+        app.overlays.remove(overlay)
+        run_for(0.0, app)
+        if number % 50 == 49:
+            gc.collect()
+            used.append(memory())
+    app.close()
+    return {"memory": used}
+
+
+def main() -> None:
+    order = json.loads(sys.argv[1])
+    sys.argv[1:] = []
+    with tempfile.TemporaryDirectory() as home:
+        os.environ.update(HOME=home, XDG_RUNTIME_DIR=home)
+        figures = cycles(order) if order["what"] == "cycles" else measure(order)
+        Path(order["into"]).write_text(json.dumps(figures), encoding="utf-8")
+    # What is measured is over; how a process ends is for others to test.
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main()
