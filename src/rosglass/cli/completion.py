@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from rosglass.comm import Node
 
-__all__ = ["SHELLS", "complete", "is_completing", "offer", "script"]
+__all__ = ["SHELLS", "complete", "complete_files", "is_completing", "offer", "script"]
 
 SHELLS = ("bash", "zsh", "fish", "tcsh")
 #: Seconds that Tab may take to look around in the graph.
@@ -32,6 +32,14 @@ def complete(argument: argparse.Action, what: str) -> None:
             kinds of types), ``service_types`` or ``action_types``.
     """
     argument.completer = _Completer(what)  # type: ignore[attr-defined]
+
+
+def complete_files(argument: argparse.Action, suffix: str) -> None:
+    """Let Tab complete an argument with folders, and files whose name ends in `suffix`."""
+    if is_completing():
+        from argcomplete.completers import FilesCompleter
+
+        argument.completer = FilesCompleter((suffix,))  # type: ignore[attr-defined]
 
 
 def is_completing() -> bool:

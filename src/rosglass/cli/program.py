@@ -25,6 +25,7 @@ __all__ = ["COMMANDS", "run"]
 #: Subcommand -> (module, one-line help). Modules have ``configure(parser)``, ``run(args) -> int``.
 COMMANDS = {
     "run": ("rosglass.cli.run", "open an interface written in QML"),
+    "rviz": ("rosglass.cli.rviz", "open RViz with interfaces over its 3D view"),
     "qml-path": ("rosglass.cli.qml_path", "tell editors where the QML modules are"),
     "demo": ("rosglass.cli.demo", "open the demo cockpit on a simulated robot"),
     "robot": ("rosglass.cli.robot", "run the simulated robot"),

@@ -16,7 +16,7 @@ from rosglass.errors import QmlError, UnsupportedError
 if TYPE_CHECKING:
     from rosglass.qml.application import Application
 
-__all__ = ["configure", "run", "show"]
+__all__ = ["configure", "format_log", "point_in_time", "run", "show"]
 
 #: Qt's messages that say nothing to whoever runs an interface.
 _QUIET = "qt.multimedia.symbolsresolver=false;qt.multimedia.ffmpeg*=false;qt.qpa.theme*=false"
@@ -66,7 +66,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--after",
         metavar="SECONDS",
-        type=_seconds,
+        type=point_in_time,
         default=2.0,
         help="when to take the screenshot (default: %(default)s)",
     )
@@ -78,7 +78,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _seconds(text: str) -> float:
+def point_in_time(text: str) -> float:
+    """Read seconds from now, a day at most; for options."""
     try:
         value = float(text)
     except ValueError:
@@ -168,7 +169,7 @@ def _show(
     from rosglass.qml.log import install_message_handler
     from rosglass.qt import QtCore
 
-    _format_log(verbose)
+    format_log(verbose)
     install_message_handler()
     app = Application(file, **options)
 
@@ -202,7 +203,7 @@ def _save(app: Application, target: Path) -> int:
     return 0
 
 
-def _format_log(verbose: bool) -> None:
+def format_log(verbose: bool) -> None:
     """Show what comes from QML with its file and line, and from its author's level on."""
     from rosglass.qml.log import LocationFormatter
 

@@ -6,7 +6,10 @@ Needs RViz 1 with its Python bindings, and the Python they are made for: on Debi
 
 from __future__ import annotations
 
+import os
+import sys
 from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -23,6 +26,9 @@ def __getattr__(name: str) -> object:
     # Imported on first use: what has nothing to do with Qt can be imported without RViz.
     if name not in _HOMES:
         raise AttributeError(f"module 'rosglass.rviz' has no attribute {name!r}")
+    if "rosglass.qt" not in sys.modules and find_spec("rviz") is not None:
+        # RViz's Qt; where there is no RViz, its absence is told, not that of Qt 5.
+        os.environ.setdefault("ROSGLASS_QT", "pyside2")
     value: object = getattr(import_module(f"rosglass.rviz.{_HOMES[name]}"), name)
     globals()[name] = value
     return value

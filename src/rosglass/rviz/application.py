@@ -112,6 +112,8 @@ class Application:
         options.namespace(None)
         if name:
             validate_node_name(name)
+        if fixed_frame:
+            _check_frame(fixed_frame)
         self._import_paths = [import_folder(path) for path in import_paths]
         require_rviz()
         if config:
@@ -165,8 +167,7 @@ class Application:
 
     @fixed_frame.setter
     def fixed_frame(self, frame: str) -> None:
-        if not frame or frame != frame.strip() or frame.startswith("/"):
-            raise Error(f"fixed_frame: {frame!r} is no name of a frame; expected e.g. 'map'")
+        _check_frame(frame)
         self.window.manager.setFixedFrame(frame)
 
     def load_config(self, config: str | os.PathLike[str]) -> None:
@@ -204,6 +205,8 @@ class Application:
         try:
             for path in self._import_paths:
                 overlay.engine.addImportPath(str(path))
+            overlay.engine.quit.connect(self.quit)
+            overlay.engine.exit.connect(self.quit)
             overlay.load()
             self.add(overlay)
         except Error:
@@ -378,6 +381,11 @@ def _connect_beside_rviz(
             "give the overlays' node or RViz another name"
         )
     return connect(url, name, namespace, arguments=arguments)
+
+
+def _check_frame(frame: str) -> None:
+    if not frame or frame != frame.strip() or frame.startswith("/"):
+        raise Error(f"fixed_frame: {frame!r} is no name of a frame; expected e.g. 'map'")
 
 
 def _log_what_is_raised() -> Any:

@@ -7,12 +7,12 @@ of one is wrapped anew for the other (reference: docs/architecture.md, section 6
 from __future__ import annotations
 
 import importlib
-import sys
 from functools import cache
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rosglass.errors import UnsupportedError
 from rosglass.qt import BINDING, QtCore
+from rosglass.rviz.requirements import PACKAGES, require_bindings
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -20,27 +20,20 @@ if TYPE_CHECKING:
 __all__ = ["as_pyqt", "as_pyside", "ogre", "ogre_overlay", "pyqt", "require_rviz", "rviz"]
 
 _T = TypeVar("_T", bound=QtCore.QObject)
-_PACKAGES = (
-    "rviz python3-rviz python3-ogre-1.12 python3-pyqt5 python3-pyside2.qtopengl "
-    "python3-pyside2.qtwidgets python3-pyside2.qtquick"
-)
-_ADVICE = (
-    "RViz and its bindings come with the system's own Python; on Debian 12: "
-    f"sudo apt install --no-install-recommends {_PACKAGES}; then run rosglass in an environment "
-    "made from it: /usr/bin/python3 -m venv --system-site-packages rviz-env"
-)
 
 
 def require_rviz() -> None:
     """Load the bindings.
 
     Raises:
-        UnsupportedError: They are missing, or this process uses another Qt than RViz; the message
-            says what to install.
+        UnsupportedError: They are missing or broken, or this process uses another Qt than RViz;
+            the message says what to install.
     """
+    require_bindings()
     if BINDING != "PySide2":
         raise UnsupportedError(
-            f"RViz uses Qt 5, and this process {BINDING}: set ROSGLASS_QT=pyside2. {_ADVICE}"
+            f"RViz uses Qt 5, and this process {BINDING} already: import rosglass.rviz first, or "
+            "set ROSGLASS_QT=pyside2"
         )
     rviz()
     ogre_overlay()
@@ -50,7 +43,10 @@ def _load(name: str) -> ModuleType:
     try:
         return importlib.import_module(name)
     except ImportError as error:
-        raise UnsupportedError(f"{sys.executable} has no {name}: {error}. {_ADVICE}") from None
+        raise UnsupportedError(
+            f"{name} is installed but cannot be loaded: {error}; install anew what it comes with: "
+            f"sudo apt install --reinstall --no-install-recommends {PACKAGES}"
+        ) from None
 
 
 @cache

@@ -1,0 +1,169 @@
+"""``rosglass rviz``: open RViz with interfaces over its 3D view."""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rosglass.cli.completion import complete_files
+from rosglass.cli.connecting import add_definitions_option, seconds
+from rosglass.cli.run import format_log, point_in_time
+from rosglass.errors import Error, QmlError
+
+if TYPE_CHECKING:
+    import argparse
+
+    from rosglass.rviz import Application
+
+__all__ = ["configure", "run"]
+
+#: Seconds after which the program ends that was told to, whatever RViz is doing.
+_PATIENCE = 1.7
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Describe the options."""
+    config = parser.add_argument(
+        "config",
+        metavar="CONFIG.rviz",
+        nargs="*",
+        help="what RViz shows; package://name/path for one in a package; default: RViz's own "
+        "default. Also remappings as RViz takes them: scan:=/robot/scan",
+    )
+    complete_files(config, "rviz")
+    overlay = parser.add_argument(
+        "--overlay",
+        dest="overlays",
+        metavar="FILE.qml",
+        action="append",
+        default=[],
+        help="an interface over the 3D view; package://name/path for one in a package; may be "
+        "repeated, the last one is uppermost",
+    )
+    complete_files(overlay, "qml")
+    parser.add_argument(
+        "--url",
+        default="",
+        help="the ROS master of RViz and the interfaces, e.g. ros1://192.168.1.5:11311; default: "
+        "ROS_MASTER_URI",
+    )
+    parser.add_argument(
+        "--name", default="", help="name of RViz's node; default: one that nobody else has"
+    )
+    parser.add_argument(
+        "--timeout",
+        metavar="SECONDS",
+        type=seconds,
+        help="how long to wait for the master (default: as long as it takes)",
+    )
+    parser.add_argument(
+        "-I",
+        dest="import_paths",
+        metavar="FOLDER",
+        action="append",
+        default=[],
+        help="a folder with QML modules, searched besides QML_IMPORT_PATH; may be repeated",
+    )
+    parser.add_argument(
+        "--fixed-frame",
+        metavar="FRAME",
+        default="",
+        help="show everything in this frame, instead of the one in the config",
+    )
+    parser.add_argument("--fullscreen", action="store_true", help="fill the screen")
+    parser.add_argument("--splash", action="store_true", help="show RViz's splash screen")
+    parser.add_argument(
+        "--screenshot",
+        metavar="PICTURE",
+        type=Path,
+        help="save a picture of RViz's window (PNG, JPEG) and end",
+    )
+    parser.add_argument(
+        "--after",
+        metavar="SECONDS",
+        type=point_in_time,
+        default=3.0,
+        help="when to take the screenshot (default: %(default)s)",
+    )
+    add_definitions_option(parser)
+    parser.set_defaults(arguments=[], ros_arguments=[], ros1=True)
+    parser.epilog = (
+        "Needs RViz 1 and the system's own Python: docs/rviz.md. What follows --ros-args is for "
+        "ROS, as remappings are. Arguments after -- are the interfaces' own, in "
+        "Qt.application.arguments."
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Show RViz until it is closed; returns the exit code."""
+    from rosglass.rviz.requirements import require_bindings
+
+    require_bindings()
+    os.environ["ROSGLASS_QT"] = "pyside2"
+    from rosglass.qml.interrupt import QuitOnSignal
+    from rosglass.qml.log import install_message_handler
+    from rosglass.qml.places import interface_file
+
+    format_log(verbose=args.verbose > 1)
+    remappings = [word for word in args.config if ":=" in word]
+    configs = [word for word in args.config if ":=" not in word]
+    if len(configs) > 1:
+        raise Error(f"RViz shows one config: expected one file, got {', '.join(configs)}")
+    try:
+        for file in args.overlays:
+            interface_file(file)
+        received: list[int] = []
+        # RViz takes a while to load, and Python cannot be interrupted meanwhile.
+        with QuitOnSignal(received.append, _PATIENCE):
+            from rosglass.rviz.application import Application
+
+            install_message_handler()
+            if received:
+                return 128 + received[0]
+            app = Application(
+                configs[0] if configs else "",
+                url=args.url,
+                name=args.name,
+                fixed_frame=args.fixed_frame,
+                fullscreen=args.fullscreen,
+                splash=args.splash,
+                timeout=args.timeout,
+                import_paths=args.import_paths,
+                arguments=args.arguments,
+                ros_arguments=[*remappings, *args.ros_arguments],
+            )
+            with app:
+                _add_overlays(app, args)
+                if received:
+                    return 128 + received[0]
+                return app.run(end_process=True)
+    except QmlError as error:
+        print(error, file=sys.stderr)
+        return 1
+
+
+def _add_overlays(app: Application, args: argparse.Namespace) -> None:
+    from rosglass.qml.places import interface_file
+    from rosglass.qt import QtCore
+
+    shown = {getattr(overlay, "file", None) for overlay in app.overlays}
+    for file in args.overlays:
+        # The config may have it already.
+        if interface_file(file) not in shown:
+            app.add_qml(file)
+    if args.screenshot is not None:
+        QtCore.QTimer.singleShot(
+            round(args.after * 1000), lambda: app.quit(_save(app, args.screenshot))
+        )
+
+
+def _save(app: Application, target: Path) -> int:
+    try:
+        app.screenshot(target)
+    except Error as error:
+        logging.getLogger("rosglass.rviz").error("%s", error)
+        return 1
+    return 0

@@ -1,0 +1,87 @@
+"""What RViz needs, and what to do where it is missing; needs nothing of it itself, not even Qt."""
+
+from __future__ import annotations
+
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import rosglass
+from rosglass.errors import UnsupportedError
+
+__all__ = ["PACKAGES", "require_bindings"]
+
+#: The packages of Debian 12 that interfaces over RViz need, besides rosglass.
+PACKAGES = (
+    "rviz python3-rviz python3-ogre-1.12 python3-pyqt5 python3-pyside2.qtcore "
+    "python3-pyside2.qtgui python3-pyside2.qtwidgets python3-pyside2.qtqml "
+    "python3-pyside2.qtquick python3-pyside2.qtopengl python3-pyside2.qtmultimedia "
+    "python3-pyside2.qtmultimediawidgets qml-module-qtquick2 qml-module-qtquick-window2 "
+    "qml-module-qtquick-layouts qml-module-qtquick-controls2 qml-module-qtmultimedia"
+)
+_MODULES = (
+    "rviz",
+    "Ogre",
+    "Ogre.Overlay",
+    "PyQt5",
+    "shiboken2",
+    *(f"PySide2.Qt{name}" for name in ("Core", "Gui", "Widgets", "Qml", "Quick", "OpenGL")),
+)
+#: Where Debian's own Python has the bindings.
+_SYSTEM = Path("/usr/lib/python3/dist-packages")
+
+
+def require_bindings() -> None:
+    """Make sure that this Python has the bindings of RViz, Ogre and Qt 5.
+
+    Raises:
+        UnsupportedError: It has not; the message says what to install, and what to run.
+    """
+    missing = [name for name in _MODULES if not _has(name)]
+    if missing:
+        raise UnsupportedError(_advice(missing))
+
+
+def _has(name: str) -> bool:
+    try:
+        return find_spec(name) is not None
+    except ImportError:
+        return False
+
+
+def _advice(missing: list[str]) -> str:
+    lacks = ", ".join(_without_parts(missing))
+    lines = [
+        f"RViz is used through the system's own Python; this one, {sys.executable}, lacks {lacks}."
+    ]
+    installed = (_SYSTEM / "rviz").exists() and any(_SYSTEM.glob("PySide2/QtWidgets*.so"))
+    own_python = _is_system_python()
+    if own_python or not installed:
+        lines.append(f"Install it (Debian 12): sudo apt install --no-install-recommends {PACKAGES}")
+    if not own_python:
+        root = Path(rosglass.__file__).parents[2]
+        checkout = (root / "pyproject.toml").exists()
+        ready = root / ".venv-system" / "bin" / "rosglass"
+        if ready.exists():
+            lines.append(f"Run it so: {ready} rviz ...")
+        else:
+            source = f"-e {root}" if checkout else "rosglass"
+            lines += [
+                "Make an environment from the system's Python, once:",
+                "    /usr/bin/python3 -m venv --system-site-packages ~/rosglass-rviz",
+                f"    ~/rosglass-rviz/bin/pip install {source}",
+                "Run it so: ~/rosglass-rviz/bin/rosglass rviz ...",
+            ]
+    return "\n".join(lines)
+
+
+def _without_parts(missing: list[str]) -> list[str]:
+    """Return the modules whose package is there, and the packages that are not."""
+    packages = {name.partition(".")[0] for name in missing}
+    absent = {package for package in packages if not _has(package)}
+    return sorted(absent | {name for name in missing if name.partition(".")[0] not in absent})
+
+
+def _is_system_python() -> bool:
+    """Return whether this Python has what Debian's packages bring."""
+    return any(Path(entry) == _SYSTEM for entry in sys.path)
