@@ -24,6 +24,19 @@ __all__ = ["OpenGLScene", "Scene", "SoftwareScene", "make_scene"]
 _OWNER = "_q_sgrendercontext"
 
 
+class _Control(QtQuick.QQuickRenderControl):  # type: ignore[misc]
+    """Tells Qt Quick which window its scene is seen in: only there, items get keys."""
+
+    panel: Any = None
+    #: With a window, a scene would be drawn in units of that one, and not in pixels.
+    drawing = False
+
+    def renderWindow(self, offset: Any) -> Any:  # noqa: ARG002, N802 - Qt's
+        if self.drawing:
+            return None
+        return self.panel.window().windowHandle() if is_alive(self.panel) else None
+
+
 class Scene(QtCore.QObject):
     """A window of Qt Quick that is drawn when it is asked for.
 
@@ -37,7 +50,7 @@ class Scene(QtCore.QObject):
 
     def __init__(self) -> None:
         super().__init__()
-        self._control = QtQuick.QQuickRenderControl()
+        self._control = _Control()
         #: The window; its coordinates, and so those of its events, are units times `factor`.
         self.window: Any = QtQuick.QQuickWindow(self._control)
         self.window.setColor(QtGui.QColor(0, 0, 0, 0))
@@ -50,6 +63,10 @@ class Scene(QtCore.QObject):
         self._closed = False
         self._control.sceneChanged.connect(self.changed)
         self._control.renderRequested.connect(self.changed)
+
+    def show_in(self, panel: Any) -> None:
+        """Say which widget shows it: keys, shortcuts and the mouse's shape are its window's."""
+        self._control.panel = panel
 
     def show_item(self, item: Any) -> None:
         """Show a root item in place of the one before; it gets the window's size."""
@@ -75,6 +92,8 @@ class Scene(QtCore.QObject):
         content = self.window.contentItem()
         content.setTransformOrigin(QtQuick.QQuickItem.TopLeft)
         content.setScale(self.factor)
+        # No window system tells the window its size, of which the popups of Controls ask this item.
+        content.setSize(self._units)
         if is_alive(self._item):
             self._item.setSize(self._units)
 
@@ -143,7 +162,9 @@ class OpenGLScene(Scene):
         with self._gl.current():
             self._control.polishItems()
             self._control.sync()
+            self._control.drawing = True
             self._control.render()
+            self._control.drawing = False
             started = time.perf_counter()
             self._buffer.bind()
             read_pixels(width, height, self._pixels)
@@ -180,7 +201,9 @@ class SoftwareScene(Scene):
         """Return how it looks now; see :meth:`Scene.draw`."""
         self._control.polishItems()
         self._control.sync()
+        self._control.drawing = True
         self._image = self._control.grab()
+        self._control.drawing = False
         height, width = self._shape
         words = np.frombuffer(self._image.constBits(), np.uint32)
         rows: NDArray[np.uint32] = words.reshape(self._image.height(), -1)[:height, :width]
