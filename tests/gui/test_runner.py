@@ -257,7 +257,6 @@ def test_a_reload_is_put_off_while_a_call_waits(runner: Runner, file: Path, wait
     from rosglass.qt import QtCore
 
     file.write_text(UI % ("new", "lime"))
-    runner.session.call_ended.connect(runner._reload_at_last)
     during: list[Any] = []
 
     def begin(end: Any) -> None:

@@ -3,30 +3,19 @@
 from __future__ import annotations
 
 import logging
-import os
 import re
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import QmlError
-from rosglass.qml.load_errors import error_list
-from rosglass.qml.modules import install
-from rosglass.qml.places import import_folder, interface_file
+from rosglass.qml.error_view import ErrorView
+from rosglass.qml.live_file import LiveFile
 from rosglass.qml.runtime import runtime_of
-from rosglass.qml.watcher import Watcher
-from rosglass.qt import (
-    QT6,
-    QtCore,
-    QtGui,
-    QtQml,
-    QtQuick,
-    Slot,
-    is_alive,
-    send_deferred_deletes,
-)
+from rosglass.qt import QtCore, QtGui, QtQuick, Slot, is_alive, send_deferred_deletes
 
 if TYPE_CHECKING:
+    import os
     from collections.abc import Sequence
 
     from rosglass.qml.kiosk import Kiosk
@@ -36,11 +25,7 @@ __all__ = ["Runner", "needs_widgets"]
 
 _log = logging.getLogger("rosglass.qml")
 _DEFAULT_SIZE = (1024, 640)
-_OVERLAY = Path(__file__).with_name("ErrorOverlay.qml")
-_HEADINGS = (
-    "This interface has errors. It is shown once they are mended.",
-    "The interface below is the last one without errors.",
-)
+_ERRORS = Path(__file__).with_name("ErrorOverlay.qml")
 _WIDGET_MODULES = re.compile(r"^\s*import\s+(QtCharts|Qt\.labs\.platform)\b", re.MULTILINE)
 
 
@@ -83,14 +68,10 @@ class Runner(QtCore.QObject):
         import_paths: Sequence[str | os.PathLike[str]] = (),
     ) -> None:
         super().__init__()
-        self.file, self.session = interface_file(file), session
+        self._live = LiveFile(file, session, watch=watch, import_paths=import_paths)
+        self.file, self.session = self._live.path, session
+        self.engine = self._live.engine
         self._fullscreen = fullscreen or kiosk
-        folders = [import_folder(path) for path in import_paths]
-        self.engine = QtQml.QQmlEngine()
-        # The last one is looked into first, and nothing hides our own modules.
-        for path in [*_environment_paths(), *map(str, reversed(folders))]:
-            self.engine.addImportPath(path)
-        install(self.engine, session)
         self.engine.quit.connect(self._quit)
         self.engine.exit.connect(self.exit)
         #: The window the interface is in, or the first of those it opens; None while it has none.
@@ -101,22 +82,13 @@ class Runner(QtCore.QObject):
         self.exit_code: int | None = None
         #: Whether `window` is ours, around an interface that is no window itself.
         self._own = False
-        self._root: QtCore.QObject | None = None
-        # Must live as long as its root: dropping it destroys the root.
-        self._component: QtQml.QQmlComponent | None = None
-        self._overlays: list[Any] = []
-        self._overlay_component: QtQml.QQmlComponent | None = None
-        #: Interfaces that were replaced and are not destroyed yet.
-        self._leaving = 0
-        self._put_off = False
+        self._errors = ErrorView(self.engine, _ERRORS)
         self._kiosk: Kiosk | None = None
         app: Any = QtCore.QCoreApplication.instance()
         if kiosk and app is not None:
             from rosglass.qml.kiosk import Kiosk  # noqa: PLC0415 - few screens are kiosks
 
             self._kiosk = Kiosk(app)
-        # Before anything is read, so that no change in between goes unnoticed.
-        self._watcher = Watcher(self.file.parent, *folders) if watch else None
 
     def load(self) -> None:
         """Show the file; one with errors that is watched is shown once they are mended.
@@ -126,17 +98,16 @@ class Runner(QtCore.QObject):
         """
         self.session.put_off()
         try:
-            self._show(*self._create())
+            made = self._live.create()
+            self._live.replace(made, lambda: self._show(made.root))
             self._await_frame()
         except QmlError as error:
             self.session.go_on()
-            if self._watcher is None:
+            if not self._live.watch:
                 raise
             _log.error("%s", error)
             self._show_empty(str(error))
-        if self._watcher is not None:
-            self._watcher.changed.connect(self.reload)
-            self.session.call_ended.connect(self._reload_at_last)
+        self._live.due.connect(self.reload)
 
     def reload(self) -> bool:
         """Show the file as it is now; with errors, keep what is shown and show them over it.
@@ -146,35 +117,26 @@ class Runner(QtCore.QObject):
         Returns:
             Whether it is shown.
         """
-        self._put_off = bool(self.session.waiting_calls)
-        if self._put_off or not is_alive(self.engine):
+        if not self._live.is_ready():
             return False
         started = time.perf_counter()
-        self.engine.clearComponentCache()
         before = {id(window): window for window in self.windows()}
         try:
-            root, component = self._create()
+            made = self._live.create()
         except QmlError as error:
             _log.error("%s", error)
             self._show_errors(str(error))
             return False
-        self._hide_errors()
+        self._errors.hide()
+
+        def show() -> None:
+            self._show(made.root, list(before.values()))
+            for window in before.values():
+                if window is not self.window and is_alive(window):
+                    self._let_go(window)
+
         # Cleaning up, the old interface may shut Ros2 down, which the new one already uses.
-        self.session.holding = True
-        self._leaving += 1
-        old_root, old_component = self._root, self._component
-        self._show(root, component, list(before.values()))
-        for window in before.values():
-            if window is not self.window and is_alive(window):
-                self._let_go(window)
-        if is_alive(old_root) and old_root is not None:
-            # Component.onDestruction runs a little after this signal.
-            old_root.destroyed.connect(
-                lambda: QtCore.QTimer.singleShot(0, lambda: self._reloaded(old_component))
-            )
-            old_root.deleteLater()
-        else:
-            self._reloaded(old_component)
+        self._live.replace(made, show)
         _log.info("%s reloaded in %.0f ms", self.file, (time.perf_counter() - started) * 1000)
         return True
 
@@ -204,14 +166,11 @@ class Runner(QtCore.QObject):
         if self._kiosk is not None:
             self._kiosk.close()
             self._kiosk = None
-        self._watcher = None
-        root, self._root = self._root, None
         window, self.window = self.window, None
-        self._hide_errors()
-        for item in (root, window, self._component, self._overlay_component, self.engine):
-            if is_alive(item) and item is not None:
-                item.deleteLater()
-        self._component = self._overlay_component = None
+        self._errors.hide()
+        self._live.close()
+        if is_alive(window) and window is not None:
+            window.deleteLater()
         send_deferred_deletes()
 
     def _await_frame(self) -> None:
@@ -228,23 +187,8 @@ class Runner(QtCore.QObject):
         if window is not None and is_alive(window):
             window.frameSwapped.disconnect(self._on_frame)
 
-    def _create(self) -> tuple[QtCore.QObject, QtQml.QQmlComponent]:
-        if not os.path.isfile(self.file):  # noqa: PTH113 - pathlib's may raise
-            raise QmlError(f"{self.file}:0:0: there is no such file")
-        component = QtQml.QQmlComponent(self.engine, QtCore.QUrl.fromLocalFile(str(self.file)))
-        root: QtCore.QObject | None = None if component.isError() else component.create()
-        if root is None:
-            raise QmlError(error_list(component.errors(), self.file))
-        return root, component
-
-    def _show(
-        self,
-        root: QtCore.QObject,
-        component: QtQml.QQmlComponent,
-        before: Sequence[QtQuick.QQuickWindow] = (),
-    ) -> None:
+    def _show(self, root: QtCore.QObject, before: Sequence[QtQuick.QQuickWindow] = ()) -> None:
         old, was_own = self.window, self._own
-        self._root, self._component = root, component
         self._own = isinstance(root, QtQuick.QQuickItem)
         if isinstance(root, QtQuick.QQuickItem):
             stays = old is not None and was_own
@@ -310,39 +254,8 @@ class Runner(QtCore.QObject):
             # Around an item; QML destroys its own with their root.
             window.deleteLater()
 
-    def _reload_at_last(self) -> None:
-        # The call that has ended is still to return into QML.
-        if self._put_off:
-            QtCore.QTimer.singleShot(0, self.reload)
-
-    def _reloaded(self, old_component: QtQml.QQmlComponent | None) -> None:
-        self._leaving -= 1
-        if not self._leaving:
-            self.session.holding = False
-        if is_alive(old_component) and old_component is not None:
-            old_component.deleteLater()
-        if is_alive(self.engine):
-            # Publishers of the old interface live until they are collected.
-            self.engine.collectGarbage()
-
     def _show_errors(self, text: str) -> None:
-        if not self._overlays:
-            url = QtCore.QUrl.fromLocalFile(str(_OVERLAY))
-            component = self._overlay_component = QtQml.QQmlComponent(self.engine, url)
-            for window in self.windows():
-                overlay: Any = component.create()
-                overlay.setProperty("heading", _HEADINGS[self._root is not None])
-                overlay.setParentItem(window.contentItem())
-                self._overlays.append(overlay)
-        for overlay in self._overlays:
-            if is_alive(overlay):
-                overlay.setProperty("text", text)
-
-    def _hide_errors(self) -> None:
-        for overlay in self._overlays:
-            if is_alive(overlay):
-                overlay.deleteLater()
-        self._overlays = []
+        self._errors.show(text, self.windows(), below=self._live.made is not None)
 
     def _no_graphics(self, error: Any, message: str) -> None:  # noqa: ARG002 - Qt's signature
         _log.error("the window cannot be drawn: %s; try QT_QUICK_BACKEND=software", message)
@@ -350,12 +263,6 @@ class Runner(QtCore.QObject):
 
     def _quit(self, *_: Any) -> None:
         self.exit(0)
-
-
-def _environment_paths() -> list[str]:
-    """Return what Qt 5 does not read itself: QML_IMPORT_PATH, the first path last."""
-    paths = [] if QT6 else os.environ.get("QML_IMPORT_PATH", "").split(os.pathsep)
-    return [path for path in reversed(paths) if path]
 
 
 def _keep_places(

@@ -114,8 +114,8 @@ class Session(QtCore.QObject):
         self.shared: dict[Any, Any] = {}
         #: When throttled streams fetch their pictures.
         self.balancer = LoadBalancer()
-        #: While true, QML's wish to shut down is ignored: its successor needs the node.
-        self.holding = False
+        #: While any, QML's wish to shut down is ignored: its successor, or others, need the node.
+        self.holding = 0
         #: Calls from QML that wait in an event loop of their own.
         self.waiting_calls = 0
         self._url, self._forced_name, self._connect = url, name, connect
@@ -288,7 +288,7 @@ class Session(QtCore.QObject):
         if self._closed:
             return
         self._closed = True
-        self.holding = False
+        self.holding = 0
         until = time.monotonic() + _PATIENCE
         streams = list(self.streams.values())
         self.shutdown()
