@@ -90,7 +90,7 @@ class Drawing:
         resized = size != self._size or not self._fits
         self._size, self._fits, self.dirty = size, False, False
         started = time.perf_counter()
-        done = False
+        done, drawn = False, 0.0
         pixels: NDArray[np.uint32] | None = None
         overlay.read_back = 0.0
         with guarded(overlay, "drawing"):
@@ -99,14 +99,15 @@ class Drawing:
             self._fits = True
             pixels = overlay.draw()
             _check(pixels, size)
+            drawn = time.perf_counter() - started
+            if pixels is not None:
+                layer.update(pixels)
             done = True
-        drawn = time.perf_counter() - started
         if done and self._failed:
             overlay.tell_problem("")
         self._failed = not done
         if pixels is None or not done:
-            return Work(drawn * 1e3)
-        layer.update(pixels)
+            return Work(1e3 * (time.perf_counter() - started))
         render = drawn - overlay.read_back
         parts = (render, overlay.read_back, layer.compared, layer.uploaded)
         return Work(*(1e3 * part for part in parts))

@@ -23,7 +23,7 @@ _GROUP = "General"
 #: Pixels that are blended in the time that a panel takes to be drawn.
 _PANEL = 2000
 #: Tiles that panels may cover without need before they are placed anew.
-_SLACK = 32
+_SLACK = 128
 
 
 class Layer:
@@ -149,18 +149,19 @@ class Layer:
         if self._unit is None:
             return
         o, part = ogre(), self._opacity
+        # Multiplying by one would cost software OpenGL a third more.
+        how = o.LBX_SOURCE1 if part == 1 else o.LBX_MODULATE
         # Both, for colours are multiplied with their alpha already.
-        faint = o.ColourValue(part, part, part, part)
-        self._unit.setColourOperationEx(
-            o.LBX_MODULATE, o.LBS_TEXTURE, o.LBS_MANUAL, o.ColourValue(1, 1, 1, 1), faint
-        )
-        self._unit.setAlphaOperation(o.LBX_MODULATE, o.LBS_TEXTURE, o.LBS_MANUAL, 1.0, part)
+        one, faint = o.ColourValue(1, 1, 1, 1), o.ColourValue(part, part, part, part)
+        self._unit.setColourOperationEx(how, o.LBS_TEXTURE, o.LBS_MANUAL, one, faint)
+        self._unit.setAlphaOperation(how, o.LBS_TEXTURE, o.LBS_MANUAL, 1.0, part)
 
     def _upload(self, pixels: NDArray[np.uint32], rect: Rect) -> None:
         o = ogre()
         assert self._before is not None
         # Ogre wants memory that it could write to.
-        part = np.ascontiguousarray(pixels[rect.top : rect.bottom, rect.left : rect.right])
+        part = pixels[rect.top : rect.bottom, rect.left : rect.right]
+        part = np.require(part, requirements=["C", "W"])
         self._before[rect.top : rect.bottom, rect.left : rect.right] = part
         height, width = part.shape
         source = o.PixelBox(width, height, 1, o.PF_A8R8G8B8, part.view(np.uint8).reshape(-1))

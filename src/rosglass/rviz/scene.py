@@ -218,13 +218,19 @@ def make_scene() -> Scene:
     """
     if os.environ.get("QSG_RHI", "0") not in ("", "0"):
         raise UnsupportedError("overlays cannot be drawn by Qt's RHI; unset QSG_RHI")
-    if QtQuick.QQuickWindow.sceneGraphBackend() == "software":
+    if _wants_software():
         return SoftwareScene()
     try:
         return OpenGLScene()
     except UnsupportedError:
         # It can be chosen until the first window is made.
         QtQuick.QQuickWindow.setSceneGraphBackend("software")
-        if QtQuick.QQuickWindow.sceneGraphBackend() != "software":
+        if not _wants_software():
             raise
         return SoftwareScene()
+
+
+def _wants_software() -> bool:
+    # Qt looks at the environment when it makes the first window, and tells no sooner.
+    named = os.environ.get("QT_QUICK_BACKEND") or os.environ.get("QMLSCENE_DEVICE")
+    return (QtQuick.QQuickWindow.sceneGraphBackend() or named) in ("software", "softwarecontext")

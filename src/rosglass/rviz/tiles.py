@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 __all__ = ["TILE", "Rect", "changed_tiles", "cover", "covered_tiles", "uncovered", "update_covered"]
 
 #: Pixels of a tile's edge.
-TILE = 16
+TILE = 8
 
 
 class Rect(NamedTuple):
