@@ -346,6 +346,30 @@ def test_controls_popups_canvas_and_shaders_are_drawn(
     assert colour(picture, 345, 205) == GREY
 
 
+def test_camera_pictures_are_drawn(app: Any, show: Any, grab: Any, wait: Any, master: str) -> None:
+    import rosglass
+
+    show(
+        """Item {
+        VideoOutput { x: 20; y: 20; width: 64; height: 48; fillMode: VideoOutput.Stretch
+            source: ImageTransportSubscription { topic: "/test/camera/image" } }
+        Component.onCompleted: Ros2.init("camera_overlay") }""".replace(
+            "Item {", "import QtMultimedia 5.15\nimport Ros2 1.0\nItem {", 1
+        )
+    )
+    with rosglass.connect(master.replace("http", "ros1"), name="camera") as node:
+        publisher = node.create_publisher("/test/camera/image", "sensor_msgs/Image")
+        data = bytes((255, 128, 0)) * (64 * 48)
+        image = {"height": 48, "width": 64, "encoding": "rgb8", "step": 192, "data": data}
+
+        def arrived() -> bool:
+            publisher.publish(image)
+            wait(50)
+            return colour(grab(), 50, 40) == (255, 128, 0)
+
+        wait(arrived)
+
+
 def test_items_without_a_size_fill_the_view(show: Any, app: Any, frames: Any) -> None:
     overlay = show("Item { }")
     frames(2)
