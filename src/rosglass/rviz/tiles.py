@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
@@ -15,6 +15,8 @@ __all__ = ["TILE", "Rect", "changed_tiles", "cover", "covered_tiles", "uncovered
 
 #: Pixels of a tile's edge.
 TILE = 8
+#: Rows of pixels that are compared at a time; a multiple of a tile's.
+_LOOK = 64
 
 
 class Rect(NamedTuple):
@@ -56,7 +58,17 @@ def covered_tiles(pixels: NDArray[np.uint32]) -> NDArray[np.bool_]:
         pixels: Shape (height, width), each pixel 0xAARRGGBB with premultiplied colours; a colour
             without alpha shines, and is seen as well.
     """
-    return _per_tile(pixels.shape, lambda rows: np.bitwise_or.reduce(pixels[rows], axis=0))
+    height, width = pixels.shape
+    whole = height // TILE
+    columns = np.zeros((-(-height // TILE), width), np.uint32)
+    full = pixels[: whole * TILE].reshape(whole, TILE, width)
+    np.bitwise_or.reduce(full, axis=1, out=columns[:whole])
+    if whole < len(columns):
+        np.bitwise_or.reduce(pixels[whole * TILE :], axis=0, out=columns[whole])
+    tiles: NDArray[np.bool_] = (
+        np.bitwise_or.reduceat(columns, np.arange(0, width, TILE), axis=1) != 0
+    )
+    return tiles
 
 
 def update_covered(
@@ -69,26 +81,13 @@ def update_covered(
 
 def changed_tiles(pixels: NDArray[np.uint32], before: NDArray[np.uint32]) -> NDArray[np.bool_]:
     """Return for each tile whether two pictures of one size differ in it."""
-
-    def changed(rows: slice) -> NDArray[np.uint32] | None:
-        now, then = pixels[rows], before[rows]
-        # Most of a picture stays as it is, which is found out faster than what is another.
-        return np.bitwise_or.reduce(now ^ then, axis=0) if (now != then).any() else None
-
-    return _per_tile(pixels.shape, changed)
-
-
-def _per_tile(
-    shape: tuple[int, ...], bits: Callable[[slice], NDArray[np.uint32] | None]
-) -> NDArray[np.bool_]:
-    """Ask for each row of tiles which of its columns have bits; None means none."""
-    height, width = shape
+    height, width = pixels.shape
     tiles = np.zeros((-(-height // TILE), -(-width // TILE)), np.bool_)
-    starts = np.arange(0, width, TILE)
-    for row, top in enumerate(range(0, height, TILE)):
-        columns = bits(slice(top, top + TILE))
-        if columns is not None:
-            tiles[row] = np.bitwise_or.reduceat(columns, starts) != 0
+    for top in range(0, height, _LOOK):
+        now, then = pixels[top : top + _LOOK], before[top : top + _LOOK]
+        # Most of a picture stays as it is, which is found out faster than what is another.
+        if (now != then).any():
+            tiles[top // TILE : -(-(top + _LOOK) // TILE)] = covered_tiles(now ^ then)
     return tiles
 
 
@@ -136,20 +135,18 @@ def _halved(tiles: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def _runs_below_each_other(tiles: NDArray[np.bool_]) -> list[Rect]:
     """Return runs of tiles, those that stand alike in rows below each other as one."""
+    padded = np.pad(tiles, 1)
+    edges = padded[:, 1:] != padded[:, :-1]
     done: list[Rect] = []
     growing: dict[tuple[int, int], int] = {}
-    for row in range(tiles.shape[0] + 1):
-        runs = _runs(tiles[row]) if row < tiles.shape[0] else []
+    for row in np.flatnonzero((edges[1:] != edges[:-1]).any(axis=1)).tolist():
+        starts = np.flatnonzero(edges[row + 1]).tolist()
+        runs = set(zip(starts[::2], starts[1::2], strict=True))
         ended = [run for run in growing if run not in runs]
         done += [Rect(left, growing.pop((left, right)), right, row) for left, right in ended]
-        for run in runs:
+        for run in sorted(runs):
             growing.setdefault(run, row)
     return done
-
-
-def _runs(row: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(row, prepend=False, append=False))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
 def _joined(rects: list[Rect], worth: int) -> list[Rect]:
