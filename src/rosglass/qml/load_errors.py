@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rosglass.qml.log import plain_path
@@ -10,13 +11,13 @@ from rosglass.qt import QT6
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
     from rosglass.qt import QtQml
 
 __all__ = ["error_list"]
 
 _MODULE = re.compile(r'module "([\w.]+)"(?: version ([\d.]+))?')
+_UNVERSIONED = re.compile(r"\s*import\s+[\w.]+\s*(?:as\b|;|//|$)")
 _OURS = {"Ros", "Ros2"}
 _TYPE = re.compile(r"^(\w+) is not a type$")
 #: Types that only one of our modules has -> the module, and what the other one calls it.
@@ -57,11 +58,20 @@ def error_list(errors: Sequence[QtQml.QQmlError], file: Path) -> str:
         place = plain_path(error.url().toString()) or str(file)
         text = error.description()
         hint = _advice(text)
-        lines.append(
-            f"{place}:{max(error.line(), 0)}:{max(error.column(), 0)}: {text}"
-            f"{f'; {hint}' if hint else ''}"
-        )
+        line, column = max(error.line(), 0), max(error.column(), 0)
+        if not line and "requires a version" in text:
+            line, column = _unversioned(place), 1
+        lines.append(f"{place}:{line}:{column}: {text}{f'; {hint}' if hint else ''}")
     return "\n".join(lines) or f"{file}:0:0: it could not be created"
+
+
+def _unversioned(place: str) -> int:
+    """Return the line of the first import without a version, which Qt 5 does not tell; or 0."""
+    try:
+        lines = Path(place).read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return 0
+    return next((n for n, line in enumerate(lines, 1) if _UNVERSIONED.match(line)), 0)
 
 
 def _advice(text: str) -> str:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rosglass.qt import QtGui
+    from rosglass.rviz.window import Window
 
 __all__ = ["SCALES", "Overlay"]
 
@@ -41,6 +42,8 @@ class Overlay(QtCore.QObject):
     changed = Signal()
     #: `z`, `scale`, `opacity` or `visible` is another now.
     arranged = Signal()
+    #: Something else is in its place, which has neither the mouse nor the keys; itself.
+    renewed = Signal(object)
     #: Something is wrong with it, or no longer, if empty.
     problem_changed = Signal(str)
 
@@ -114,6 +117,9 @@ class Overlay(QtCore.QObject):
         if problem != self._problem:
             self._problem = problem
             self.problem_changed.emit(problem)
+
+    def attach(self, window: Window) -> None:
+        """Be told over which RViz it is shown, before anything else happens to it."""
 
     def resize(self, width: int, height: int, ratio: float) -> None:
         """Fit it to the 3D view.

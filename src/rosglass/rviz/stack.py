@@ -49,10 +49,12 @@ class Stack(QtCore.QObject):
         """
         if self.find(overlay.name) is not None:
             raise Error(f"there is an overlay {overlay.name!r} already; give this one another name")
+        overlay.attach(self._window)
         entry = Drawing(overlay)
         self._entries.append(entry)
         overlay.changed.connect(entry.mark)
         overlay.arranged.connect(self._arrange)
+        overlay.renewed.connect(self.input.forget)
         self._arrange()
 
     def remove(self, overlay: Overlay) -> None:
@@ -62,6 +64,7 @@ class Stack(QtCore.QObject):
                 self._entries.remove(entry)
                 overlay.changed.disconnect(entry.mark)
                 overlay.arranged.disconnect(self._arrange)
+                overlay.renewed.disconnect(self.input.forget)
                 entry.close()
                 self.input.forget(overlay)
                 if self._drawing:
