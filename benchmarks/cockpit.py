@@ -198,7 +198,10 @@ def publish(url: str) -> None:
             for camera in cameras:
                 camera.publish(
                     header={"stamp": now},
-                    width=640, height=480, encoding="rgb8", step=1920,
+                    width=640,
+                    height=480,
+                    encoding="rgb8",
+                    step=1920,
                     data=pixels,
                 )
         tf.send_transform(
