@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from rosglass.errors import Error
 from rosglass.qt import QtCore, Signal, is_alive
 from rosglass.rviz.drawing import Drawing, Work
+from rosglass.rviz.guard import guarded
 from rosglass.rviz.input import Input
 from rosglass.rviz.layer import HIGHEST_Z
 
@@ -68,10 +69,10 @@ class Stack(QtCore.QObject):
                 entry.close()
                 self.input.forget(overlay)
                 if self._drawing:
-                    self._later.append(overlay.close)
+                    self._later.append(lambda: _close(overlay))
                 else:
                     # It may be handling the very event that had it removed.
-                    self.input.after_event(overlay.close)
+                    self.input.after_event(lambda: _close(overlay))
                 self.changed.emit()
                 return
 
@@ -131,15 +132,23 @@ class Stack(QtCore.QObject):
         if not is_alive(panel) or not panel.isVisible() or panel.window().isMinimized():
             return
         width, height, ratio = self._window.view_size()
-        if not width or not height:
+        # QML that waits for an answer has RViz's timer go off meanwhile.
+        if not width or not height or self._drawing:
             return
         # What is drawn may have overlays come and go, itself included.
         self._drawing = True
-        works = [entry.before_frame(width, height, ratio) for entry in list(self._entries)]
-        self._drawing = False
+        try:
+            works = [entry.before_frame(width, height, ratio) for entry in list(self._entries)]
+        finally:
+            self._drawing = False
         later, self._later = self._later, []
         for close in later:
             close()
         done = [work for work in works if work is not None]
         if done:
             self.drawn.emit(Work(*map(sum, zip(*done, strict=True))))
+
+
+def _close(overlay: Overlay) -> None:
+    with guarded(overlay, "closing"):
+        overlay.close()
