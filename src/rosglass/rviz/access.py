@@ -1,0 +1,120 @@
+"""RViz from Python, without an interface: its tools, displays, views, camera and config."""
+
+from __future__ import annotations
+
+import time
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from rosglass.qt import QtCore, Signal
+from rosglass.rviz.displays_access import Displays
+from rosglass.rviz.frames import Frames
+from rosglass.rviz.picking import Picker
+from rosglass.rviz.tools import Tools
+from rosglass.rviz.trackers import Trackers
+from rosglass.rviz.view import View
+from rosglass.rviz.views import Views
+from rosglass.rviz.watch import Hook
+
+if TYPE_CHECKING:
+    from rosglass.qml.session import Session
+    from rosglass.rviz.window import Window
+
+__all__ = ["Access"]
+
+
+class Access(QtCore.QObject):
+    """What an interface can ask of RViz; ``Application.rviz``.
+
+    Parts are made when they are first asked for. Used in the GUI thread.
+
+    Args:
+        window: RViz.
+        session: The node that receives transforms.
+    """
+
+    #: Another frame is the fixed one.
+    fixed_frame_changed = Signal()
+    #: :attr:`frame_rate` is another.
+    frame_rate_changed = Signal()
+
+    def __init__(self, window: Window, session: Session) -> None:
+        super().__init__()
+        self.window, self._session = window, session
+        self._rate, self._frames_drawn, self._since = 0.0, 0, time.monotonic()
+        window.before_frame.connect(self._count)
+        self._timer = QtCore.QTimer(self)
+        self._timer.setInterval(1000)
+        self._timer.timeout.connect(self._measure)
+        self._timer.start()
+        options = window.manager.getRootDisplayGroup().subProp("Global Options")
+        # RViz has no signal of its own for it.
+        self._hook = Hook(self.fixed_frame_changed.emit)
+        self._hook.watch(options.subProp("Fixed Frame"), "changed()")
+
+    @cached_property
+    def tools(self) -> Tools:
+        """The tools."""
+        return Tools(self.window)
+
+    @cached_property
+    def displays(self) -> Displays:
+        """The displays."""
+        return Displays(self.window)
+
+    @cached_property
+    def frames(self) -> Frames:
+        """Where the robot's frames are."""
+        return Frames(self._session, self.window)
+
+    @cached_property
+    def view(self) -> View:
+        """The camera, moved."""
+        return View(self.window, self.frames)
+
+    @cached_property
+    def views(self) -> Views:
+        """The kinds of views, and those that are saved."""
+        return Views(self.window)
+
+    @cached_property
+    def picker(self) -> Picker:
+        """What is under a pixel, and pictures."""
+        return Picker(self.window)
+
+    @cached_property
+    def trackers(self) -> Trackers:
+        """Points followed on the 3D view."""
+        return Trackers(self.window, lambda: self.frames)
+
+    @property
+    def fixed_frame(self) -> str:
+        """RViz's fixed frame."""
+        return str(self.window.manager.getFixedFrame())
+
+    @fixed_frame.setter
+    def fixed_frame(self, frame: str) -> None:
+        self.displays.set("Global Options/Fixed Frame", frame)
+
+    @property
+    def frame_rate(self) -> float:
+        """How many frames RViz has drawn in the last second."""
+        return self._rate
+
+    def close(self) -> None:
+        """Let go of what follows RViz and the robot; safe to call twice."""
+        self._timer.stop()
+        for name, part in list(self.__dict__.items()):
+            if name in ("displays", "frames"):
+                part.close()
+
+    def _count(self) -> None:
+        self._frames_drawn += 1
+
+    def _measure(self) -> None:
+        now = time.monotonic()
+        rate = round(self._frames_drawn / max(now - self._since, 0.001), 1)
+        self._frames_drawn, self._since = 0, now
+        if rate != self._rate:
+            self._rate = rate
+            self.frame_rate_changed.emit()

@@ -1,0 +1,357 @@
+"""RViz's displays: which there are, how they are, their properties; adding and removing them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rosglass.errors import Error
+from rosglass.qt import QtCore, Signal
+from rosglass.rviz import property_access
+from rosglass.rviz.host import as_pyside
+from rosglass.rviz.plugins import DISPLAY, declared, require_class_id
+from rosglass.rviz.qt5 import QtWidgets
+from rosglass.rviz.tools import failure
+from rosglass.rviz.watch import Hook, address, class_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from rosglass.rviz.window import Window
+
+__all__ = ["Display", "Displays", "Status", "status_of"]
+
+#: Milliseconds between looks at what no signal tells.
+_PERIOD = 200
+_LONGEST = 1000
+_SIGNALS = ("displayAdded(rviz::Display*)", "displayRemoved(rviz::Display*)")
+
+
+class Status(NamedTuple):
+    """How a display is, by its own account."""
+
+    #: ``ok``, ``warn`` or ``error``.
+    level: str
+    #: What it says about itself, one line for each; empty where it says nothing.
+    text: str
+
+
+def status_of(item: Any) -> Status:
+    """Return the status below a display, or of RViz below its root."""
+    for index in range(item.numChildren()):
+        child = item.childAt(index)
+        if class_of(child) == "rviz::StatusList":
+            level = str(child.getName()).rpartition(":")[2].strip().lower()
+            each = [child.childAt(at) for at in range(child.numChildren())]
+            lines = [f"{one.getName()}: {one.getValue()}" for one in each]
+            return Status(level or "ok", "\n".join(lines))
+    return Status("ok", "")
+
+
+class Display:
+    """One display; its name and class stay readable once it is gone. Made by :class:`Displays`."""
+
+    def __init__(self, owner: Displays, handle: Any) -> None:
+        self._owner = owner
+        #: RViz's display; None once it is gone.
+        self.handle: Any = handle
+        #: The class, e.g. ``rviz/Grid``.
+        self.class_id = str(handle.getClassId())
+        self._told = self._read()
+
+    def _read(self) -> tuple[str, bool, Status]:
+        if self.handle is None:
+            return self._told
+        handle = self.handle
+        return str(handle.getName()), bool(handle.isEnabled()), status_of(handle)
+
+    def refresh(self) -> bool:
+        """Remember how it is now; returns whether it was another way."""
+        before, self._told = self._told, self._read()
+        return before != self._told
+
+    @property
+    def exists(self) -> bool:
+        """Whether RViz still has it."""
+        return self.handle is not None
+
+    @property
+    def at(self) -> int:
+        """Where in memory RViz has it; 0 once it is gone."""
+        return 0 if self.handle is None else address(self.handle)
+
+    @property
+    def name(self) -> str:
+        """Its name in the panel; several displays may have the same.
+
+        Raises:
+            Error: It is set to no text of one line, or the display is gone.
+        """
+        return self._read()[0]
+
+    @name.setter
+    def name(self, name: str) -> None:
+        self.require().setName(_plain_name(name))
+        self._owner.settle()
+
+    @property
+    def enabled(self) -> bool:
+        """Whether it is shown.
+
+        Raises:
+            Error: It is set once the display is gone.
+        """
+        return self.exists and self._read()[1]
+
+    @enabled.setter
+    def enabled(self, enabled: bool) -> None:
+        self.require().setEnabled(enabled)
+        self._owner.settle()
+
+    @property
+    def status(self) -> Status:
+        """How it is; an error once it is gone."""
+        return self._read()[2] if self.exists else Status("error", f"{self.name} was removed")
+
+    def properties(self) -> list[dict[str, Any]]:
+        """Return all its properties; see :func:`rosglass.rviz.property_access.describe`.
+
+        Raises:
+            Error: It is gone.
+        """
+        return property_access.describe(self.require())
+
+    def get(self, path: str | Sequence[str]) -> Any:
+        """Return the value of a property; see :func:`rosglass.rviz.property_access.read`.
+
+        Args:
+            path: E.g. ``Offset/X``.
+
+        Raises:
+            Error: It has no such property, or is gone.
+        """
+        return property_access.read(property_access.find(self.require(), path, self.name))
+
+    def set(self, path: str | Sequence[str], value: Any) -> None:
+        """Change a property; see :func:`rosglass.rviz.property_access.write`.
+
+        Args:
+            path: E.g. ``Offset/X``.
+            value: Its new value.
+
+        Raises:
+            Error: It has no such property or is gone, or the property cannot hold the value.
+        """
+        found = property_access.find(self.require(), path, self.name)
+        property_access.write(found, value, f"{self.name}/{path}")
+        self._owner.settle()
+
+    def require(self) -> Any:
+        """Return RViz's display.
+
+        Raises:
+            Error: It is gone.
+        """
+        if self.handle is None:
+            raise Error(f"the display {self.name} was removed or moved; ask for it again")
+        return self.handle
+
+
+class Displays(QtCore.QObject):
+    """The displays of an RViz, those in groups included.
+
+    Signals are sent when RViz has done with what it was doing, so that whoever hears them may add
+    and remove displays again. A display that is dragged to another group is another one then.
+
+    Args:
+        window: RViz.
+    """
+
+    #: A display came: the :class:`Display`.
+    added = Signal(object)
+    #: A display went: the :class:`Display`.
+    removed = Signal(object)
+    #: Another name, status, or shown or not: the :class:`Display`.
+    changed = Signal(object)
+    #: RViz's own status is another: the fixed frame is not known, for instance.
+    status_changed = Signal()
+
+    def __init__(self, window: Window) -> None:
+        super().__init__()
+        self._window = window
+        self._root = window.manager.getRootDisplayGroup()
+        self._displays: list[Display] = []
+        self._told: list[Display] = []
+        self._status = status_of(self._root)
+        self._groups: set[int] = set()
+        self._scheduled = False
+        self._hook = Hook(self._on_change)
+        self._match()
+        self._told = list(self._displays)
+        self._timer = QtCore.QTimer(self)
+        self._timer.setInterval(_PERIOD)
+        self._timer.timeout.connect(self.settle)
+        self._timer.start()
+
+    @property
+    def all(self) -> list[Display]:
+        """The displays in the order of the panel."""
+        return list(self._displays)
+
+    @property
+    def classes(self) -> list[str]:
+        """Ids of the classes that can be added."""
+        return list(declared(DISPLAY))
+
+    @property
+    def status(self) -> Status:
+        """How RViz itself is, e.g. whether it knows the fixed frame."""
+        return status_of(self._root)
+
+    def find(self, name: str) -> Display | None:
+        """Return the first display of a name."""
+        return next((display for display in self._displays if display.name == name), None)
+
+    def get(self, path: str | Sequence[str]) -> Any:
+        """Return the value of a property of any display, or of RViz.
+
+        Args:
+            path: E.g. ``Grid/Color`` or ``Global Options/Background Color``.
+
+        Raises:
+            Error: There is no such property.
+        """
+        return property_access.read(self._find_property(path))
+
+    def set(self, path: str | Sequence[str], value: Any) -> None:
+        """Change a property of any display, or of RViz; see :meth:`get`.
+
+        Raises:
+            Error: There is no such property, or it cannot hold the value.
+        """
+        names = path if isinstance(path, str) else "/".join(map(str, path))
+        property_access.write(self._find_property(names), value, names[:120])
+        self.settle()
+
+    def options(self) -> list[dict[str, Any]]:
+        """Return RViz's global options; see :func:`rosglass.rviz.property_access.describe`."""
+        return property_access.describe(self._root)
+
+    def _find_property(self, path: str | Sequence[str]) -> Any:
+        names = path if isinstance(path, str) else "/".join(map(str, path))
+        for display in self._displays:
+            if names.startswith(f"{display.name}/"):
+                rest = names[len(display.name) + 1 :]
+                return property_access.find(display.require(), rest, display.name)
+        return property_access.find(self._root, names, "RViz")
+
+    def add(self, class_id: str, name: str = "", *, enabled: bool = True) -> Display:
+        """Add a display, as the last one.
+
+        Args:
+            class_id: E.g. ``rviz/Grid``.
+            name: Its name; that of the class by default.
+            enabled: Whether it is shown.
+
+        Raises:
+            Error: There is no such class, or it could not be loaded.
+        """
+        class_id = require_class_id(class_id, DISPLAY)
+        shown = _plain_name(name) if name else class_id.rpartition("/")[2]
+        handle = self._window.manager.createDisplay(class_id, shown, enabled)
+        text = failure(handle, class_id, DISPLAY)
+        if text:
+            self._take(handle)
+            self.settle()
+            raise Error(f"no display was added: {text}")
+        self._match()
+        at = address(handle)
+        made = next(display for display in self._displays if display.at == at)
+        self.settle()
+        return made
+
+    def remove(self, display: Display) -> None:
+        """Remove a display, with those in it.
+
+        Raises:
+            Error: It was removed before.
+        """
+        self._take(display.require())
+        self.settle()
+
+    def _take(self, handle: Any) -> None:
+        self.settle_panel()
+        wrapped = as_pyside(handle, QtCore.QObject)
+        # As RViz's own panel does it: displays may have sent signals from other threads.
+        handle.disconnect()
+        handle.getParent().takeChild(handle)
+        wrapped.deleteLater()
+
+    def settle_panel(self) -> None:
+        """Have RViz's panels hide and show what they were told to.
+
+        They do so later, and crash by properties whose display was removed in between.
+        """
+        event = int(QtCore.QEvent.Type.MetaCall)
+        for tree in self._window.widget.findChildren(QtWidgets.QTreeView):
+            QtCore.QCoreApplication.sendPostedEvents(tree, event)
+
+    def settle(self) -> None:
+        """Tell what has changed since it was told last."""
+        self._scheduled = False
+        self._match()
+        before, self._told = self._told, list(self._displays)
+        for display in before:
+            if not display.exists:
+                self.removed.emit(display)
+        for display in self._told:
+            if display not in before:
+                self.added.emit(display)
+            elif display.refresh():
+                self.changed.emit(display)
+        status = self.status
+        if status != self._status:
+            self._status = status
+            self.status_changed.emit()
+
+    def close(self) -> None:
+        """Look no longer at what changes; safe to call twice."""
+        self._timer.stop()
+
+    def _on_change(self) -> None:
+        self._match()
+        if not self._scheduled:
+            self._scheduled = True
+            QtCore.QTimer.singleShot(0, self.settle)
+
+    def _match(self) -> None:
+        """Drop at once what RViz is about to delete, before its place goes to another object."""
+        known = {display.at: display for display in self._displays}
+        found, groups = [], set()
+        for handle, is_group in _walk(self._root):
+            at = address(handle)
+            if handle is not self._root:
+                found.append(known.pop(at) if at in known else Display(self, handle))
+            if is_group:
+                groups.add(at)
+                if at not in self._groups:
+                    self._hook.watch(handle, *_SIGNALS)
+        self._displays, self._groups = found, groups
+        for display in known.values():
+            display.handle = None
+
+
+def _walk(group: Any) -> Iterator[tuple[Any, bool]]:
+    """Iterate over a group and the displays in it, and tell which are groups."""
+    yield group, True
+    for index in range(group.numDisplays()):
+        inner = group.getGroupAt(index)
+        if inner is not None:
+            yield from _walk(inner)
+        else:
+            yield group.getDisplayAt(index), False
+
+
+def _plain_name(name: object) -> str:
+    if isinstance(name, str) and name.strip() and len(name) <= _LONGEST and name.isprintable():
+        return name
+    raise Error(f"expected a name, a text of one line, got {name!r:.80}")

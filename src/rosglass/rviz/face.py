@@ -1,0 +1,110 @@
+"""What the faces that QML sees of RViz have in common: values given, values and errors returned."""
+
+from __future__ import annotations
+
+import contextlib
+from typing import TYPE_CHECKING, Any
+
+from rosglass.errors import Error
+from rosglass.qml.js_values import object_of
+from rosglass.qml.plain import plain_from_js
+from rosglass.qt import QJSValue, QtCore, QtGui, QtQml, Slot
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from rosglass.qml.runtime import Runtime
+
+__all__ = ["Face", "given", "place", "taking"]
+
+_OWN: Any = QtQml.QQmlEngine.ObjectOwnership
+
+
+class Face(QtCore.QObject):
+    """An object of QML with which it reaches something of RViz.
+
+    Args:
+        runtime: Of the engine that sees it.
+        parent: What it ends with; without one, it lives until JavaScript has collected it.
+    """
+
+    def __init__(self, runtime: Runtime, parent: QtCore.QObject | None) -> None:
+        super().__init__(parent)
+        self._runtime = runtime
+        if parent is None:
+            runtime.keep(self)
+        else:
+            QtQml.QQmlEngine.setObjectOwnership(self, _OWN.CppOwnership)
+
+    @contextlib.contextmanager
+    def _telling(self, what: str) -> Iterator[None]:
+        """Throw an error into the JavaScript that is running."""
+        try:
+            yield
+        except Error as error:
+            self._runtime.throw(f"{what}: {error}")
+
+    def _to_js(self, item: QtCore.QObject | None) -> QJSValue:
+        """Return an object for JavaScript; null for None."""
+        engine = self._runtime.engine
+        if engine is None or item is None:
+            return QJSValue(QJSValue.SpecialValue.NullValue)
+        return engine.newQObject(item)
+
+    def let_go(self) -> None:
+        """Leave it to JavaScript, which may hold what is no more for as long as it likes."""
+        self.setParent(None)
+        self._runtime.keep(self)
+        # Only what JavaScript has known is ever collected by it.
+        self._to_js(self)
+
+
+def taking(least: int, most: int, result: Any = QJSValue) -> Callable[[Any], Any]:
+    """Make a method callable from QML with so many arguments of any kind."""
+
+    def decorate(function: Any) -> Any:
+        for count in range(least, most + 1):
+            answer = {} if result is None else {"result": result}
+            function = Slot(*[QJSValue] * count, **answer)(function)
+        return function
+
+    return decorate
+
+
+def given(value: QJSValue | None) -> Any:
+    """Return what JavaScript gave: plain values, colours, vectors as dicts, and our own faces.
+
+    Raises:
+        ConversionError: It is a function, refers to itself, or is too large.
+    """
+    if value is None:
+        return None
+    if value.isQObject():
+        return object_of(value)
+    found = plain_from_js(value)
+    names = set(found) if isinstance(found, dict) else set()
+    if names == {"scalar", "x", "y", "z"}:
+        return {"x": found["x"], "y": found["y"], "z": found["z"], "w": found["scalar"]}
+    if {"r", "g", "b", "a", "hsvHue"} <= names:
+        return QtGui.QColor.fromRgbF(*(found[name] for name in "rgba"))
+    return found
+
+
+def place(value: Any, what: str = "a point") -> tuple[float, float, float]:
+    """Return a point that is given as a vector, an object with x, y and z, or a list of three.
+
+    Raises:
+        Error: It is none, or its numbers are not finite.
+    """
+    parts = list(value) if isinstance(value, (list, tuple)) else []
+    if isinstance(value, dict) and {"x", "y", "z"} <= set(value):
+        parts = [value["x"], value["y"], value["z"]]
+    fits = len(parts) == 3 and all(
+        isinstance(part, (int, float)) and not isinstance(part, bool) and abs(part) < 1e30
+        for part in parts
+    )
+    if not fits:
+        raise Error(
+            f"{what}: expected x, y and z in metres, e.g. Qt.vector3d(1, 2, 0), got {value!r:.80}"
+        )
+    return float(parts[0]), float(parts[1]), float(parts[2])

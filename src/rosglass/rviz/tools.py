@@ -1,0 +1,239 @@
+"""RViz's tools: which there are, which one has the mouse, adding and removing them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rosglass.comm.similar import similar
+from rosglass.errors import Error
+from rosglass.qt import QtCore, Signal
+from rosglass.rviz.host import pyqt
+from rosglass.rviz.plugins import TOOL, declared, require_class_id
+from rosglass.rviz.watch import Hook, address, type_name
+
+if TYPE_CHECKING:
+    from rosglass.rviz.window import Window
+
+__all__ = ["Tool", "Tools", "failure"]
+
+#: What stands for what could not be loaded.
+_FAILED = ("N4rviz10FailedToolE", "N4rviz13FailedDisplayE")
+
+
+class Tool:
+    """One tool; what it tells stays readable once it is removed. Made by :class:`Tools` only."""
+
+    def __init__(self, owner: Tools, handle: Any) -> None:
+        self._owner = owner
+        #: RViz's tool; None once it is gone.
+        self.handle: Any = handle
+        #: The class, e.g. ``rviz/Measure``; several tools may have the same.
+        self.class_id = str(handle.getClassId())
+        key = str(handle.getShortcutKey())
+        #: The key that selects it, e.g. ``m``; empty for none.
+        self.shortcut_key = "" if key == "\0" else key
+        self._name = str(handle.getName())
+        self._description = ""
+        self.refresh()
+
+    def refresh(self) -> bool:
+        """Read what may change; returns whether it has."""
+        before = (self._name, self._description)
+        if self.handle is not None:
+            self._name = str(self.handle.getName())
+            self._description = " ".join(str(self.handle.getDescription()).split())
+        return before != (self._name, self._description)
+
+    @property
+    def exists(self) -> bool:
+        """Whether RViz still has it."""
+        return self.handle is not None
+
+    @property
+    def name(self) -> str:
+        """What its button says; several tools may have the same."""
+        return self._name
+
+    @property
+    def description(self) -> str:
+        """What it is for."""
+        return self._description
+
+    @property
+    def selected(self) -> bool:
+        """Whether it has the mouse."""
+        return self.exists and self._owner.current is self
+
+    def select(self) -> None:
+        """Give it the mouse.
+
+        Raises:
+            Error: It was removed.
+        """
+        self._owner.select(self)
+
+    def icon(self) -> Any:
+        """Return its icon, a ``QIcon`` of PyQt5; None once it is removed."""
+        return None if self.handle is None else self.handle.getIcon()
+
+
+class Tools(QtCore.QObject):
+    """The tools of an RViz.
+
+    Signals are sent when RViz has done with what it was doing, so that whoever hears them may add
+    and remove tools again.
+
+    Args:
+        window: RViz.
+    """
+
+    #: A tool came: the :class:`Tool`.
+    added = Signal(object)
+    #: A tool went: the :class:`Tool`.
+    removed = Signal(object)
+    #: Another tool has the mouse.
+    selected = Signal()
+    #: Another name or description: the :class:`Tool`.
+    renamed = Signal(object)
+
+    def __init__(self, window: Window) -> None:
+        super().__init__()
+        self._window = window
+        self._manager = window.manager.getToolManager()
+        self._tools: list[Tool] = []
+        self._told: list[Tool] = []
+        self._told_current: Tool | None = None
+        self._scheduled = False
+        self._hook = Hook(self._on_change)
+        signals = ("toolAdded(Tool*)", "toolRemoved(Tool*)", "toolChanged(Tool*)")
+        self._hook.watch(self._manager, *signals, "toolRefreshed(Tool*)")
+        self._match()
+        self._told, self._told_current = list(self._tools), self.current
+
+    @property
+    def all(self) -> list[Tool]:
+        """The tools in the order of their buttons."""
+        return list(self._tools)
+
+    @property
+    def classes(self) -> list[str]:
+        """Ids of the classes that can be added."""
+        return list(declared(TOOL))
+
+    @property
+    def current(self) -> Tool | None:
+        """The tool that has the mouse; None where there is none."""
+        handle = self._manager.getCurrentTool()
+        if handle is None:
+            return None
+        at = address(handle)
+        return next((t for t in self._tools if t.exists and address(t.handle) == at), None)
+
+    def find(self, class_id: str) -> Tool | None:
+        """Return the first tool of a class."""
+        return next((tool for tool in self._tools if tool.class_id == class_id), None)
+
+    def select(self, tool: Tool) -> None:
+        """Give a tool the mouse.
+
+        Raises:
+            Error: It was removed.
+        """
+        self._manager.setCurrentTool(self._handle(tool))
+        self.settle()
+
+    def add(self, class_id: str) -> Tool:
+        """Add a tool.
+
+        Raises:
+            Error: There is no such class, or it could not be loaded.
+        """
+        class_id = require_class_id(class_id, TOOL)
+        handle = self._manager.addTool(class_id)
+        text = failure(handle, class_id, TOOL)
+        made = next(tool for tool in reversed(self._tools) if tool.handle is not None)
+        if text:
+            self._manager.removeTool(self._manager.numTools() - 1)
+            self.settle()
+            raise Error(f"no tool was added: {text}")
+        self.settle()
+        return made
+
+    def ask_for_new(self) -> None:
+        """Show RViz's dialog for adding a tool, as soon as the event loop is reached."""
+        core = pyqt()
+        frame, queued = self._window.frame, core.Qt.QueuedConnection
+        core.QMetaObject.invokeMethod(frame, "openNewToolDialog", queued)
+
+    def remove(self, tool: Tool) -> None:
+        """Remove a tool; RViz selects its first one where it had the mouse.
+
+        Raises:
+            Error: It was removed before.
+        """
+        self._handle(tool)
+        self._manager.removeTool(self._tools.index(tool))
+        self.settle()
+
+    def remove_all(self) -> None:
+        """Remove every tool: the mouse does nothing in the 3D view until one is added."""
+        self._manager.removeAll()
+        self.settle()
+
+    def settle(self) -> None:
+        """Tell what has changed since it was told last."""
+        self._scheduled = False
+        self._match()
+        before, self._told = self._told, list(self._tools)
+        current, told = self.current, self._told_current
+        self._told_current = current
+        for tool in before:
+            if not tool.exists:
+                self.removed.emit(tool)
+        for tool in self._told:
+            if tool not in before:
+                self.added.emit(tool)
+            elif tool.refresh():
+                self.renamed.emit(tool)
+        if current is not told:
+            self.selected.emit()
+
+    def _handle(self, tool: Tool) -> Any:
+        if tool.handle is None or tool not in self._tools:
+            raise Error(f"the tool {tool.name} was removed")
+        return tool.handle
+
+    def _on_change(self) -> None:
+        self._match()
+        if not self._scheduled:
+            self._scheduled = True
+            QtCore.QTimer.singleShot(0, self.settle)
+
+    def _match(self) -> None:
+        """Drop at once what RViz is about to delete, before its place goes to another object."""
+        manager = self._manager
+        handles = [manager.getTool(index) for index in range(manager.numTools())]
+        known = {address(tool.handle): tool for tool in self._tools}
+        self._tools = [
+            known.pop(address(handle)) if address(handle) in known else Tool(self, handle)
+            for handle in handles
+        ]
+        for gone in known.values():
+            gone.handle = None
+
+
+def failure(handle: Any, class_id: str, base: str) -> str:
+    """Return why RViz has made a stand-in only; empty when it has made what was wanted.
+
+    Args:
+        handle: A tool or a display.
+        class_id: What was wanted.
+        base: Its kind, as in :mod:`rosglass.rviz.plugins`.
+    """
+    if type_name(handle) not in _FAILED:
+        return ""
+    known = declared(base)
+    if class_id in known:
+        return f"{class_id} could not be loaded; RViz's log says why"
+    hint = similar(class_id, known) or f"; there are: {', '.join(known)}"
+    return f"no package has the class {class_id}{hint}"

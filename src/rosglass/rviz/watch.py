@@ -1,0 +1,66 @@
+"""Signals of RViz's C++ objects, whose arguments Python cannot be given; and what they are."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import TYPE_CHECKING, Any
+
+from rosglass.qt import QtCore, Slot
+from rosglass.rviz.host import as_pyside, pyqt
+from rosglass.rviz.qt5 import QtCore as Qt5Core
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+__all__ = ["Hook", "address", "class_of", "is_a", "type_name"]
+
+
+class Hook(QtCore.QObject):
+    """Calls a function for signals, at once, without their arguments.
+
+    Args:
+        call: Called in the middle of whatever RViz does: it may look, and must change nothing.
+    """
+
+    def __init__(self, call: Callable[[], None]) -> None:
+        super().__init__()
+        self._call = call
+
+    def watch(self, sender: Any, *signals: str) -> None:
+        """Call for signals of an object, from RViz's bindings, from now on."""
+        wrapped = as_pyside(sender, QtCore.QObject)
+        for signal in signals:
+            Qt5Core.QObject.connect(wrapped, Qt5Core.SIGNAL(signal), self, Qt5Core.SLOT("_on()"))
+
+    @Slot()
+    def _on(self) -> None:
+        self._call()
+
+
+def address(item: Any) -> int:
+    """Return what tells an object of RViz from every other one that exists now."""
+    return int(pyqt("sip").unwrapinstance(item))
+
+
+def class_of(item: Any) -> str:
+    """Return the C++ class of an object of RViz, e.g. ``rviz::GridDisplay``."""
+    return str(as_pyside(item, QtCore.QObject).metaObject().className())
+
+
+def is_a(item: Any, kind: str) -> bool:
+    """Return whether an object of RViz is of a C++ class, or of one derived from it."""
+    return bool(as_pyside(item, QtCore.QObject).inherits(kind))
+
+
+def type_name(item: Any) -> str:
+    """Return the C++ class of an object of RViz that may not tell it by :func:`class_of`.
+
+    Returns:
+        As compilers write it, e.g. ``N4rviz10FailedToolE``.
+    """
+    # Itanium C++ ABI, section 2.5.2 "Virtual Table Components" and 2.9.5 "RTTI Layout".
+    word = ctypes.sizeof(ctypes.c_void_p)
+    table = ctypes.c_void_p.from_address(address(item)).value or 0
+    info = ctypes.c_void_p.from_address(table - word).value or 0
+    name: bytes = ctypes.c_char_p.from_address(info + word).value or b""
+    return name.decode()

@@ -1,0 +1,508 @@
+"""The object ``rviz`` in QML, and the same from Python, with a real RViz."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+IMPORTS = "import QtQuick 2.15\n"
+TOOLS = ["rviz/Interact", "rviz/MoveCamera", "rviz/Select"]
+
+
+class Qml:
+    """An overlay, and JavaScript that runs in its context."""
+
+    def __init__(self, overlay: Any, wait: Callable[..., None]) -> None:
+        from rosglass.rviz.qt5 import QtCore
+
+        self.overlay, self.wait, self._core = overlay, wait, QtCore
+        self.root = overlay._root
+
+    def run(self, script: str) -> Any:
+        """Return what a script gives, as Python has it; JavaScript's errors are raised."""
+        engine = self.overlay.engine
+        scope = engine.newQObject(self.root)
+        engine.globalObject().setProperty("root", scope)
+        engine.globalObject().setProperty("rviz", engine.newQObject(self.overlay.properties))
+        text = (
+            f"(function () {{ try {{ return JSON.stringify({{ v: (function () {{ {script} }})() }})"
+        )
+        text += "} catch (e) { return JSON.stringify({ e: '' + e }) } })()"
+        import json
+
+        answer = json.loads(engine.evaluate(text).toString())
+        if "e" in answer:
+            raise AssertionError(answer["e"])
+        return answer.get("v")
+
+    def fails(self, script: str) -> str:
+        """Return the error that a script throws."""
+        with pytest.raises(AssertionError) as caught:
+            self.run(script)
+        return str(caught.value)
+
+
+@pytest.fixture
+def tools(app: Any) -> Any:
+    """Return RViz's tools, three of them."""
+    tools = app.rviz.tools
+    tools.remove_all()
+    for class_id in TOOLS:
+        tools.add(class_id)
+    return tools
+
+
+@pytest.fixture
+def displays(app: Any, wait: Callable[..., None]) -> Any:
+    """Return RViz's displays, a grid alone, and take everything away again."""
+    displays = app.rviz.displays
+    for display in displays.all:
+        displays.remove(display)
+    displays.add("rviz/Grid", "Grid")
+    yield displays
+    for display in displays.all:
+        if display.exists:
+            displays.remove(display)
+    wait(20)
+
+
+@pytest.fixture
+def qml(app: Any, wait: Callable[..., None], tmp_path: Path) -> Callable[..., Qml]:
+    """Show QML text over the 3D view."""
+    count = iter(range(100))
+
+    def show(text: str = "Item {}", **options: Any) -> Qml:
+        name = f"Overlay{next(count)}"
+        file = tmp_path / f"{name}.qml"
+        file.write_text(IMPORTS + text)
+        overlay = app.add_qml(file, **options)
+        frames: list[int] = []
+        app.window.before_frame.connect(lambda: frames.append(1))
+        wait(lambda: len(frames) > 2)
+        return Qml(overlay, wait)
+
+    return show
+
+
+def test_tools(app: Any, tools: Any, qml: Any, wait: Any) -> None:
+    here = qml(
+        """Item { property var told: []
+        property Connections c: Connections { target: rviz.toolManager
+            function onToolAdded(tool) { told.push("added " + tool.classId) }
+            function onToolRemoved(tool) {
+                told.push("removed " + tool.classId + " " + tool.exists) }
+            function onToolChanged(tool) { told.push("changed " + tool.classId) }
+            function onToolsChanged() { told.push("tools " + rviz.toolManager.tools.length) } }
+        function log() { const t = told; told = []; return t } }"""
+    )
+    run = here.run
+    assert run("return rviz.toolManager.tools.map(t => t.classId)") == TOOLS
+    assert run("return rviz.toolManager.tools.map(t => t.isSelected)") == [True, False, False]
+    first = "const t = rviz.toolManager.tools[1];"
+    assert run(first + "return [t.name, t.shortcutKey, t.iconSource]") == [
+        "Move Camera",
+        "m",
+        "image://rviz_tool_icons/rviz/MoveCamera",
+    ]
+    assert "viewpoint" in run(first + "return t.description")
+    assert run("return rviz.toolManager.tools[0] === rviz.toolManager.tools[0]")
+    run(first + "rviz.toolManager.currentTool = t")
+    assert run("return rviz.toolManager.currentTool.classId") == "rviz/MoveCamera"
+    assert run(first + "return t.isSelected")
+    run("root.log()")
+    # Two of one class are two tools.
+    assert run(
+        "const m = rviz.toolManager, a = m.addTool('rviz/Measure'), b = m.addTool('rviz/Measure');"
+        "m.currentTool = b; const r = [a === b, a.isSelected, b.isSelected, m.tools.length];"
+        "b.remove(); return r.concat([a.exists, b.exists, b.name, m.tools.length])"
+    ) == [False, False, True, 5, True, False, "Measure", 4]
+    assert run("return root.log()") == [
+        "tools 4",
+        "added rviz/Measure",
+        "tools 5",
+        "added rviz/Measure",
+        "changed rviz/Measure",
+        "tools 4",
+        "removed rviz/Measure false",
+        "changed rviz/Interact",
+    ]
+    # What the user does is told as well.
+    manager = app.window.manager.getToolManager()
+    manager.setCurrentTool(manager.getTool(2))
+    wait(lambda: here.run("return root.told.length"))
+    assert run("return root.log()") == ["changed rviz/Select"]
+    manager.removeTool(3)
+    wait(lambda: here.run("return root.told.length > 1"))
+    assert run("return root.log()") == ["tools 3", "removed rviz/Measure false"]
+    assert "rviz/PublishPoint" in run("return rviz.toolManager.toolClasses")
+    assert run("return rviz.toolManager.getTool('rviz/Measure')") is None
+    run("rviz.toolManager.removeTool(0); rviz.toolManager.removeTool('rviz/Select')")
+    assert [tool.class_id for tool in tools.all] == ["rviz/MoveCamera"]
+    run("rviz.toolManager.removeAll()")
+    assert run("return [rviz.toolManager.tools.length, rviz.toolManager.currentTool]") == [0, None]
+
+
+def test_mistakes_with_tools_say_what_to_do(tools: Any, qml: Any) -> None:
+    here = qml()
+    fails = here.fails
+    assert "did you mean rviz/Measure?" in fails("rviz.toolManager.addTool('rviz/Measur')")
+    assert "expected the id of a class" in fails("rviz.toolManager.addTool('; rm -rf /')")
+    assert "there are 3" in fails("rviz.toolManager.removeTool(7)")
+    assert "rviz/Select" in fails("rviz.toolManager.removeTool('rviz/Measure')")
+    assert "expected a tool" in fails("rviz.toolManager.currentTool = null")
+    gone = "const t = rviz.toolManager.tools[2]; t.remove();"
+    assert "the tool Select was removed" in fails(gone + "t.select()")
+    assert len(tools.all) == 2
+
+
+def test_tool_icons(tools: Any, qml: Any, wait: Any) -> None:
+    here = qml(
+        """Row { property alias a: a; property alias b: b; property alias c: c
+        Image { id: a; source: rviz.toolManager.getTool("rviz/Select").iconSource }
+        Image { id: b; source: a.source; sourceSize.width: 20 }
+        Image { id: c; source: "image://rviz_tool_icons/no/Such" } }"""
+    )
+    sizes = (
+        "return [root.a, root.b, root.c].map(i => [i.status, i.sourceSize.width, i.implicitHeight])"
+    )
+    wait(lambda: here.run(sizes)[0][0] == 1)
+    assert here.run(sizes) == [[1, 48, 48], [1, 20, 20], [1, 48, 48]]
+
+
+def test_displays(app: Any, displays: Any, qml: Any, wait: Any) -> None:
+    here = qml(
+        """Item { property var told: []
+        property Connections c: Connections { target: rviz
+            function onDisplayAdded(d) { told.push("added " + d.name) }
+            function onDisplayRemoved(d) { told.push("removed " + d.name + " " + d.exists) } }
+        property var grid: rviz.display("Grid")
+        property bool shown: grid.enabled
+        property string called: grid.name }"""
+    )
+    run = here.run
+    assert run("return rviz.displays.map(d => [d.name, d.classId, d.enabled, d.status])") == [
+        ["Grid", "rviz/Grid", True, "ok"]
+    ]
+    run("root.grid.enabled = false")
+    assert not app.window.manager.getRootDisplayGroup().getDisplayAt(0).isEnabled()
+    assert run("return root.shown") is False
+    app.window.manager.getRootDisplayGroup().getDisplayAt(0).setEnabled(True)
+    wait(lambda: run("return root.shown"))
+    run("root.grid.name = 'Floor'")
+    assert run("return root.called") == "Floor"
+    made = run(
+        "const d = rviz.addDisplay('rviz/RobotModel', 'Robot'); root.grid = d; "
+        "return [d.name, d.classId, d.enabled, rviz.displays.length]"
+    )
+    assert made == ["Robot", "rviz/RobotModel", True, 2]
+    wait(lambda: run("return root.grid.status === 'error'"))
+    assert "robot_description" in run("return root.grid.statusText")
+    run("rviz.removeDisplay('Robot')")
+    assert run("return [root.grid.exists, root.grid.name, root.grid.status]") == [
+        False,
+        "Robot",
+        "error",
+    ]
+    assert "was removed" in here.fails("root.grid.get('Alpha')")
+    assert "was removed" in here.fails("root.grid.enabled = true")
+    assert "was removed" in here.fails("root.grid.remove()")
+    assert run("return root.told") == ["added Robot", "removed Robot false"]
+    assert "rviz/PointCloud2" in run("return rviz.displayClasses")
+    assert "did you mean rviz/Grid?" in here.fails("rviz.addDisplay('rviz/Gridd')")
+    assert run("return rviz.displays.length") == 1
+    assert "Floor" in here.fails("rviz.removeDisplay('Grid')")
+
+
+def test_displays_removed_by_the_user(app: Any, displays: Any, qml: Any, wait: Any) -> None:
+    """In every way in which RViz does it, those in groups included."""
+    from rosglass.qt import QtCore
+    from rosglass.rviz.host import as_pyside
+
+    here = qml("Item { property var axes: null }")
+    group = displays.add("rviz/Group", "Group")
+    inner = app.rviz.displays._root.getGroupAt(1)
+    axes = displays.add("rviz/Axes")
+    inner.addChild(displays._root.takeChild(axes.handle))
+    assert not axes.exists
+    names = [display.name for display in displays.all]
+    assert len(names) == 3
+    here.run("root.axes = rviz.displays[2]")
+    app.window.manager.removeAllDisplays()
+    assert "was removed" in here.fails("root.axes.get('Length')")
+    assert here.run("return [root.axes.exists, rviz.displays.length]") == [False, 0]
+    assert not group.exists
+    again = displays.add("rviz/Axes")
+    handle = again.handle
+    handle.disconnect()
+    handle.getParent().takeChild(handle)
+    as_pyside(handle, QtCore.QObject).deleteLater()
+    wait(20)
+    assert not again.exists
+    assert again.status.level == "error"
+
+
+def test_properties_of_displays(app: Any, displays: Any, qml: Any) -> None:
+    here = qml("Item { property var grid: rviz.display('Grid') }")
+    run, fails = here.run, here.fails
+    tree = run("return root.grid.properties")
+    by_name = {one["name"]: one for one in tree}
+    assert by_name["Color"]["value"] == "#a0a0a4"
+    assert by_name["Color"]["kind"] == "color"
+    assert by_name["Offset"]["value"] == {"x": 0, "y": 0, "z": 0}
+    assert [one["path"] for one in by_name["Offset"]["properties"]] == [
+        "Offset/X",
+        "Offset/Y",
+        "Offset/Z",
+    ]
+    assert by_name["Plane Cell Count"]["kind"] == "int"
+    for path, value in {
+        "Color": "#ff8000",
+        "Plane Cell Count": 4,
+        "Cell Size": 0.25,
+        "Alpha": 0.75,
+        "Plane": "XZ",
+        "Offset": {"x": 1, "y": 2.5, "z": -3},
+        "Offset/X": 7,
+        "Reference Frame": "map",
+    }.items():
+        import json
+
+        run(f"root.grid.set({json.dumps(path)}, {json.dumps(value)})")
+        assert run(f"return root.grid.get({json.dumps(path)})") == value
+    run(
+        "root.grid.set('Color', Qt.rgba(0, 1, 0, 1));"
+        "root.grid.set(['Offset'], Qt.vector3d(1, 2, 3))"
+    )
+    assert run("return [root.grid.get('Color'), root.grid.get('Offset/Z')]") == ["#00ff00", 3]
+    run("rviz.setProperty('Global Options/Background Color', 'navy')")
+    assert run("return rviz.getProperty('Global Options/Background Color')") == "#000080"
+    assert displays.get("Grid/Color") == "#00ff00"
+    assert "did you mean Color" in fails("root.grid.get('Colour')")
+    assert "expected a colour" in fails("root.grid.set('Color', 'no colour')")
+    assert "one of XY, XZ, YZ" in fails("root.grid.set('Plane', 'YX')")
+    assert "a whole number" in fails("root.grid.set('Plane Cell Count', 1.5)")
+    # Ogre would end the process.
+    assert "a finite number" in fails("root.grid.set('Offset/X', NaN)")
+    assert "a finite number" in fails("root.grid.set('Offset', [0, Infinity, 0])")
+    assert "a finite number" in fails("root.grid.set('Cell Size', 1e300)")
+    assert "it is 1.0 now" in fails("root.grid.set('Alpha', 7)")
+    assert "has no value of its own" in fails("rviz.setProperty('Global Options', 7)")
+
+
+def test_the_fixed_frame_is_told(app: Any, qml: Any) -> None:
+    here = qml("Item { property string frame: rviz.fixedFrame }")
+    here.run("rviz.fixedFrame = 'odom'")
+    assert app.window.manager.getFixedFrame() == "odom"
+    assert here.root.property("frame") == "odom"
+    app.window.manager.setFixedFrame("map")
+    assert here.root.property("frame") == "map"
+
+
+def test_the_overlay_and_the_window(app: Any, qml: Any, wait: Any) -> None:
+    here = qml(
+        "Item { property bool shown: rviz.visible; property bool full: rviz.isFullscreen;"
+        "property real rate: rviz.frameRate; property string how: rviz.status }"
+    )
+    assert here.root.property("shown") is True
+    here.overlay.visible = False
+    assert here.root.property("shown") is False
+    here.overlay.visible = True
+    here.run("rviz.isFullscreen = true")
+    wait(lambda: here.root.property("full"))
+    assert app.window.fullscreen
+    here.run("rviz.isFullscreen = false")
+    wait(lambda: not here.root.property("full"))
+    wait(lambda: here.root.property("rate") > 0)
+    assert here.root.property("how") in ("ok", "warn", "error")
+    wait(lambda: "Fixed Frame" in here.run("return rviz.statusText"))
+
+
+def straight_down(app: Any, wait: Any) -> None:
+    """Look from 10 m above at the origin."""
+    app.rviz.view.reset()
+    app.rviz.view.move_eye_and_focus((0, 0, 10), (0, 0, 0), animate=False)
+    frames: list[int] = []
+    app.window.before_frame.connect(lambda: frames.append(1))
+    wait(lambda: len(frames) > 3)
+
+
+def test_position_trackers(app: Any, displays: Any, qml: Any, wait: Any) -> None:
+    here = qml(
+        """Item { property var tracker: null; property var told: []
+        function track() { tracker = rviz.createPositionTracker(0, 0, 0)
+            tracker.positionChanged.connect(p => told.push([p.x, p.y, p.z])) } }""",
+        scale=2.0,
+    )
+    straight_down(app, wait)
+    run = here.run
+    run("root.track()")
+    where = "const p = root.tracker.position; return [p.x, p.y, p.z]"
+    x, y, z = run(where)
+    panel = app.window.panel
+    assert (x, y) == pytest.approx((panel.width() / 4, panel.height() / 4), abs=1)
+    assert z == pytest.approx(10, abs=0.05)
+    # It follows the camera, the point, and the overlay's scale.
+    app.rviz.view.move_eye_and_focus((0, 0, 20), (0, 0, 0), animate=False)
+    wait(lambda: abs(run(where)[2] - 20) < 0.1)
+    assert run("return root.told.length") > 0
+    run("root.tracker.point = Qt.vector3d(0, 0, 5)")
+    assert run(where)[2] == pytest.approx(15, abs=0.1)
+    assert run("return root.tracker.point") == {"x": 0, "y": 0, "z": 5}
+    here.overlay.scale = 1.0
+    wait(lambda: run(where)[0] == pytest.approx(panel.width() / 2, abs=1))
+    run("root.tracker.point = {x: 0, y: 0, z: 30}")
+    # JSON has no NaN.
+    assert run(where) == [None, None, None]
+    assert run("return isNaN(root.tracker.position.x)")
+    # A frame that nobody knows.
+    run("root.tracker.point = [0, 0, 0]; root.tracker.frame = 'nowhere'")
+    wait(lambda: "nowhere" in run("return root.tracker.problem"))
+    assert run(where) == [None, None, None]
+    run("root.tracker.frame = ''")
+    assert run("return root.tracker.problem") == ""
+    assert "expected x, y and z" in here.fails("rviz.createPositionTracker('a', 0, 0)")
+    assert "expected x, y and z" in here.fails("root.tracker.point = 5")
+
+
+def test_trackers_end_with_their_objects(app: Any, qml: Any, wait: Any) -> None:
+    here = qml()
+    before = len(app.rviz.trackers)
+    here.run("for (let i = 0; i < 20; i++) rviz.createPositionTracker(i, 0, 0)")
+    wait(20)
+    here.overlay.engine.collectGarbage()
+    wait(lambda: len(app.rviz.trackers) <= before + 1)
+
+
+def test_picking(app: Any, displays: Any, qml: Any, wait: Any) -> None:
+    here = qml(scale=2.0)
+    displays.find("Grid").enabled = False
+    displays.add("rviz/Axes")
+    displays.set("Axes/Length", 4)
+    displays.set("Axes/Radius", 0.5)
+    displays.set("Global Options/Fixed Frame", "map")
+    straight_down(app, wait)
+    middle = "const x = root.width / 2, y = root.height / 2;"
+    wait(lambda: here.run(middle + "return rviz.pick(x, y)") is not None)
+    found = here.run(middle + "return rviz.pick(x, y)")
+    # The end of the axis that points at the camera.
+    assert found["z"] == pytest.approx(4, abs=0.05)
+    assert abs(found["x"]) < 0.1
+    assert abs(found["y"]) < 0.1
+    # There and back again, somewhere on another axis.
+    run = here.run
+    back = run(
+        "const t = rviz.createPositionTracker(0, 2, 0.25), p = t.position;"
+        "return [p.x, p.y, rviz.pick(p.x, p.y), rviz.pick(p)]"
+    )
+    assert back[2]["y"] == pytest.approx(2, abs=0.1)
+    assert back[2]["z"] == pytest.approx(0.25, abs=0.05)
+    assert back[2] == back[3]
+    assert run("return rviz.pick(1, 1)") is None
+    assert run("return [rviz.pick(-5, 0), rviz.pick(1e6, 0)]") == [None, None]
+    # Around the place.
+    beside = "const p = rviz.createPositionTracker(0, 2, 0.25).position; let x = p.x;"
+    beside += "while (rviz.pick(x, p.y)) x -= 1; x -= 3;"
+    beside += "return [rviz.pick(x, p.y), rviz.pick(x, p.y, 10)]"
+    near = run(beside)
+    assert near[0] is None
+    assert near[1] is not None
+    assert "in units of the overlay" in here.fails("rviz.pick('a', 2)")
+    assert "expected x, y" in here.fails("rviz.pick(NaN, 2)")
+
+
+def test_the_view(app: Any, qml: Any, wait: Any) -> None:
+    here = qml("Item { property vector3d eye: rviz.view.eye; property int mode: rviz.view.mode }")
+    run, fails = here.run, here.fails
+    run("rviz.view.reset()")
+    eye = "const e = rviz.view.eye; return [e.x, e.y, e.z]"
+    assert run(eye) == pytest.approx([4, 0, 3], abs=1e-3)
+    run("rviz.view.moveEye(Qt.vector3d(1, 2, 3), {animate: false})")
+    assert run(eye) == pytest.approx([1, 2, 3], abs=1e-3)
+    wait(lambda: abs(here.root.property("eye").y() - 2) < 1e-2)
+    run("rviz.view.moveEyeAndFocus([0, -5, 5], {x: 0, y: 0, z: 1}, {animate: false})")
+    focus = run("const f = rviz.view.focus; return [f.x, f.y, f.z]")
+    assert focus == pytest.approx([0, 0, 1], abs=1e-3)
+    run("rviz.view.setMode(rviz.view.MODE_2D, false)")
+    assert run("return [rviz.view.mode, rviz.view.type]") == [1, "rviz/TopDownOrtho"]
+    wait(lambda: here.root.property("mode") == 1)
+    run("rviz.view.saveView('Above'); rviz.view.type = 'rviz/XYOrbit'")
+    assert run("return [rviz.view.savedViews, rviz.view.type]") == [["Above"], "rviz/XYOrbit"]
+    run("rviz.view.showView('Above')")
+    assert run("return rviz.view.type") == "rviz/TopDownOrtho"
+    run("rviz.view.removeView(0); rviz.view.animationDuration = 0.2; rviz.view.mode = 0")
+    wait(lambda: run("return rviz.view.type") == "rviz/Orbit")
+    assert run("return rviz.view.savedViews") == []
+    assert "rviz/FPS" in run("return rviz.view.viewTypes")
+    # RViz itself crashes at those.
+    assert "there is no kind of view" in fails("rviz.view.type = 'rviz/Nope'")
+    assert "none is saved yet" in fails("rviz.view.showView('Above')")
+    assert "expected x, y and z" in fails("rviz.view.moveEye(5)")
+    assert "there is no option 'animated'" in fails("rviz.view.moveEye([1, 2, 3], {animated: 1})")
+    assert "0 (3D)" in fails("rviz.view.setMode(7)")
+    assert "from 0 to 60" in fails("rviz.view.animationDuration = NaN")
+    assert "nowhere" in fails("rviz.view.track('nowhere')")
+
+
+def test_configs(app: Any, displays: Any, qml: Any, wait: Any, tmp_path: Path) -> None:
+    here = qml(
+        """Item { property var told: []
+        property Connections c: Connections { target: rviz
+            function onConfigLoaded(file) { told.push(file) } } }"""
+    )
+    file = tmp_path / "saved.rviz"
+    displays.find("Grid").name = "Saved grid"
+    here.run(f"rviz.saveConfig('{file}')")
+    assert "Saved grid" in file.read_text()
+    here.run("rviz.display('Saved grid').name = 'Grid'")
+    here.run(f"root.told = []; rviz.loadConfig('{file.as_uri()}')")
+    wait(lambda: here.run("return root.told"))
+    assert here.run("return root.told") == [str(file)]
+    assert here.run("return rviz.displays.map(d => d.name)") == ["Saved grid"]
+    assert "does not exist" in here.fails("rviz.loadConfig('/nowhere/x.rviz')")
+    assert "could not save" in here.fails("rviz.saveConfig('/nowhere/x.rviz')")
+
+
+def test_screenshots(app: Any, qml: Any, tmp_path: Path) -> None:
+    from rosglass.rviz.qt5 import QtGui
+
+    here = qml('Item { Rectangle { x: 10; y: 10; width: 50; height: 50; color: "#ff0000" } }')
+    for window, size in ((False, app.window.panel), (True, app.window.widget)):
+        file = tmp_path / f"{window}.png"
+        here.run(f"rviz.screenshot('{file}', {str(window).lower()})")
+        picture = QtGui.QImage(str(file))
+        assert abs(picture.width() - size.width()) <= 1
+        at = app.window.panel.mapTo(size, app.window.panel.rect().topLeft())
+        assert picture.pixelColor(at.x() + 30, at.y() + 30).name() == "#ff0000"
+    assert "there is no folder" in here.fails("rviz.screenshot('/nowhere/x.png')")
+    assert ".png" in here.fails(f"rviz.screenshot('{tmp_path}/x.xyz')")
+    assert "expected the path" in here.fails("rviz.screenshot(5)")
+
+
+def test_registered_properties_and_config(qml: Any) -> None:
+    here = qml("Item { property var p: rviz.registerFloatProperty('Speed', 0.5) }")
+    assert here.run("return root.p.value") == 0.5
+    here.run("root.p.value = 2; rviz.config = {a: [1, 2]}")
+    assert here.run("return [root.p.value, rviz.config.a[1]]") == [2, 2]
+    assert math.isclose(here.overlay.properties.properties["Speed"].get(), 2)
+
+
+def test_overlays_that_come_and_go(app: Any, tools: Any, qml: Any, wait: Any) -> None:
+    """What they followed is not followed any longer."""
+    for _ in range(3):
+        here = qml("Item { property var t: [rviz.toolManager, rviz.view, rviz.displays] }")
+        app.overlays.remove(here.overlay)
+        tools.add("rviz/Measure")
+        tools.remove(tools.find("rviz/Measure"))
+        wait(20)
+    # From within its own JavaScript.
+    here = qml("Item { signal end; onEnd: rviz.toolManager.removeTool(0) }")
+    tools.removed.connect(lambda tool: app.overlays.remove(here.overlay))
+    here.root.end.emit()
+    wait(50)
+    assert here.overlay not in list(app.overlays)
