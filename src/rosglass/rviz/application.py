@@ -21,6 +21,7 @@ from rosglass.ros1.arguments import Arguments
 from rosglass.ros1.options import Ros1Options
 from rosglass.ros2.names import validate_node_name
 from rosglass.rviz import roscpp
+from rosglass.rviz.access import Access
 from rosglass.rviz.host import require_rviz
 from rosglass.rviz.master import MasterWatch, wait_for_master
 from rosglass.rviz.qml_overlay import QmlOverlay
@@ -142,6 +143,9 @@ class Application:
             connect=_connect_beside_rviz,
             arguments=_shared_arguments(options),
         )
+        #: RViz's tools, displays, views and camera.
+        self.rviz = Access(self.window, self.session)
+        self.session.shared[Access] = self.rviz
         #: The overlays, the lowest first.
         self.overlays = Stack(self.window)
         #: Whether the master of RViz is there.
@@ -196,17 +200,14 @@ class Application:
             options: Of :class:`QmlOverlay`.
 
         Raises:
-            QmlError: The file is missing or has errors.
+            QmlError: The file is missing, or has errors and is not watched.
             Error: There is an overlay of this name.
         """
-        overlay = QmlOverlay(file, self.session, name, **options)
+        paths = [*self._import_paths, *options.pop("import_paths", ())]
+        overlay = QmlOverlay(file, self.session, name, import_paths=paths, **options)
         if not name:
             overlay.name = self._free_name(overlay.name)
         try:
-            for path in self._import_paths:
-                overlay.engine.addImportPath(str(path))
-            overlay.engine.quit.connect(self.quit)
-            overlay.engine.exit.connect(self.quit)
             overlay.load()
             self.add(overlay)
         except Error:
@@ -222,10 +223,11 @@ class Application:
 
     def show(self) -> None:
         """Show RViz; :meth:`run` does it when this was not called."""
-        self.window.widget.show()
         if self._fullscreen:
+            # Shown in no other size before; where no window manager runs, it would keep that.
             self.window.fullscreen = True
         self._fullscreen = False
+        self.window.widget.show()
 
     def run(self, *, end_process: bool = False) -> int:
         """Show RViz until it is closed.
@@ -279,6 +281,8 @@ class Application:
         self.master.close()
         self.window.close()
         self.overlays.close()
+        self.session.shared.pop(Access, None)
+        self.rviz.close()
         if self._owns_session:
             self.session.close()
         roscpp.shut_down()

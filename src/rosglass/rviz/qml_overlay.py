@@ -2,27 +2,38 @@
 
 from __future__ import annotations
 
+import logging
+import time
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import QmlError
-from rosglass.qml.load_errors import error_list
-from rosglass.qml.modules import install
-from rosglass.qml.places import interface_file
-from rosglass.qt import QtQml, is_alive
+from rosglass.qml.error_view import ErrorView
+from rosglass.qml.live_file import LiveFile
+from rosglass.qt import is_alive
 from rosglass.rviz.overlay import Overlay
 from rosglass.rviz.qml_input import QmlInput
 from rosglass.rviz.qt5 import QtCore, QtQuick
+from rosglass.rviz.rviz_object import RvizObject
 from rosglass.rviz.scene import make_scene
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Sequence
 
     import numpy as np
     from numpy.typing import NDArray
 
+    from rosglass.qml.live_file import Made
     from rosglass.qml.session import Session
+    from rosglass.rviz.window import Window
 
 __all__ = ["QmlOverlay"]
+
+_log = logging.getLogger("rosglass.rviz")
+_ERRORS = Path(__file__).with_name("ErrorPanel.qml")
+#: In `Session.shared`: the overlays that talk through it.
+_USERS = "overlays"
 
 
 class QmlOverlay(QmlInput, Overlay):
@@ -32,46 +43,174 @@ class QmlOverlay(QmlInput, Overlay):
         file: The QML file; its root must be a visual item.
         session: The node its QML talks through.
         name: Its name; that of the file by default.
+        watch: Show it anew whenever a file in its folder, or in `import_paths`, is saved.
+        import_paths: Further folders with QML modules; ``package://`` as well.
         options: Of :class:`Overlay`.
 
     Raises:
-        QmlError: There is no such file.
+        QmlError: There is no such file or folder.
         UnsupportedError: Neither OpenGL nor Qt's software renderer can draw here.
     """
 
     def __init__(
-        self, file: str | os.PathLike[str], session: Session, name: str = "", **options: Any
+        self,
+        file: str | os.PathLike[str],
+        session: Session,
+        name: str = "",
+        *,
+        watch: bool = False,
+        import_paths: Sequence[str | os.PathLike[str]] = (),
+        **options: Any,
     ) -> None:
-        self.file = interface_file(file)
+        self._live = LiveFile(file, session, watch=watch, import_paths=import_paths)
+        self.file = self._live.path
         super().__init__(name or self.file.stem, **options)
         self.session = session
-        self.engine = QtQml.QQmlEngine()
-        install(self.engine, session)
+        self.engine = self._live.engine
+        self.engine.quit.connect(self._quit)
+        self.engine.exit.connect(self._exit)
+        #: What QML finds as ``rviz``.
+        self.properties = RvizObject(self, self.engine)
+        self.engine.rootContext().setContextProperty("rviz", self.properties)
         self._scene = make_scene()
         self._window = self._scene.window
         self._scene.changed.connect(self.changed)
-        self._component: QtQml.QQmlComponent | None = None
+        self._shown_over: Window | None = None
         self._root: Any = None
-        self._closed = False
+        self._error = ""
+        self._errors = ErrorView(self.engine, _ERRORS)
+        self.arranged.connect(self._fit_errors)
+        self._closed = self._loading = False
+        self._users: list[QmlOverlay] = session.shared.setdefault(_USERS, [])
+        self._users.append(self)
+        self._live.due.connect(self.reload)
+
+    @property
+    def root(self) -> Any:
+        """The root item of what is shown; None before anything is."""
+        return self._root
+
+    @property
+    def loaded(self) -> bool:
+        """Whether it shows the file, as it is now or as it was when it last had no errors."""
+        return self._root is not None
+
+    @property
+    def watch(self) -> bool:
+        """Whether it is shown anew when a file is saved."""
+        return self._live.watch
+
+    @watch.setter
+    def watch(self, watch: bool) -> None:
+        self._live.watch = watch
 
     def load(self) -> None:
-        """Show the file.
+        """Show the file; one with errors that is watched is shown once they are mended.
 
         Raises:
-            QmlError: It has errors.
+            QmlError: It has errors, and is not watched. They are shown in its place all the same,
+                until :meth:`reload` finds them mended.
         """
-        component = QtQml.QQmlComponent(self.engine, QtCore.QUrl.fromLocalFile(str(self.file)))
-        root: Any = None if component.isError() else component.create()
-        if root is None:
-            raise QmlError(error_list(component.errors(), self.file))
-        if not isinstance(root, QtQuick.QQuickItem):
-            raise QmlError(
-                f"{self.file}:0:0: the root of an overlay must be an Item, e.g. Item {{}}"
-            )
-        before = (self._root, self._component)
-        self._component, self._root = component, root
+        self.session.put_off()
+        try:
+            self._load()
+        except QmlError as error:
+            self.session.go_on()
+            if not self.watch:
+                raise
+            _log.error("%s", error)
+
+    def reload(self) -> bool:
+        """Show the file as it is now; with errors, keep what is shown and show them over it.
+
+        Put off while a call from QML waits, which would return into an interface that is gone.
+
+        Returns:
+            Whether it is shown.
+        """
+        if self._loading or not self._live.is_ready():
+            return False
+        started = time.perf_counter()
+        try:
+            self._load()
+        except QmlError as error:
+            _log.error("%s", error)
+            return False
+        _log.info("%s reloaded in %.0f ms", self.file, (time.perf_counter() - started) * 1000)
+        return not self._closed
+
+    def _load(self) -> None:
+        self._loading = True
+        try:
+            made = self._live.create()
+            self._check(made)
+        except QmlError as error:
+            self._show_error(str(error))
+            raise
+        finally:
+            self._loading = False
+        if self._closed:
+            # Something in it had it removed.
+            self._live.drop(made)
+            return
+        self._show_error("")
+        self._live.replace(made, lambda: self._show(made.root))
+
+    def _check(self, made: Made) -> None:
+        root = made.root
+        if isinstance(root, QtQuick.QQuickItem):
+            return
+        if isinstance(root, QtQuick.QQuickWindow):
+            root.setVisible(False)
+            what = "a window, and RViz's 3D view is the window here: write Item { } in its place"
+        else:
+            what = f"a {_kind(root)}: put what it holds into an Item {{ }}"
+        self._live.drop(made)
+        raise QmlError(f"{self.file}:0:0: the root of an overlay must be an Item, and is {what}")
+
+    def _show(self, root: Any) -> None:
+        # What was pressed, and had the keys, is about to go.
+        self.renewed.emit(self)
+        self._root = root
         self._scene.show_item(root)
-        _delete_later(*before)
+
+    def tell_problem(self, problem: str) -> None:
+        """Say what is wrong with it; as long as its file has errors, it is they."""
+        super().tell_problem(problem or self._error)
+
+    def _show_error(self, error: str) -> None:
+        self._error = error
+        self.tell_problem(error)
+        if self._closed:
+            return
+        if error:
+            self._errors.show(error, [self._window], below=self.loaded)
+            self._fit_errors()
+        else:
+            self._errors.hide()
+        self.changed.emit()
+
+    def _fit_errors(self) -> None:
+        for item in self._errors.items:
+            item.setProperty("unit", 1 / self.scale)
+
+    def _quit(self, *_: Any) -> None:
+        # RViz may ask about unsaved changes, which is not for the middle of a JavaScript function.
+        QtCore.QTimer.singleShot(0, self._close_rviz)
+
+    def _close_rviz(self) -> None:
+        window = self._shown_over
+        if window is not None and is_alive(window.widget):
+            window.widget.close()
+
+    def _exit(self, code: int) -> None:
+        QtCore.QTimer.singleShot(0, lambda: QtCore.QCoreApplication.exit(code))
+
+    def attach(self, window: Window) -> None:
+        """Be shown over an RViz."""
+        self._panel = window.panel
+        self._shown_over = window
+        self._scene.show_in(window.panel)
 
     def resize(self, width: int, height: int, ratio: float) -> None:
         """Fit the interface to the 3D view."""
@@ -80,6 +219,7 @@ class QmlOverlay(QmlInput, Overlay):
 
     def draw(self) -> NDArray[np.uint32] | None:
         """Render the scene, and read it back."""
+        self.session.go_on()
         pixels = self._scene.draw()
         self.read_back = self._scene.read_back
         return pixels
@@ -89,14 +229,22 @@ class QmlOverlay(QmlInput, Overlay):
         if self._closed:
             return
         self._closed = True
+        self.properties.close()
         self._scene.changed.disconnect(self.changed)
-        _delete_later(self._root, self._component)
+        self._users.remove(self)
+        self._errors.hide()
+        # QML sees it to its end.
+        self.properties.setParent(self.engine)
+        # The last overlay may shut its node down, one of several not.
+        self._live.close(hold=bool(self._users))
         self._scene.close()
-        _delete_later(self.engine)
-        self._component = self._root = None
+        self._root = None
 
 
-def _delete_later(*items: Any) -> None:
-    for item in items:
-        if is_alive(item):
-            item.deleteLater()
+def _kind(root: Any) -> str:
+    """Return what QML calls an object."""
+    kind = root.metaObject()
+    while "_QML" in kind.className():
+        kind = kind.superClass()
+    name = str(kind.className())
+    return "QtObject" if name == "QObject" else name.removeprefix("QQuick").removeprefix("QQml")
