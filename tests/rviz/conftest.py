@@ -137,6 +137,70 @@ def grab(app: Application, wait: Callable[..., None]) -> Callable[[], Any]:
     return grab
 
 
+class Hand:
+    """A mouse and a keyboard, in units of the 3D view."""
+
+    def __init__(self, app: Any, wait: Callable[..., None]) -> None:
+        self.app, self.wait, self.panel = app, wait, app.window.panel
+
+    def do(self, *words: object) -> None:
+        subprocess.run(["xdotool", *map(str, words)], check=True, capture_output=True)
+        self.wait(60)
+
+    def move(self, x: float, y: float) -> None:
+        from rosglass.rviz.qt5 import QtCore
+
+        at = self.panel.mapToGlobal(QtCore.QPoint(round(x), round(y)))
+        # RViz's tools take two places; one way leads over the place beside it.
+        self.do("mousemove", at.x() - 1, at.y(), "mousemove", at.x(), at.y())
+
+    def press(self, button: int = 1) -> None:
+        self.do("mousedown", button)
+
+    def release(self, button: int = 1) -> None:
+        self.do("mouseup", button)
+
+    def click(self, x: float, y: float, button: int = 1) -> None:
+        self.move(x, y)
+        self.press(button)
+        self.release(button)
+
+    def drag(self, x: float, y: float, to_x: float, to_y: float, button: int = 1) -> None:
+        self.move(x, y)
+        self.press(button)
+        self.move((x + to_x) / 2, (y + to_y) / 2)
+        self.move(to_x, to_y)
+        self.release(button)
+
+    def wheel(self, x: float, y: float, up: bool = True) -> None:
+        self.move(x, y)
+        self.do("click", 4 if up else 5)
+
+    def key(self, *keys: str) -> None:
+        for key in keys:
+            self.do("key", key)
+
+
+@pytest.fixture
+def hand(app: Any, wait: Callable[..., None]) -> Any:
+    hand = Hand(app, wait)
+    app.window.widget.activateWindow()
+    for button in (1, 2, 3):
+        hand.do("mouseup", button)
+    hand.move(5, 5)
+    return hand
+
+
+@pytest.fixture
+def view(app: Any) -> Callable[[str], float]:
+    """Return a property of RViz's camera."""
+    views = app.window.manager.getViewManager()
+    before = {"Yaw": 0.8, "Pitch": 0.8, "Distance": 10.0}
+    for name, value in before.items():
+        views.getCurrent().subProp(name).setValue(value)
+    return lambda name: float(views.getCurrent().subProp(name).getValue())
+
+
 @pytest.fixture(autouse=True)
 def clean(request: pytest.FixtureRequest) -> Iterator[None]:
     """Take every overlay away after each test."""

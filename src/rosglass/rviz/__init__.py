@@ -16,10 +16,16 @@ if TYPE_CHECKING:
     from rosglass.rviz.application import Application
     from rosglass.rviz.overlay import Overlay
     from rosglass.rviz.qml_overlay import QmlOverlay
+    from rosglass.rviz.widget_overlay import WidgetOverlay
 
-__all__ = ["Application", "Overlay", "QmlOverlay"]
+__all__ = ["Application", "Overlay", "QmlOverlay", "WidgetOverlay"]
 
-_HOMES = {"Application": "application", "Overlay": "overlay", "QmlOverlay": "qml_overlay"}
+_HOMES = {
+    "Application": "application",
+    "Overlay": "overlay",
+    "QmlOverlay": "qml_overlay",
+    "WidgetOverlay": "widget_overlay",
+}
 
 
 def __getattr__(name: str) -> object:

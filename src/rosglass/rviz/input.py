@@ -22,8 +22,8 @@ __all__ = ["Input"]
 
 _E = Qt5Core.QEvent
 _NONE = Qt5Core.Qt.NoButton
-#: RViz tells its tools where the mouse is this often, even while it stands still.
-_REMIND = 33
+#: Milliseconds after which it is noticed that the mouse went away without a word.
+_LOOK_AROUND = 100
 
 
 class Owner(enum.Enum):
@@ -76,9 +76,9 @@ class Input(QtCore.QObject):
         self._panel.installEventFilter(self)
         window.widget.installEventFilter(self)
         stack.changed.connect(self._overlays_changed)
-        self._reminder = Qt5Core.QTimer()
-        self._reminder.timeout.connect(self._remind)
-        self._watch = _TimerWatch(self._panel, lambda: self._reminder.start(_REMIND))
+        self._look_around = Qt5Core.QTimer()
+        self._look_around.setInterval(_LOOK_AROUND)
+        self._look_around.timeout.connect(self._look)
 
     @property
     def focused(self) -> Overlay | None:
@@ -124,14 +124,15 @@ class Input(QtCore.QObject):
 
     def close(self) -> None:
         """Leave all events to RViz."""
-        self._reminder.stop()
-        self._watch.close()
+        self._look_around.stop()
         for watched in (self._panel, self._window.widget):
             if is_alive(watched):
                 watched.removeEventFilter(self)
 
     def eventFilter(self, watched: Any, event: Any) -> bool:  # noqa: N802 - Qt's name
         """Return whether an event is for an overlay, and RViz is to hear nothing of it."""
+        if not is_alive(self._panel):
+            return False
         if watched is not self._panel:
             if event.type() == _E.WindowDeactivate:
                 self._deactivated()
@@ -140,6 +141,7 @@ class Input(QtCore.QObject):
         # Without overlays, RViz is as if this were not here.
         if route is None or not (self._owner or self._stack.topmost_first()):
             return False
+        accepted = event.isAccepted()
         self._depth += 1
         try:
             taken = route(event)
@@ -150,8 +152,8 @@ class Input(QtCore.QObject):
                 for call in later:
                     call()
         if event.type() not in DRAG:
-            # What is left to RViz arrives there as it came: accepted, unless RViz says otherwise.
-            event.setAccepted(True)
+            # What is left to RViz arrives there as it came; touch does as the mouse, by Qt.
+            event.setAccepted(taken or (accepted and event.type() not in TOUCH))
         return taken
 
     # Offering
@@ -240,6 +242,15 @@ class Input(QtCore.QObject):
             self._panel.unsetCursor()
         if overlay is not None:
             self._show_cursor(overlay)
+            self._look_around.start()
+        else:
+            self._look_around.stop()
+
+    def _look(self) -> None:
+        """Notice that the mouse is elsewhere: RViz's view is not told when it leaves it."""
+        over = QtWidgets.QApplication.widgetAt(QtGui.QCursor.pos())
+        if self._owner is None and over is not self._panel:
+            self._hover(None)
 
     def _show_cursor(self, overlay: Overlay) -> None:
         with guarded(overlay, "choosing the mouse's shape"):
@@ -267,13 +278,6 @@ class Input(QtCore.QObject):
         if which is not None and not isinstance(which, Owner):
             self._deliver(which, event)
         return which is not None
-
-    def _remind(self) -> None:
-        """Have RViz's tools see what moves below a still mouse; not when it is over an overlay."""
-        over_rviz = self._hovered is None and self._owner in (None, Owner.RVIZ)
-        modal = any(overlay.is_modal for overlay in self._stack.topmost_first())
-        if over_rviz and not modal and is_alive(self._panel):
-            Qt5Core.QMetaObject.invokeMethod(self._panel, "sendMouseMoveEvent")
 
     # Touch and drags
 
@@ -359,40 +363,3 @@ def _moved(event: Any) -> Any:
     )
     made.setTimestamp(event.timestamp())
     return made
-
-
-class _TimerWatch(QtCore.QObject):
-    """Stops the timer by which RViz sees the mouse through overlays.
-
-    RViz's RenderPanel calls itself with the mouse's place 30 times per second, as no filter of
-    events can see (render_panel.cpp, sendMouseMoveEvent). Its timer belongs to nobody that could be
-    asked for it, but it tells itself by its own events.
-    """
-
-    def __init__(self, panel: Any, found: Callable[[], None]) -> None:
-        super().__init__()
-        self._panel, self._found = panel, found
-        self._left = 300
-        self._app = QtWidgets.QApplication.instance()
-        self._app.installEventFilter(self)
-
-    def eventFilter(self, watched: Any, event: Any) -> bool:  # noqa: N802 - Qt's name
-        """Look at the timers that go off: each of RViz's does so some 30 times per second."""
-        if event.type() == _E.Timer and watched.metaObject().className() == "QTimer":
-            self._try(watched)
-        return False
-
-    def _try(self, timer: Any) -> None:
-        self._left -= 1
-        ends = Qt5Core.SIGNAL("timeout()"), Qt5Core.SLOT("sendMouseMoveEvent()")
-        if is_alive(self._panel) and Qt5Core.QObject.disconnect(
-            timer, ends[0], self._panel, ends[1]
-        ):
-            self.close()
-            self._found()
-        elif not self._left:
-            self.close()
-
-    def close(self) -> None:
-        """Look no longer."""
-        self._app.removeEventFilter(self)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.qt import is_alive
 from rosglass.rviz.events import DRAG, KEYS, PRESS, TOUCH, position, scaled
@@ -31,10 +31,12 @@ class QmlInput:
     """
 
     _window: Any
+    #: The widget that shows it; Qt Quick sets the mouse's shape on the window of that.
+    _panel: Any = None
     #: Units of the window for one of the overlay.
     _ratio = 1.0
     _pressed = False
-    _hoverable: Sequence[Any] = ()
+    _hoverable: Sequence[_Shown] = ()
     _listed = 0.0
 
     def deliver(self, event: Any) -> bool:
@@ -81,7 +83,8 @@ class QmlInput:
             window.contentItem().setEnabled(False)
             window.contentItem().setEnabled(True)
         QtCore.QCoreApplication.sendEvent(window, QtCore.QEvent(_E.Leave))
-        window.unsetCursor()
+        if self._shown_in() is not None:
+            self._shown_in().unsetCursor()
 
     def set_focus(self, focus: bool) -> None:
         """Give keys to the item that has the focus in its scope, or take them away."""
@@ -91,15 +94,37 @@ class QmlInput:
 
     def cursor(self) -> Any:
         """Return the shape that the item under the mouse wants; None for none in particular."""
-        cursor = self._window.cursor()
-        return None if cursor.shape() == QtCore.Qt.ArrowCursor else cursor
+        shown_in = self._shown_in()
+        if shown_in is None or shown_in.cursor().shape() == QtCore.Qt.ArrowCursor:
+            return None
+        return shown_in.cursor()
+
+    def _shown_in(self) -> Any:
+        return self._panel.window().windowHandle() if is_alive(self._panel) else None
 
     def _is_hovered(self, at: Any) -> bool:
         now = time.monotonic()
         if now - self._listed > _KEPT:
             self._listed = now
-            self._hoverable = [i for i in _items(self._window) if i.acceptHoverEvents()]
-        return any(is_alive(item) and _is_over(item, at) for item in self._hoverable)
+            self._hoverable = [s for s in _shown(self._window) if s.item.acceptHoverEvents()]
+        return any(shown.has(at) for shown in self._hoverable)
+
+
+class _Shown(NamedTuple):
+    """An item, and those around it beyond which it is not seen."""
+
+    item: Any
+    clips: tuple[Any, ...]
+
+    def has(self, at: Any) -> bool:
+        """Return whether a place of the window is in it, and it may get what happens there."""
+        if not all(is_alive(item) for item in (self.item, *self.clips)):
+            return False
+        return bool(
+            self.item.isVisible()
+            and self.item.isEnabled()
+            and all(item.contains(item.mapFromScene(at)) for item in (self.item, *self.clips))
+        )
 
 
 def _send(receiver: Any, event: Any) -> bool:
@@ -123,33 +148,24 @@ def _pressing(event: Any) -> Any:
     return made
 
 
-def _items(window: Any) -> Iterator[Any]:
+def _shown(window: Any) -> Iterator[_Shown]:
     """Iterate over all items that are shown."""
-    waiting = list(window.contentItem().childItems())
+    waiting = [_Shown(item, ()) for item in window.contentItem().childItems()]
     while waiting:
-        item = waiting.pop()
+        shown = waiting.pop()
+        item, clips = shown
         if item.isVisible():
-            yield item
-            waiting += item.childItems()
-
-
-def _is_over(item: Any, at: Any) -> bool:
-    """Return whether a place of the window is inside an item and in what its parents show."""
-    if not (item.isVisible() and item.isEnabled() and item.contains(item.mapFromScene(at))):
-        return False
-    parent = item.parentItem()
-    while parent is not None:
-        if parent.clip() and not parent.contains(parent.mapFromScene(at)):
-            return False
-        parent = parent.parentItem()
-    return True
+            yield shown
+            inside = (*clips, item) if item.clip() else clips
+            waiting += [_Shown(child, inside) for child in item.childItems()]
 
 
 def _handlers(window: Any, at: Any) -> Iterator[Any]:
     """Iterate over the enabled pointer handlers of the items at a place."""
-    for item in _items(window):
-        found = [c for c in item.children() if c.metaObject().className().endswith("Handler")]
-        if found and _is_over(item, at):
+    for shown in _shown(window):
+        children = shown.item.children()
+        found = [c for c in children if c.metaObject().className().endswith("Handler")]
+        if found and shown.has(at):
             yield from (handler for handler in found if handler.property("enabled"))
 
 
@@ -159,10 +175,15 @@ def _takes_press(handler: Any, button: Any) -> bool:
     return name in _TAKING and bool(int(buttons) & int(button))
 
 
+def _is_for_touch(item: Any) -> bool:
+    # Every item says that it accepts touch, until it gets some.
+    return item.metaObject().className() in ("QQuickMultiPointTouchArea", "QQuickPinchArea")
+
+
 def _takes_touch(window: Any, at: Any) -> bool:
     left = QtCore.Qt.LeftButton
     return any(
-        (item.acceptTouchEvents() or int(item.acceptedMouseButtons()) & int(left))
-        and _is_over(item, at)
-        for item in _items(window)
+        (_is_for_touch(shown.item) or int(shown.item.acceptedMouseButtons()) & int(left))
+        and shown.has(at)
+        for shown in _shown(window)
     ) or any(_takes_press(handler, left) for handler in _handlers(window, at))

@@ -1,0 +1,331 @@
+"""An interface made of Qt's widgets, drawn over RViz's 3D view."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rosglass.errors import Error
+from rosglass.qt import is_alive
+from rosglass.rviz.events import DRAG, KEYS, MOUSE, PRESS, position
+from rosglass.rviz.guard import guarded
+from rosglass.rviz.overlay import Overlay
+from rosglass.rviz.qt5 import QtCore, QtGui, QtWidgets
+from rosglass.rviz.style_sheet import StyleSheet
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+__all__ = ["WidgetOverlay"]
+
+_E = QtCore.QEvent
+#: A widget with this dynamic property, or below one, leaves the wheel to what is below.
+IGNORE_WHEEL = "IgnoreWheelEvents"
+_OTHERS = frozenset({_E.Wheel, _E.ContextMenu, _E.ToolTip, _E.DragLeave})
+_INPUT_METHOD = frozenset({_E.InputMethod, _E.InputMethodQuery})
+_FAR_OUTSIDE = QtCore.QPointF(-1e5, -1e5)
+
+
+class WidgetOverlay(Overlay):
+    """A widget over RViz's 3D view, as large as the view; see-through where nothing is in it.
+
+    Give the widget, or a function that makes it, or derive from this class and fill an empty one in
+    :meth:`setup`. Labels, frames and what is empty leave the mouse to RViz.
+
+    Args:
+        widget: The widget, without a parent, or what returns it.
+        name: Its name; that of the widget's class by default.
+        style_sheet: A ``.qss`` file, ``package://package/file.qss``, or a style sheet itself.
+        watch: Whether to read the file anew when it changes.
+        options: Of :class:`Overlay`.
+
+    Raises:
+        Error: It is no widget, it has a parent, or the style sheet cannot be read.
+    """
+
+    def __init__(
+        self, widget: Any = None, name: str = "", *, style_sheet: str = "", watch: bool = False,
+        **options: Any,
+    ) -> None:  # fmt: skip
+        made = _make(widget, name)
+        own = type(self).__name__ if widget is None else type(made).__name__
+        super().__init__(name or own, **options)
+        #: The widget that fills the view.
+        self.root: Any = made
+        made.setAttribute(QtCore.Qt.WA_TranslucentBackground)
+        self._image = QtGui.QImage()
+        self._pixels: NDArray[np.uint32] = np.zeros((0, 0), np.uint32)
+        self._ratio = 1.0
+        self._stale = QtGui.QRegion()
+        self._buttons = QtCore.Qt.NoButton
+        self._at: Any = None
+        self._scene = QtWidgets.QGraphicsScene()
+        self._view = _HiddenView(self._scene)
+        self._proxy = self._scene.addWidget(made)
+        self._scene.changed.connect(self._mark)
+        # Widgets of a window that is not active neither look nor act as if they had the keys.
+        QtCore.QCoreApplication.sendEvent(self._scene, QtCore.QEvent(_E.WindowActivate))
+        self._style = StyleSheet(self.name, self._use_style, self._style_failed)
+        if widget is None:
+            self.setup(made)
+        if style_sheet:
+            self._style.use(style_sheet, watch=watch, strict=True)
+
+    def setup(self, root: Any) -> None:
+        """Put widgets into an empty one, e.g. with a layout; for classes derived from this one."""
+
+    @property
+    def style_sheet(self) -> str:
+        """What it looks like: a ``.qss`` file, a ``package://`` URL, or the style sheet itself.
+
+        What cannot be read is told in the log and as :attr:`problem`, and changes nothing.
+        """
+        return self._style.source
+
+    @style_sheet.setter
+    def style_sheet(self, source: str) -> None:
+        self._style.use(source, watch=self._style.watch)
+
+    def _use_style(self, text: str) -> None:
+        if is_alive(self.root):
+            self.root.setStyleSheet(text)
+            self.tell_problem("")
+
+    def _style_failed(self, problem: str) -> None:
+        self.tell_problem(problem)
+
+    # Drawing
+
+    def resize(self, width: int, height: int, ratio: float) -> None:
+        """Fit the widget to the 3D view."""
+        self._image = QtGui.QImage(width, height, QtGui.QImage.Format_ARGB32_Premultiplied)
+        self._image.fill(0)
+        self._pixels = np.frombuffer(self._image.bits(), np.uint32).reshape(height, width)
+        self._ratio = ratio
+        units = QtCore.QRectF(0, 0, width / ratio, height / ratio)
+        with guarded(self, "changing its size"):
+            self._scene.setSceneRect(units)
+            self._view.fit(units)
+            self._proxy.setGeometry(units)
+        self._stale = QtGui.QRegion(self._image.rect())
+
+    def draw(self) -> NDArray[np.uint32] | None:
+        """Paint what has changed."""
+        stale, self._stale = self._stale, QtGui.QRegion()
+        if stale.isEmpty() or not is_alive(self._scene):
+            return None
+        painter = QtGui.QPainter(self._image)
+        try:
+            painter.setClipRegion(stale)
+            painter.setCompositionMode(QtGui.QPainter.CompositionMode_Source)
+            painter.fillRect(stale.boundingRect(), QtCore.Qt.transparent)
+            painter.setCompositionMode(QtGui.QPainter.CompositionMode_SourceOver)
+            painter.setRenderHint(QtGui.QPainter.Antialiasing)
+            box = QtCore.QRectF(stale.boundingRect())
+            part = QtCore.QRectF(box.topLeft() / self._ratio, box.size() / self._ratio)
+            with guarded(self, "painting"):
+                self._scene.render(painter, box, part, QtCore.Qt.IgnoreAspectRatio)
+        finally:
+            painter.end()
+        return self._pixels
+
+    def _mark(self, areas: list[Any]) -> None:
+        for area in areas:
+            scaled = QtCore.QRectF(area.topLeft() * self._ratio, area.size() * self._ratio)
+            self._stale += scaled.adjusted(-1, -1, 1, 1).toAlignedRect() & self._image.rect()
+        if not self._stale.isEmpty():
+            self.changed.emit()
+
+    # Input
+
+    def deliver(self, event: Any) -> bool:
+        """Give the event to the widget it is for."""
+        kind = event.type()
+        if not is_alive(self._scene):
+            return False
+        if kind in KEYS or kind in _INPUT_METHOD:
+            return self._deliver_key(event)
+        if kind not in MOUSE and kind not in DRAG and kind not in _OTHERS:
+            return False
+        at = position(event)
+        if at is not None:
+            self._at = at
+            self._view.put_under(event, at)
+        if kind == _E.Wheel and _has(self._widget_at(at), _ignores_wheel):
+            return False
+        opened = self._has_popup()
+        if kind in PRESS and not opened:
+            _focus_clicked(self._widget_at(at))
+        event.setAccepted(False)
+        QtCore.QCoreApplication.sendEvent(self._view.viewport(), event)
+        taken = bool(event.isAccepted())
+        if not is_alive(self._scene):
+            return taken
+        if kind in PRESS:
+            # Qt takes one that no widget wants for accepted. One beside a popup closes that.
+            taken = opened or self._scene.mouseGrabberItem() is not None
+        if kind in MOUSE:
+            self._buttons = event.buttons() if taken or kind not in PRESS else self._buttons
+        if kind == _E.MouseMove and event.buttons() == QtCore.Qt.NoButton:
+            taken = _has(self._widget_at(at), _minds_mouse)
+        return taken
+
+    def _deliver_key(self, event: Any) -> bool:
+        item = self._scene.focusItem()
+        event.setAccepted(False)
+        if event.type() in (_E.KeyPress, _E.KeyRelease):
+            QtCore.QCoreApplication.sendEvent(self._scene, event)
+        elif _as_widget(item) is not None:
+            receiver = _as_widget(item).widget()
+            receiver = receiver.focusWidget() or receiver
+            QtCore.QCoreApplication.sendEvent(receiver, event)
+        return bool(event.isAccepted())
+
+    def leave(self) -> None:
+        """End hovering, and let go without effect of what is pressed."""
+        if not is_alive(self._scene):
+            return
+        viewport = self._view.viewport()
+        if self._buttons != QtCore.Qt.NoButton:
+            self._buttons = QtCore.Qt.NoButton
+            release = QtGui.QMouseEvent(
+                _E.MouseButtonRelease,
+                _FAR_OUTSIDE,
+                QtCore.Qt.LeftButton,
+                QtCore.Qt.NoButton,
+                QtCore.Qt.NoModifier,
+            )
+            QtCore.QCoreApplication.sendEvent(viewport, release)
+        self._at = None
+        QtCore.QCoreApplication.sendEvent(viewport, QtCore.QEvent(_E.Leave))
+
+    def set_focus(self, focus: bool) -> None:
+        """Give keys to the widget that had them last, or take them away."""
+        if is_alive(self._scene):
+            event = QtGui.QFocusEvent(_E.FocusIn if focus else _E.FocusOut)
+            QtCore.QCoreApplication.sendEvent(self._scene, event)
+
+    def cursor(self) -> Any:
+        """Return the shape that the widget under the mouse wants; None for none in particular."""
+        widget = None if self._at is None else self._widget_at(self._at)
+        if widget is None or widget.cursor().shape() == QtCore.Qt.ArrowCursor:
+            return None
+        return widget.cursor()
+
+    def _has_popup(self) -> bool:
+        """Return whether the list of a combo box or a menu is open."""
+        popup = QtCore.Qt.Popup
+        return any(
+            item.isVisible() and item.isWindow() and item.windowFlags() & popup == popup
+            for item in map(_as_widget, self._scene.items())
+            if item is not None
+        )
+
+    def _widget_at(self, at: Any) -> Any:
+        item = _as_widget(self._scene.itemAt(at, QtGui.QTransform()))
+        top = None if item is None else item.widget()
+        if top is None:
+            return None
+        return top.childAt(item.mapFromScene(at).toPoint()) or top
+
+    def close(self) -> None:
+        """Delete the widgets."""
+        self._style.close()
+        if is_alive(self._scene):
+            self._scene.changed.disconnect(self._mark)
+            self._view.setScene(None)
+            self._scene.deleteLater()
+            self._view.deleteLater()
+
+
+class _HiddenView(QtWidgets.QGraphicsView):  # type: ignore[misc]
+    """Turns the events of widgets into those of a scene; never shown."""
+
+    def __init__(self, scene: Any) -> None:
+        super().__init__(scene)
+        self.setFrameShape(QtWidgets.QFrame.NoFrame)
+        self.setHorizontalScrollBarPolicy(QtCore.Qt.ScrollBarAlwaysOff)
+        self.setVerticalScrollBarPolicy(QtCore.Qt.ScrollBarAlwaysOff)
+        self.setAlignment(QtCore.Qt.AlignLeft | QtCore.Qt.AlignTop)
+        self.viewport().setMouseTracking(True)
+
+    def fit(self, units: Any) -> None:
+        """Take the size of the scene, and so its coordinates."""
+        size = units.size().toSize()
+        self.resize(size)
+        # Nobody lays out what is hidden.
+        self.viewport().resize(size)
+
+    def put_under(self, event: Any, at: Any) -> None:
+        """Stand where an event on the screen is at a place of the view: Qt asks the screen."""
+        kind = event.type()
+        if kind in MOUSE:
+            seen = event.screenPos().toPoint()
+        elif kind == _E.Wheel:
+            seen = event.globalPosition().toPoint()
+        elif kind in (_E.ContextMenu, _E.ToolTip):
+            seen = event.globalPos()
+        else:
+            seen = QtGui.QCursor.pos()
+        self.move(seen - at.toPoint())
+
+
+def _make(widget: Any, name: str) -> Any:
+    if widget is None:
+        return QtWidgets.QWidget()
+    made = widget
+    if not isinstance(made, QtWidgets.QWidget) and callable(made):
+        made = made()
+    if not isinstance(made, QtWidgets.QWidget):
+        raise Error(
+            f"overlay {name or widget!r}: {made!r} is no QWidget of PySide2; give a widget, or a "
+            "function that returns one"
+        )
+    if made.parentWidget() is not None:
+        raise Error(
+            f"overlay {name or made!r}: the widget is part of another one; give it no parent"
+        )
+    return made
+
+
+def _as_widget(item: Any) -> Any:
+    """Return an item of the scene as what shows a widget; None when it shows none."""
+    found = None if item is None else item.toGraphicsObject()
+    return found if isinstance(found, QtWidgets.QGraphicsProxyWidget) else None
+
+
+def _focus_clicked(widget: Any) -> None:
+    """Give the keys to a widget that takes them when it is clicked on.
+
+    Qt does so itself only for events that come from the window system.
+    """
+    while widget is not None:
+        if widget.isEnabled() and widget.focusPolicy() & QtCore.Qt.ClickFocus:
+            widget.setFocus(QtCore.Qt.MouseFocusReason)
+            return
+        widget = widget.parentWidget()
+
+
+def _has(widget: Any, quality: Callable[[Any], bool]) -> bool:
+    """Return whether a widget or one that it is part of has a quality."""
+    while widget is not None:
+        if quality(widget):
+            return True
+        widget = widget.parentWidget()
+    return False
+
+
+def _ignores_wheel(widget: Any) -> bool:
+    return bool(widget.property(IGNORE_WHEEL))
+
+
+def _minds_mouse(widget: Any) -> bool:
+    return bool(
+        widget.hasMouseTracking()
+        or widget.testAttribute(QtCore.Qt.WA_Hover)
+        or widget.focusPolicy() != QtCore.Qt.NoFocus
+        or widget.testAttribute(QtCore.Qt.WA_SetCursor)
+    )

@@ -1,0 +1,199 @@
+"""Widgets drawn over RViz's 3D view."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+
+@pytest.fixture
+def panel(app: Any, hand: Any) -> Any:
+    """An overlay with a few widgets."""
+    from rosglass.rviz import WidgetOverlay
+    from rosglass.rviz.qt5 import QtCore, QtWidgets
+
+    class Panel(WidgetOverlay):
+        def setup(self, root: Any) -> None:
+            self.clicks = 0
+            layout = QtWidgets.QVBoxLayout(root)
+            layout.setAlignment(QtCore.Qt.AlignTop | QtCore.Qt.AlignLeft)
+            self.button = QtWidgets.QPushButton("Press")
+            self.button.clicked.connect(self.count)
+            self.first, self.second = QtWidgets.QLineEdit(), QtWidgets.QLineEdit()
+            self.combo = QtWidgets.QComboBox()
+            self.combo.addItems(["one", "two", "three"])
+            self.text = QtWidgets.QPlainTextEdit("\n" * 200)
+            self.slider = QtWidgets.QSlider(QtCore.Qt.Horizontal)
+            self.label = QtWidgets.QLabel("only text")
+            for widget in (
+                self.button, self.first, self.second, self.combo, self.text, self.slider,
+                self.label,
+            ):  # fmt: skip
+                widget.setFixedWidth(160)
+                layout.addWidget(widget)
+            self.text.setFixedHeight(80)
+
+        def count(self) -> None:
+            self.clicks += 1
+
+    overlay = app.add(Panel())
+    hand.wait(200)
+    return overlay
+
+
+def middle(widget: Any) -> tuple[float, float]:
+    at = widget.mapTo(widget.window(), widget.rect().center())
+    return at.x(), at.y()
+
+
+def test_widgets_are_operated_and_gaps_are_rvizs(hand: Any, panel: Any, view: Any) -> None:
+    yaw, distance = view("Yaw"), view("Distance")
+    hand.click(*middle(panel.button))
+    assert panel.clicks == 1
+    x, y = middle(panel.slider)
+    hand.drag(x, y, x + 60, y)
+    assert panel.slider.value() > 0
+    hand.wheel(*middle(panel.text), up=False)
+    assert panel.text.verticalScrollBar().value() > 0
+    assert (view("Yaw"), view("Distance")) == (yaw, distance)
+    hand.wheel(*middle(panel.label))
+    assert view("Distance") < distance
+    hand.drag(400, 300, 500, 300)
+    assert view("Yaw") != yaw
+    yaw = view("Yaw")
+    x, y = middle(panel.label)
+    hand.drag(x, y, x + 200, y)
+    assert view("Yaw") != yaw
+
+
+def test_keys_tab_and_focus(hand: Any, app: Any, panel: Any) -> None:
+    hand.click(*middle(panel.first))
+    assert panel.first.hasFocus()
+    hand.key("m")
+    hand.key("Tab")
+    assert panel.second.hasFocus()
+    hand.key("s")
+    assert (panel.first.text(), panel.second.text()) == ("m", "s")
+    hand.key("shift+Tab")
+    assert panel.first.hasFocus()
+    hand.click(400, 400)
+    assert not panel.first.hasFocus()
+    hand.key("m")
+    assert panel.first.text() == "m"
+
+
+def test_combo_box_opens_in_the_overlay(hand: Any, panel: Any) -> None:
+    hand.click(*middle(panel.combo))
+    hand.wait(lambda: panel.combo.view().isVisible())
+    hand.key("Down", "Return")
+    hand.wait(lambda: panel.combo.currentIndex() == 1)
+
+
+def test_cursor_is_the_widgets(hand: Any, app: Any, panel: Any) -> None:
+    from rosglass.rviz.qt5 import QtCore
+
+    hand.move(*middle(panel.first))
+    assert app.window.panel.cursor().shape() == QtCore.Qt.IBeamCursor
+    hand.move(400, 400)
+    assert app.window.panel.cursor().shape() != QtCore.Qt.IBeamCursor
+
+
+def test_ignore_wheel_events(hand: Any, panel: Any, view: Any) -> None:
+    distance = view("Distance")
+    panel.text.setProperty("IgnoreWheelEvents", True)
+    hand.wheel(*middle(panel.text))
+    assert view("Distance") < distance
+
+
+def test_text_is_sharp_at_any_scale(app: Any, panel: Any, grab: Any) -> None:
+    grab()
+    small = panel._pixels
+    panel.scale = 2.0
+    grab()
+    large = panel._pixels
+    # A picture made larger would have blocks of four equal pixels.
+    part = large[: large.shape[0] // 2 * 2, : large.shape[1] // 2 * 2]
+    blocks = (part[::2, ::2] == part[1::2, 1::2]) | (part[::2, ::2] == 0)
+    assert small.shape == large.shape
+    assert not blocks.all()
+
+
+def test_nothing_is_painted_when_nothing_changed(app: Any, panel: Any, grab: Any) -> None:
+    grab()
+    drawn: list[Any] = []
+    draw = panel.draw
+    panel.draw = lambda: drawn.append(draw())
+    grab()
+    assert not drawn
+    panel.slider.setValue(50)
+    grab()
+    assert drawn
+
+
+@pytest.mark.parametrize("where", ["paintEvent", "slot"])
+def test_widget_that_raises_is_told(
+    hand: Any, app: Any, grab: Any, where: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    from rosglass.rviz import WidgetOverlay
+    from rosglass.rviz.qt5 import QtWidgets
+
+    class Bad(QtWidgets.QPushButton):  # type: ignore[misc]
+        def paintEvent(self, event: Any) -> None:  # noqa: N802
+            if where == "paintEvent":
+                raise ValueError("cannot paint")
+            super().paintEvent(event)
+
+    def fail() -> None:
+        raise ValueError("cannot do")
+
+    button = Bad("x")
+    button.clicked.connect(fail)
+    overlay = app.add(WidgetOverlay(button, "Bad"))
+    grab()
+    hand.click(100, 100)
+    assert "ValueError: cannot" in overlay.problem
+    assert "test_widgets.py" in overlay.problem
+    assert "overlay Bad" in caplog.text
+
+
+def test_style_sheets(app: Any, panel: Any, wait: Callable[..., None], tmp_path: Path) -> None:
+    from rosglass.rviz.qt5 import QtGui
+
+    def colour() -> str:
+        panel.label.ensurePolished()
+        name: str = panel.label.palette().color(QtGui.QPalette.WindowText).name()
+        return name
+
+    panel.style_sheet = "QLabel { color: #ff0000 }"
+    assert colour() == "#ff0000"
+    file = tmp_path / "look.qss"
+    file.write_text("QLabel { color: #00ff00; image: url(a.png) }")
+    panel._style.use(str(file), watch=True)
+    assert colour() == "#00ff00"
+    assert f'url("{tmp_path}/a.png")' in panel.root.styleSheet()
+    file.write_text("QLabel { color: #0000ff }")
+    wait(lambda: colour() == "#0000ff")
+    file.write_text("QLabel { color: #0000ff")
+    wait(lambda: "look.qss" in panel.problem)
+    assert colour() == "#0000ff"
+    panel.style_sheet = str(tmp_path / "none.qss")
+    assert "none.qss" in panel.problem
+
+
+def test_what_is_no_widget_is_refused(app: Any) -> None:
+    from rosglass import Error
+    from rosglass.rviz import WidgetOverlay
+    from rosglass.rviz.qt5 import QtWidgets
+
+    with pytest.raises(Error, match="is no QWidget"):
+        WidgetOverlay(lambda: 5, "Five")
+    outer = QtWidgets.QWidget()
+    with pytest.raises(Error, match="give it no parent"):
+        WidgetOverlay(QtWidgets.QLabel(outer), "Inner")
+    with pytest.raises(Error, match="No such file"):
+        WidgetOverlay(QtWidgets.QLabel, style_sheet="none.qss".upper())
