@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-__all__ = ["STEEPEST", "Orbit", "Point", "ease", "shortest_turn"]
+__all__ = ["NEAREST", "STEEPEST", "Orbit", "Place", "Point", "ease", "shortest_turn"]
 
 #: Radians of pitch at which RViz stops: straight from above, yaw would mean nothing.
 STEEPEST = math.pi / 2 - 0.001
-#: Metres; RViz comes no nearer.
-_NEAREST = 0.01
+#: Metres between a camera and what it looks at, at least.
+NEAREST = 0.01
 
 
 class Point(NamedTuple):
@@ -58,6 +58,26 @@ def _numbers(point: object) -> tuple[float, float, float]:
     return x, y, z
 
 
+class Place(NamedTuple):
+    """Where a frame is, as far as the camera goes with it.
+
+    Attributes:
+        point: Its origin, in the fixed frame.
+        yaw: Radians around z.
+    """
+
+    point: Point
+    yaw: float
+
+    def seen(self, point: Point) -> Point:
+        """Return a point of the fixed frame as it is seen from here."""
+        return (point - self.point).turned(-self.yaw)
+
+    def outside(self, point: Point) -> Point:
+        """Return a point that is seen from here as it is in the fixed frame."""
+        return self.point + point.turned(self.yaw)
+
+
 class Orbit(NamedTuple):
     """A camera that looks at a point (RViz's ``rviz/Orbit``, orbit_view_controller.cpp).
 
@@ -91,7 +111,7 @@ class Orbit(NamedTuple):
         """
         x, y, z = eye - focus
         flat = math.hypot(x, y)
-        distance = max(math.hypot(flat, z), _NEAREST)
+        distance = max(math.hypot(flat, z), NEAREST)
         pitch = max(-STEEPEST, min(STEEPEST, math.atan2(z, flat)))
         if flat > 1e-6 * distance:
             yaw = math.atan2(y, x)
@@ -108,6 +128,26 @@ class Orbit(NamedTuple):
             self.distance * (other.distance / self.distance) ** part,
             self.yaw + shortest_turn(self.yaw, other.yaw) * part,
             self.pitch + (other.pitch - self.pitch) * part,
+        )
+
+    def carried(self, before: Place, after: Place) -> Orbit:
+        """Return where it is after it has gone along with a frame.
+
+        Args:
+            before: Where the frame was.
+            after: Where it is now.
+        """
+        turn = shortest_turn(before.yaw, after.yaw)
+        focus = after.point + (self.focus - before.point).turned(turn)
+        return self._replace(focus=focus, yaw=self.yaw + turn)
+
+    def is_near(self, other: Orbit) -> bool:
+        """Return whether nobody would see a difference: RViz keeps 32 bits of each number."""
+        return (
+            max(abs(n) for n in self.focus - other.focus) <= 1e-6 * max(1.0, self.distance)
+            and abs(self.distance / other.distance - 1) <= 1e-6
+            and abs(shortest_turn(self.yaw, other.yaw)) <= 1e-6
+            and abs(self.pitch - other.pitch) <= 1e-6
         )
 
 

@@ -7,14 +7,15 @@ properties, so that the mouse keeps working as in any RViz.
 from __future__ import annotations
 
 import enum
+import logging
 import math
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.errors import Error
 from rosglass.qt import QtCore, Signal
-from rosglass.rviz.frames import FIXED_FRAME
-from rosglass.rviz.orbit import STEEPEST, Orbit, Point, ease, shortest_turn
+from rosglass.rviz.current_view import FLAT, ORBIT, CurrentView
+from rosglass.rviz.orbit import STEEPEST, Orbit, Place, Point, ease, shortest_turn
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,11 +25,16 @@ if TYPE_CHECKING:
 
 __all__ = ["View", "ViewMode"]
 
-_3D, _2D = "rviz/Orbit", "rviz/TopDownOrtho"
-#: What the two views are set to at first, and by :meth:`View.reset`.
+_log = logging.getLogger("rosglass.rviz")
+#: What the camera is set to by :meth:`View.reset`.
 _START = Orbit.between(Point(4.0, 0.0, 3.0), Point(0.0, 0.0, 0.0))
-#: What is taken for somebody else's change of a property, which keeps 32 bits of a number.
-_NOTICED = 1e-4
+#: Metres from the fixed frame's origin; RViz's numbers have 32 bits, and its renderer crashes
+#: where they are infinite.
+_FARTHEST = 1e8
+#: Seconds that a movement may take.
+_LONGEST = 60.0
+#: A gain at which the camera is there with the next frame.
+_HIGHEST_GAIN = 1000.0
 
 
 class ViewMode(enum.IntEnum):
@@ -38,11 +44,22 @@ class ViewMode(enum.IntEnum):
     MODE_2D = 1
 
 
+class _Way(NamedTuple):
+    """A movement: from where, to where, since when, and whether 2D is shown at its end."""
+
+    start: Orbit
+    goal: Orbit
+    began: float
+    flat: bool
+
+
 class View(QtCore.QObject):
     """Moves the camera: to places, between 2D and 3D, along with a frame.
 
-    Places are in metres. Movements take `animation_duration`; one by the mouse ends ours, and one
-    that shifts the view ends tracking, too.
+    Places are in metres. A movement ends when somebody else moves the camera, e.g. by the mouse;
+    tracking ends when somebody else shifts it, and goes on when it is turned or zoomed only. Other
+    views of RViz's (FPS, ThirdPersonFollower) make place for ``rviz/Orbit`` with the first
+    movement.
 
     Args:
         window: RViz.
@@ -58,40 +75,42 @@ class View(QtCore.QObject):
 
     def __init__(self, window: Window, frames: Frames) -> None:
         super().__init__()
-        self._window, self._frames = window, frames
-        #: Seconds that a movement takes; 0 jumps.
-        self.animation_duration = 1.0
-        #: How quickly the camera follows the tracked frame, in 1/s.
-        self.tracking_gain = 3.0
+        self._frames, self._current = frames, CurrentView(window)
+        self._duration, self._gain = 1.0, 3.0
         self._tracked, self._problem = "", ""
-        #: Where the focus is held, seen from the tracked frame.
-        self._offset = Point(0.0, 0.0, 0.0)
-        self._last_yaw: float | None = None
-        self._start: Orbit | None = None
-        self._goal: Orbit | None = None
-        self._began = 0.0
-        #: Whether the view from above is to be shown once the camera is there.
-        self._flatten = False
+        #: Where the focus is held, seen from the tracked frame; None: where it is then.
+        self._offset: Point | None = Point(0.0, 0.0, 0.0)
+        #: Where the tracked frame was last, its yaw as far as the camera has turned with it.
+        self._base: Place | None = None
+        self._way: _Way | None = None
         #: What 3D returns to.
         self._pitch = _START.pitch
-        self._told: Orbit | None = None
+        #: What RViz's properties were after our last change; None where it does not matter.
+        self._left_at: tuple[Any, ...] | None = None
+        self._fixed = ""
         self._last_mode = self.mode
         self._last_frame = time.monotonic()
+        self._closed = False
         window.before_frame.connect(self._step)
+        window.config_loading.connect(self._let_go)
+        window.closing.connect(self.close)
+        self._current.changed.connect(self._view_changed)
 
     @property
     def mode(self) -> ViewMode:
         """2D, straight from above and without perspective, or 3D."""
-        return ViewMode.MODE_2D if self._class() == _2D or self._flattening else ViewMode.MODE_3D
-
-    @property
-    def _flattening(self) -> bool:
-        return self._flatten and self._goal is not None
+        flat = self._current.kind == FLAT if self._way is None else self._way.flat
+        return ViewMode.MODE_2D if flat else ViewMode.MODE_3D
 
     @property
     def tracked_frame(self) -> str:
         """The frame that the camera follows; empty when it follows none."""
         return self._tracked
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether a movement is under way."""
+        return self._way is not None
 
     @property
     def problem(self) -> str:
@@ -101,12 +120,38 @@ class View(QtCore.QObject):
     @property
     def eye(self) -> Point:
         """Where the camera is, in the fixed frame; in 2D, above what it shows."""
-        return self._read().eye
+        return self._current.read().eye
 
     @property
     def focus(self) -> Point:
         """What the camera looks at, in the fixed frame."""
-        return self._read().focus
+        return self._current.read().focus
+
+    @property
+    def animation_duration(self) -> float:
+        """Seconds that a movement takes; 0 jumps.
+
+        Raises:
+            Error: Set to something that is not from 0 to 60.
+        """
+        return self._duration
+
+    @animation_duration.setter
+    def animation_duration(self, seconds: float) -> None:
+        self._duration = _number(seconds, "animation duration", "seconds", _LONGEST)
+
+    @property
+    def tracking_gain(self) -> float:
+        """How quickly the camera follows the tracked frame, in 1/s.
+
+        Raises:
+            Error: Set to something that is not from 0 to 1000.
+        """
+        return self._gain
+
+    @tracking_gain.setter
+    def tracking_gain(self, gain: float) -> None:
+        self._gain = _number(gain, "tracking gain", "1/s", _HIGHEST_GAIN)
 
     def move_eye(
         self,
@@ -127,17 +172,17 @@ class View(QtCore.QObject):
             switch_to_3d: Show it in 3D.
 
         Raises:
-            Error: They are not three finite numbers, or the frame is not known.
+            Error: They are not three finite numbers or too far away, or the frame is not known.
         """
         place, now = self._in_fixed(eye, frame), self._end_of_movement()
-        if switch_to_3d and self.mode is ViewMode.MODE_2D:
-            now = self._raised(now)
-        flat = self.mode is ViewMode.MODE_2D and not switch_to_3d
-        if flat:
+        flat = self.mode is ViewMode.MODE_2D
+        if flat and switch_to_3d:
+            flat, now = False, now._replace(pitch=self._pitch)
+        elif flat:
             place = Point(place.x, place.y, now.eye.z)
-        self._set_off(
-            now._replace(focus=now.focus + (place - now.eye)), animate, stop_tracking, flat=flat
-        )
+        goal = now._replace(focus=now.focus + (place - now.eye))
+        self._hold(goal, stop_tracking)
+        self._set_off(goal, animate, flat=flat)
 
     def move_eye_and_focus(
         self,
@@ -158,14 +203,15 @@ class View(QtCore.QObject):
             stop_tracking: Follow no frame any longer.
 
         Raises:
-            Error: They are not three finite numbers each or the same place, or the frame is not
-                known.
+            Error: They are not three finite numbers each, too far away or the same place, or the
+                frame is not known.
         """
         start, end = self._in_fixed(eye, frame), self._in_fixed(focus, frame)
         if start == end:
             raise Error(f"eye and focus are both at {tuple(start)}; the camera must look somewhere")
         goal = Orbit.between(start, end, self._end_of_movement().yaw)
-        self._set_off(goal, animate, stop_tracking, flat=False)
+        self._hold(goal, stop_tracking)
+        self._set_off(goal, animate, flat=False)
 
     def set_mode(self, mode: ViewMode | int, *, animate: bool = True) -> None:
         """Switch between 2D and 3D.
@@ -177,17 +223,16 @@ class View(QtCore.QObject):
         Raises:
             Error: There is no such mode.
         """
-        if mode not in (0, 1) or isinstance(mode, bool):
+        if isinstance(mode, bool) or mode not in (0, 1):
             raise Error(f"there is no view mode {mode!r}: expected 0 (3D) or 1 (2D)")
         wanted = ViewMode(mode)
         if wanted is self.mode:
             return
-        now = self._end_of_movement()
-        if wanted is ViewMode.MODE_2D:
+        now, flat = self._end_of_movement(), wanted is ViewMode.MODE_2D
+        if flat:
             self._pitch = now.pitch
-            self._set_off(now._replace(pitch=STEEPEST), animate, False, flat=True)
-        else:
-            self._set_off(self._raised(now), animate, False, flat=False)
+        pitch = STEEPEST if flat else self._pitch
+        self._set_off(now._replace(pitch=pitch), animate, flat=flat)
 
     def track(self, frame: str) -> None:
         """Have the camera follow a frame, and turn with it.
@@ -198,199 +243,217 @@ class View(QtCore.QObject):
         Raises:
             Error: The frame is not known.
         """
+        if not isinstance(frame, str):
+            raise Error(f"a frame is named by a text, not by {frame!r:.80}")
         if frame:
             self._frames.locate(frame)
         if frame == self._tracked:
             return
-        self._tracked, self._last_yaw = frame, None
+        self._tracked, self._base = frame, None
         self._offset = Point(0.0, 0.0, 0.0)
         self._tell_problem("")
         self.tracked_frame_changed.emit()
 
     def reset(self) -> None:
-        """Show the fixed frame's origin in 3D, as at first, and follow nothing."""
-        self.track("")
-        self._stop()
-        self._write(_START)
+        """Show the fixed frame's origin in 3D from (4, 0, 3), and follow nothing."""
+        self._let_go()
+        self._write(_START, ORBIT)
+        self._tell_mode()
 
     def nudge(self, ahead: float, left: float) -> None:
-        """Shift the view in the plane of x and y, as seen by the operator, as the keys do it.
+        """Shift the view in the plane of x and y, as the keys do it; ends movement and tracking.
 
         Args:
             ahead: Metres away from the operator.
-            left: Metres to the left.
-        """
-        self._stop()
-        now = self._read()
-        way = Point(-ahead, -left, 0.0).turned(now.yaw)
-        self.track("")
-        self._write(now._replace(focus=now.focus + way))
+            left: Metres to the operator's left.
 
-    def _set_off(self, goal: Orbit, animate: bool, stop_tracking: bool, *, flat: bool) -> None:
-        start = self._read()
+        Raises:
+            Error: They are not finite, or lead too far away.
+        """
+        self._let_go()
+        now = self._current.read()
+        x, y, _ = now.focus + Point(-ahead, -left, 0.0).turned(now.yaw)
+        focus = self._in_fixed((x, y, now.focus.z), "")
+        self._write(now._replace(focus=focus), self._kind())
+
+    def close(self) -> None:
+        """Leave the camera to RViz; safe to call twice."""
+        self._closed = True
+        self._way, self._tracked = None, ""
+        self._current.close()
+
+    # Movements
+
+    def _hold(self, goal: Orbit, stop_tracking: bool) -> None:
+        """Hold the focus where it will be, seen from the tracked frame."""
         if stop_tracking:
             self.track("")
         elif self._tracked:
-            where, yaw = self._place_of(self._tracked)
-            self._offset = (goal.focus - where).turned(-yaw)
-        if flat and self._class() == _2D and not animate:
-            self._stop()
-            self._write(goal)
+            try:
+                self._offset = self._place_of(self._tracked).seen(goal.focus)
+            except Error:
+                self._offset = None
+
+    def _set_off(self, goal: Orbit, animate: bool, *, flat: bool) -> None:
+        start, self._base = self._current.read(), None
+        if not animate or not self._duration:
+            self._arrive(goal, flat=flat)
             return
-        if not flat and self._class() == _2D:
-            self._use(_3D)
-            self._write(start._replace(pitch=STEEPEST))
-        self._flatten = flat
-        self._start, self._goal, self._began = start, goal, time.monotonic()
-        if not animate or self.animation_duration <= 0:
-            self._arrive()
+        if not (flat and self._current.kind == FLAT):
+            self._write(start, ORBIT)
+        self._way = _Way(start, goal, time.monotonic(), flat)
+        self._left_at, self._fixed = self._current.state, self._frames.fixed
         self._tell_mode()
 
-    def _arrive(self) -> None:
-        goal, flat = self._goal, self._flatten
-        self._stop()
-        if goal is None:
-            return
-        if flat and self._class() != _2D:
-            self._use(_2D)
-        self._write(goal)
+    def _arrive(self, goal: Orbit, *, flat: bool) -> None:
+        self._way = None
+        self._write(goal, FLAT if flat else ORBIT)
+        self._tell_mode()
 
-    def _stop(self) -> None:
-        self._start = self._goal = None
-        self._flatten = False
+    def _let_go(self) -> None:
+        """End movement and tracking."""
+        self._way = None
+        self.track("")
 
     def _step(self) -> None:
         now = time.monotonic()
         passed, self._last_frame = now - self._last_frame, now
-        self._notice_others()
-        if self._goal is not None and self._start is not None:
-            progress = (now - self._began) / max(self.animation_duration, 1e-6)
-            if progress >= 1:
-                self._arrive()
-            else:
-                self._write(self._start.towards(self._goal, ease(progress)))
-        elif self._tracked:
-            self._follow(min(self.tracking_gain * passed, 1.0))
+        if self._closed or (self._way is None and not self._tracked):
+            self._left_at = None
+            return
+        try:
+            self._notice_others()
+            if self._way is not None:
+                self._go_on(now)
+            elif self._tracked:
+                self._follow(min(self._gain * passed, 1.0))
+        except (AttributeError, RuntimeError, TypeError):
+            # As when another version of RViz names the properties of its views another way.
+            _log.exception("RViz's camera cannot be moved")
+            self._let_go()
         self._tell_mode()
 
-    def _follow(self, part: float) -> None:
-        try:
-            where, yaw = self._place_of(self._tracked)
-        except Error as error:
-            self._tell_problem(str(error))
+    def _go_on(self, now: float) -> None:
+        if self._tracked:
+            self._go_along()
+        way = self._way
+        assert way is not None
+        progress = (now - way.began) / self._duration if self._duration else 1.0
+        if progress >= 1:
+            self._arrive(way.goal, flat=way.flat)
+        else:
+            self._write(way.start.towards(way.goal, ease(progress)), self._kind())
+
+    def _go_along(self) -> None:
+        """Have start and goal of a movement go along with the tracked frame."""
+        place, way = self._find_tracked(), self._way
+        if place is None or way is None:
             return
-        self._tell_problem("")
-        now = self._read()
-        turn = 0.0 if self._last_yaw is None else shortest_turn(self._last_yaw, yaw) * part
-        self._last_yaw = yaw if self._last_yaw is None else self._last_yaw + turn
-        focus = now.focus.towards(where + self._offset.turned(yaw), part)
+        before, self._base = self._base or place, place
+        start, goal = way.start.carried(before, place), way.goal.carried(before, place)
+        self._way = way._replace(start=start, goal=goal)
+
+    def _follow(self, part: float) -> None:
+        place = self._find_tracked()
+        if place is None:
+            return
+        now = self._current.read()
+        if self._offset is None:
+            self._offset = place.seen(now.focus)
+        yaw = place.yaw if self._base is None else self._base.yaw
+        turn = shortest_turn(yaw, place.yaw) * part
+        self._base = Place(place.point, yaw + turn)
+        focus = now.focus.towards(place.outside(self._offset), part)
         moved = now._replace(focus=focus, yaw=now.yaw + turn)
-        if moved != now:
-            self._write(moved)
+        if not moved.is_near(now):
+            self._write(moved, self._kind())
+
+    def _find_tracked(self) -> Place | None:
+        try:
+            place = self._place_of(self._tracked)
+        except Error as error:
+            # Told once: what is missing may be said in other words with each frame.
+            self._tell_problem(self._problem or str(error))
+            return None
+        self._tell_problem("")
+        return place
 
     def _notice_others(self) -> None:
-        """Stop where somebody else has moved the camera since the last frame."""
-        told, now = self._told, self._read()
-        if told is None:
-            self._told = now
+        """End what somebody else has put an end to since the last frame."""
+        before, now = self._left_at, self._current.state
+        fixed, self._fixed = self._fixed, self._frames.fixed
+        self._left_at = now
+        if before is None or (before == now and fixed == self._fixed):
             return
-        moved = max(abs(n) for n in now.focus - told.focus) > _NOTICED * max(1.0, now.distance)
-        turned = abs(shortest_turn(told.yaw, now.yaw)) + abs(now.pitch - told.pitch) > _NOTICED
-        zoomed = abs(now.distance / told.distance - 1) > _NOTICED
-        if moved or turned or zoomed:
-            self._stop()
-            self._told = now
-        if moved and self._tracked:
+        self._way = None
+        if fixed == self._fixed and before[:2] == now[:2] and _is_shifted(before, now):
+            self.track("")
+        elif fixed == self._fixed and before[1] != now[1]:
+            # Somebody has RViz itself follow a frame.
             self.track("")
 
+    def _view_changed(self, by_us: bool) -> None:
+        if by_us or self._closed:
+            return
+        self._way = self._left_at = None
+        if self._current.kind not in (ORBIT, FLAT):
+            self.track("")
+        self._tell_mode()
+
     def _tell_mode(self) -> None:
-        if self.mode is not self._last_mode:
-            self._last_mode = self.mode
+        mode = self.mode
+        if mode is not self._last_mode:
+            self._last_mode = mode
             self.mode_changed.emit()
 
     def _tell_problem(self, problem: str) -> None:
         if problem != self._problem:
             self._problem = problem
+            if problem:
+                _log.warning("the camera cannot follow %s", problem)
             self.problem_changed.emit(problem)
 
     def _in_fixed(self, place: Sequence[float], frame: str) -> Point:
         try:
             x, y, z = (float(number) for number in place)
         except (TypeError, ValueError):
-            raise Error(f"expected x, y and z in metres, got {place!r}") from None
+            raise Error(f"expected x, y and z in metres, got {place!r:.80}") from None
         if not all(math.isfinite(number) for number in (x, y, z)):
             raise Error(f"expected finite metres, got {(x, y, z)}")
-        if not frame:
-            return Point(x, y, z)
-        transform = self._frames.locate(frame)
-        return Point(*transform.apply_point((x, y, z)))
+        if not isinstance(frame, str):
+            raise Error(f"a frame is named by a text, not by {frame!r:.80}")
+        point = Point(x, y, z)
+        if frame:
+            point = Point(*self._frames.locate(frame).apply_point(point))
+        if max(abs(number) for number in point) > _FARTHEST:
+            raise Error(f"{(x, y, z)} is more than {_FARTHEST:g} m from the fixed frame's origin")
+        return point
 
-    def _place_of(self, frame: str) -> tuple[Point, float]:
-        """Return where a frame is in the fixed frame, and its yaw in radians."""
+    def _place_of(self, frame: str) -> Place:
         transform = self._frames.locate(frame)
         x, y, z, w = transform.rotation
         yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-        return Point(*transform.translation), yaw
+        return Place(Point(*transform.translation), yaw)
 
     def _end_of_movement(self) -> Orbit:
-        return self._read() if self._goal is None else self._goal
+        return self._current.read() if self._way is None else self._way.goal
 
-    def _raised(self, view: Orbit) -> Orbit:
-        """Return a view from above as it is in 3D again."""
-        return view._replace(pitch=self._pitch)
+    def _kind(self) -> str:
+        return FLAT if self._current.kind == FLAT else ORBIT
 
-    # RViz's own views.
-
-    def _current(self) -> Any:
-        return self._window.manager.getViewManager().getCurrent()
-
-    def _class(self) -> str:
-        return str(self._current().getClassId())
-
-    def _use(self, kind: str) -> None:
-        self._window.manager.getViewManager().setCurrentViewControllerType(kind)
-
-    def _pixels_per_metre(self, distance: float) -> float:
-        """Return the scale of the view from above that shows what a camera at a distance shows."""
-        height = self._window.view_size()[1] / self._window.view_size()[2]
-        return max(height, 1.0) / (2 * distance * math.tan(self._field_of_view / 2))
-
-    #: Radians, of RViz's perspective views unless they are told otherwise.
-    _field_of_view = math.pi / 4
-
-    def _read(self) -> Orbit:
-        view, kind = self._current(), self._class()
-        if kind == _2D:
-            x, y = _get(view, "X"), _get(view, "Y")
-            height = self._pixels_per_metre(1.0) / max(_get(view, "Scale"), 1e-6)
-            yaw = _get(view, "Angle") - math.pi / 2
-            return Orbit(Point(x, y, 0.0), height, yaw, STEEPEST)
-        if kind == _3D:
-            focal = view.subProp("Focal Point")
-            focus = Point(*(_get(focal, name) for name in "XYZ"))
-            return Orbit(focus, _get(view, "Distance"), _get(view, "Yaw"), _get(view, "Pitch"))
-        return self._told or _START
-
-    def _write(self, where: Orbit) -> None:
-        if self._class() not in (_2D, _3D):
-            self._use(_3D)
-        view = self._current()
-        if view.subProp("Target Frame").getValue() != FIXED_FRAME:
-            view.subProp("Target Frame").setValue(FIXED_FRAME)
-        if self._class() == _2D:
-            _set(view, X=where.focus.x, Y=where.focus.y, Angle=where.yaw + math.pi / 2)
-            _set(view, Scale=self._pixels_per_metre(1.0) / where.distance)
-        else:
-            _set(view.subProp("Focal Point"), X=where.focus.x, Y=where.focus.y, Z=where.focus.z)
-            yaw = math.remainder(where.yaw, math.tau) % math.tau
-            _set(view, Distance=where.distance, Yaw=yaw, Pitch=where.pitch)
-        self._told = self._read()
+    def _write(self, where: Orbit, kind: str) -> None:
+        self._current.write(where, kind)
+        # As RViz keeps it, in numbers of 32 bits.
+        self._left_at = self._current.state
 
 
-def _get(view: Any, name: str) -> float:
-    return float(view.subProp(name).getValue())
+def _is_shifted(before: tuple[Any, ...], now: tuple[Any, ...]) -> bool:
+    """Return whether what is looked at is elsewhere, by the states of the same view."""
+    axes = 2 if now[0] == FLAT else 3
+    return before[2 : 2 + axes] != now[2 : 2 + axes]
 
 
-def _set(view: Any, **values: float) -> None:
-    for name, value in values.items():
-        view.subProp(name).setValue(value)
+def _number(value: float, what: str, unit: str, most: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 <= value <= most:
+        raise Error(f"the {what} is {value!r:.80}: expected {unit} from 0 to {most:g}")
+    return float(value)
