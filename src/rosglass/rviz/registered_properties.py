@@ -10,9 +10,9 @@ import logging
 from typing import TYPE_CHECKING, Any, cast
 
 from rosglass.errors import Error
-from rosglass.qml.js_values import Shown
 from rosglass.qml.plain import plain_from_js
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
+from rosglass.rviz.face import given
 from rosglass.rviz.property_kinds import KINDS, Kind
 from rosglass.rviz.saved_values import merged, writable
 
@@ -31,26 +31,19 @@ _COMMON = ("description", "readOnly", "hidden")
 
 
 def _python(value: Any) -> Any:
-    """Return what JavaScript gave, as Python and Qt have it."""
-    if not isinstance(value, QJSValue):
-        return value
-    if value.isCallable():
-        return Shown("a function")
-    # An item of the answer may be a QJSValue again, of a function for instance.
-    return _inner(value.toVariant())
+    """Return what JavaScript gave, as Python and Qt have it.
+
+    Raises:
+        ConversionError: It is a function, refers to itself, or is too large.
+    """
+    return given(value) if isinstance(value, QJSValue) else value
 
 
-def _inner(value: Any) -> Any:
-    if isinstance(value, QJSValue):
-        return _python(value)
-    if isinstance(value, list):
-        return [_inner(one) for one in value]
-    return {k: _inner(v) for k, v in value.items()} if isinstance(value, dict) else value
-
-
-def _answering(runtime: Runtime | None, what: str, error: Error) -> None:
+def _answering(runtime: Runtime | None, what: str, error: Error, *given_by_js: Any) -> None:
     """Throw an error into the JavaScript that is running; where none is, raise it."""
-    if runtime is None or runtime.caller().file == "<python>":
+    # Where JavaScript's own getters have thrown, it no longer tells where it is.
+    sure = any(isinstance(value, QJSValue) for value in given_by_js)
+    if runtime is None or not (sure or runtime.caller().file != "<python>"):
         raise Error(f"{what}: {error}") from error
     runtime.throw(f"{what}: {error}")
 
@@ -112,7 +105,7 @@ class RegisteredProperty(QtCore.QObject):
         try:
             self.set(value)
         except Error as error:
-            _answering(self._owner.runtime, f"property {'/'.join(self.path)}", error)
+            _answering(self._owner.runtime, f"property {'/'.join(self.path)}", error, value)
 
     #: The value; one that does not fit throws.
     value = Property(_VARIANT, get, _set_value, notify=valueChanged)
@@ -255,7 +248,7 @@ class RegisteredProperties(QtCore.QObject):
         try:
             self.set_config(config)
         except Error as error:
-            _answering(self.runtime, "rviz.config", error)
+            _answering(self.runtime, "rviz.config", error, config)
 
     #: Assign whole maps: a change inside of what was read is not seen.
     config = Property(_VARIANT, get_config, _set_config, notify=configChanged)
@@ -335,7 +328,7 @@ class RegisteredProperties(QtCore.QObject):
         try:
             return self.register(kind, **_named(names, [_python(a) for a in arguments], options))
         except Error as error:
-            _answering(self.runtime, f"rviz.{function}", error)
+            _answering(self.runtime, f"rviz.{function}", error, *arguments)
             return None
 
     def register(

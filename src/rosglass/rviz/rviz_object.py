@@ -213,8 +213,10 @@ class RvizObject(RegisteredProperties):
         """Save RViz's config; without a file, where it was loaded from."""
 
         def work() -> None:
-            wanted = given(file)
-            self._access.window.save_config("" if wanted is None else _file(wanted))
+            wanted, window = given(file), self._access.window
+            if wanted is None and not window.config:
+                raise Error("no config file is loaded; say where to save it")
+            window.save_config("" if wanted is None else _file(wanted))
 
         self._asked("saveConfig", work)
 
