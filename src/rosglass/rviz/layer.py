@@ -19,6 +19,8 @@ __all__ = ["HIGHEST_Z", "Layer"]
 #: Ogre draws overlays of higher order later, and knows no higher order than this.
 HIGHEST_Z = 650
 _numbers = itertools.count()
+#: RViz's two windows, of which one is never seen.
+_WINDOWS = ("OgreWindow(0)", "OgreWindow(1)")
 _GROUP = "General"
 #: Pixels that are blended in the time that a panel takes to be drawn.
 _PANEL = 2000
@@ -95,6 +97,7 @@ class Layer:
         if self._closed:
             return []
         height, width = pixels.shape
+        _use_own_context()
         started = time.perf_counter()
         if self._before is None or self._before.shape != pixels.shape:
             self._make_texture(width, height)
@@ -119,6 +122,7 @@ class Layer:
         if self._closed:
             return
         self._closed = True
+        _use_own_context()
         self._overlay.hide()
         self._drop_panels()
         self._manager.destroy(self._name)
@@ -216,3 +220,12 @@ class Layer:
             o.MaterialManager.getSingleton().remove(self._material.getName(), _GROUP)
             o.TextureManager.getSingleton().remove(self._texture.getName(), _GROUP)
             self._texture = self._material = self._unit = None
+
+
+def _use_own_context() -> None:
+    """Make Ogre's OpenGL context current: windows of Qt leave theirs, or none, when they go."""
+    root = ogre().Root.getSingleton()
+    system = root.getRenderSystem()
+    # Ogre takes its own to be current still, unless it has used that of another window meanwhile.
+    for name in _WINDOWS:
+        system._setRenderTarget(root.getRenderTarget(name))
