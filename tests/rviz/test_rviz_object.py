@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import math
+import os
+import subprocess
+import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
 IMPORTS = "import QtQuick 2.15\n"
 TOOLS = ["rviz/Interact", "rviz/MoveCamera", "rviz/Select"]
@@ -34,8 +38,6 @@ class Qml:
             f"(function () {{ try {{ return JSON.stringify({{ v: (function () {{ {script} }})() }})"
         )
         text += "} catch (e) { return JSON.stringify({ e: '' + e }) } })()"
-        import json
-
         answer = json.loads(engine.evaluate(text).toString())
         if "e" in answer:
             raise AssertionError(answer["e"])
@@ -271,8 +273,6 @@ def test_properties_of_displays(app: Any, displays: Any, qml: Any) -> None:
         "Offset/X": 7,
         "Reference Frame": "map",
     }.items():
-        import json
-
         run(f"root.grid.set({json.dumps(path)}, {json.dumps(value)})")
         assert run(f"return root.grid.get({json.dumps(path)})") == value
     run(
@@ -506,3 +506,27 @@ def test_overlays_that_come_and_go(app: Any, tools: Any, qml: Any, wait: Any) ->
     here.root.end.emit()
     wait(50)
     assert here.overlay not in list(app.overlays)
+
+
+def test_nothing_crashes_hangs_or_raises(screen: str, master: str, tmp_path: Path) -> None:
+    """In a process of its own, since a crash is what it looks for."""
+    program, last = Path(__file__).with_name("fuzz_rviz.py"), tmp_path / "last"
+    environment = os.environ | {"DISPLAY": screen, "ROS_MASTER_URI": master, "HOME": str(tmp_path)}
+    environment |= {"ROSGLASS_QT": "pyside2", "QT_QPA_PLATFORM": "xcb", "ROS_IP": "127.0.0.1"}
+    with (tmp_path / "output").open("wb") as output:
+        done = subprocess.run(
+            [sys.executable, str(program), str(last), str(tmp_path)],
+            cwd=tmp_path,
+            env=environment,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            timeout=300,
+            check=False,
+        )
+    text = (tmp_path / "output").read_text(errors="replace")
+    tried = last.read_text(errors="replace").strip()
+    end = "\n".join(line[:300] for line in text.splitlines()[-40:])
+    assert done.returncode == 0, f"it ended at {tried}:\n{end}"
+    assert "came to the end" in text
+    for sign in ("Traceback (most recent", "internal error"):
+        assert sign not in text, text[text.index(sign) :][:2000]
