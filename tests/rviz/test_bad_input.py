@@ -293,6 +293,47 @@ def test_an_overlay_may_be_removed_while_it_is_loaded(
     goes_on()
 
 
+@pytest.mark.parametrize("how", ["removed", "closed"])
+def test_an_overlay_may_be_removed_while_its_call_waits(
+    app: Any, show: Any, wait: Any, press: Any, grab: Any, goes_on: Any, messages: Any, how: str
+) -> None:
+    from rosglass.qml.waiting import wait_for
+    from rosglass.qt import QtCore, Slot
+
+    class Waiting(QtCore.QObject):
+        overlay: Any = None
+
+        @Slot()
+        def call(self) -> None:
+            def begin(end: Any) -> None:
+                QtCore.QTimer.singleShot(0, self.remove)
+                QtCore.QTimer.singleShot(150, end)
+
+            wait_for(app.session, begin)
+
+        def remove(self) -> None:
+            if how == "closed":
+                self.overlay.close()
+            app.overlays.remove(self.overlay)
+            self.overlay = None
+
+    waiting = Waiting()
+    overlay = waiting.overlay = show("Item {}")
+    overlay.engine.rootContext().setContextProperty("waiting", waiting)
+    overlay.file.write_text(
+        f"""{IMPORTS}Item {{ id: root; property int number: 7
+        Component.onDestruction: console.warn("goodbye")
+        Timer {{ running: true; interval: 1
+            onTriggered: {{ waiting.call(); console.warn("returned", root.number) }} }} }}"""
+    )
+    assert overlay.reload()
+    del overlay
+    wait(lambda: any("goodbye" in text for text in messages()))
+    said = [text.rpartition(": ")[2] for text in messages() if "Ui.qml" in text]
+    assert said[-2:] == ["returned 7", "goodbye"]
+    goes_on()
+
+
 @pytest.mark.parametrize(
     "broken", ["resize", "draw", "deliver", "leave", "set_focus", "cursor", "close"]
 )
