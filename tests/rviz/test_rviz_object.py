@@ -530,3 +530,31 @@ def test_nothing_crashes_hangs_or_raises(screen: str, master: str, tmp_path: Pat
     assert "came to the end" in text
     for sign in ("Traceback (most recent", "internal error"):
         assert sign not in text, text[text.index(sign) :][:2000]
+
+
+def test_trackers_of_frames(app: Any, qml: Any, wait: Any) -> None:
+    """They move with the robot, and say so while nobody knows where it is."""
+    from rosglass.tf import Transform
+
+    app.rviz.fixed_frame = "map"
+    here = qml(
+        "import Ros2 1.0\nItem { Component.onCompleted: Ros2.init('tracking')\n"
+        "property var t: rviz.createPositionTracker(Qt.vector3d(1, 0, 0), 'tracked_link') }"
+    )
+    straight_down(app, wait)
+    run = here.run
+    assert "tracked_link" in run("return root.t.problem")
+    wait(lambda: app.rviz.frames.buffer is not None)
+
+    def place(x: float) -> None:
+        made = Transform((x, 0.0, 0.0), frame_id="map", child_frame_id="tracked_link")
+        app.rviz.frames.buffer.set_transform(made, static=True)
+
+    place(2.0)
+    wait(lambda: run("return root.t.problem") == "")
+    # The same place of the fixed frame.
+    same = "const s = rviz.createPositionTracker({0}, 0, 0).position, p = root.t.position;"
+    same += "return Math.hypot(p.x - s.x, p.y - s.y) < 0.5"
+    wait(lambda: run(same.replace("{0}", "3")))
+    place(1.0)
+    wait(lambda: run(same.replace("{0}", "2")))

@@ -68,7 +68,7 @@ class Tracker(QtCore.QObject):
         try:
             at = self._owner.seen(self._point, self._frame, self._scale())
         except Error as error:
-            problem = str(error)
+            problem = f"frame {self._frame}: {error}"
         if _differ(at, self._position):
             self._position = at
             self.positionChanged.emit(QtGui.QVector3D(*at))
