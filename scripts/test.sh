@@ -20,7 +20,10 @@ scripts/check_wheel.sh
 side_by_side=(-n 3 --dist loadfile --max-worker-restart=0 --reruns 1 --rerun-show-tracebacks)
 say "tests on Debian's own Python and Qt 5 ($(.venv-system/bin/python -V))"
 scripts/private_network.sh .venv-system/bin/python -m pytest -q "${side_by_side[@]}" \
-  tests/unit tests/gui tests/rviz "$@"
+  tests/unit tests/gui "$@"
+say "tests in RViz ($(.venv-system/bin/python -V))"
+# Apart from tests/gui: a process has one Qt application, and RViz needs one of its own kind.
+scripts/private_network.sh .venv-system/bin/python -m pytest -q "${side_by_side[@]}" tests/rviz "$@"
 say "tests, standalone ($(.venv/bin/python -V))"
 # Coverage slows tight loops tenfold: what compares every type ran above, without it.
 scripts/private_network.sh .venv/bin/python -m pytest -q "${side_by_side[@]}" -m "not exhaustive" \

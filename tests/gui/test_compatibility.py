@@ -10,9 +10,8 @@ from typing import Any
 import pytest
 
 # PySide2 cannot tell what a type inherits; the members are the same files' on both Qt versions.
-pytestmark = pytest.mark.skipif(
-    find_spec("PySide6") is None, reason="the page is made from the types as Qt 6 sees them"
-)
+if find_spec("PySide6") is None:
+    pytest.skip("the page is made from the types as Qt 6 sees them", allow_module_level=True)
 
 ROOT = Path(__file__).parents[2]
 

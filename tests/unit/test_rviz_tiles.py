@@ -7,7 +7,7 @@ import sys
 from typing import TYPE_CHECKING
 
 import numpy as np
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rosglass.rviz.tiles import Rect, changed_tiles, cover, covered_tiles, uncovered, update_covered
@@ -58,6 +58,8 @@ def test_a_panel_is_one_rectangle_cut_at_the_edge() -> None:
     assert cover(covered_tiles(picture(100, 70)), 100, 70) == []
 
 
+# Other tests may take the processor meanwhile.
+@settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
 @given(
     st.integers(1, 200),
     st.integers(1, 200),
