@@ -27,6 +27,8 @@ from rosglass.rviz.master import MasterWatch, wait_for_master
 from rosglass.rviz.qml_overlay import QmlOverlay
 from rosglass.rviz.qt5 import QtGui, QtWidgets
 from rosglass.rviz.stack import Stack
+from rosglass.rviz.view_keys import ViewKeys
+from rosglass.rviz.view_services import ViewServices
 from rosglass.rviz.window import Window, config_file
 
 if TYPE_CHECKING:
@@ -41,6 +43,8 @@ __all__ = ["Application"]
 _log = logging.getLogger("rosglass.rviz")
 #: Seconds after which a program ends that was told to, whatever RViz is doing.
 _PATIENCE = 1.7
+#: Milliseconds that overlays have to ask for a node of a name of their own.
+_LONGEST_WITHOUT_NODE = 2000
 #: Milliseconds between two looks whether somebody has shut RViz's node down.
 _LOOK = 300
 
@@ -148,6 +152,14 @@ class Application:
         self.session.shared[Access] = self.rviz
         #: The overlays, the lowest first.
         self.overlays = Stack(self.window)
+        #: RViz's camera, moved.
+        self.view = self.rviz.view
+        #: The keys that move it.
+        self.view_keys = ViewKeys(self.window, self.view, self.overlays)
+        #: How robots move it.
+        self.view_services = ViewServices(
+            self.view, self.session, f"{self.node_name}/hector_view_controller"
+        )
         #: Whether the master of RViz is there.
         self.master = MasterWatch(options.master)
         self.master.problem_changed.connect(self._show_problem)
@@ -229,6 +241,15 @@ class Application:
         self._fullscreen = False
         self.window.widget.show()
 
+    def connect(self) -> None:
+        """Ask for a node of the name of RViz's and ``_overlays``, if no overlay has asked for one.
+
+        :meth:`run` does it after two seconds: robots reach the camera by it.
+        """
+        if not self._closed and not self.session.is_initialized:
+            namespace, _, name = self.node_name.rpartition("/")
+            self.session.init(f"{name}_overlays", namespace or "/")
+
     def run(self, *, end_process: bool = False) -> int:
         """Show RViz until it is closed.
 
@@ -239,6 +260,7 @@ class Application:
             The exit code: 0, what :meth:`quit` was given, 130 after Ctrl-C, 143 after SIGTERM.
         """
         self.show()
+        QtCore.QTimer.singleShot(_LONGEST_WITHOUT_NODE, self.connect)
         self._running = True
         with QuitOnSignal(lambda number: self.quit(128 + number), _PATIENCE):
             code = run_event_loop(self.qt)
@@ -281,6 +303,7 @@ class Application:
         self.master.close()
         self.window.close()
         self.overlays.close()
+        self.view_services.close()
         self.session.shared.pop(Access, None)
         self.rviz.close()
         if self._owns_session:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rosglass.errors import Error, LookupException
+from rosglass.errors import Error, LookupException, TransformException
 from rosglass.qml.tf_link import TfLink
 from rosglass.qt import QtCore, Signal
 
@@ -69,7 +69,11 @@ class Frames(QtCore.QObject):
             raise LookupException(f"{frame}: no transforms yet, there is no connection to a robot")
         if self._link.problem:
             raise Error(f"{frame}: {self._link.problem}")
-        return self._link.buffer.lookup_transform(fixed, frame, time)
+        try:
+            return self._link.buffer.lookup_transform(fixed, frame, time)
+        except TransformException as error:
+            # What is wrong may be the fixed frame: who asked has named only the other one.
+            raise type(error)(f"{frame} in {fixed}: {error}") from None
 
     def close(self) -> None:
         """Let the transforms go; safe to call twice."""
