@@ -26,5 +26,5 @@ say "tests in RViz ($(.venv-system/bin/python -V))"
 scripts/private_network.sh .venv-system/bin/python -m pytest -q "${side_by_side[@]}" tests/rviz "$@"
 say "tests, standalone ($(.venv/bin/python -V))"
 # Coverage slows tight loops tenfold: what compares every type ran above, without it.
-scripts/private_network.sh .venv/bin/python -m pytest -q "${side_by_side[@]}" -m "not exhaustive" \
+scripts/private_network.sh .venv/bin/python -m pytest -q "${side_by_side[@]}" -m "not exhaustive" --ignore=tests/rviz \
   --cov --cov-report=term --cov-report=html "$@"
