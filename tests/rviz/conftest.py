@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 HAVE_RVIZ = find_spec("PySide6") is None and find_spec("rviz") is not None
 if HAVE_RVIZ:
     os.environ.setdefault("ROSGLASS_QT", "pyside2")
+IMPORTS = "import QtQuick 2.15\nimport QtQuick.Controls 2.15\n"
 SCREEN = (1280, 800)
 
 
@@ -199,6 +200,22 @@ def view(app: Any) -> Callable[[str], float]:
     for name, value in before.items():
         views.getCurrent().subProp(name).setValue(value)
     return lambda name: float(views.getCurrent().subProp(name).getValue())
+
+
+@pytest.fixture
+def show(app: Any, wait: Callable[..., None], tmp_path: Path) -> Callable[..., Any]:
+    """Show QML text over the 3D view; returns its root."""
+
+    def show(text: str, name: str = "Test", **options: Any) -> Any:
+        file = tmp_path / f"{name}.qml"
+        file.write_text(IMPORTS + text)
+        overlay = app.add_qml(file, **options)
+        drawn: list[int] = []
+        app.window.before_frame.connect(lambda: drawn.append(1))
+        wait(lambda: len(drawn) > 2)
+        return overlay._root
+
+    return show
 
 
 @pytest.fixture(autouse=True)

@@ -2,31 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-IMPORTS = "import QtQuick 2.15\nimport QtQuick.Controls 2.15\n"
-
-
-@pytest.fixture
-def show(app: Any, wait: Callable[..., None], tmp_path: Path) -> Callable[..., Any]:
-    """Show QML text over the 3D view; returns its root."""
-
-    def show(text: str, name: str = "Test", **options: Any) -> Any:
-        file = tmp_path / f"{name}.qml"
-        file.write_text(IMPORTS + text)
-        overlay = app.add_qml(file, **options)
-        drawn: list[int] = []
-        app.window.before_frame.connect(lambda: drawn.append(1))
-        wait(lambda: len(drawn) > 2)
-        return overlay._root
-
-    return show
 
 
 def item(root: Any, name: str) -> Any:

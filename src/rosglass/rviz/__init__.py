@@ -14,13 +14,30 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rosglass.rviz.application import Application
+    from rosglass.rviz.dialog import Button, Dialog, message
     from rosglass.rviz.overlay import Overlay
+    from rosglass.rviz.popup import Anchor, Popup
     from rosglass.rviz.qml_overlay import QmlOverlay
     from rosglass.rviz.widget_overlay import WidgetOverlay
 
-__all__ = ["Application", "Overlay", "QmlOverlay", "WidgetOverlay"]
+__all__ = [
+    "Anchor",
+    "Application",
+    "Button",
+    "Dialog",
+    "Overlay",
+    "Popup",
+    "QmlOverlay",
+    "WidgetOverlay",
+    "message",
+]
 
 _HOMES = {
+    "Anchor": "popup",
+    "Button": "dialog",
+    "Dialog": "dialog",
+    "Popup": "popup",
+    "message": "dialog",
     "Application": "application",
     "Overlay": "overlay",
     "QmlOverlay": "qml_overlay",

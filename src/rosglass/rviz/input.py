@@ -348,6 +348,9 @@ class Input(QtCore.QObject):
         for which in (self._owner, self._touched, self._hovered, self._focused):
             if which is not None and not isinstance(which, Owner) and which not in shown:
                 self.forget(which)
+        modal = next((number for number, o in enumerate(shown) if o.is_modal), None)
+        if modal is not None and self._focused not in shown[: modal + 1]:
+            self.focus(shown[modal])
 
 
 def _moved(event: Any) -> Any:

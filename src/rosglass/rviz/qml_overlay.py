@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["QmlOverlay"]
 
 _log = logging.getLogger("rosglass.rviz")
+_IMPORTS = Path(__file__).with_name("imports")
 _ERRORS = Path(__file__).with_name("ErrorPanel.qml")
 #: In `Session.shared`: the overlays that talk through it.
 _USERS = "overlays"
@@ -67,6 +68,7 @@ class QmlOverlay(QmlInput, Overlay):
         super().__init__(name or self.file.stem, **options)
         self.session = session
         self.engine = self._live.engine
+        self.engine.addImportPath(str(_IMPORTS))
         self.engine.quit.connect(self._quit)
         self.engine.exit.connect(self._exit)
         #: What QML finds as ``rviz``.

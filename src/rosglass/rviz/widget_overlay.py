@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["WidgetOverlay"]
+__all__ = ["WidgetOverlay", "make_widget"]
 
 _E = QtCore.QEvent
 #: A widget with this dynamic property, or below one, leaves the wheel to what is below.
@@ -50,7 +50,7 @@ class WidgetOverlay(Overlay):
         self, widget: Any = None, name: str = "", *, style_sheet: str = "", watch: bool = False,
         **options: Any,
     ) -> None:  # fmt: skip
-        made = _make(widget, name)
+        made = make_widget(widget, name)
         own = type(self).__name__ if widget is None else type(made).__name__
         super().__init__(name or own, **options)
         #: The widget that fills the view.
@@ -273,7 +273,16 @@ class _HiddenView(QtWidgets.QGraphicsView):  # type: ignore[misc]
         self.move(seen - at.toPoint())
 
 
-def _make(widget: Any, name: str) -> Any:
+def make_widget(widget: Any, name: str) -> Any:
+    """Return a widget that was given, or is made now.
+
+    Args:
+        widget: It, what returns it, or None for an empty one.
+        name: For messages.
+
+    Raises:
+        Error: It is no widget, or part of another one.
+    """
     if widget is None:
         return QtWidgets.QWidget()
     made = widget

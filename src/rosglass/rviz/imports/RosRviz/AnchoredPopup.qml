@@ -1,0 +1,83 @@
+import QtQuick 2.15
+import QtQuick.Controls 2.15
+
+// A popup that stays where a point of RViz's scene is seen; movable by its edge, and by a MoveArea.
+Popup {
+    id: popup
+
+    // x, y and z in metres, of `frame`; without one, the popup is where `x` and `y` put it.
+    property var point: null
+    // A frame of the robot that the point moves with; empty for RViz's fixed frame.
+    property string frame: ""
+    // Which point of the popup is at its place: shares of its width and height.
+    property point anchor: Qt.point(0.5, 0.5)
+    // Whether the user may move it; it then follows the point no longer.
+    property bool movable: false
+    // Why the point cannot be followed; empty where it can.
+    readonly property string problem: tracker ? tracker.problem : ""
+
+    property var tracker: null
+    readonly property size room: parent ? Qt.size(parent.width, parent.height) : Qt.size(0, 0)
+
+    function follow() {
+        if (!point) {
+            tracker = null
+        } else if (tracker) {
+            tracker.point = point
+            tracker.frame = frame
+        } else {
+            tracker = rviz.createPositionTracker(point, frame)
+        }
+        place()
+    }
+
+    function place() {
+        if (!tracker || !parent)
+            return
+        var at = tracker.position
+        var seen = at.x >= 0 && at.y >= 0 && at.x <= parent.width && at.y <= parent.height
+        opacity = seen ? 1 : 0
+        if (!seen)
+            return
+        x = Math.max(0, Math.min(at.x - anchor.x * width, parent.width - width))
+        y = Math.max(0, Math.min(at.y - anchor.y * height, parent.height - height))
+    }
+
+    function moveBy(dx, dy) {
+        tracker = null
+        x = Math.max(0, Math.min(x + dx, parent.width - width))
+        y = Math.max(0, Math.min(y + dy, parent.height - height))
+    }
+
+    parent: Overlay.overlay
+    focus: modal
+    closePolicy: modal ? Popup.CloseOnEscape : Popup.NoAutoClose
+    onPointChanged: follow()
+    onFrameChanged: follow()
+    onAnchorChanged: place()
+    onRoomChanged: place()
+    onWidthChanged: place()
+    onHeightChanged: place()
+    Component.onCompleted: follow()
+
+    Connections {
+        target: popup.tracker
+        function onPositionChanged() { popup.place() }
+    }
+
+    background: Rectangle {
+        color: popup.palette.window
+        border.color: popup.palette.mid
+        radius: 4
+
+        MouseArea {
+            property point start
+
+            anchors.fill: parent
+            enabled: popup.movable
+            cursorShape: enabled ? Qt.SizeAllCursor : Qt.ArrowCursor
+            onPressed: start = Qt.point(mouse.x, mouse.y)
+            onPositionChanged: popup.moveBy(mouse.x - start.x, mouse.y - start.y)
+        }
+    }
+}

@@ -1,0 +1,22 @@
+import QtQuick 2.15
+import QtQuick.Controls 2.15
+
+// A text with buttons, in the middle of the view; `accepted` and `rejected` tell the answer.
+Dialog {
+    property alias text: label.text
+
+    parent: Overlay.overlay
+    anchors.centerIn: parent
+    modal: true
+    focus: true
+    standardButtons: Dialog.Ok
+    closePolicy: Popup.CloseOnEscape
+
+    Label {
+        id: label
+
+        width: Math.min(implicitWidth, 400)
+        textFormat: Text.PlainText
+        wrapMode: Text.Wrap
+    }
+}

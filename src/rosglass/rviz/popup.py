@@ -1,0 +1,245 @@
+"""Widgets that pop up over RViz's 3D view: at a place of it, or where a point of the scene is."""
+
+from __future__ import annotations
+
+import enum
+import math
+from typing import TYPE_CHECKING, Any
+
+from rosglass.errors import Error
+from rosglass.qt import Signal, is_alive
+from rosglass.rviz.qt5 import QtCore, QtGui, QtWidgets
+from rosglass.rviz.widget_overlay import WidgetOverlay, make_widget
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from rosglass.rviz.trackers import Tracker, Trackers
+
+__all__ = ["Anchor", "MoveBar", "Popup"]
+
+
+class Anchor(enum.Enum):
+    """Which point of a popup is at its place: shares of its width and height."""
+
+    TOP_LEFT = (0.0, 0.0)
+    TOP_RIGHT = (1.0, 0.0)
+    CENTER = (0.5, 0.5)
+    BOTTOM_LEFT = (0.0, 1.0)
+    BOTTOM_RIGHT = (1.0, 1.0)
+    #: The corner with which most of it is inside the view.
+    AUTO = (-1.0, -1.0)
+
+
+class Popup(WidgetOverlay):
+    """A widget of its own size above all overlays that are no popups.
+
+    It is kept inside the view. What it follows may leave the view, or be behind the camera: it is
+    not seen then.
+
+    Args:
+        content: The widget, or what returns it.
+        name: Its name; that of the widget's class by default.
+        modal: Whether nothing below it gets input, RViz's view included.
+        modal_color: What a modal one covers everything below with.
+        anchor: Which point of it is at its place.
+        light_dismiss: Whether a press beside it hides it; it then takes that press.
+        options: Of :class:`WidgetOverlay`.
+
+    Raises:
+        Error: It is no widget, or part of another one.
+    """
+
+    #: A press beside it has hidden it.
+    dismissed = Signal()
+
+    def __init__(
+        self,
+        content: Any,
+        name: str = "",
+        *,
+        modal: bool = False,
+        modal_color: Any = None,
+        anchor: Anchor = Anchor.CENTER,
+        light_dismiss: bool = False,
+        **options: Any,
+    ) -> None:
+        made = make_widget(content, name)
+        base = _Base(made, self._put, self._pressed_beside)
+        #: The widget.
+        self.content: Any = made
+        self._anchor, self._place = anchor, (math.nan, math.nan)
+        self._free = True
+        self._tracker: Tracker | None = None
+        self._trackers: Trackers | None = None
+        self._light_dismiss = light_dismiss
+        super().__init__(base, name or type(made).__name__, **options)
+        self.is_popup, self.is_modal = True, modal
+        base.takes_presses = modal or light_dismiss
+        if modal:
+            base.color = QtGui.QColor(modal_color or QtGui.QColor(80, 80, 80, 180))
+
+    @property
+    def anchor(self) -> Anchor:
+        """Which point of it is at its place."""
+        return self._anchor
+
+    @anchor.setter
+    def anchor(self, anchor: Anchor) -> None:
+        self._anchor = anchor
+        self._put()
+
+    @property
+    def place(self) -> tuple[float, float]:
+        """Where its anchor is, in units from the upper left corner of the view."""
+        if not self._free:
+            return self._place
+        return self.root.width() / 2, self.root.height() / 2
+
+    def move(self, x: float, y: float) -> None:
+        """Put it at a place, and follow nothing any longer; it is kept inside the view.
+
+        Args:
+            x: Units from the left edge of the view.
+            y: The same, from its upper edge.
+
+        Raises:
+            Error: That is no place.
+        """
+        if not (math.isfinite(x) and math.isfinite(y)):
+            raise Error(f"popup {self.name}: ({x:g}, {y:g}) is no place")
+        self._follow_nothing()
+        self._go(x, y)
+
+    def follow(
+        self, trackers: Trackers, point: Sequence[float] = (0, 0, 0), frame: str = ""
+    ) -> None:
+        """Stay where a point of the scene is seen.
+
+        Args:
+            trackers: Those of the RViz it is shown over, ``app.rviz.trackers``.
+            point: x, y, z in metres.
+            frame: Whose; empty for RViz's fixed frame.
+
+        Raises:
+            Error: It is no point.
+        """
+        tracker = trackers.add(point, frame, lambda: self.scale)
+        self._follow_nothing()
+        self._tracker, self._trackers = tracker, trackers
+        tracker.positionChanged.connect(lambda at: self._go(at.x(), at.y()))
+        at: Any = tracker.position
+        self._go(at.x(), at.y())
+
+    def close(self) -> None:
+        """Delete the widgets."""
+        self._follow_nothing()
+        super().close()
+
+    def _follow_nothing(self) -> None:
+        tracker, self._tracker = self._tracker, None
+        if tracker is not None and self._trackers is not None:
+            self._trackers.remove(tracker)
+
+    def _go(self, x: float, y: float) -> None:
+        self._place, self._free = (x, y), False
+        self._put()
+
+    def _put(self) -> None:
+        """Place the content as its size, the view's, and what it follows are now."""
+        content = self.content
+        if not is_alive(content):
+            return
+        x, y = self.place
+        room = content.parentWidget().size()
+        seen = self._tracker is None or (0 <= x <= room.width() and 0 <= y <= room.height())
+        content.setVisible(seen)
+        if not seen:
+            return
+        size = content.sizeHint().expandedTo(content.minimumSize()).boundedTo(content.maximumSize())
+        across, down = self._anchor.value
+        if self._anchor is Anchor.AUTO:
+            across = float(x + size.width() > room.width())
+            down = float(y + size.height() > room.height())
+        left = _inside(x - across * size.width(), room.width() - size.width())
+        top = _inside(y - down * size.height(), room.height() - size.height())
+        content.setGeometry(left, top, size.width(), size.height())
+
+    def _pressed_beside(self) -> None:
+        if self._light_dismiss:
+            self.visible = False
+            self.dismissed.emit()
+
+
+class _Base(QtWidgets.QWidget):  # type: ignore[misc]
+    """What fills the view around a popup's content."""
+
+    def __init__(self, content: Any, put: Callable[[], None], pressed: Callable[[], None]) -> None:
+        super().__init__()
+        self._put, self._pressed = put, pressed
+        self.color: Any = None
+        self.takes_presses = False
+        content.setParent(self)
+        # Without a background of its own, the scene would be seen between its widgets.
+        content.setAutoFillBackground(True)
+
+    def event(self, event: Any) -> bool:
+        """Follow sizes, and tell of presses."""
+        kind = event.type()
+        if kind in (QtCore.QEvent.Resize, QtCore.QEvent.LayoutRequest, QtCore.QEvent.Show):
+            self._put()
+        if kind == QtCore.QEvent.MouseButtonPress and self.takes_presses:
+            event.accept()
+            self._pressed()
+            return True
+        return bool(super().event(event))
+
+    def paintEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
+        """Cover what is below a modal popup."""
+        if self.color is not None:
+            QtGui.QPainter(self).fillRect(event.rect(), self.color)
+
+
+class MoveBar(QtWidgets.QLabel):  # type: ignore[misc]
+    """A bar by which a popup is moved; part of its content.
+
+    Args:
+        text: What it shows.
+    """
+
+    def __init__(self, text: str = "") -> None:
+        super().__init__(text)
+        #: What it moves.
+        self.popup: Popup | None = None
+        self._from: Any = None
+        self._start = (0.0, 0.0)
+        self.setCursor(QtCore.Qt.SizeAllCursor)
+
+    def mousePressEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
+        """Take hold of it."""
+        if self.popup is None or event.button() != QtCore.Qt.LeftButton:
+            event.ignore()
+            return
+        across, down = self.popup.anchor.value
+        if self.popup.anchor is Anchor.AUTO:
+            # The corner must not change under the hand.
+            across = down = 0.0
+            self.popup.anchor = Anchor.TOP_LEFT
+        box = self.popup.content.geometry()
+        self._start = (box.x() + across * box.width(), box.y() + down * box.height())
+        self._from = event.screenPos()
+
+    def mouseMoveEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
+        """Move it along."""
+        if self._from is not None and self.popup is not None:
+            way = (event.screenPos() - self._from) / self.popup.scale
+            self.popup.move(self._start[0] + way.x(), self._start[1] + way.y())
+
+    def mouseReleaseEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
+        """Let go of it."""
+        del event
+        self._from = None
+
+
+def _inside(start: float, most: float) -> int:
+    return round(max(min(start, most), 0))

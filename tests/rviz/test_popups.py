@@ -1,0 +1,200 @@
+"""Popups and dialogs of widgets over RViz's 3D view."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+
+def label(text: str = "popup") -> Any:
+    from rosglass.rviz.qt5 import QtWidgets
+
+    made = QtWidgets.QPushButton(text)
+    made.setFixedSize(100, 60)
+    return made
+
+
+def test_popups_are_above_and_the_pressed_one_above_the_others(hand: Any, app: Any) -> None:
+    from rosglass.rviz.popup import Popup
+
+    low, middle, high = (app.add(Popup(label(), name)) for name in ("low", "middle", "high"))
+    for number, popup in enumerate((low, middle, high)):
+        popup.move(150 + 60 * number, 200)
+    hand.wait(200)
+    clicked: list[str] = []
+    for popup in (low, middle, high):
+        popup.content.clicked.connect(lambda _=0, name=popup.name: clicked.append(name))
+    # At the left edge of the lowest one, and then where it overlaps the next.
+    hand.click(110, 200)
+    hand.click(180, 200)
+    assert clicked == ["low", "low"]
+    assert [overlay.name for overlay in app.overlays] == ["middle", "high", "low"]
+
+
+def test_modal_popup_blocks_what_is_below(hand: Any, app: Any, view: Any) -> None:
+    from rosglass.rviz import WidgetOverlay
+    from rosglass.rviz.popup import Popup
+
+    below: list[bool] = []
+    button = label("below")
+    button.clicked.connect(below.append)
+    app.add(WidgetOverlay(button, "Below"))
+    popup = app.add(Popup(label(), "Modal", modal=True))
+    hand.wait(200)
+    yaw, distance = view("Yaw"), view("Distance")
+    hand.drag(400, 400, 500, 400)
+    hand.click(50, 30)
+    hand.wheel(400, 400)
+    assert (view("Yaw"), view("Distance"), below) == (yaw, distance, [])
+    assert app.overlays.input.focused is popup
+    popup.visible = False
+    hand.wheel(400, 400)
+    assert view("Distance") < distance
+
+
+def test_modeless_popup_leaves_the_rest_alone(hand: Any, app: Any, view: Any) -> None:
+    from rosglass.rviz.popup import Popup
+
+    app.add(Popup(label(), "Modeless"))
+    hand.wait(200)
+    yaw = view("Yaw")
+    hand.drag(400, 500, 500, 500)
+    assert view("Yaw") != yaw
+
+
+def test_press_beside_dismisses(hand: Any, app: Any) -> None:
+    from rosglass.rviz.popup import Popup
+
+    popup = app.add(Popup(label(), "Light", light_dismiss=True))
+    popup.move(200, 200)
+    told: list[int] = []
+    popup.dismissed.connect(lambda: told.append(1))
+    hand.wait(200)
+    hand.click(200, 200)
+    assert popup.visible
+    hand.click(400, 400)
+    assert (popup.visible, told) == (False, [1])
+
+
+@pytest.mark.parametrize(
+    ("anchor", "corner"),
+    [
+        ("TOP_LEFT", (300, 200)),
+        ("TOP_RIGHT", (200, 200)),
+        ("CENTER", (250, 170)),
+        ("BOTTOM_LEFT", (300, 140)),
+        ("BOTTOM_RIGHT", (200, 140)),
+        ("AUTO", (300, 200)),
+    ],
+)
+def test_anchor_is_at_the_place(hand: Any, app: Any, anchor: str, corner: Any) -> None:
+    from rosglass.rviz.popup import Anchor, Popup
+
+    popup = app.add(Popup(label(), "Anchored", anchor=Anchor[anchor]))
+    popup.move(300, 200)
+    hand.wait(200)
+    box = popup.content.geometry()
+    assert (box.x(), box.y()) == corner
+    popup.move(1e4, -50)
+    box = popup.content.geometry()
+    assert (box.right() + 1, box.top()) == (popup.root.width(), 0)
+
+
+def test_popup_follows_a_point(hand: Any, app: Any, view: Any) -> None:
+    from rosglass.rviz.camera import Camera
+    from rosglass.rviz.popup import Popup
+
+    popup = app.add(Popup(label(), "Point"))
+    popup.follow(app.rviz.trackers, (1, 0, 0))
+
+    def right() -> bool:
+        seen = Camera(app.window).project((1, 0, 0))
+        at = popup.content.geometry().center()
+        return bool(abs(at.x() - seen.x) < 3 and abs(at.y() - seen.y) < 3)
+
+    hand.wait(right)
+    before = popup.content.geometry().center()
+    app.window.manager.getViewManager().getCurrent().subProp("Yaw").setValue(view("Yaw") + 1)
+    hand.wait(lambda: popup.content.geometry().center() != before and right())
+    # Behind the camera, it is not seen.
+    x, y, z = Camera(app.window).eye
+    popup.follow(app.rviz.trackers, (2 * x, 2 * y, 2 * z))
+    assert not popup.content.isVisible()
+
+
+def test_dialog_is_moved_by_its_title_and_tells_its_button(hand: Any, app: Any) -> None:
+    from rosglass.rviz.dialog import Button, message
+
+    dialog = app.add(message("Title", "Really?", buttons=Button.YES | Button.NO))
+    hand.wait(200)
+    told: list[Any] = []
+    dialog.clicked.connect(told.append)
+    box = dialog.content.geometry()
+    hand.drag(box.center().x(), box.y() + 16, box.center().x() + 80, box.y() + 66)
+    moved = dialog.content.geometry()
+    assert abs(moved.x() - box.x() - 80) <= 2
+    assert abs(moved.y() - box.y() - 50) <= 2
+    at = dialog.buttons[Button.NO].mapTo(dialog.root, dialog.buttons[Button.NO].rect().center())
+    hand.click(at.x(), at.y())
+    assert told == [Button.NO]
+    assert not dialog.visible
+
+
+def test_bad_popups_are_refused(app: Any) -> None:
+    from rosglass import Error
+    from rosglass.rviz.dialog import Button, message
+    from rosglass.rviz.popup import Popup
+
+    with pytest.raises(Error, match="is no QWidget"):
+        Popup(lambda: None, "None")
+    with pytest.raises(Error, match="needs a button"):
+        message("Title", "text", buttons=Button(0))
+    with pytest.raises(Error, match="no place"):
+        app.add(Popup(label(), "Here")).move(float("nan"), 0)
+
+
+def test_qml_popup_follows_a_point_and_is_moved(hand: Any, app: Any, show: Any) -> None:
+    from rosglass.rviz.camera import Camera
+
+    root = show(
+        """import RosRviz 1.0
+        Item { property real px: popup.x; property real py: popup.y
+            property real wide: popup.width; property real high: popup.height
+            AnchoredPopup { id: popup; visible: true; movable: true; width: 120; height: 80
+                point: [1, 0, 0] } }"""
+    )
+
+    def centre() -> tuple[float, float]:
+        left, top, wide, high = (root.property(n) for n in ("px", "py", "wide", "high"))
+        return left + wide / 2, top + high / 2
+
+    def right() -> bool:
+        seen = Camera(app.window).project((1, 0, 0))
+        x, y = centre()
+        return abs(x - seen.x) < 2 and abs(y - seen.y) < 2
+
+    hand.wait(right)
+    x, y = centre()
+    hand.drag(x - 55, y, x + 45, y + 50)
+    assert abs(centre()[0] - x - 100) < 3
+    assert abs(centre()[1] - y - 50) < 3
+
+
+def test_qml_message_blocks_until_it_is_answered(hand: Any, show: Any, view: Any) -> None:
+    root = show(
+        """import RosRviz 1.0
+        Item { property bool done: false
+            MessageDialog { visible: true; title: "Stop"; text: "Really?"
+                onAccepted: parent.done = true } }""".replace("parent.done", "top.done").replace(
+            "Item {", "Item { id: top;"
+        )
+    )
+    distance = view("Distance")
+    hand.wheel(30, 500)
+    hand.drag(30, 500, 130, 500)
+    assert view("Distance") == distance
+    hand.key("Tab", "space")
+    hand.wait(lambda: root.property("done"))
+    hand.wheel(30, 500)
+    hand.wait(lambda: view("Distance") != distance)
