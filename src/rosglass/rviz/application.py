@@ -235,11 +235,10 @@ class Application:
 
     def show(self) -> None:
         """Show RViz; :meth:`run` does it when this was not called."""
+        self.window.widget.show()
         if self._fullscreen:
-            # Shown in no other size before; where no window manager runs, it would keep that.
             self.window.fullscreen = True
         self._fullscreen = False
-        self.window.widget.show()
 
     def connect(self) -> None:
         """Ask for a node of the name of RViz's and ``_overlays``, if no overlay has asked for one.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +22,8 @@ __all__ = ["Window", "config_file"]
 
 #: What RViz says right before it makes the displays of a config file.
 _LOADING = "Creating displays"
+#: Milliseconds that a window manager may take to make a window as large as the screen.
+_RESIZING = 300
 _PATHS = "ROS_PACKAGE_PATH"
 #: Where a config file has the displays.
 _CONTENT = "Visualization Manager"
@@ -57,7 +60,7 @@ class Window(QtCore.QObject):
         self._closing = False
         bindings = rviz()
         #: RViz's ``VisualizationFrame``, as its own bindings know it.
-        self.frame: Any = _frame(bindings.VisualizationFrame, self._tell_closing)
+        self.frame: Any = bindings.VisualizationFrame()
         if not splash:
             self.frame.setSplashPath("")
         with _without_noise():
@@ -69,13 +72,16 @@ class Window(QtCore.QObject):
         #: The widget with the 3D view.
         self.panel = self._find_panel(QtWidgets.QWidget)
         self._wrapped = as_pyside(self.manager, QtCore.QObject)
-        self._loading = False
+        self._loading = self._filled = False
+        self._normal: Any = None
         self._config = file
         self._menus: dict[str, Any] = {}
+        self._close_watch = _CloseWatch(self._tell_closing)
+        self.widget.installEventFilter(self._close_watch)
         self._connect(self._wrapped, "preUpdate()", self.before_frame.emit)
         self._connect(self._wrapped, "statusUpdate(QString)", self._on_status)
         self._connect(self.widget, "displayConfigFileChanged(QString)", self._on_config)
-        self._connect(self.widget, "fullScreenChange(bool)", self.fullscreen_changed.emit)
+        self._connect(self.widget, "fullScreenChange(bool)", self._on_fullscreen)
 
     @staticmethod
     def _connect(sender: Any, signal: str, slot: Any) -> None:
@@ -88,7 +94,9 @@ class Window(QtCore.QObject):
     def view_size(self) -> tuple[int, int, float]:
         """Return width and height of the 3D view in pixels of the screen, and its pixel ratio."""
         ratio = self.panel.devicePixelRatioF()
-        return round(self.panel.width() * ratio), round(self.panel.height() * ratio), ratio
+        # Halves are rounded up, as Qt does when it makes the window.
+        width, height = self.panel.width() * ratio, self.panel.height() * ratio
+        return math.floor(width + 0.5), math.floor(height + 0.5), ratio
 
     @property
     def config(self) -> str:
@@ -175,6 +183,22 @@ class Window(QtCore.QObject):
         if not told:
             self.closing.emit()
 
+    def _on_fullscreen(self, fullscreen: bool) -> None:
+        if fullscreen:
+            self._normal = self.widget.geometry()
+            QtCore.QTimer.singleShot(_RESIZING, self._fill_screen)
+        elif self._filled:
+            self._filled = False
+            self.widget.setGeometry(self._normal)
+        self.fullscreen_changed.emit(fullscreen)
+
+    def _fill_screen(self) -> None:
+        """Take the size of the screen where no window manager runs that would give it."""
+        place = self.widget.windowHandle().screen().geometry()
+        if self.fullscreen and self.widget.size() != place.size():
+            self._filled = True
+            self.widget.setGeometry(place)
+
     def _on_status(self, status: str) -> None:
         if status == _LOADING:
             self._loading = True
@@ -206,15 +230,27 @@ def _plain(title: str) -> str:
     return title.replace("&", "")
 
 
-def _frame(base: Any, closed: Callable[[], None]) -> Any:
-    class Frame(base):  # type: ignore[misc]
-        def closeEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
-            super().closeEvent(event)
-            # The user may have said no when asked about unsaved changes.
-            if event.isAccepted():
-                closed()
+class _CloseWatch(QtCore.QObject):
+    """Tells when a window was closed, and not when the user said no to that.
 
-    return Frame()
+    Args:
+        closed: Called after RViz has accepted.
+    """
+
+    def __init__(self, closed: Callable[[], None]) -> None:
+        super().__init__()
+        self._closed, self._asking = closed, False
+
+    def eventFilter(self, watched: QtCore.QObject, event: QtCore.QEvent) -> bool:  # noqa: N802
+        """See Qt; RViz decides, and may ask the user, while the event is sent once more."""
+        if event.type() != QtCore.QEvent.Type.Close or self._asking:
+            return False
+        self._asking = True
+        QtCore.QCoreApplication.sendEvent(watched, event)
+        self._asking = False
+        if event.isAccepted():
+            self._closed()
+        return True
 
 
 def config_file(place: str | os.PathLike[str]) -> Path:

@@ -1,0 +1,208 @@
+"""``rosglass rviz``, as a program of its own."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+PATIENCE = 30
+#: What the program may take to end, on a machine that does other things, too.
+ENDING = 8.0
+OVERLAY = """
+import QtQuick 2.15
+Item {
+    Rectangle { x: 40; y: 30; width: 100; height: 60; color: "#00ff00" }
+    Timer { running: true; interval: %s; onTriggered: { %s } }
+}
+"""
+
+
+class Program:
+    """A running ``rosglass rviz``; `output` is what it has written so far."""
+
+    def __init__(self, process: subprocess.Popen[str], log: Path) -> None:
+        self.process, self._log = process, log
+
+    @property
+    def output(self) -> str:
+        return self._log.read_text()
+
+    def wait_for(self, text: str) -> None:
+        until = time.monotonic() + PATIENCE
+        while text not in self.output:
+            assert self.process.poll() is None, self.output
+            assert time.monotonic() < until, self.output
+            time.sleep(0.02)
+
+    def end(self, number: int = signal.SIGINT) -> int:
+        started = time.monotonic()
+        self.process.send_signal(number)
+        code = self.process.wait(PATIENCE)
+        assert time.monotonic() - started < ENDING, self.output
+        return code
+
+
+@pytest.fixture
+def start(screen: str, master: str, tmp_path: Path) -> Iterator[Callable[..., Program]]:
+    running: list[Program] = []
+    home = tmp_path / "home"
+    home.mkdir(mode=0o700)
+
+    def start(*arguments: Any, **env: str) -> Program:
+        log = tmp_path / f"log{len(running)}"
+        # Another client of the screen keeps it open after this one; see conftest.
+        given = {
+            "PATH": os.environ["PATH"],
+            "HOME": str(home),
+            "XDG_RUNTIME_DIR": str(home),
+            "DISPLAY": screen,
+            "ROS_MASTER_URI": master,
+            "ROS_IP": "127.0.0.1",
+            **env,
+        }
+        command = [sys.executable, "-m", "rosglass.cli", "rviz", *map(str, arguments)]
+        with log.open("w") as file:
+            process = subprocess.Popen(command, env=given, stdout=file, stderr=file, text=True)
+        running.append(Program(process, log))
+        return running[-1]
+
+    yield start
+    for program in running:
+        if program.process.poll() is None:
+            program.process.kill()
+            program.process.wait()
+
+
+def interface(folder: Path, code: str, after: int = 500, name: str = "Overlay.qml") -> Path:
+    file = folder / name
+    file.write_text(OVERLAY % (after, code))
+    return file
+
+
+def test_shows_overlays_over_rviz_and_takes_a_picture(
+    start: Callable[..., Program], tmp_path: Path
+) -> None:
+    from rosglass.qt import QtGui
+
+    file = interface(tmp_path, 'console.warn("arguments", Qt.application.arguments)')
+    picture = tmp_path / "picture.png"
+    program = start(
+        *("--overlay", file, "--overlay", file, "--fixed-frame", "odom", "--fullscreen"),
+        *("--screenshot", picture, "--after", "3", "--", "--speed=2"),
+    )
+    assert program.process.wait(PATIENCE) == 0, program.output
+    assert "--speed=2" in program.output
+    seen = QtGui.QImage(str(picture))
+    assert (seen.width(), seen.height()) == (1280, 800)
+    colours = {seen.pixelColor(x, y).name() for x in range(0, 1280, 20) for y in range(0, 800, 20)}
+    assert "#00ff00" in colours
+    assert "#303030" in colours
+
+
+def test_qml_ends_it_with_an_exit_code(start: Callable[..., Program], tmp_path: Path) -> None:
+    program = start("--overlay", interface(tmp_path, "Qt.exit(7)"))
+    assert program.process.wait(PATIENCE) == 7, program.output
+
+
+def test_says_nothing_of_its_own_when_all_is_well(
+    start: Callable[..., Program], tmp_path: Path
+) -> None:
+    program = start("--overlay", interface(tmp_path, "Qt.quit()"))
+    assert program.process.wait(PATIENCE) == 0
+    assert program.output == ""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("after", [0.3, 0.6, 0.9, 1.3, 2.0])
+def test_ends_when_told_to_at_any_moment(
+    start: Callable[..., Program], number: int, after: float
+) -> None:
+    program = start()
+    time.sleep(after)
+    code = program.end(number)
+    assert code in (128 + number, -number), program.output
+    assert "Traceback" not in program.output or after < 0.5
+
+
+def test_waits_for_a_master_and_says_so(start: Callable[..., Program]) -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    program = start("--url", f"ros1://127.0.0.1:{port}")
+    program.wait_for("start one: roscore")
+    assert program.end() == 130
+    program = start("--url", f"ros1://127.0.0.1:{port}", "--timeout", "0.5")
+    assert program.process.wait(PATIENCE) == 1
+    assert f"http://127.0.0.1:{port} does not answer" in program.output
+
+
+def test_ends_when_another_node_takes_its_name(
+    start: Callable[..., Program], tmp_path: Path, master: str
+) -> None:
+    from rosglass.ros1.master import call_node
+
+    program = start("--name", "rviz_named", "--overlay", interface(tmp_path, "console.warn('up')"))
+    program.wait_for("up")
+    api = call_node(master, "lookupNode", "/test", "/rviz_named")
+    call_node(api, "shutdown", "/test", "another one came")
+    assert program.process.wait(PATIENCE) == 0
+    assert "/rviz_named was shut down" in program.output
+
+
+def test_refuses_to_end_its_own_node(start: Callable[..., Program], tmp_path: Path) -> None:
+    file = interface(tmp_path, 'Ros.init("rviz_named")', 100)
+    file.write_text("import Ros 1.0\n" + file.read_text())
+    program = start("--name", "rviz_named", "--overlay", file)
+    program.wait_for("/rviz_named is RViz's own node")
+    assert program.end() == 130
+
+
+BROKEN = "a: [1,\n b: }"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["{folder}/none.rviz"], "none.rviz does not exist"),
+        (["{folder}"], "is a folder"),
+        (["{folder}/broken.rviz"], "broken.rviz: RViz cannot read it"),
+        (["{folder}/Bad.qml"], "RViz cannot read it"),
+        (["a.rviz", "b.rviz"], "one file, got a.rviz, b.rviz"),
+        (["--overlay", "{folder}/None.qml"], "None.qml:0:0: there is no such file"),
+        (["--overlay", "{folder}/Bad.qml"], "Bad.qml:2:"),
+        (["--url", "zenoh://robot"], "expected its master, ros1://..., got zenoh://robot"),
+        (["--name", "a-b"], "node name 'a-b' contains '-'"),
+        (["--fixed-frame", "/map"], "'/map' is no name of a frame"),
+        (["-I", "{folder}/none"], "no such folder to import QML modules from"),
+        (["__foo:=x"], "__foo is not known"),
+    ],
+)
+def test_bad_input_is_told(
+    start: Callable[..., Program], tmp_path: Path, arguments: list[str], message: str
+) -> None:
+    (tmp_path / "broken.rviz").write_text(BROKEN)
+    (tmp_path / "Bad.qml").write_text("import QtQuick 2.15\nItem { : }")
+    program = start(*[argument.format(folder=tmp_path) for argument in arguments])
+    assert program.process.wait(PATIENCE) == 1
+    assert message in program.output
+    assert "Traceback" not in program.output
+
+
+def test_without_a_display(start: Callable[..., Program]) -> None:
+    program = start(DISPLAY="")
+    assert program.process.wait(PATIENCE) == 1
+    assert "there is no display" in program.output
+    program = start(QT_QPA_PLATFORM="offscreen")
+    assert program.process.wait(PATIENCE) == 1
+    assert "RViz draws on X11 only" in program.output
