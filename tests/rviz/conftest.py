@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
-import signal
 import socket
 import subprocess
 import sys
@@ -37,22 +35,27 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.skip("RViz's bindings need the system's own Python"))
 
 
-def _end_with_parent() -> None:
-    """Have the kernel end this process when the tests do (prctl(2), PR_SET_PDEATHSIG)."""
-    ctypes.CDLL(None).prctl(1, signal.SIGTERM)
-
-
 @pytest.fixture(scope="session")
 def screen() -> str:
     """A display of the test's own; Qt would end the tests if it ended before them."""
     read, write = os.pipe()
-    command = ["Xvfb", "-displayfd", str(write), "-screen", "0", f"{SCREEN[0]}x{SCREEN[1]}x24"]
+    # The kernel ends it when the tests end, however they do.
+    command = [
+        "setpriv",
+        "--pdeathsig",
+        "TERM",
+        "Xvfb",
+        "-displayfd",
+        str(write),
+        "-screen",
+        "0",
+        f"{SCREEN[0]}x{SCREEN[1]}x24",
+    ]
     # Without -noreset it would start over, and refuse others, whenever its last client leaves.
     subprocess.Popen(
         [*command, "-nolisten", "tcp", "-noreset"],
         pass_fds=[write],
         stderr=subprocess.DEVNULL,
-        preexec_fn=_end_with_parent,
     )
     os.close(write)
     with os.fdopen(read) as told:
