@@ -39,6 +39,19 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--jpeg-quality", type=int, default=80, metavar="1-100", help="default: %(default)s"
     )
     parser.add_argument(
+        "--equipped",
+        action="store_true",
+        help="also offer a model and a point cloud for RViz, more cameras, modes, a mission and "
+        "behaviours",
+    )
+    parser.add_argument(
+        "--mode",
+        default="supervised",
+        metavar="MODE",
+        help="first mode of an equipped robot: autonomous, supervised or safe "
+        "(default: %(default)s)",
+    )
+    parser.add_argument(
         "--leash",
         action="store_true",
         help="end when standard input closes, that is, with the program that started the robot",
@@ -56,6 +69,8 @@ def run(args: argparse.Namespace) -> int:
         raw=not args.no_raw,
         compressed=not args.no_compressed,
         jpeg_quality=args.jpeg_quality,
+        equipped=args.equipped,
+        mode=args.mode,
     )
     end = threading.Event()
     signal.signal(signal.SIGTERM, lambda *_: end.set())

@@ -77,8 +77,8 @@ class Camera:
         self._things = Surfaces([f for p in standing for f in faces_of(p)] + ramp_faces(world))
         self._beam = _beam()
 
-    def render(self, state: RobotState) -> Picture:
-        """Return a new picture, rows of RGB, of what the camera sees."""
+    def render(self, state: RobotState, *, body: bool = True) -> Picture:
+        """Return a new picture, rows of RGB, of what is seen, of its own `body`, too."""
         picture = np.empty((HEIGHT, WIDTH, 3), np.uint8)
         rotation, position = pose_of(state)
         self._draw_sky(picture, state)
@@ -90,7 +90,8 @@ class Camera:
         things.sort(key=lambda view: -view.distance)
         for view in things:
             self._draw(picture, view)
-        self._draw_body(picture, state)
+        if body:
+            self._draw_body(picture, state)
         if state.flashlight:
             cv2.multiply(picture, self._beam, picture, 1 / 128)
         return picture

@@ -22,9 +22,10 @@ from rosglass.demo.simulation import CommandRejectedError, Simulation
 from rosglass.errors import Error, NodeClosedError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from rosglass.comm import Node, Publisher
+    from rosglass.demo.equipment import Equipment
     from rosglass.demo.simulation import RobotState
     from rosglass.messages import Message
 
@@ -48,12 +49,16 @@ class RobotOptions:
         raw: Whether to send ``/camera/image_raw``.
         compressed: Whether to send ``/camera/image_raw/compressed`` (while somebody listens).
         jpeg_quality: 1 to 100.
+        equipped: Whether it has :class:`~rosglass.demo.equipment.Equipment` as well.
+        mode: The first one of :data:`~rosglass.demo.operation.MODES`, if it is equipped.
     """
 
     fps: float = 30.0
     raw: bool = True
     compressed: bool = True
     jpeg_quality: int = 80
+    equipped: bool = False
+    mode: str = "supervised"
 
     def __post_init__(self) -> None:
         if not 0 < self.fps <= 120:
@@ -108,6 +113,9 @@ class Robot:
             )
         ]
         self._duties = Duties(node, lambda: self.state, self._switch, self._drive)
+        self._equipment: Equipment | None = None
+        if self.options.equipped:
+            self._equipment = self._equip(node)
 
     @property
     def state(self) -> RobotState:
@@ -118,14 +126,26 @@ class Robot:
         """Come to life."""
         now = Time.now()
         cells = occupancy(self._simulation.world, _GRID_RESOLUTION)
-        self._send["/tf_static"].publish(telemetry.static_frames(now))
+        frames, work = (
+            telemetry.static_frames(now),
+            [
+                ("body", self._live),
+                ("reporter", self._report),
+                ("camera", self._film),
+            ],
+        )
+        if (more := self._equipment) is not None:
+            more.describe()
+            frames["transforms"] += more.frames(now)
+            work += [
+                ("operation", more.operation.work),
+                ("cloud", lambda: more.scan(self._ending.wait)),
+                ("cameras", lambda: more.film(self._ending.wait)),
+            ]
+        self._send["/tf_static"].publish(frames)
         self._send["/map"].publish(telemetry.occupancy_grid(cells, _GRID_RESOLUTION, now))
-        for name, work in (
-            ("body", self._live),
-            ("reporter", self._report),
-            ("camera", self._film),
-        ):
-            thread = threading.Thread(target=self._guard(work), name=f"robot {name}", daemon=True)
+        for name, job in work:
+            thread = threading.Thread(target=self._guard(job), name=f"robot {name}", daemon=True)
             self._threads.append(thread)
             thread.start()
 
@@ -137,6 +157,8 @@ class Robot:
         """Stop moving and end the threads; safe to call twice, from any thread but the robot's."""
         self._ending.set()
         self._duties.close()
+        if self._equipment is not None:
+            self._equipment.operation.close()
         for subscription in self._subscriptions:
             subscription.close()
         for thread in self._threads:
@@ -181,10 +203,31 @@ class Robot:
                     f"a motion only along linear.x and angular.z expected, "
                     f"got another component {value}"
                 )
+        if self._equipment is not None:
+            self._equipment.operation.take_over()
         self._drive(speed, turn)
+
+    def _equip(self, node: Node) -> Equipment:
+        from rosglass.demo.equipment import Equipment  # noqa: PLC0415 - needs OpenCV
+
+        return Equipment(
+            node,
+            self._simulation,
+            self._camera,
+            LaserScanner(self._simulation.world),
+            self._drive,
+            self._command_flippers,
+            self.options.mode,
+        )
+
+    def _command_flippers(self, angles: Sequence[float]) -> None:
+        with self._lock:
+            self._simulation.command_flippers(angles)
 
     def _drive(self, speed: float, turn: float) -> None:
         fastest = self._duties.max_speed
+        if self._equipment is not None:
+            fastest = min(fastest, self._equipment.operation.max_speed)
         if math.isfinite(speed) and abs(speed) <= self._simulation.limits.believable:
             speed = max(-fastest, min(fastest, speed))
         with self._lock:
@@ -207,8 +250,7 @@ class Robot:
         self._send["/flashlight/state"].publish(data=self.state.flashlight)
 
     def _on_flippers(self, message: Message) -> None:
-        with self._lock:
-            self._simulation.command_flippers([float(angle) for angle in message.data])
+        self._command_flippers([float(angle) for angle in message.data])
 
     def _confirm(self) -> None:
         self._send["/emergency_stop/state"].publish(data=self.state.emergency_stop)

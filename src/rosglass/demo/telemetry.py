@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from rosglass.comm import Time
 
 __all__ = [
+    "AXLES",
     "battery",
     "camera_info",
     "diagnostics",
@@ -30,13 +31,17 @@ __all__ = [
     "moving_frames",
     "occupancy_grid",
     "odometry",
+    "part",
     "scan",
     "static_frames",
 ]
 
 Fields = dict[str, Any]
 #: Where the flippers' axles are: metres forward, left and up of the middle.
-_AXLES = ((0.26, 0.32, 0.14), (0.26, -0.32, 0.14), (-0.26, 0.32, 0.14), (-0.26, -0.32, 0.14))
+AXLES = {
+    name: (0.26 * ahead, 0.32 * left, 0.14)
+    for name, (ahead, left) in zip(FLIPPERS, ((1, 1), (1, -1), (-1, 1), (-1, -1)), strict=True)
+}
 # diagnostic_msgs/msg/DiagnosticStatus and sensor_msgs/msg/BatteryState name these numbers.
 _OK, _WARN, _ERROR = 0, 1, 2
 _CHARGING, _DISCHARGING, _FULL = 1, 2, 4
@@ -112,9 +117,16 @@ def moving_frames(state: RobotState, stamp: Time) -> Fields:
             _vector(*axle),
             _rotation(0.0, -angle if axle[0] > 0 else angle, 0.0),
         )
-        for name, axle, angle in zip(FLIPPERS, _AXLES, state.flippers, strict=True)
+        for (name, axle), angle in zip(AXLES.items(), state.flippers, strict=True)
     ]
     return {"transforms": [body, *flippers]}
+
+
+def part(
+    stamp: Time, name: str, place: tuple[float, float, float], turn: tuple[float, float, float]
+) -> Fields:
+    """Return where a part is on ``base_link``; its turn is roll, pitch, yaw in radians."""
+    return _transform(stamp, "base_link", name, _vector(*place), _rotation(*turn))
 
 
 def static_frames(stamp: Time) -> Fields:

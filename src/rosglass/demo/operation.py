@@ -1,0 +1,266 @@
+"""How the robot is operated: its mode, the mission it drives by itself, and its behaviours."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+from rosglass.comm import QoS, Time
+from rosglass.demo.telemetry import header
+from rosglass.errors import Error
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from rosglass.comm import Node, ServerGoal
+    from rosglass.demo.simulation import RobotState
+    from rosglass.messages import Message
+
+__all__ = ["BEHAVIOURS", "MODES", "WAYPOINTS", "Operation"]
+
+MODES = ("autonomous", "supervised", "safe")
+#: The mission: a round through the yard, over the rubble. Map frame, metres.
+WAYPOINTS = ((-3.6, -1.8), (-2.2, -0.3), (-2.4, 2.6), (-4.4, 1.8), (-5.0, -1.0))
+BEHAVIOURS = ("Look around", "Turn around", "Flippers up", "Flippers flat", "Return to dock")
+_PERIOD = 0.1
+#: Seconds between two confirmations of what has not changed.
+_CONFIRM = 0.5
+_NEAR, _NEAR_ANGLE = 0.25, 0.05
+#: Metres and radians per second that it drives by itself, and metres per second when it is careful.
+_SPEED, _TURN, _CAREFUL = 0.55, 0.9, 0.3
+_FLIPPER_TIME = 2.0
+
+
+class Operation:
+    """Modes, mission, goals and behaviours.
+
+    ``/mode`` tells one of :data:`MODES`; the services ``/mode/autonomous`` and so on choose it.
+    The mission is driven in mode autonomous, and told in ``/mission/state``, ``/mission/path``
+    and ``/mission/waypoint``; ``/mission/pause`` holds it. A place at ``/move_base_simple/goal``
+    is driven to in mode supervised, and so are behaviours, ``/flexbe/execute_behavior``, in all
+    modes but safe.
+
+    Args:
+        node: Where all this is offered.
+        state: Tells how the robot is now.
+        drive: Takes metres and radians per second.
+        flippers: Takes four angles.
+        dock: Where it charges.
+        mode: The first one.
+
+    Raises:
+        Error: There is no such mode.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        state: Callable[[], RobotState],
+        drive: Callable[[float, float], None],
+        flippers: Callable[[Sequence[float]], None],
+        dock: tuple[float, float],
+        mode: str = "supervised",
+    ) -> None:
+        if mode not in MODES:
+            raise Error(f"there is no mode {mode!r}; there are {', '.join(MODES)}")
+        self.mode = mode
+        self._state, self._drive, self._flippers, self._dock = state, drive, flippers, dock
+        self._ending = threading.Event()
+        self._paused, self._next = False, 0
+        self._goal: tuple[float, float] | None = None
+        self._behaviour = ""
+        self._told: dict[str, tuple[Any, float]] = {}
+        latched = QoS.latched()
+        self._send = {
+            topic: node.create_publisher(topic, kind, latched)
+            for topic, kind in (
+                ("/mode", "std_msgs/msg/String"),
+                ("/mission/state", "std_msgs/msg/String"),
+                ("/mission/waypoint", "std_msgs/msg/Int32"),
+                ("/mission/path", "nav_msgs/msg/Path"),
+            )
+        }
+        self._send["/mission/path"].publish(_path())
+        trigger = "std_srvs/srv/Trigger"
+        self._parts: list[Any] = [
+            node.create_service_server(f"/mode/{name}", trigger, self._chooser(name))
+            for name in MODES
+        ]
+        self._parts += [
+            node.create_service_server("/mission/pause", "std_srvs/srv/SetBool", self._on_pause),
+            node.create_service_server("/mission/restart", trigger, self._on_restart),
+            node.create_subscription(
+                "/move_base_simple/goal", "geometry_msgs/msg/PoseStamped", self._on_goal, 1
+            ),
+        ]
+        if node.wire == "ros1":
+            self._parts.append(
+                node.create_action_server(
+                    "/flexbe/execute_behavior",
+                    "flexbe_msgs/action/BehaviorExecution",
+                    self._behave,
+                    accept=lambda goal: goal.behavior_name in BEHAVIOURS and not self._behaviour,
+                )
+            )
+
+    @property
+    def max_speed(self) -> float:
+        """Metres per second that the mode allows."""
+        return _CAREFUL if self.mode == "safe" else math.inf
+
+    def work(self) -> None:
+        """Drive and tell, until :meth:`close`."""
+        while not self._ending.wait(_PERIOD):
+            state = self._state()
+            self._tell("/mode", self.mode)
+            self._tell("/mission/waypoint", self._next)
+            self._tell("/mission/state", self._proceed(state))
+
+    def take_over(self) -> None:
+        """Leave the driving to the operator, who has just driven."""
+        if self.mode == "autonomous":
+            self.mode = "supervised"
+        self._goal = None
+
+    def close(self) -> None:
+        """Withdraw all; safe to call twice."""
+        self._ending.set()
+        for part in self._parts:
+            part.close()
+
+    def _proceed(self, state: RobotState) -> str:
+        """Drive on for a moment; returns what the robot is about."""
+        if state.emergency_stop:
+            self._goal = None
+            return "emergency stop"
+        if self._behaviour:
+            return self._behaviour.lower()
+        if self._goal is not None:
+            if self._steer(state, self._goal):
+                self._goal = None
+            return "driving to the goal"
+        if self.mode != "autonomous":
+            return "waiting for mode autonomous"
+        if self._paused:
+            return "paused"
+        if self._steer(state, WAYPOINTS[self._next]):
+            self._next = (self._next + 1) % len(WAYPOINTS)
+        return "on patrol"
+
+    def _steer(self, state: RobotState, target: tuple[float, float]) -> bool:
+        """Drive towards a place; returns whether it is reached."""
+        x, y = target[0] - state.x, target[1] - state.y
+        distance = math.hypot(x, y)
+        if distance < _NEAR:
+            self._drive(0.0, 0.0)
+            return True
+        rest = math.remainder(math.atan2(y, x) - state.yaw, math.tau)
+        speed = min(_SPEED, 0.9 * distance) * max(0.0, 1 - abs(rest) / 0.6)
+        self._drive(speed, max(-_TURN, min(_TURN, 2 * rest)))
+        return False
+
+    def _tell(self, topic: str, data: Any) -> None:
+        value, told = self._told.get(topic, (None, -math.inf))
+        now = time.monotonic()
+        if data != value or now - told >= _CONFIRM:
+            self._told[topic] = (data, now)
+            self._send[topic].publish(data=data)
+
+    def _chooser(self, name: str) -> Callable[[Message], dict[str, Any]]:
+        def choose(_: Message) -> dict[str, Any]:
+            self.mode = name
+            if name == "safe":
+                self._goal = None
+            self._drive(0.0, 0.0)
+            self._tell("/mode", name)
+            return {"success": True, "message": name}
+
+        return choose
+
+    def _on_pause(self, request: Message) -> dict[str, Any]:
+        self._paused = bool(request.data)
+        self._drive(0.0, 0.0)
+        return {"success": True, "message": "paused" if self._paused else "going on"}
+
+    def _on_restart(self, _: Message) -> dict[str, Any]:
+        self._next, self._paused = 0, False
+        return {"success": True, "message": "from the first waypoint"}
+
+    def _on_goal(self, message: Message) -> None:
+        place = message.pose.position
+        if message.header.frame_id.lstrip("/") not in ("map", "odom", ""):
+            raise Error(f"a goal in {message.header.frame_id!r} refused: expected it in 'map'")
+        if self.mode == "supervised" and math.isfinite(place.x) and math.isfinite(place.y):
+            self._goal = (place.x, place.y)
+
+    def _behave(self, goal: ServerGoal) -> dict[str, str]:
+        name = goal.goal.behavior_name
+        if self.mode == "safe":
+            raise Error("no behaviours in mode safe")
+        self._behaviour, self._goal = name, None
+        try:
+            start = self._state()
+            {
+                "Look around": lambda: self._turn(goal, math.tau),
+                "Turn around": lambda: self._turn(goal, math.pi),
+                "Flippers up": lambda: self._move_flippers(goal, 1.2),
+                "Flippers flat": lambda: self._move_flippers(goal, 0.0),
+                "Return to dock": lambda: self._go(goal, self._dock),
+            }[name]()
+            self._drive(0.0, 0.0)
+            moved = math.dist((start.x, start.y), (self._state().x, self._state().y))
+            return {"outcome": "cancelled" if goal.is_cancel_requested else f"{moved:.1f} m driven"}
+        finally:
+            self._behaviour = ""
+
+    def _steps(self, goal: ServerGoal) -> Any:
+        """Yield the robot's state now and then, until the behaviour is to end."""
+        while not goal.is_cancel_requested:
+            if self._ending.wait(_PERIOD):
+                raise Error("the robot ends")
+            state = self._state()
+            if state.emergency_stop:
+                raise Error("the emergency stop is latched; release it first")
+            yield state
+
+    def _turn(self, goal: ServerGoal, angle: float) -> None:
+        last, rest = self._state().yaw, angle
+        for state in self._steps(goal):
+            rest -= math.remainder(state.yaw - last, math.tau)
+            last = state.yaw
+            if rest < _NEAR_ANGLE:
+                return
+            goal.publish_feedback({"current_state": f"{math.degrees(rest):.0f}° to go"})
+            self._drive(0.0, max(0.15, min(_TURN, 2 * rest)))
+
+    def _move_flippers(self, goal: ServerGoal, angle: float) -> None:
+        self._flippers([angle] * 4)
+        until = time.monotonic() + _FLIPPER_TIME
+        for state in self._steps(goal):
+            rest = max(abs(angle - now) for now in state.flippers)
+            if rest < _NEAR_ANGLE or time.monotonic() > until:
+                return
+            goal.publish_feedback({"current_state": f"{math.degrees(rest):.0f}° to go"})
+
+    def _go(self, goal: ServerGoal, target: tuple[float, float]) -> None:
+        for state in self._steps(goal):
+            rest = math.dist(target, (state.x, state.y))
+            goal.publish_feedback({"current_state": f"{rest:.1f} m to go"})
+            if self._steer(state, target):
+                return
+
+
+def _path() -> dict[str, Any]:
+    now = Time.now()
+    places = [*WAYPOINTS, WAYPOINTS[0]]
+    upright = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+    poses = [
+        {
+            "header": header(now, "map"),
+            "pose": {"position": {"x": x, "y": y, "z": 0.03}, "orientation": upright},
+        }
+        for x, y in places
+    ]
+    return {"header": header(now, "map"), "poses": poses}
