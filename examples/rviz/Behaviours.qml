@@ -1,0 +1,59 @@
+// Behaviours of FlexBE: a button sends the action's goal, and what the robot says of it is below.
+import QtQuick 2.15
+import Ros 1.0
+
+Column {
+    id: behaviours
+    spacing: 4
+    property var client: Ros.createActionClient("flexbe_msgs/BehaviorExecutionAction", "/flexbe/execute_behavior")
+    property var goal: null
+    property string name
+    property string outcome
+    readonly property bool active: goal !== null && goal.isActive
+
+    function start(behaviour) {
+        name = behaviour
+        outcome = ""
+        goal = client.sendGoal({behavior_name: behaviour}, function (handle) {
+            if (handle.commState !== ActionCommStates.DONE)
+                return
+            var end = handle.terminalState, result = handle.getResult()
+            outcome = end.state === ActionTerminalStates.SUCCEEDED ? "done, " + result.outcome
+                : end.state === ActionTerminalStates.PREEMPTED ? "cancelled"
+                : "failed: " + (end.text || "no answer")
+        }, function () {})
+    }
+
+    Repeater {
+        model: ["Look around", "Turn around", "Flippers up", "Flippers flat", "Return to dock"]
+        Push {
+            objectName: "behaviour " + modelData
+            width: behaviours.width; height: 24
+            text: modelData
+            enabled: behaviours.client.connected && !behaviours.active
+            checked: behaviours.active && behaviours.name === modelData
+            onClicked: behaviours.start(modelData)
+        }
+    }
+    Text {
+        width: behaviours.width
+        elide: Text.ElideRight
+        text: !behaviours.client.connected ? "NO BEHAVIOUR SERVER" : behaviours.active
+            ? behaviours.name + ": " + (behaviours.goal.feedback ? behaviours.goal.feedback.current_state : "on its way")
+            : behaviours.name ? behaviours.name + ": " + behaviours.outcome : ""
+        color: behaviours.client.connected ? Theme.text : Theme.bad
+        font.pixelSize: 11
+    }
+    Push {
+        width: behaviours.width; height: 24
+        text: "Cancel"
+        tint: Theme.bad
+        enabled: behaviours.active
+        checked: behaviours.active
+        onClicked: behaviours.goal.cancel()
+    }
+    Connections {
+        target: behaviours.goal
+        function onCancelFailed(reason) { behaviours.outcome = "NOT CANCELLED: " + reason }
+    }
+}

@@ -1,0 +1,51 @@
+// The paper's Figure 1: an operator station over RViz's 3D view.
+//   rosglass rviz figure1.rviz --overlay Dashboard.qml
+import QtQuick 2.15
+import QtQuick.Layouts 1.15
+import Ros 1.0
+
+Item {
+    id: dashboard
+    Component.onCompleted: Ros.init("dashboard")
+
+    Clock { x: Theme.gap; y: Theme.gap }
+    ToolButtons { x: Theme.gap; y: 62 }
+
+    Rectangle {
+        anchors { left: parent.left; right: parent.right; bottom: parent.bottom }
+        height: Math.min(266, parent.height * 0.45)
+        color: Theme.background
+
+        RowLayout {
+            anchors { fill: parent; margins: Theme.gap }
+            spacing: Theme.gap
+
+            ColumnLayout {
+                Layout.preferredWidth: 158; Layout.fillHeight: true
+                spacing: Theme.gap
+                ViewControls { Layout.fillWidth: true; Layout.preferredHeight: 98 }
+                EmergencyStop { Layout.fillWidth: true; Layout.fillHeight: true }
+            }
+            ColumnLayout {
+                Layout.preferredWidth: 216; Layout.fillHeight: true
+                spacing: Theme.gap
+                Posture { Layout.fillWidth: true; Layout.fillHeight: true }
+                RowLayout {
+                    Layout.fillWidth: true; Layout.fillHeight: false; Layout.preferredHeight: 88
+                    spacing: Theme.gap
+                    OperatingMode { Layout.fillWidth: true; Layout.fillHeight: true }
+                    Battery { Layout.preferredWidth: 84; Layout.fillHeight: true }
+                }
+            }
+            MultiCamera {
+                Layout.fillWidth: true; Layout.preferredWidth: 300; Layout.fillHeight: true
+                selected: 0
+            }
+            MultiCamera {
+                Layout.fillWidth: true; Layout.preferredWidth: 300; Layout.fillHeight: true
+                selected: 1
+            }
+            Tabs { Layout.preferredWidth: 236; Layout.fillHeight: true }
+        }
+    }
+}

@@ -1,0 +1,79 @@
+// The emergency stop. It shows what the robot confirms, not what was clicked; a wish that is not
+// confirmed is sent again and again. It stops when pressed, and releases only after a long press.
+import QtQuick 2.15
+import Ros 1.0
+
+Rectangle {
+    id: stop
+    objectName: "emergency stop"
+    property var publisher: Ros.advertise("std_msgs/Bool", "/emergency_stop", 1)
+    // What the operator wants: true, false, or null for whatever it is.
+    property var wanted: null
+    readonly property bool known: state_.message !== undefined && !state_.stale
+    readonly property bool stopped: known && state_.message.data
+    readonly property bool pending: wanted !== null && (!known || stopped !== wanted)
+
+    function want(stopped) {
+        wanted = stopped
+        publisher.publish({data: wanted})
+    }
+
+    radius: 8
+    color: !known ? "#4a4a1c" : stopped ? "#8c0010" : "#d3122a"
+    border { color: !known || pending ? "#ffe24a" : stopped ? "#ff8a94" : "#ff6b78"; width: 3 }
+
+    Subscriber { id: state_; topic: "/emergency_stop/state"; messageType: "std_msgs/Bool"; timeout: 1000 }
+    Timer {
+        interval: 100; repeat: true
+        running: stop.pending
+        onTriggered: stop.want(stop.wanted)
+    }
+    // A stop is never given up; a release must not undo, much later, somebody else's stop.
+    Timer {
+        interval: 3000
+        running: stop.wanted === false
+        onTriggered: stop.wanted = null
+    }
+
+    Column {
+        anchors.centerIn: parent
+        spacing: 4
+        Text {
+            anchors.horizontalCenter: parent.horizontalCenter
+            text: stop.stopped ? "STOPPED" : "STOP"
+            color: "white"
+            font { pixelSize: stop.stopped ? 25 : 36; weight: Font.Black; letterSpacing: 1 }
+        }
+        Text {
+            anchors.horizontalCenter: parent.horizontalCenter
+            text: !stop.known ? "STATE UNKNOWN" : stop.pending ? "NOT CONFIRMED"
+                : stop.stopped ? "hold to release" : "emergency stop"
+            color: !stop.known || stop.pending ? "#ffe24a" : "#ffd9dc"
+            font { pixelSize: 12; weight: Font.DemiBold }
+        }
+    }
+    Rectangle {
+        anchors { left: parent.left; bottom: parent.bottom; margins: 5 }
+        width: (parent.width - 10) * hold.progress
+        height: 5; radius: 2
+        color: "white"
+    }
+    NumberAnimation {
+        id: hold
+        property real progress: 0
+        target: hold; property: "progress"
+        from: 0; to: 1; duration: 700
+        onFinished: { progress = 0; stop.want(false) }
+    }
+    MouseArea {
+        anchors.fill: parent
+        onPressed: {
+            if (stop.stopped && !stop.pending)
+                hold.restart()
+            else
+                stop.want(true)
+        }
+        onReleased: { hold.stop(); hold.progress = 0 }
+        onCanceled: { hold.stop(); hold.progress = 0 }
+    }
+}

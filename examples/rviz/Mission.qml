@@ -1,0 +1,58 @@
+// What the robot is about, how far it is, and how to hold it.
+import QtQuick 2.15
+import Ros 1.0
+
+Column {
+    id: mission
+    spacing: 8
+    property string failure
+    readonly property int count: path.message ? path.message.poses.length - 1 : 0
+    readonly property int next: waypoint.message ? waypoint.message.data : 0
+
+    Subscriber { id: state_; topic: "/mission/state"; messageType: "std_msgs/String"; timeout: 2000 }
+    Subscriber { id: waypoint; topic: "/mission/waypoint"; messageType: "std_msgs/Int32"; timeout: 2000 }
+    Subscriber { id: path; topic: "/mission/path"; messageType: "nav_msgs/Path"; timeout: 0 }
+
+    function ask(name, type, request) {
+        Service.callAsync(name, type, request, function (response) {
+            failure = response && response.success ? "" : "the robot did not answer"
+        })
+    }
+
+    Text {
+        text: state_.stale ? "STATE UNKNOWN" : state_.message.data
+        color: state_.stale ? Theme.bad : Theme.text
+        font { pixelSize: 17; weight: Font.Light }
+    }
+    Row {
+        spacing: 6
+        Repeater {
+            model: mission.count
+            Rectangle {
+                width: 26; height: 26; radius: 13
+                color: index < mission.next ? Theme.accent : Theme.button
+                opacity: state_.stale ? 0.3 : 1
+                border { color: index === mission.next ? Theme.accent : Theme.edge; width: 2 }
+                Text {
+                    anchors.centerIn: parent
+                    text: index + 1
+                    color: index < mission.next ? "black" : Theme.text
+                    font.pixelSize: 11
+                }
+            }
+        }
+    }
+    Text {
+        text: "next waypoint " + (mission.next + 1) + " of " + mission.count
+        visible: mission.count > 0
+        color: Theme.dim
+        font.pixelSize: 11
+    }
+    Row {
+        spacing: 5
+        Push { text: "Go on"; onClicked: mission.ask("/mission/pause", "std_srvs/SetBool", {data: false}) }
+        Push { text: "Pause"; onClicked: mission.ask("/mission/pause", "std_srvs/SetBool", {data: true}) }
+        Push { text: "Restart"; onClicked: mission.ask("/mission/restart", "std_srvs/Trigger", {}) }
+    }
+    Text { text: mission.failure; color: Theme.bad; font.pixelSize: 11 }
+}

@@ -1,0 +1,48 @@
+// One of several cameras, whichever is chosen. A picture that is not live says so.
+import QtQuick 2.15
+import Ros 1.0
+
+Panel {
+    id: panel
+    property var cameras: [
+        {name: "Front", topic: "/camera/image_raw"}, {name: "Rear", topic: "/rear_camera/image_raw"},
+        {name: "Left", topic: "/left_camera/image_raw"}, {name: "Right", topic: "/right_camera/image_raw"},
+        {name: "Thermal", topic: "/thermal_camera/image_raw"}
+    ]
+    property int selected: 0
+    title: cameras[selected].name + " camera"
+    stale: camera.stale
+    note: camera.framerate.toFixed(0) + " Hz   " + Math.max(0, camera.latency).toFixed(0) + " ms"
+
+    ImageTransportSubscriber {
+        id: camera
+        topic: panel.cameras[panel.selected].topic
+        defaultTransport: "raw"
+        timeout: 1000
+    }
+    ImageItem {
+        anchors { fill: parent; bottomMargin: 26 }
+        source: camera
+    }
+    Text {
+        anchors { centerIn: parent; verticalCenterOffset: -13 }
+        visible: camera.stale
+        text: "NO PICTURE"
+        color: Theme.bad
+        font { pixelSize: 20; weight: Font.Black }
+    }
+    Row {
+        anchors { bottom: parent.bottom; horizontalCenter: parent.horizontalCenter }
+        spacing: 3
+        Repeater {
+            model: panel.cameras
+            Push {
+                objectName: "camera " + modelData.name
+                height: 21; size: 10
+                text: modelData.name
+                checked: index === panel.selected
+                onClicked: panel.selected = index
+            }
+        }
+    }
+}

@@ -1,0 +1,31 @@
+// The robot's mode, as it tells it; a click asks for another.
+import QtQuick 2.15
+import Ros 1.0
+
+Panel {
+    id: panel
+    title: "Mode"
+    stale: mode.stale
+    note: failure
+    property string failure
+
+    Subscriber { id: mode; topic: "/mode"; messageType: "std_msgs/String"; timeout: 2000 }
+    Column {
+        anchors.fill: parent
+        spacing: 2
+        Repeater {
+            model: ["autonomous", "supervised", "safe"]
+            Push {
+                objectName: "mode " + modelData
+                width: parent.width; height: 16
+                size: 10
+                text: modelData
+                tint: modelData === "autonomous" ? Theme.accent : modelData === "safe" ? Theme.good : Theme.warn
+                checked: mode.message !== undefined && mode.message.data === modelData
+                onClicked: Service.callAsync("/mode/" + modelData, "std_srvs/Trigger", {}, function (response) {
+                    panel.failure = response && response.success ? "" : "NOT CHANGED"
+                })
+            }
+        }
+    }
+}

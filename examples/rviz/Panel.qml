@@ -1,0 +1,32 @@
+// A titled card. What it shows is dimmed, and said to be old, when `stale`.
+import QtQuick 2.15
+
+Rectangle {
+    id: panel
+    property string title
+    property string note
+    property bool stale: false
+    default property alias content: body.data
+
+    color: Theme.panel
+    radius: 6
+    border.color: stale ? Theme.bad : Theme.edge
+    Text {
+        x: 9; y: 6
+        text: panel.title.toUpperCase()
+        color: Theme.dim
+        font { pixelSize: 10; letterSpacing: 1; weight: Font.DemiBold }
+    }
+    Text {
+        anchors { right: parent.right; rightMargin: 9 }
+        y: 6
+        text: panel.stale ? "NO DATA" : panel.note
+        color: panel.stale ? Theme.bad : Theme.dim
+        font { pixelSize: 10; weight: panel.stale ? Font.Bold : Font.Normal }
+    }
+    Item {
+        id: body
+        anchors { fill: parent; margins: 8; topMargin: 24 }
+        opacity: panel.stale ? 0.3 : 1
+    }
+}

@@ -1,0 +1,42 @@
+// A button, as all of this interface look.
+import QtQuick 2.15
+
+Rectangle {
+    id: push
+    property string text
+    property url icon
+    property bool checked: false
+    property int size: 11
+    property color tint: Theme.accent
+    signal clicked()
+
+    implicitWidth: label.implicitWidth + 18
+    implicitHeight: 26
+    radius: 5
+    opacity: enabled ? 1 : 0.4
+    color: checked ? Qt.darker(tint, 2.2) : area.pressed ? "#2b3a4a" : Theme.button
+    border.color: checked ? tint : area.containsMouse ? Theme.dim : Theme.edge
+    Row {
+        id: label
+        anchors.centerIn: parent
+        spacing: 6
+        Image {
+            anchors.verticalCenter: parent.verticalCenter
+            visible: push.icon != ""
+            source: push.icon
+            sourceSize { width: 18; height: 18 }
+        }
+        Text {
+            anchors.verticalCenter: parent.verticalCenter
+            text: push.text
+            color: push.checked ? "white" : Theme.text
+            font.pixelSize: push.size
+        }
+    }
+    MouseArea {
+        id: area
+        anchors.fill: parent
+        hoverEnabled: true
+        onClicked: push.clicked()
+    }
+}
