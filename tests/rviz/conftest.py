@@ -71,7 +71,7 @@ def master(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     home = str(tmp_path_factory.mktemp("ros_home"))
     env = {"PATH": "/usr/bin:/bin", "HOME": home, "ROS_HOME": home, "ROS_IP": "127.0.0.1"}
     server = subprocess.Popen(
-        ["/usr/bin/rosmaster", "--core", "-p", str(port)],
+        ["setpriv", "--pdeathsig", "KILL", "/usr/bin/rosmaster", "--core", "-p", str(port)],
         env=env,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,

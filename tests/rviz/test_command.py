@@ -160,6 +160,37 @@ def test_ends_when_another_node_takes_its_name(
     assert "/rviz_named was shut down" in program.output
 
 
+def test_tells_when_the_master_is_gone_and_when_another_one_came(
+    start: Callable[..., Program], tmp_path: Path
+) -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    home = str(tmp_path / "ros")
+
+    def roscore() -> subprocess.Popen[bytes]:
+        env = {"PATH": "/usr/bin:/bin", "HOME": home, "ROS_HOME": home, "ROS_IP": "127.0.0.1"}
+        command = ["/usr/bin/rosmaster", "--core", "-p", str(port)]
+        null = subprocess.DEVNULL
+        return subprocess.Popen(command, env=env, stdout=null, stderr=null)
+
+    # It waits for the master, and starts as soon as there is one.
+    overlay = interface(tmp_path, "console.warn('up')")
+    program = start("--overlay", overlay, ROS_MASTER_URI=f"http://127.0.0.1:{port}")
+    program.wait_for("start one: roscore")
+    for message in ("up", "started anew"):
+        server = roscore()
+        try:
+            program.wait_for(message)
+            # The watch has asked the first one by then, too.
+            time.sleep(2.5)
+        finally:
+            server.kill()
+            server.wait()
+        program.wait_for("nothing new is found")
+    assert program.end() == 130
+
+
 def test_refuses_to_end_its_own_node(start: Callable[..., Program], tmp_path: Path) -> None:
     file = interface(tmp_path, 'Ros.init("rviz_named")', 100)
     file.write_text("import Ros 1.0\n" + file.read_text())

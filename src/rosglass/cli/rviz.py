@@ -60,6 +60,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="how long to wait for the master (default: as long as it takes)",
     )
     parser.add_argument(
+        "--watch",
+        action="store_true",
+        help="show interfaces anew whenever a file in their folders is saved",
+    )
+    parser.add_argument(
         "-I",
         dest="import_paths",
         metavar="FOLDER",
@@ -153,7 +158,7 @@ def _add_overlays(app: Application, args: argparse.Namespace) -> None:
     for file in args.overlays:
         # The config may have it already.
         if interface_file(file) not in shown:
-            app.add_qml(file)
+            app.add_qml(file, watch=args.watch)
     if args.screenshot is not None:
         QtCore.QTimer.singleShot(
             round(args.after * 1000), lambda: app.quit(_save(app, args.screenshot))

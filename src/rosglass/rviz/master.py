@@ -143,6 +143,8 @@ class MasterWatch(QtCore.QObject):
     def __init__(self, uri: str) -> None:
         super().__init__()
         self._uri, self._number, self._problem = uri, -1, ""
+        #: Whether another one took its place, which knows nothing of this RViz.
+        self.replaced = False
         self._asker = _Asker(uri, _WATCHING, self._on_answer)
 
     @property
@@ -156,9 +158,10 @@ class MasterWatch(QtCore.QObject):
 
     def _on_answer(self, answer: Any) -> None:
         problem = ""
+        self.replaced = not isinstance(answer, Error) and self._number not in (-1, answer)
         if isinstance(answer, Error):
             problem = f"{answer}; what is received already goes on, nothing new is found"
-        elif self._number not in (-1, answer):
+        elif self.replaced:
             problem = (
                 f"the ROS master at {self._uri} was started anew and knows nothing of this RViz: "
                 "its displays find no new topics until RViz is started again"
