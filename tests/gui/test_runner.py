@@ -335,6 +335,8 @@ def test_files_that_are_none(file: Path, world: MemoryWorld, place: str, message
             "import Ros 1.0\nSubscription {}",
             "Ros2 1.0 has it; the other module calls it Subscriber",
         ),
+        ("import QtQuick 2.15\nButton {}", "it comes with: import QtQuick.Controls 2.15"),
+        ("import QtQuick 2.15\nRowLayout {}", "it comes with: import QtQuick.Layouts 1.15"),
     ],
 )
 def test_errors_say_what_to_do(

@@ -118,7 +118,11 @@ def test_qml_ends_it_with_an_exit_code(start: Callable[..., Program], tmp_path: 
 def test_says_nothing_of_its_own_when_all_is_well(
     start: Callable[..., Program], tmp_path: Path
 ) -> None:
-    program = start("--overlay", interface(tmp_path, "Qt.quit()"))
+    # What a binding reads is there until the binding has gone.
+    reads = "Item { property var at: rviz.createPositionTracker(0, 0, 0); x: at.position.x }"
+    file = interface(tmp_path, "Qt.quit()")
+    file.write_text(file.read_text().replace("Rectangle", reads + "\n    Rectangle"))
+    program = start("--overlay", file)
     assert program.process.wait(PATIENCE) == 0
     assert program.output == ""
 

@@ -197,3 +197,26 @@ def test_what_is_no_widget_is_refused(app: Any) -> None:
         WidgetOverlay(QtWidgets.QLabel(outer), "Inner")
     with pytest.raises(Error, match="No such file"):
         WidgetOverlay(QtWidgets.QLabel, style_sheet="none.qss".upper())
+    shown = WidgetOverlay(outer, "Outer")
+    with pytest.raises(Error, match="another overlay shows the widget already"):
+        WidgetOverlay(outer, "Outer 2")
+    shown.close()
+
+
+def test_what_is_no_overlay_is_refused(app: Any) -> None:
+    from rosglass import Error
+    from rosglass.rviz import Overlay, WidgetOverlay
+
+    class Nameless(WidgetOverlay):
+        def __init__(self) -> None:
+            self.ready = True
+
+    with pytest.raises(Error, match=r"overlay Nameless: its __init__ must call super\(\)"):
+        app.add(Nameless())
+    with pytest.raises(Error, match=r"got the class; make one of it: Nameless\(\)"):
+        app.add(Nameless)
+    with pytest.raises(Error, match=r"got 'panel'; WidgetOverlay\(widget\) makes one"):
+        app.add("panel")
+    for option in ("z", "scale", "opacity"):
+        with pytest.raises(Error, match=f"overlay Top: {option} .*'high'"):
+            Overlay("Top", **{option: "high"})

@@ -27,6 +27,18 @@ _ONLY_IN = {
     "Subscription": ("Ros2 1.0", "Subscriber"),
     "ImageTransportSubscription": ("Ros2 1.0", "ImageTransportSubscriber"),
 }
+#: Import -> types that only it has, of those that are used most.
+_IMPORTED_BY = {
+    "QtQuick.Controls 2.15": {
+        *("ApplicationWindow", "Button", "CheckBox", "ComboBox", "Dial", "Dialog", "Drawer"),
+        *("Label", "Menu", "Popup", "ProgressBar", "RoundButton", "ScrollView", "Slider"),
+        *("SpinBox", "StackView", "Switch", "TabBar", "TextArea", "TextField"),
+    },
+    "QtQuick.Layouts 1.15": {"ColumnLayout", "GridLayout", "RowLayout", "StackLayout"},
+    "QtQuick.Shapes 1.15": {"Shape", "ShapePath"},
+    "QtQuick.Window 2.15": {"Window"},
+    "RosRviz 1.0": {"AnchoredPopup", "MessageDialog"},
+}
 #: Module -> what brings it, on Qt 6 and on Qt 5.
 _BROUGHT_BY = {
     "QtMultimedia": ('pip install "rosglass[camera]"', "apt install qml-module-qtmultimedia"),
@@ -82,6 +94,9 @@ def _advice(text: str) -> str:
     if kind is not None and kind[1] in _ONLY_IN:
         module, other = _ONLY_IN[kind[1]]
         return f"{module} has it; the other module calls it {other}"
+    if kind is not None:
+        imports = (module for module, kinds in _IMPORTED_BY.items() if kind[1] in kinds)
+        return next((f"it comes with: import {module}" for module in imports), "")
     found = _MODULE.search(text)
     if found is None:
         return ""

@@ -69,6 +69,8 @@ class Overlay(QtCore.QObject):
 
     @z.setter
     def z(self, z: int) -> None:
+        if not isinstance(z, int):
+            raise Error(f"overlay {self.name}: z must be a whole number, e.g. 1, got {z!r}")
         self._z = z
         self.arranged.emit()
 
@@ -79,8 +81,8 @@ class Overlay(QtCore.QObject):
 
     @scale.setter
     def scale(self, scale: float) -> None:
-        if not (math.isfinite(scale) and SCALES[0] <= scale <= SCALES[1]):
-            raise Error(f"overlay {self.name}: scale {scale:g} is not from 0.1 to 10")
+        if not (_is_number(scale) and SCALES[0] <= scale <= SCALES[1]):
+            raise Error(f"overlay {self.name}: scale {scale!r} is not a number from 0.1 to 10")
         self._scale = scale
         self.arranged.emit()
 
@@ -91,8 +93,8 @@ class Overlay(QtCore.QObject):
 
     @opacity.setter
     def opacity(self, opacity: float) -> None:
-        if not 0 <= opacity <= 1:
-            raise Error(f"overlay {self.name}: opacity {opacity:g} is not from 0 to 1")
+        if not (_is_number(opacity) and 0 <= opacity <= 1):
+            raise Error(f"overlay {self.name}: opacity {opacity!r} is not a number from 0 to 1")
         self._opacity = opacity
         self.arranged.emit()
 
@@ -164,3 +166,7 @@ class Overlay(QtCore.QObject):
 
     def close(self) -> None:
         """Let everything go; safe to call twice."""
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and math.isfinite(value)

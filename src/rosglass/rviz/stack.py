@@ -5,16 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rosglass.errors import Error
-from rosglass.qt import QtCore, Signal, is_alive
+from rosglass.qt import QtCore, Signal, is_alive, send_deferred_deletes
 from rosglass.rviz.drawing import Drawing, Work
 from rosglass.rviz.guard import guarded
 from rosglass.rviz.input import Input
 from rosglass.rviz.layer import HIGHEST_Z
+from rosglass.rviz.overlay import Overlay
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from rosglass.rviz.overlay import Overlay
     from rosglass.rviz.window import Window
 
 __all__ = ["Stack"]
@@ -46,8 +46,10 @@ class Stack(QtCore.QObject):
         """Show an overlay above those of lower or equal `z`.
 
         Raises:
-            Error: There is one of this name.
+            Error: There is one of this name, or it is no overlay.
         """
+        if not (isinstance(overlay, Overlay) and hasattr(overlay, "name")):
+            raise Error(_no_overlay(overlay))
         if self.find(overlay.name) is not None:
             raise Error(f"there is an overlay {overlay.name!r} already; give this one another name")
         overlay.attach(self._window)
@@ -120,6 +122,9 @@ class Stack(QtCore.QObject):
         """Take every overlay away."""
         for overlay in list(self):
             self.remove(overlay)
+        if QtCore.QThread.currentThread().loopLevel() == 0:
+            # Nothing of QML is running. Left to the end of Python, it would see its parts go.
+            send_deferred_deletes()
 
     def _arrange(self) -> None:
         self._entries.sort(key=lambda entry: (entry.overlay.is_popup, entry.overlay.z))
@@ -152,3 +157,16 @@ class Stack(QtCore.QObject):
 def _close(overlay: Overlay) -> None:
     with guarded(overlay, "closing"):
         overlay.close()
+
+
+def _no_overlay(given: object) -> str:
+    """Return why something cannot be shown, and what can."""
+    if isinstance(given, Overlay):
+        kind = type(given).__name__
+        return f"overlay {kind}: its __init__ must call super().__init__(), which gives it a name"
+    if isinstance(given, type) and issubclass(given, Overlay):
+        return f"expected an overlay, got the class; make one of it: {given.__name__}()"
+    return (
+        f"expected an overlay, got {given!r}; WidgetOverlay(widget) makes one of a widget, and "
+        "app.add_qml(file) one of a QML file"
+    )

@@ -43,7 +43,8 @@ class WidgetOverlay(Overlay):
         options: Of :class:`Overlay`.
 
     Raises:
-        Error: It is no widget, it has a parent, or the style sheet cannot be read.
+        Error: It is no widget, it has a parent or another overlay, or the style sheet cannot be
+            read.
     """
 
     def __init__(
@@ -281,7 +282,7 @@ def make_widget(widget: Any, name: str) -> Any:
         name: For messages.
 
     Raises:
-        Error: It is no widget, or part of another one.
+        Error: It is no widget, part of another one, or shown by another overlay.
     """
     if widget is None:
         return QtWidgets.QWidget()
@@ -297,6 +298,8 @@ def make_widget(widget: Any, name: str) -> Any:
         raise Error(
             f"overlay {name or made!r}: the widget is part of another one; give it no parent"
         )
+    if made.graphicsProxyWidget() is not None:
+        raise Error(f"overlay {name or made!r}: another overlay shows the widget already")
     return made
 
 
