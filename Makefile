@@ -5,7 +5,7 @@ SHELL := /bin/bash
 BIN := .venv/bin
 export PYTHON
 
-.PHONY: help demo test setup lint types docs wheel bench clean
+.PHONY: help demo rviz-demo test setup lint types docs wheel bench clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
@@ -13,6 +13,10 @@ help: ## show this list
 demo: ## open the demo cockpit on a simulated robot (20 s on a virtual screen where there is no display)
 	@scripts/setup.sh demo
 	@$(BIN)/rosglass demo $(DEMO_ARGS)
+
+rviz-demo: ## open RViz with a dashboard on a simulated robot (20 s on a virtual screen where there is no display)
+	@scripts/setup.sh rviz-demo
+	@ROSGLASS_QT=pyside2 .venv-system/bin/python -m rosglass.demo.rviz
 
 test: ## run lint, types, docs and all tests in both environments
 	@scripts/setup.sh test
@@ -37,4 +41,4 @@ bench: ## run every benchmark (an hour, half of it watching memory)
 	@scripts/bench.sh
 
 clean: ## remove everything that set-up and builds made
-	@rm -rf .venv .venv-system .stamps site dist build demo.png htmlcov .coverage* coverage.xml
+	@rm -rf .venv .venv-system .stamps site dist build demo.png rviz-demo.png htmlcov .coverage* coverage.xml

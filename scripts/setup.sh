@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Prepares a clean checkout: scripts/setup.sh demo | test
+# Prepares a clean checkout: scripts/setup.sh demo | rviz-demo | test
 #   demo  what `make demo` needs: .venv with rosglass and its cockpit
+#   rviz-demo  what `make rviz-demo` needs: RViz and ROS's master, .venv-system on Debian's own Python
 #   test  what `make test` needs: .venv with everything, .venv-system on Debian's own Python
 # Repeatable: what is already there is left alone, so a second run needs no network and no root.
 set -euo pipefail
@@ -11,7 +12,7 @@ mkdir -p .stamps
 say()  { printf '==> %s\n' "$*"; }
 fail() { printf '\nrosglass set-up stopped: %s\n' "$1" >&2; shift; printf '  %s\n' "$@" >&2; exit 1; }
 
-case $purpose in demo|test) ;; *) fail "unknown purpose '$purpose'" "use: scripts/setup.sh demo|test" ;; esac
+case $purpose in demo|rviz-demo|test) ;; *) fail "unknown purpose '$purpose'" "use: scripts/setup.sh demo|rviz-demo|test" ;; esac
 
 # What Qt's wheels expect from the system, a virtual screen, and a font.
 apt_demo=(xvfb xauth libegl1 libgl1 libopengl0 libxkbcommon-x11-0 libdbus-1-3 libfontconfig1 libglib2.0-0
@@ -31,12 +32,12 @@ apt_test=(python3 python3-venv python3-genpy python3-genmsg xdotool x11-apps
           libroscpp-dev libactionlib-dev libstd-msgs-dev
           libstd-srvs-dev libgeometry-msgs-dev libsensor-msgs-dev)
 # RViz, its renderer and Qt 5 in Debian's own Python.
-apt_test+=(rviz python3-rviz python3-ogre-1.12 python3-pyqt5.qtquick python3-pyqt5.qtopengl
-           python3-pyside2.qtopengl python3-pyside2.qtmultimediawidgets python3-pyside2.qtquickwidgets
-           python3-pyside2.qtcore python3-pyside2.qtgui python3-pyside2.qtqml python3-pyside2.qtquick
-           python3-pyside2.qtmultimedia python3-pyside2.qtwidgets python3-pyside2.qttest
-           qml-module-qtquick2 qml-module-qtquick-window2 qml-module-qtquick-layouts
-           qml-module-qtquick-controls2 qml-module-qtmultimedia)
+apt_rviz=(python3 python3-venv python3-rosmaster rviz python3-rviz python3-ogre-1.12 python3-pyqt5.qtquick python3-pyqt5.qtopengl
+          python3-pyside2.qtopengl python3-pyside2.qtmultimediawidgets python3-pyside2.qtquickwidgets
+          python3-pyside2.qtcore python3-pyside2.qtgui python3-pyside2.qtqml python3-pyside2.qtquick
+          python3-pyside2.qtmultimedia python3-pyside2.qtwidgets python3-pyside2.qttest
+          qml-module-qtquick2 qml-module-qtquick-window2 qml-module-qtquick-layouts
+          qml-module-qtquick-controls2 qml-module-qtmultimedia)
 
 install_apt() {
   command -v dpkg-query >/dev/null && command -v apt-get >/dev/null || {
@@ -90,10 +91,13 @@ make_venv() {
 }
 
 python=${PYTHON:-python3}
+system_extras=zenoh,dds,bags,completion,images,test,peers
 case $purpose in
   demo) install_apt "${apt_demo[@]}" ;;
-  test) install_apt "${apt_demo[@]}" "${apt_test[@]}" ;;
+  test) install_apt "${apt_demo[@]}" "${apt_rviz[@]}" "${apt_test[@]}" ;;
+  rviz-demo) install_apt "${apt_demo[@]}" "${apt_rviz[@]}" ;;
 esac
+[ "$purpose" = rviz-demo ] && python=/usr/bin/python3
 command -v "$python" >/dev/null || install_apt python3 python3-venv
 command -v "$python" >/dev/null || fail "there is no $python" "install Python 3.10 or newer, or name it: make PYTHON=... $purpose"
 if ! "$python" -c 'import venv, ensurepip' 2>/dev/null; then install_apt python3-venv; fi
@@ -102,10 +106,14 @@ case $purpose in
     # Once it was made for the tests, keep it complete.
     if [ -f .venv/.rosglass-dev ]; then make_venv .venv "$python" dev
     else make_venv .venv "$python" cockpit; fi ;;
+  rviz-demo)
+    # Once it was made for the tests, keep it complete.
+    if [ -f .venv/.rosglass-dev ]; then make_venv .venv-system /usr/bin/python3 "$system_extras" --system-site-packages
+    else make_venv .venv-system /usr/bin/python3 images --system-site-packages; fi ;;
   test)
     make_venv .venv "$python" dev
     touch .venv/.rosglass-dev
     [ -x /usr/bin/python3 ] || fail "/usr/bin/python3 is missing" "the RViz environment needs Debian's own Python 3"
-    make_venv .venv-system /usr/bin/python3 zenoh,dds,bags,completion,images,test,peers --system-site-packages ;;
+    make_venv .venv-system /usr/bin/python3 "$system_extras" --system-site-packages ;;
 esac
 say "set-up complete"

@@ -4,9 +4,8 @@ import Ros 1.0
 
 Panel {
     id: panel
-    title: "Orientation and flippers"
+    title: "Orientation, flippers"
     stale: imu.stale || joints.stale
-    note: degrees(roll) + " / " + degrees(-pitch)
 
     // Radians; roll positive with the left side up, pitch positive with the nose down (REP 103).
     property real roll: 0
@@ -36,19 +35,20 @@ Panel {
         }
     }
 
-    component Flipper: Rectangle {
+    // Seen from the right side, nose to the right; its angle is positive upwards.
+    component Flipper: Item {
+        id: flipper
         property real angle: 0
         property bool front: true
-        x: front ? 26 : -34; y: -4
-        width: 38; height: 9; radius: 4
-        color: "#9fb2c2"
-        border.color: "#dbe7f0"
-        transformOrigin: Item.Left
-        transform: [
-            Translate { x: 4; y: -0.5 },
-            Rotation { origin.x: 4; origin.y: 4; axis { x: 0; y: 1; z: 0 } angle: front ? 0 : 180 },
-            Rotation { origin.x: 4; origin.y: 4; angle: (front ? -1 : 1) * angle * 180 / Math.PI }
-        ]
+        x: front ? 24 : -24
+        transform: Scale { xScale: flipper.front ? 1 : -1 }
+        Rectangle {
+            x: -5; y: -5
+            width: 36; height: 10; radius: 5
+            color: "#9fb2c2"
+            border.color: "#dbe7f0"
+            transform: Rotation { origin.x: 5; origin.y: 5; angle: -flipper.angle * 180 / Math.PI }
+        }
     }
     component View: Item {
         property real lean: 0

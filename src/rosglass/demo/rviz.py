@@ -1,0 +1,131 @@
+"""The paper's Figure 1 as one command: master, robot, and RViz with its dashboard."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from contextlib import ExitStack, suppress
+from pathlib import Path
+
+from rosglass.demo.processes import Child, VirtualScreen, start_robot
+from rosglass.errors import Error
+
+__all__ = ["main"]
+
+_FOLDER = Path(__file__).parents[3] / "examples/rviz"
+_SIZE = (1280, 800)
+_PATIENCE = 20.0
+_SHOT = """
+import sys
+from rosglass.rviz import Application
+from rosglass.qt import QtCore
+config, overlay, url, picture, seconds = sys.argv[1:]
+with Application(config, url=url, name="rviz") as app:
+    app.add_qml(overlay)
+    app.window.widget.setGeometry(0, 0, 1280, 800)
+    QtCore.QTimer.singleShot(int(1000 * float(seconds)) - 1000, lambda: app.screenshot(picture))
+    QtCore.QTimer.singleShot(int(1000 * float(seconds)), app.quit)
+    sys.exit(app.run(end_process=True))
+"""
+
+
+def main(seconds: float | None = None, picture: Path | None = None) -> int:
+    """Run it until RViz is closed; without a display, for 20 s and with a picture.
+
+    Args:
+        seconds: When it ends by itself; None for not at all.
+        picture: Where to save what it looks like.
+
+    Returns:
+        RViz's exit code.
+
+    Raises:
+        Error: ROS's master is missing, or does not start.
+    """
+    headless = not os.environ.get("DISPLAY")
+    if headless:
+        seconds, picture = seconds or 20.0, picture or Path("rviz-demo.png")
+    with ExitStack() as stack:
+        if headless:
+            screen = VirtualScreen(*_SIZE)
+            stack.callback(screen.close)
+            os.environ.update(DISPLAY=screen.display, QT_QPA_PLATFORM="xcb")
+            print(f"no display: RViz runs {seconds:g} s on a virtual screen", flush=True)
+        url = _start_master(stack)
+        mode = ("--mode", "autonomous") if headless else ()
+        robot = start_robot(url, ("--equipped", "--fps", "20", *mode))
+        stack.callback(robot.close)
+        files = (str(_FOLDER / "figure1.rviz"), str(_FOLDER / "Dashboard.qml"))
+        if seconds is None:
+            arguments = ["-m", "rosglass", "rviz", files[0], "--overlay", files[1], "--url", url]
+        else:
+            shot = str(picture or "rviz-demo.png")
+            arguments = ["-c", _SHOT, *files, url, shot, str(seconds)]
+        rviz = Child([sys.executable, *arguments], "RViz")
+        stack.callback(rviz.close)
+        code = _wait(rviz)
+        if picture is not None and code == 0:
+            print(f"picture of RViz: {picture.resolve()}")
+        return code
+
+
+def _start_master(stack: ExitStack) -> str:
+    program = shutil.which("rosmaster", path="/usr/bin:" + os.environ.get("PATH", ""))
+    if program is None:
+        raise Error("ROS's master is not installed; install it with: apt install python3-rosmaster")
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    os.environ["ROS_IP"] = "127.0.0.1"
+    # Debian's own program, on Debian's own Python.
+    environment = {**os.environ, "PATH": "/usr/bin:/bin"}
+    environment.pop("PYTHONPATH", None)
+    master = subprocess.Popen(
+        [program, "--core", "-p", str(port)],
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    stack.callback(_end, master)
+    until = time.monotonic() + _PATIENCE
+    while time.monotonic() < until and master.poll() is None:
+        with suppress(OSError), socket.create_connection(("127.0.0.1", port), 1.0):
+            print(f"started ROS's master on port {port}", flush=True)
+            return f"ros1://127.0.0.1:{port}"
+        time.sleep(0.05)
+    raise Error(f"ROS's master ({program}) did not start within {_PATIENCE:g} s")
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.kill()
+    process.wait()
+
+
+def _wait(rviz: Child) -> int:
+    """Wait for RViz; a signal to end is one to it."""
+    received: list[int] = []
+    before = {
+        number: signal.signal(number, lambda got, _: received.append(got))
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        while (code := rviz.poll()) is None and not received:
+            time.sleep(0.05)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    return 128 + received[0] if received else int(code or 0)
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except Error as error:
+        sys.exit(f"rosglass: {error}")
