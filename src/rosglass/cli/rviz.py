@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import logging
 import os
+import signal
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +17,7 @@ from rosglass.errors import Error, QmlError
 
 if TYPE_CHECKING:
     import argparse
+    from collections.abc import Iterator
 
     from rosglass.rviz import Application
 
@@ -104,50 +107,67 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Show RViz until it is closed; returns the exit code."""
-    from rosglass.rviz.requirements import require_bindings
-
-    require_bindings()
-    os.environ["ROSGLASS_QT"] = "pyside2"
-    from rosglass.qml.interrupt import QuitOnSignal
-    from rosglass.qml.log import install_message_handler
-    from rosglass.qml.places import interface_file
-
-    format_log(verbose=args.verbose > 1)
     remappings = [word for word in args.config if ":=" in word]
     configs = [word for word in args.config if ":=" not in word]
     if len(configs) > 1:
         raise Error(f"RViz shows one config: expected one file, got {', '.join(configs)}")
-    try:
-        for file in args.overlays:
-            interface_file(file)
-        received: list[int] = []
-        # RViz takes a while to load, and Python cannot be interrupted meanwhile.
-        with QuitOnSignal(received.append, _PATIENCE):
-            from rosglass.rviz.application import Application
+    from rosglass.rviz.requirements import require_bindings
 
-            install_message_handler()
-            if received:
-                return 128 + received[0]
-            app = Application(
-                configs[0] if configs else "",
-                url=args.url,
-                name=args.name,
-                fixed_frame=args.fixed_frame,
-                fullscreen=args.fullscreen,
-                splash=args.splash,
-                timeout=args.timeout,
-                import_paths=args.import_paths,
-                arguments=args.arguments,
-                ros_arguments=[*remappings, *args.ros_arguments],
-            )
-            with app:
-                _add_overlays(app, args)
-                if received:
-                    return 128 + received[0]
-                return app.run(end_process=True)
-    except QmlError as error:
-        print(error, file=sys.stderr)
-        return 1
+    require_bindings()
+    os.environ["ROSGLASS_QT"] = "pyside2"
+    received: list[int] = []
+    with _noting_signals(received):
+        from rosglass.qml.interrupt import QuitOnSignal
+
+        with QuitOnSignal(received.append, _PATIENCE):
+            try:
+                return _show(args, configs[0] if configs else "", remappings, received)
+            except QmlError as error:
+                print(error, file=sys.stderr)
+                return 1
+
+
+@contextmanager
+def _noting_signals(received: list[int]) -> Iterator[None]:
+    """Keep KeyboardInterrupt from modules that would abort or swallow it while they are loaded."""
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, lambda n, _: received.append(n)) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
+
+
+def _show(args: argparse.Namespace, config: str, remappings: list[str], received: list[int]) -> int:
+    from rosglass.qml.log import install_message_handler
+    from rosglass.qml.places import interface_file
+
+    format_log(verbose=args.verbose > 1)
+    for file in args.overlays:
+        interface_file(file)
+    from rosglass.rviz.application import Application
+
+    install_message_handler()
+    if received:
+        return 128 + received[0]
+    app = Application(
+        config,
+        url=args.url,
+        name=args.name,
+        fixed_frame=args.fixed_frame,
+        fullscreen=args.fullscreen,
+        splash=args.splash,
+        timeout=args.timeout,
+        import_paths=args.import_paths,
+        arguments=args.arguments,
+        ros_arguments=[*remappings, *args.ros_arguments],
+    )
+    with app:
+        _add_overlays(app, args)
+        if received:
+            return 128 + received[0]
+        return app.run(end_process=True)
 
 
 def _add_overlays(app: Application, args: argparse.Namespace) -> None:

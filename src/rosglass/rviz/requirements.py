@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from importlib.util import find_spec
+from importlib.machinery import PathFinder
 from pathlib import Path
 
 import rosglass
@@ -43,10 +43,16 @@ def require_bindings() -> None:
 
 
 def _has(name: str) -> bool:
-    try:
-        return find_spec(name) is not None
-    except ImportError:
-        return False
+    """Return whether a module is there, without loading the package that it is in."""
+    path: list[str] | None = None
+    found = ""
+    for part in name.split("."):
+        found = f"{found}.{part}" if found else part
+        spec = PathFinder.find_spec(found, path)
+        if spec is None:
+            return False
+        path = list(spec.submodule_search_locations or ())
+    return True
 
 
 def _advice(missing: list[str]) -> str:
