@@ -32,7 +32,7 @@ from rosglass.rviz.view_services import ViewServices
 from rosglass.rviz.window import Window, config_file
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from types import TracebackType
 
     from rosglass.comm.node import Node
@@ -298,17 +298,20 @@ class Application:
         if self._closed:
             return
         self._closed = True
-        self._timer.stop()
-        self.master.close()
-        self.window.close()
-        self.overlays.close()
-        self.view_services.close()
-        self.session.shared.pop(Access, None)
-        self.rviz.close()
-        if self._owns_session:
-            self.session.close()
-        roscpp.shut_down()
-        self.window.destroy()
+        steps: list[Callable[[], object]] = [
+            self._timer.stop,
+            self.master.close,
+            self.window.close,
+            self.overlays.close,
+            self.view_services.close,
+            lambda: self.session.shared.pop(Access, None),
+            self.rviz.close,
+            *([self.session.close] if self._owns_session else []),
+            roscpp.shut_down,
+            self.window.destroy,
+        ]
+        for step in steps:
+            _attempt(step)
         if sys.excepthook is _tell_raised:
             sys.excepthook = self._excepthook
 
@@ -412,6 +415,14 @@ def _connect_beside_rviz(
 def _check_frame(frame: str) -> None:
     if not frame or frame != frame.strip() or frame.startswith("/"):
         raise Error(f"fixed_frame: {frame!r} is no name of a frame; expected e.g. 'map'")
+
+
+def _attempt(step: Callable[[], object]) -> None:
+    """Do a step of the end: what would be left of RViz otherwise crashes the process."""
+    try:
+        step()
+    except Exception:
+        _log.exception("ending RViz: a part of it failed, the rest goes on")
 
 
 def _log_what_is_raised() -> Any:
