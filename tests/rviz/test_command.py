@@ -212,7 +212,7 @@ BROKEN = "a: [1,\n b: }"
         (["{folder}/none.rviz"], "none.rviz does not exist"),
         (["{folder}"], "is a folder"),
         (["{folder}/broken.rviz"], "broken.rviz: RViz cannot read it"),
-        (["{folder}/Bad.qml"], "RViz cannot read it"),
+        (["{folder}/Bad.qml"], "not a config file of RViz: rosglass rviz --overlay"),
         (["a.rviz", "b.rviz"], "one file, got a.rviz, b.rviz"),
         (["--overlay", "{folder}/None.qml"], "None.qml:0:0: there is no such file"),
         (["--overlay", "{folder}/Bad.qml"], "Bad.qml:2:"),

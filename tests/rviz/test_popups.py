@@ -121,6 +121,13 @@ def test_popup_follows_a_point(hand: Any, app: Any, view: Any) -> None:
     x, y, z = Camera(app.window).eye
     popup.follow(app.rviz.trackers, (2 * x, 2 * y, 2 * z))
     assert not popup.content.isVisible()
+    # Nor where nobody knows its frame, which is told.
+    popup.follow(app.rviz.trackers, (0, 0, 0), frame="nowhere")
+    hand.wait(lambda: popup.problem.startswith("frame nowhere: "))
+    assert not popup.content.isVisible()
+    popup.move(50, 50)
+    assert popup.problem == ""
+    assert popup.content.isVisible()
 
 
 def test_dialog_is_moved_by_its_title_and_tells_its_button(hand: Any, app: Any) -> None:

@@ -71,6 +71,8 @@ class Popup(WidgetOverlay):
         self._anchor, self._place = anchor, (math.nan, math.nan)
         self._free = True
         self._tracker: Tracker | None = None
+        #: What of its problem is that the frame it follows is not known.
+        self._lost = ""
         self._trackers: Trackers | None = None
         self._light_dismiss = light_dismiss
         super().__init__(base, name or type(made).__name__, **options)
@@ -114,7 +116,7 @@ class Popup(WidgetOverlay):
     def follow(
         self, trackers: Trackers, point: Sequence[float] = (0, 0, 0), frame: str = ""
     ) -> None:
-        """Stay where a point of the scene is seen.
+        """Stay where a point of the scene is seen; a frame not known yet is its `problem`.
 
         Args:
             trackers: Those of the RViz it is shown over, ``app.rviz.trackers``.
@@ -128,6 +130,8 @@ class Popup(WidgetOverlay):
         self._follow_nothing()
         self._tracker, self._trackers = tracker, trackers
         tracker.positionChanged.connect(lambda at: self._go(at.x(), at.y()))
+        tracker.problemChanged.connect(self._tell_lost)
+        self._tell_lost()
         at: Any = tracker.position
         self._go(at.x(), at.y())
 
@@ -140,6 +144,13 @@ class Popup(WidgetOverlay):
         tracker, self._tracker = self._tracker, None
         if tracker is not None and self._trackers is not None:
             self._trackers.remove(tracker)
+            self._tell_lost()
+
+    def _tell_lost(self) -> None:
+        # What else is wrong with it stays told.
+        before, self._lost = self._lost, str(self._tracker.problem) if self._tracker else ""
+        if self.problem in ("", before):
+            self.tell_problem(self._lost)
 
     def _go(self, x: float, y: float) -> None:
         self._place, self._free = (x, y), False

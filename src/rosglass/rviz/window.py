@@ -266,6 +266,10 @@ def config_file(place: str | os.PathLike[str]) -> Path:
     if not path.is_file():
         wrong = "is a folder" if path.is_dir() else "does not exist"
         raise Error(f"{path} {wrong}; expected a config file of RViz (.rviz)")
+    if path.suffix == ".qml":
+        raise Error(
+            f"{path} is an interface, not a config file of RViz: rosglass rviz --overlay {path}"
+        )
     bindings = rviz()
     reader, config = bindings.YamlConfigReader(), bindings.Config()
     reader.readFile(config, str(path))
