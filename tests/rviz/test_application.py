@@ -70,7 +70,8 @@ def test_menus_in_the_menu_bar(app: Any) -> None:
     menu.addAction("Dock")
     assert app.window.menu("Robot") is menu
     shown = [action.text().replace("&", "") for action in app.window.widget.menuBar().actions()]
-    assert shown == ["File", "Panels", "Robot", "Help"]
+    assert shown[0] == "File"
+    assert shown[-2:] == ["Robot", "Help"]
     assert "Quit" in [a.text().replace("&", "") for a in app.window.menu("File").actions()]
 
 
