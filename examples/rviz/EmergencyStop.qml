@@ -46,7 +46,7 @@ Rectangle {
         }
         Text {
             anchors.horizontalCenter: parent.horizontalCenter
-            text: !stop.known ? "STATE UNKNOWN" : stop.pending ? "NOT CONFIRMED"
+            text: !stop.known && !stop.pending ? "STATE UNKNOWN" : stop.pending ? "NOT CONFIRMED"
                 : stop.stopped ? "hold to release" : "emergency stop"
             color: !stop.known || stop.pending ? "#ffe24a" : "#ffd9dc"
             font { pixelSize: 12; weight: Font.DemiBold }

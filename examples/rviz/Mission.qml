@@ -20,6 +20,8 @@ Column {
     }
 
     Text {
+        width: parent.width
+        wrapMode: Text.Wrap
         text: state_.stale ? "STATE UNKNOWN" : state_.message.data
         color: state_.stale ? Theme.bad : Theme.text
         font { pixelSize: 17; weight: Font.Light }
@@ -54,5 +56,5 @@ Column {
         Push { text: "Pause"; onClicked: mission.ask("/mission/pause", "std_srvs/SetBool", {data: true}) }
         Push { text: "Restart"; onClicked: mission.ask("/mission/restart", "std_srvs/Trigger", {}) }
     }
-    Text { text: mission.failure; color: Theme.bad; font.pixelSize: 11 }
+    Text { width: parent.width; wrapMode: Text.Wrap; text: mission.failure; color: Theme.bad; font.pixelSize: 11 }
 }

@@ -12,6 +12,7 @@ Panel {
     property int selected: 0
     title: cameras[selected].name + " camera"
     stale: camera.stale
+    dims: false
     note: camera.framerate.toFixed(0) + " Hz   " + Math.max(0, camera.latency).toFixed(0) + " ms"
 
     ImageTransportSubscriber {

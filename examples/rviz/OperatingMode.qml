@@ -21,7 +21,7 @@ Panel {
                 size: 10
                 text: modelData
                 tint: modelData === "autonomous" ? Theme.accent : modelData === "safe" ? Theme.good : Theme.warn
-                checked: mode.message !== undefined && mode.message.data === modelData
+                checked: !mode.stale && mode.message.data === modelData
                 onClicked: Service.callAsync("/mode/" + modelData, "std_srvs/Trigger", {}, function (response) {
                     panel.failure = response && response.success ? "" : "NOT CHANGED"
                 })

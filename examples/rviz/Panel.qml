@@ -1,4 +1,4 @@
-// A titled card. What it shows is dimmed, and said to be old, when `stale`.
+// A titled card. What it shows is said to be old when `stale`, and dimmed if it `dims`.
 import QtQuick 2.15
 
 Rectangle {
@@ -6,6 +6,7 @@ Rectangle {
     property string title
     property string note
     property bool stale: false
+    property bool dims: true
     default property alias content: body.data
 
     color: Theme.panel
@@ -13,11 +14,14 @@ Rectangle {
     border.color: stale ? Theme.bad : Theme.edge
     Text {
         x: 9; y: 6
+        width: note.x - 13
+        elide: Text.ElideRight
         text: panel.title.toUpperCase()
         color: Theme.dim
         font { pixelSize: 10; letterSpacing: 1; weight: Font.DemiBold }
     }
     Text {
+        id: note
         anchors { right: parent.right; rightMargin: 9 }
         y: 6
         text: panel.stale ? "NO DATA" : panel.note
@@ -27,6 +31,6 @@ Rectangle {
     Item {
         id: body
         anchors { fill: parent; margins: 8; topMargin: 24 }
-        opacity: panel.stale ? 0.3 : 1
+        opacity: panel.stale && panel.dims ? 0.3 : 1
     }
 }
