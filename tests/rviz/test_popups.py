@@ -205,3 +205,18 @@ def test_qml_message_blocks_until_it_is_answered(hand: Any, show: Any, view: Any
     hand.wait(lambda: root.property("done"))
     hand.wheel(30, 500)
     hand.wait(lambda: view("Distance") != distance)
+
+
+def test_labels_that_pop_up_later_hide_no_question(hand: Any, show: Any, grab: Any) -> None:
+    root = show(
+        """import RosRviz 1.0
+        Item { id: top; property bool both: label.opened
+            MessageDialog { visible: true; padding: 0
+                contentItem: Rectangle { implicitWidth: 300; implicitHeight: 150; color: "lime" } }
+            AnchoredPopup { id: label; padding: 0; x: top.width / 2 - 10; y: top.height / 2 - 10
+                contentItem: Rectangle { implicitWidth: 20; implicitHeight: 20; color: "red" } }
+            Timer { running: true; interval: 500; onTriggered: label.open() } }"""
+    )
+    hand.wait(lambda: root.property("both"))
+    picture = grab()
+    assert picture.pixelColor(picture.width() // 2, picture.height() // 2).name() == "#00ff00"

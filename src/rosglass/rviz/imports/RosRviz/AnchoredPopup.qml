@@ -51,6 +51,7 @@ Popup {
 
     parent: Overlay.overlay
     focus: modal
+    z: modal ? 1 : 0
     closePolicy: modal ? Popup.CloseOnEscape : Popup.NoAutoClose
     onPointChanged: follow()
     onFrameChanged: follow()

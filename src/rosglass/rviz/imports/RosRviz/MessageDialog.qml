@@ -8,6 +8,8 @@ Dialog {
     parent: Overlay.overlay
     anchors.centerIn: parent
     modal: true
+    // Above what pops up later: no label may hide the question.
+    z: 1
     focus: true
     standardButtons: Dialog.Ok
     closePolicy: Popup.CloseOnEscape
