@@ -44,7 +44,7 @@ def test_no_such_python(checkout: Path) -> None:
 def test_unknown_purpose(checkout: Path) -> None:
     done = set_up(checkout, "fly")
     assert done.returncode == 1
-    assert "use: scripts/setup.sh demo|test" in done.stderr
+    assert "use: scripts/setup.sh demo|rviz-demo|test" in done.stderr
 
 
 def test_no_network(checkout: Path) -> None:
