@@ -139,7 +139,7 @@ def test_files_that_are_none(app: Any, tmp_path: Path, goes_on: Any) -> None:
 
 
 def test_what_fails_at_run_time_is_logged_with_its_place(
-    show: Any, file: Path, messages: Any, press: Any, grab: Any, goes_on: Any
+    show: Any, file: Path, messages: Any, press: Any, grab: Any, goes_on: Any, wait: Any
 ) -> None:
     overlay = show(
         """Item {
@@ -157,6 +157,8 @@ def test_what_fails_at_run_time_is_logged_with_its_place(
     )
     grab()
     assert press(90, 290)
+    # The timer's comes by itself.
+    wait(lambda: any("'missing' of" in text for text in messages()))
     said = messages()
     for line, what in ((4, "Binding loop"), (11, "'missing' of"), (13, "'deeper' of undefined")):
         assert any(f"{file}:{line}: " in text and what in text for text in said), said

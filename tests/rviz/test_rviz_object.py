@@ -282,6 +282,8 @@ def test_properties_of_displays(app: Any, displays: Any, qml: Any) -> None:
     assert run("return [root.grid.get('Color'), root.grid.get('Offset/Z')]") == ["#00ff00", 3]
     run("rviz.setProperty('Global Options/Background Color', 'navy')")
     assert run("return rviz.getProperty('Global Options/Background Color')") == "#000080"
+    # Other tests look at RViz's own grey.
+    run("rviz.setProperty('Global Options/Background Color', '#303030')")
     assert displays.get("Grid/Color") == "#00ff00"
     assert "did you mean Color" in fails("root.grid.get('Colour')")
     assert "expected a colour" in fails("root.grid.set('Color', 'no colour')")
