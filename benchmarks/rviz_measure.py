@@ -23,6 +23,7 @@ __all__ = ["fit_view", "memory", "processor", "run_for", "uncapped", "works_duri
 
 VIEW = (1280, 800)
 QML = Path(__file__).with_name("rviz_overlay.qml")
+DASHBOARD = Path(__file__).parents[1] / "examples/rviz"
 
 
 def memory(pid: int | str = "self") -> float:
@@ -146,6 +147,29 @@ def measure(order: dict[str, Any]) -> dict[str, Any]:
     return figures
 
 
+def dashboard(order: dict[str, Any]) -> dict[str, Any]:
+    """Measure the dashboard of examples/rviz beside a live robot."""
+    from rosglass.rviz import Application
+
+    app = Application(DASHBOARD / "figure1.rviz", url=order["url"])
+    app.add_qml(DASHBOARD / "Dashboard.qml")
+    app.window.widget.setGeometry(0, 0, *VIEW)
+    app.window.widget.show()
+    fit_view(app)
+    run_for(5.0, app)
+    frames: list[None] = []
+    app.window.before_frame.connect(lambda: frames.append(None))
+    used: list[float] = []
+
+    def run() -> None:
+        used.append(processor(order["seconds"], lambda s: run_for(s, app)))
+
+    works = works_during(app, run)
+    figures: dict[str, Any] = {"cpu": used[0], "frames": len(frames)}
+    figures["works"] = [{**work._asdict(), "total": work.total} for work in works]
+    return figures
+
+
 def cycles(order: dict[str, Any]) -> dict[str, Any]:
     """Add, resize, reload and remove overlays again and again; return the memory meanwhile."""
     from rosglass.rviz import Application
@@ -177,7 +201,7 @@ def main() -> None:
     sys.argv[1:] = []
     with tempfile.TemporaryDirectory() as home:
         os.environ.update(HOME=home, XDG_RUNTIME_DIR=home)
-        figures = cycles(order) if order["what"] == "cycles" else measure(order)
+        figures = {"cycles": cycles, "dashboard": dashboard}.get(order["what"], measure)(order)
         Path(order["into"]).write_text(json.dumps(figures), encoding="utf-8")
     # What is measured is over; how a process ends is for others to test.
     os._exit(0)

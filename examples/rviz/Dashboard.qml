@@ -14,7 +14,8 @@ Item {
     Rectangle {
         anchors { left: parent.left; right: parent.right; bottom: parent.bottom }
         height: Math.min(266, parent.height * 0.45)
-        color: Theme.background
+        // Opaque: what is blended takes long where no graphics card does it.
+        color: Theme.bar
 
         RowLayout {
             anchors { fill: parent; margins: Theme.gap }

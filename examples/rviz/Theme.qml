@@ -4,6 +4,7 @@ import QtQuick 2.15
 
 QtObject {
     readonly property color background: "#e6070b10"
+    readonly property color bar: "#090e14"
     readonly property color panel: "#0e151d"
     readonly property color edge: "#1d2935"
     readonly property color button: "#1a2531"
