@@ -9,6 +9,7 @@ import socket
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
@@ -71,7 +72,8 @@ def main(seconds: float | None = None, picture: Path | None = None) -> int:
             shot = str(picture or "rviz-demo.png")
             arguments = ["-c", _SHOT, *files, url, shot, str(seconds)]
         rviz = Child([*_LEASH, sys.executable, *arguments], "RViz")
-        stack.callback(rviz.close)
+        # Both at a time: whoever has ended RViz waits.
+        stack.callback(_close, rviz, robot)
         code = _wait(rviz)
         if picture is not None and code == 0:
             print(f"picture of RViz: {picture.resolve()}")
@@ -105,6 +107,12 @@ def _start_master(stack: ExitStack) -> str:
             return f"ros1://127.0.0.1:{port}"
         time.sleep(0.05)
     raise Error(f"ROS's master ({program}) did not start within {_PATIENCE:g} s")
+
+
+def _close(*children: Child) -> None:
+    with ThreadPoolExecutor() as pool:
+        for child in children:
+            pool.submit(child.close)
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
