@@ -561,3 +561,16 @@ class TestReduction:
         root.property("view0").setParentItem(window.contentItem())
         large = message(QUARTERS.repeat(96, 0).repeat(128, 1))
         wait(lambda: camera.publish(large) or self.width(root) == 128)
+
+
+@pytest.mark.usefixtures("running")
+def test_an_item_lets_a_source_go_that_is_gone_already() -> None:
+    from rosglass.qt import QtCore, send_deferred_deletes
+
+    item, source = ImageItem(), QtCore.QObject()
+    item._set_source(source)
+    assert source.property("videoSink") is item
+    source.deleteLater()
+    send_deferred_deletes()
+    item._set_source(None)
+    assert item.property("source") is None

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from rosglass.qt import Property, QtCore, QtGui, QtQuick, Signal
+from rosglass.qt import Property, QtCore, QtGui, QtQuick, Signal, is_alive
 
 __all__ = ["ImageItem"]
 
@@ -82,8 +82,10 @@ class ImageItem(QtQuick.QQuickPaintedItem):
     def _set_source(self, source: QtCore.QObject | None) -> None:
         if source is self._source:
             return
-        if self._source is not None and self._source.property("videoSink") is self:
-            self._source.setProperty("videoSink", None)
+        before = self._source
+        # At the end of an interface, QML may take the source away before this.
+        if before is not None and is_alive(before) and before.property("videoSink") is self:
+            before.setProperty("videoSink", None)
         self._source = source
         if source is not None:
             source.setProperty("videoSink", self)
