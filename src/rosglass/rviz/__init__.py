@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rosglass.rviz.application import Application
     from rosglass.rviz.dialog import Button, Dialog, message
+    from rosglass.rviz.display_classes import register
     from rosglass.rviz.overlay import Overlay
     from rosglass.rviz.popup import Anchor, Popup
     from rosglass.rviz.qml_overlay import QmlOverlay
@@ -30,6 +31,7 @@ __all__ = [
     "QmlOverlay",
     "WidgetOverlay",
     "message",
+    "register",
 ]
 
 _HOMES = {
@@ -38,6 +40,7 @@ _HOMES = {
     "Dialog": "dialog",
     "Popup": "popup",
     "message": "dialog",
+    "register": "display_classes",
     "Application": "application",
     "Overlay": "overlay",
     "QmlOverlay": "qml_overlay",

@@ -22,8 +22,10 @@ from rosglass.ros1.options import Ros1Options
 from rosglass.ros2.names import validate_node_name
 from rosglass.rviz import roscpp
 from rosglass.rviz.access import Access
+from rosglass.rviz.entries import Entries
 from rosglass.rviz.host import require_rviz
 from rosglass.rviz.master import MasterWatch, wait_for_master
+from rosglass.rviz.overlay_menu import OverlayMenu
 from rosglass.rviz.qml_overlay import QmlOverlay
 from rosglass.rviz.qt5 import QtGui, QtWidgets
 from rosglass.rviz.stack import Stack
@@ -152,6 +154,9 @@ class Application:
         self.session.shared[Access] = self.rviz
         #: The overlays, the lowest first.
         self.overlays = Stack(self.window)
+        #: Their entries in RViz's Displays panel.
+        self.entries = Entries(self.window, self.overlays, self.session, self._import_paths)
+        self._menu = OverlayMenu(self.window, self.entries)
         #: RViz's camera, moved.
         self.view = self.rviz.view
         #: The keys that move it.
@@ -302,6 +307,7 @@ class Application:
             self._timer.stop,
             self.master.close,
             self.window.close,
+            self.entries.close,
             self.overlays.close,
             self.view_services.close,
             lambda: self.session.shared.pop(Access, None),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from rosglass.errors import Error
 from rosglass.qt import QtCore, Signal
+from rosglass.rviz.registered_properties import RegisteredProperties
 
 if TYPE_CHECKING:
     import numpy as np
@@ -52,6 +53,8 @@ class Overlay(QtCore.QObject):
         if not name:
             raise Error("an overlay needs a name, e.g. 'Dashboard'")
         self.name = name
+        #: What it lets be set in RViz's Displays panel, and kept with RViz's config.
+        self.properties = RegisteredProperties()
         self._z, self._scale, self._opacity, self._visible = 0, 1.0, 1.0, True
         self._problem = ""
         #: Above all overlays that are no popups.

@@ -53,6 +53,8 @@ class QmlOverlay(QmlInput, Overlay):
         UnsupportedError: Neither OpenGL nor Qt's software renderer can draw here.
     """
 
+    properties: RvizObject
+
     def __init__(
         self,
         file: str | os.PathLike[str],
@@ -143,6 +145,7 @@ class QmlOverlay(QmlInput, Overlay):
 
     def _load(self) -> None:
         self._loading = True
+        self.properties.begin_load()
         try:
             made = self._live.create()
             self._check(made)

@@ -60,21 +60,22 @@ def _writable(value: Any, path: str, depth: int) -> Any:
     raise ConversionError(path, value, _WANTED)
 
 
-def to_config(config: Any, value: Any) -> None:
+def to_config(config: Any, value: Any, *, plain: bool = False) -> None:
     """Write a value to RViz's ``Config``.
 
     Args:
         config: RViz's; as yet empty.
         value: From :func:`writable`.
+        plain: Write texts as they are, for a reader who knows what is a text.
     """
     if isinstance(value, dict) and value:
         for key, inner in value.items():
-            to_config(config.mapMakeChild(key), inner)
+            to_config(config.mapMakeChild(key), inner, plain=plain)
     elif isinstance(value, list) and value:
         for inner in value:
-            to_config(config.listAppendNew(), inner)
+            to_config(config.listAppendNew(), inner, plain=plain)
     else:
-        config.setValue(_text(value))
+        config.setValue(value if plain and isinstance(value, str) else _text(value))
 
 
 def _text(value: Any) -> str:

@@ -1,0 +1,297 @@
+"""RViz's Displays panel and our overlays, kept in step: what is in one is in the other."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from rosglass.qt import QtCore, Slot
+from rosglass.rviz.display import Entry
+from rosglass.rviz.display_classes import (
+    QML_CLASS,
+    REFERENCE_QML_CLASS,
+    class_id_of,
+    maker_of,
+)
+from rosglass.rviz.host import pyqt, rviz
+from rosglass.rviz.properties import quiet, take_out
+from rosglass.rviz.property_sources import Sources
+from rosglass.rviz.qml_overlay import QmlOverlay
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+    from pathlib import Path
+
+    from rosglass.qml.session import Session
+    from rosglass.rviz.overlay import Overlay
+    from rosglass.rviz.stack import Stack
+    from rosglass.rviz.window import Window
+
+__all__ = ["Entries"]
+
+
+class Entries(QtCore.QObject):
+    """Gives each overlay an entry in the panel, and each entry of a config file its overlay.
+
+    RViz makes a placeholder of each display whose class it cannot load, which keeps what the file
+    has for it; ours take the places of those that are overlays.
+
+    Args:
+        window: RViz.
+        stack: The overlays.
+        session: The node that QML talks through.
+        import_paths: Further folders with QML modules.
+    """
+
+    def __init__(
+        self, window: Window, stack: Stack, session: Session, import_paths: Sequence[Path] = ()
+    ) -> None:
+        super().__init__()
+        self._window, self._stack, self._session = window, stack, session
+        self._import_paths = import_paths
+        self._sources = Sources(session, lambda text: window.widget.statusBar().showMessage(text))
+        self._entries: list[Entry] = []
+        #: Overlays that the program has brought, which outlive the displays of a config file.
+        self._programs: list[Overlay] = []
+        self._held = False
+        self._scheduled = self._settling = self._closed = False
+        self._watched: set[int] = set()
+        self._looking = False
+        self._token: QtCore.QObject | None = None
+        stack.changed.connect(self._schedule)
+        window.before_frame.connect(self._look)
+        window.config_loading.connect(self._hold)
+        window.config_loaded.connect(self._look_for_placeholders)
+        self._replace_placeholders()
+
+    def __iter__(self) -> Iterator[Entry]:
+        """Iterate over the entries, in the order in which they came."""
+        return iter(list(self._entries))
+
+    def of(self, overlay: Overlay) -> Entry | None:
+        """Return the entry of an overlay."""
+        return next((entry for entry in self._entries if entry.overlay is overlay), None)
+
+    def add_qml(self, file: str, name: str = "") -> Entry:
+        """Put an entry for a QML file into the panel; what is wrong with it is told there."""
+        entry = self._make(QML_CLASS)
+        entry.own.properties["Path"].set(file)
+        entry.display.setName(name or QtCore.QFileInfo(file).completeBaseName())
+        self._window.manager.addDisplay(entry.display, True)
+        self._settle()
+        return entry
+
+    def remove(self, entry: Entry) -> None:
+        """Take an entry and its overlay away."""
+        self._forget(entry)
+        take_out(entry.display)
+
+    def close(self) -> None:
+        """Leave RViz's panel as it is, and follow nothing any longer; safe to call twice."""
+        if self._closed:
+            return
+        self._closed = True
+        self._sources.close()
+        for entry in list(self._entries):
+            self.remove(entry)
+
+    # Keeping in step.
+
+    @Slot()
+    def _schedule(self, *_: Any) -> None:
+        if not self._scheduled and not self._closed:
+            self._scheduled = True
+            QtCore.QTimer.singleShot(0, self._settle)
+
+    @Slot()
+    def _settle(self) -> None:
+        self._scheduled = False
+        if self._closed or self._settling or self._held:
+            return
+        self._settling = True
+        try:
+            quiet()(self._bring_about)()
+        finally:
+            self._settling = False
+
+    def _bring_about(self) -> None:
+        self._watch_panel()
+        shown = list(self._stack)
+        for entry in list(self._entries):
+            overlay = entry.overlay
+            if not entry.alive:
+                self._forget(entry)
+            elif overlay is not None and overlay not in shown:
+                self.remove(entry)
+            elif entry.outdated:
+                self._let_go(entry.drop())
+        known = {id(entry.overlay) for entry in self._entries}
+        for overlay in list(self._stack):
+            if id(overlay) not in known and not overlay.is_popup:
+                self._enter(overlay)
+        for entry in list(self._entries):
+            self._show(entry)
+
+    def _enter(self, overlay: Overlay) -> None:
+        """Give an overlay of the program's an entry: one that waits for it, or a new one."""
+        if overlay not in self._programs:
+            self._programs.append(overlay)
+        class_id = QML_CLASS if isinstance(overlay, QmlOverlay) else class_id_of(type(overlay))
+        for entry in self._entries:
+            if entry.overlay is None and self._waits_for(entry, overlay, class_id):
+                self._untouched(partial(entry.take, overlay))
+                return
+        entry = self._make(class_id)
+        entry.display.setName(overlay.name)
+        entry.reflect(overlay)
+        self._window.manager.addDisplay(entry.display, overlay.visible)
+        entry.take(overlay)
+
+    @staticmethod
+    def _waits_for(entry: Entry, overlay: Overlay, class_id: str) -> bool:
+        if str(entry.display.getName()) != overlay.name:
+            return False
+        if isinstance(overlay, QmlOverlay):
+            return entry.is_qml and entry.shows(overlay.file)
+        return entry.class_id == class_id
+
+    def _show(self, entry: Entry) -> None:
+        """Have an overlay be seen or not as its entry says; make it when it is seen first."""
+        enabled = bool(entry.display.isEnabled())
+        if entry.overlay is None and enabled:
+            self._untouched(entry.ensure)
+        overlay = entry.overlay
+        if overlay is None:
+            return
+        if overlay not in list(self._stack):
+            overlay.name = self._free_name(str(entry.display.getName()), overlay)
+            self._stack.add(overlay)
+        overlay.visible = enabled
+
+    def _rename(self, entry: Entry) -> None:
+        if entry.overlay is not None and entry.alive:
+            entry.overlay.name = self._free_name(str(entry.display.getName()), entry.overlay)
+
+    def _free_name(self, wanted: str, overlay: Overlay) -> str:
+        wanted = wanted or type(overlay).__name__
+        name, number = wanted, 2
+        while self._stack.find(name) not in (None, overlay):
+            name, number = f"{wanted} {number}", number + 1
+        return name
+
+    def _make(self, class_id: str) -> Entry:
+        entry = Entry(class_id, self._session, self._sources, self._import_paths)
+        self._entries.append(entry)
+        entry.touched.connect(self._schedule)
+        entry.gone.connect(self._schedule)
+        entry.renamed.connect(lambda: self._rename(entry))
+        entry.edited.connect(quiet()(self._window.manager.notifyConfigChanged))
+        return entry
+
+    def _forget(self, entry: Entry) -> None:
+        if entry in self._entries:
+            self._entries.remove(entry)
+            self._let_go(entry.drop())
+
+    def _let_go(self, overlay: Overlay | None) -> None:
+        if overlay is not None:
+            if overlay in self._programs:
+                self._programs.remove(overlay)
+            overlay.visible = False
+            self._stack.remove(overlay)
+
+    def _look(self) -> None:
+        """See what no signal tells: groups that are switched, placeholders without a panel."""
+        for entry in self._entries if not self._closed else ():
+            overlay = entry.overlay
+            enabled = entry.alive and bool(entry.display.isEnabled())
+            if enabled != (overlay is not None and overlay.visible) and not (
+                enabled and entry.waiting
+            ):
+                self._schedule()
+                return
+
+    # Config files.
+
+    @Slot()
+    def _hold(self) -> None:
+        """Take the program's overlays out of the displays that RViz is about to delete."""
+        self._held = True
+        for entry in list(self._entries):
+            if entry.overlay in self._programs:
+                self._entries.remove(entry)
+                entry.drop()
+
+    # Placeholders.
+
+    def _watch_panel(self) -> None:
+        """Follow the panel's tree, which there may be another one of since the last config."""
+        for view in self._window.frame.findChildren(pyqt("QtWidgets").QTreeView):
+            model = view.model()
+            if model is None or model.metaObject().className() != "rviz::PropertyTreeModel":
+                continue
+            address = int(pyqt("sip").unwrapinstance(model))
+            if address not in self._watched:
+                self._watched.add(address)
+                model.rowsInserted.connect(quiet()(lambda *_: self._look_for_placeholders()))
+
+    @Slot()
+    def _look_for_placeholders(self, *_: Any) -> None:
+        """Replace placeholders when RViz is done with the event that made them.
+
+        Its panel handles other events while it duplicates displays, and then goes on with them.
+        Only what is deleted later waits for so long.
+        """
+        if not self._looking and not self._closed:
+            self._looking = True
+            # Python must not let go of it while C++ deletes it.
+            self._token = QtCore.QObject()
+            self._token.destroyed.connect(self._replace_placeholders)
+            self._token.deleteLater()
+
+    @Slot()
+    def _replace_placeholders(self, *_: Any) -> None:
+        if not self._closed:
+            quiet()(self._replace_all)()
+            self._held = False
+            self._schedule()
+        self._looking = False
+
+    def _replace_all(self) -> None:
+        found = list(self._placeholders(self._window.manager.getRootDisplayGroup()))
+        for display in found:
+            self._untouched(partial(self._replace, display))
+
+    def _placeholders(self, group: Any) -> Iterator[Any]:
+        bindings, sip = rviz(), pyqt("sip")
+        for at in range(group.numDisplays()):
+            display = group.getDisplayAt(at)
+            if display.metaObject().className() == "rviz::DisplayGroup":
+                yield from self._placeholders(sip.cast(display, bindings.DisplayGroup))
+            elif getattr(display, "entry", None) is None and _is_ours(display.getClassId()):
+                yield display
+
+    def _replace(self, placeholder: Any) -> None:
+        config = rviz().Config()
+        placeholder.save(config)
+        above, row = placeholder.getParent(), placeholder.rowNumberInParent()
+        entry = self._make(str(placeholder.getClassId()))
+        entry.display.setName(placeholder.getName())
+        manager = self._window.manager
+        manager.addDisplay(entry.display, False)
+        manager.getRootDisplayGroup().takeChild(entry.display)
+        above.takeChildAt(row)
+        above.addChild(entry.display, row)
+        entry.display.load(config)
+        placeholder.deleteLater()
+
+    def _untouched(self, do: Callable[[], None]) -> None:
+        """Do what changes nothing that the user would have to save."""
+        modified = self._window.modified
+        do()
+        if not modified:
+            self._window.widget.setWindowModified(False)
+
+
+def _is_ours(class_id: str) -> bool:
+    return class_id in {QML_CLASS, REFERENCE_QML_CLASS} or maker_of(class_id) is not None
