@@ -14,12 +14,13 @@ from rosglass.errors import Error
 from rosglass.qt import is_alive
 from rosglass.rviz.editors import make_editor
 from rosglass.rviz.host import pyqt, rviz
+from rosglass.rviz.registered_properties import RegisteredProperty
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.rviz.property_sources import Sources
-    from rosglass.rviz.registered_properties import RegisteredProperties, RegisteredProperty
+    from rosglass.rviz.registered_properties import RegisteredProperties
 
 __all__ = ["PropertyTree", "given_to_rviz", "quiet", "take_out"]
 
@@ -214,7 +215,7 @@ class PropertyTree:
         self._owner, self._above, self._sources = owner, above, sources
         self._views: dict[RegisteredProperty, PropertyView] = {}
         self._watched: dict[RegisteredProperty, Any] = {}
-        self._added, self._gone = quiet()(self._enter), quiet()(self._leave)
+        self._added, self._gone = quiet()(self._on_registered), quiet()(self._on_unregistered)
         owner.registered.connect(self._added)
         owner.unregistered.connect(self._gone)
         for found in owner.all():
@@ -230,6 +231,15 @@ class PropertyTree:
             self._owner.registered.disconnect(self._added)
             self._owner.unregistered.disconnect(self._gone)
         for found in list(self._owner.properties.values()):
+            self._leave(found)
+
+    def _on_registered(self, found: object) -> None:
+        # QML can emit every signal that it sees, with anything.
+        if isinstance(found, RegisteredProperty) and found not in self._watched:
+            self._enter(found)
+
+    def _on_unregistered(self, found: object) -> None:
+        if isinstance(found, RegisteredProperty) and found in self._watched:
             self._leave(found)
 
     def _enter(self, found: RegisteredProperty) -> None:
