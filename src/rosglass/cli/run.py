@@ -16,7 +16,15 @@ from rosglass.errors import QmlError, UnsupportedError
 if TYPE_CHECKING:
     from rosglass.qml.application import Application
 
-__all__ = ["configure", "format_log", "point_in_time", "run", "show"]
+__all__ = [
+    "add_import_paths",
+    "add_screenshot",
+    "configure",
+    "format_log",
+    "point_in_time",
+    "run",
+    "show",
+]
 
 #: Qt's messages that say nothing to whoever runs an interface.
 _QUIET = "qt.multimedia.symbolsresolver=false;qt.multimedia.ffmpeg*=false;qt.qpa.theme*=false"
@@ -42,14 +50,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-watch", dest="watch", action="store_false", help="don't; this is the default"
     )
-    parser.add_argument(
-        "-I",
-        dest="import_paths",
-        metavar="FOLDER",
-        action="append",
-        default=[],
-        help="a folder with QML modules, searched besides QML_IMPORT_PATH; may be repeated",
-    )
+    add_import_paths(parser)
     parser.add_argument("--fullscreen", action="store_true", help="fill the screen")
     parser.add_argument(
         "--kiosk",
@@ -57,19 +58,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="fill the screen, ignore what would close the window (Alt-F4), and hide the pointer "
         "while it is not moved; Ctrl-C, SIGTERM and Qt.quit() end it",
     )
-    parser.add_argument(
-        "--screenshot",
-        metavar="PICTURE",
-        type=Path,
-        help="save a picture of the window (PNG, JPEG) and end",
-    )
-    parser.add_argument(
-        "--after",
-        metavar="SECONDS",
-        type=point_in_time,
-        default=2.0,
-        help="when to take the screenshot (default: %(default)s)",
-    )
+    add_screenshot(parser, "the window", after=2.0)
     add_definitions_option(parser)
     parser.set_defaults(arguments=[], ros_arguments=[])
     parser.epilog = (
@@ -87,6 +76,41 @@ def point_in_time(text: str) -> float:
     if not 0 <= value <= 86_400:
         raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds from 0 to 86400")
     return value
+
+
+def add_import_paths(parser: argparse.ArgumentParser) -> None:
+    """Declare the option that says where QML modules are, besides the usual places."""
+    parser.add_argument(
+        "-I",
+        dest="import_paths",
+        metavar="FOLDER",
+        action="append",
+        default=[],
+        help="a folder with QML modules, searched besides QML_IMPORT_PATH; may be repeated",
+    )
+
+
+def add_screenshot(parser: argparse.ArgumentParser, what: str, after: float) -> None:
+    """Declare the options that save a picture.
+
+    Args:
+        parser: Of the command.
+        what: What is in the picture.
+        after: Seconds until it is taken, unless told otherwise.
+    """
+    parser.add_argument(
+        "--screenshot",
+        metavar="PICTURE",
+        type=Path,
+        help=f"save a picture of {what} (PNG, JPEG) and end",
+    )
+    parser.add_argument(
+        "--after",
+        metavar="SECONDS",
+        type=point_in_time,
+        default=after,
+        help="when to take the screenshot (default: %(default)s)",
+    )
 
 
 def run(args: argparse.Namespace) -> int:

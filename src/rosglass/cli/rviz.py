@@ -7,17 +7,17 @@ import os
 import signal
 import sys
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rosglass.cli.completion import complete_files
 from rosglass.cli.connecting import add_definitions_option, seconds
-from rosglass.cli.run import format_log, point_in_time
+from rosglass.cli.run import add_import_paths, add_screenshot, format_log
 from rosglass.errors import Error, QmlError
 
 if TYPE_CHECKING:
     import argparse
     from collections.abc import Iterator
+    from pathlib import Path
 
     from rosglass.rviz import Application
 
@@ -67,14 +67,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="show interfaces anew whenever a file in their folders is saved",
     )
-    parser.add_argument(
-        "-I",
-        dest="import_paths",
-        metavar="FOLDER",
-        action="append",
-        default=[],
-        help="a folder with QML modules, searched besides QML_IMPORT_PATH; may be repeated",
-    )
+    add_import_paths(parser)
     parser.add_argument(
         "--fixed-frame",
         metavar="FRAME",
@@ -83,19 +76,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--fullscreen", action="store_true", help="fill the screen")
     parser.add_argument("--splash", action="store_true", help="show RViz's splash screen")
-    parser.add_argument(
-        "--screenshot",
-        metavar="PICTURE",
-        type=Path,
-        help="save a picture of RViz's window (PNG, JPEG) and end",
-    )
-    parser.add_argument(
-        "--after",
-        metavar="SECONDS",
-        type=point_in_time,
-        default=3.0,
-        help="when to take the screenshot (default: %(default)s)",
-    )
+    add_screenshot(parser, "RViz's window", after=3.0)
     add_definitions_option(parser)
     parser.set_defaults(arguments=[], ros_arguments=[], ros1=True)
     parser.epilog = (

@@ -126,6 +126,9 @@ class Overlay(QtCore.QObject):
     def attach(self, window: Window) -> None:
         """Be told over which RViz it is shown, before anything else happens to it."""
 
+    def _missing(self, method: str) -> str:
+        return f"overlay {self.name}: its class {type(self).__name__} has to give {method}"
+
     def resize(self, width: int, height: int, ratio: float) -> None:
         """Fit it to the 3D view.
 
@@ -134,7 +137,7 @@ class Overlay(QtCore.QObject):
             height: Pixels.
             ratio: Pixels for one unit of the overlay, its scale and the screen's pixel ratio in it.
         """
-        raise NotImplementedError
+        raise NotImplementedError(self._missing("resize(width, height, ratio)"))
 
     def draw(self) -> NDArray[np.uint32] | None:
         """Return what is to be seen, or None for the same as before.
@@ -143,7 +146,7 @@ class Overlay(QtCore.QObject):
             Array of shape (height, width) as :meth:`resize` asked for, each pixel 0xAARRGGBB with
             premultiplied colours. It is read before the next call.
         """
-        raise NotImplementedError
+        raise NotImplementedError(self._missing("draw()"))
 
     def deliver(self, event: QtCore.QEvent) -> bool:
         """Handle an event of the mouse, of touch or of the keyboard.

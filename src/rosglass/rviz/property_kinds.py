@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
 import numpy as np
@@ -96,7 +97,7 @@ class _Bool(Kind):
         return self.read(saved)
 
 
-class _Number(Kind):
+class _Number(Kind, ABC):
     """A number between the options `min` and `max`, which editors change by `step`."""
 
     DEFAULT: ClassVar[Any] = 0
@@ -121,11 +122,11 @@ class _Number(Kind):
     def default(self) -> Any:
         return min(max(self.DEFAULT, self.min), self.max)
 
-    def _limits(self) -> tuple[Any, Any]:
-        raise NotImplementedError
+    @abstractmethod
+    def _limits(self) -> tuple[Any, Any]: ...
 
-    def _number(self, value: Any) -> Any:
-        raise NotImplementedError
+    @abstractmethod
+    def _number(self, value: Any) -> Any: ...
 
     def read(self, value: Any) -> Any:
         number = self._number(value)
@@ -256,14 +257,14 @@ class _Color(Kind):
         return str(value.name(form.HexRgb if whole else form.HexArgb))
 
 
-class _Parts(Kind):
+class _Parts(Kind, ABC):
     """Numbers with names; kept as RViz keeps its own vectors: ``X: 1, Y: 2, Z: 3``."""
 
     HOLDS_OTHERS = False
     NAMES: ClassVar[tuple[str, ...]] = ()
 
-    def _make(self, parts: list[float]) -> Any:
-        raise NotImplementedError
+    @abstractmethod
+    def _make(self, parts: list[float]) -> Any: ...
 
     def parts(self, value: Any) -> dict[str, float]:
         """Return the numbers by name, in capitals."""

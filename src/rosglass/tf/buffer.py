@@ -15,7 +15,6 @@ from rosglass.comm.complaints import Complaints
 from rosglass.comm.executor import IMMEDIATE
 from rosglass.comm.node import Handle
 from rosglass.comm.promise import check_timeout
-from rosglass.comm.receiving import check_may_wait
 from rosglass.comm.similar import similar
 from rosglass.comm.time import Duration, Time
 from rosglass.errors import (
@@ -30,7 +29,7 @@ from rosglass.tf.changes import Changes
 from rosglass.tf.frames import FrameInfo, FrameTree
 from rosglass.tf.store import FrameStore
 from rosglass.tf.transform import Transform
-from rosglass.tf.waiting import Waiting
+from rosglass.tf.waiting import Waiting, check_may_wait_for
 from rosglass.tf.walk import common_time, links_between, look_up
 
 if TYPE_CHECKING:
@@ -324,7 +323,7 @@ class TransformBuffer(Handle):
         """
         promise = self.lookup_transform_async(target, source, time, timeout=timeout)
         if not promise.done():
-            _check_may_wait(promise, f"{target} <- {source}")
+            check_may_wait_for(promise, f"{target} <- {source}")
         return promise.result()
 
     def can_transform(
@@ -458,7 +457,7 @@ class TransformBuffer(Handle):
             return query()
         promise = self._waiting.add(what, query, patience)
         if not promise.done():
-            _check_may_wait(promise, what)
+            check_may_wait_for(promise, what)
         try:
             return promise.result()
         except TimeoutException as late:
@@ -495,11 +494,3 @@ def _tried(query: Callable[[], Transform]) -> Transformable:
     except TransformException as error:
         return Transformable(error)
     return Transformable()
-
-
-def _check_may_wait(promise: Promise[Transform], what: str) -> None:
-    try:
-        check_may_wait(what)
-    except Exception:
-        promise.cancel()
-        raise

@@ -6,6 +6,7 @@ import threading
 from typing import TYPE_CHECKING
 
 from rosglass.comm.promise import Promise, check_timeout
+from rosglass.comm.receiving import check_may_wait
 from rosglass.comm.timers import Timers
 from rosglass.errors import (
     InvalidArgumentException,
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from rosglass.comm.node import Handle
     from rosglass.tf.transform import Transform
 
-__all__ = ["Waiting"]
+__all__ = ["Waiting", "check_may_wait_for"]
 
 
 class Waiting:
@@ -128,3 +129,20 @@ class _Request:
         )
         error.__cause__ = self._reason
         self.promise.fail(error)
+
+
+def check_may_wait_for(promise: Promise[Transform], what: str) -> None:
+    """Cancel a promise that the calling thread must not wait for.
+
+    Args:
+        promise: Of a transform.
+        what: What is looked up.
+
+    Raises:
+        UnsupportedError: This is a thread that receives transforms.
+    """
+    try:
+        check_may_wait(what)
+    except Exception:
+        promise.cancel()
+        raise
