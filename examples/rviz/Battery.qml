@@ -14,16 +14,16 @@ Panel {
         anchors.horizontalCenter: parent.horizontalCenter
         text: battery.message ? (100 * panel.share).toFixed(0) + " %" : "–"
         color: panel.tint
-        font { pixelSize: 20; weight: Font.Light }
+        font { pixelSize: 22; weight: Font.Light }
     }
     Rectangle {
-        y: 26; width: parent.width; height: 9; radius: 3
+        y: 32; width: parent.width; height: 9; radius: 3
         color: "#16202a"
         Rectangle { width: parent.width * panel.share; height: parent.height; radius: 3; color: panel.tint }
     }
     Text {
-        y: 38; anchors.horizontalCenter: parent.horizontalCenter
-        text: battery.message ? battery.message.voltage.toFixed(1) + " V" : ""
+        y: 47; anchors.horizontalCenter: parent.horizontalCenter
+        text: battery.stale ? "" : battery.message.voltage.toFixed(1) + " V"
         color: Theme.dim
         font.pixelSize: 10
     }

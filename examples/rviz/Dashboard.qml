@@ -1,5 +1,5 @@
 // The paper's Figure 1: an operator station over RViz's 3D view.
-//   rosglass rviz figure1.rviz --overlay Dashboard.qml
+//   rosglass rviz figure1.rviz --overlay Dashboard.qml --bare
 import QtQuick 2.15
 import QtQuick.Layouts 1.15
 import Ros 1.0
@@ -8,8 +8,13 @@ Item {
     id: dashboard
     Component.onCompleted: Ros.init("dashboard")
 
+    Contact { id: contact }
     Clock { x: Theme.gap; y: Theme.gap }
     ToolButtons { x: Theme.gap; y: 62 }
+    Notices {
+        contact: contact
+        anchors { horizontalCenter: parent.horizontalCenter; top: parent.top; topMargin: Theme.gap }
+    }
 
     Rectangle {
         anchors { left: parent.left; right: parent.right; bottom: parent.bottom }
@@ -24,7 +29,7 @@ Item {
             ColumnLayout {
                 Layout.preferredWidth: 158; Layout.fillHeight: true
                 spacing: Theme.gap
-                ViewControls { Layout.fillWidth: true; Layout.preferredHeight: 98 }
+                ViewControls { live: contact.live; Layout.fillWidth: true; Layout.preferredHeight: 98 }
                 EmergencyStop { Layout.fillWidth: true; Layout.fillHeight: true }
             }
             ColumnLayout {
@@ -32,10 +37,10 @@ Item {
                 spacing: Theme.gap
                 Posture { Layout.fillWidth: true; Layout.fillHeight: true }
                 RowLayout {
-                    Layout.fillWidth: true; Layout.fillHeight: false; Layout.preferredHeight: 88
+                    Layout.fillWidth: true; Layout.fillHeight: false; Layout.preferredHeight: 106
                     spacing: Theme.gap
                     OperatingMode { Layout.fillWidth: true; Layout.fillHeight: true }
-                    Battery { Layout.preferredWidth: 84; Layout.fillHeight: true }
+                    Battery { Layout.preferredWidth: 92; Layout.fillHeight: true }
                 }
             }
             MultiCamera {
@@ -46,7 +51,7 @@ Item {
                 Layout.fillWidth: true; Layout.preferredWidth: 300; Layout.fillHeight: true
                 selected: 1
             }
-            Tabs { Layout.preferredWidth: 236; Layout.fillHeight: true }
+            Tabs { live: contact.live; Layout.preferredWidth: 236; Layout.fillHeight: true }
         }
     }
 }

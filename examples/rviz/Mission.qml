@@ -46,7 +46,7 @@ Column {
     }
     Text {
         text: "next waypoint " + (mission.next + 1) + " of " + mission.count
-        visible: mission.count > 0
+        visible: mission.count > 0 && !state_.stale
         color: Theme.dim
         font.pixelSize: 11
     }

@@ -12,13 +12,12 @@ Panel {
     Subscriber { id: mode; topic: "/mode"; messageType: "std_msgs/String"; timeout: 2000 }
     Column {
         anchors.fill: parent
-        spacing: 2
+        spacing: 3
         Repeater {
             model: ["autonomous", "supervised", "safe"]
             Push {
                 objectName: "mode " + modelData
-                width: parent.width; height: 16
-                size: 10
+                width: parent.width; height: 22
                 text: modelData
                 tint: modelData === "autonomous" ? Theme.accent : modelData === "safe" ? Theme.good : Theme.warn
                 checked: !mode.stale && mode.message.data === modelData

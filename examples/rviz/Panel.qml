@@ -7,6 +7,8 @@ Rectangle {
     property string note
     property bool stale: false
     property bool dims: true
+    // Too little room beside the title: it is said below.
+    readonly property bool narrow: width < 110
     default property alias content: body.data
 
     color: Theme.panel
@@ -14,23 +16,23 @@ Rectangle {
     border.color: stale ? Theme.bad : Theme.edge
     Text {
         x: 9; y: 6
-        width: note.x - 13
+        width: (panel.narrow ? parent.width : note.x) - 13
         elide: Text.ElideRight
         text: panel.title.toUpperCase()
         color: Theme.dim
         font { pixelSize: 10; letterSpacing: 1; weight: Font.DemiBold }
     }
-    Text {
-        id: note
-        anchors { right: parent.right; rightMargin: 9 }
-        y: 6
-        text: panel.stale ? "NO DATA" : panel.note
-        color: panel.stale ? Theme.bad : Theme.dim
-        font { pixelSize: 10; weight: panel.stale ? Font.Bold : Font.Normal }
-    }
     Item {
         id: body
         anchors { fill: parent; margins: 8; topMargin: 24 }
         opacity: panel.stale && panel.dims ? 0.3 : 1
+    }
+    Text {
+        id: note
+        x: panel.narrow ? (panel.width - width) / 2 : panel.width - width - 9
+        y: panel.narrow ? panel.height - height - 7 : 6
+        text: panel.stale ? "NO DATA" : panel.note
+        color: panel.stale ? Theme.bad : Theme.dim
+        font { pixelSize: 10; weight: panel.stale ? Font.Bold : Font.Normal }
     }
 }

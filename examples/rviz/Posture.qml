@@ -4,7 +4,7 @@ import Ros 1.0
 
 Panel {
     id: panel
-    title: "Orientation, flippers"
+    title: "Posture"
     stale: imu.stale || joints.stale
 
     // Radians; roll positive with the left side up, pitch positive with the nose down (REP 103).

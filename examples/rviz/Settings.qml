@@ -6,7 +6,10 @@ import Ros 1.0
 Column {
     id: settings
     spacing: 10
+    property bool live
     property string failure
+    // ROS keeps parameters on the master: they are there when the robot is not.
+    readonly property bool known: speed.ready && live
 
     Parameter {
         id: speed
@@ -16,14 +19,14 @@ Column {
     Subscriber { id: lamp; topic: "/flashlight/state"; messageType: "std_msgs/Bool"; timeout: 2000 }
 
     Text {
-        text: "Highest speed   " + (speed.ready ? Number(speed.value).toFixed(2) + " m/s" : "unknown")
-        color: speed.ready ? Theme.text : Theme.bad
+        text: "Highest speed   " + (known ? Number(speed.value).toFixed(2) + " m/s" : "unknown")
+        color: known ? Theme.text : Theme.bad
         font.pixelSize: 12
     }
     Slider {
         objectName: "speed"
         width: parent.width; height: 24
-        enabled: speed.ready
+        enabled: settings.known
         from: 0.1; to: 1.2
         value: speed.value || 0
         onPressedChanged: if (!pressed) speed.value = value

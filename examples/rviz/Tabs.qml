@@ -3,6 +3,7 @@ import QtQuick 2.15
 
 Panel {
     id: panel
+    property bool live
     property int current: 0
     readonly property var names: ["Mission", "Behaviours", "Settings"]
 
@@ -25,6 +26,6 @@ Panel {
         anchors { fill: parent; topMargin: 14 }
         Mission { anchors.fill: parent; visible: panel.current === 0 }
         Behaviours { anchors.fill: parent; visible: panel.current === 1 }
-        Settings { anchors.fill: parent; visible: panel.current === 2 }
+        Settings { live: panel.live; anchors.fill: parent; visible: panel.current === 2 }
     }
 }

@@ -5,7 +5,11 @@ import QtQuick.Layouts 1.15
 Panel {
     id: panel
     title: "View"
+    property bool live
     property string failure
+    // A robot that is silent is not followed: RViz keeps showing where it was.
+    stale: !live
+    dims: false
     note: failure || rviz.view.problem ? "NO ROBOT" : rviz.view.trackedFrame ? "following" : ""
 
     function look(eye) {

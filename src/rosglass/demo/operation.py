@@ -8,6 +8,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import QoS, Time
+from rosglass.demo.goal import ABORTED, PREEMPTED, SUCCEEDED, DriveGoal
 from rosglass.demo.telemetry import header
 from rosglass.errors import Error
 
@@ -38,9 +39,9 @@ class Operation:
 
     ``/mode`` tells one of :data:`MODES`; the services ``/mode/autonomous`` and so on choose it.
     The mission is driven in mode autonomous, and told in ``/mission/state``, ``/mission/path``
-    and ``/mission/waypoint``; ``/mission/pause`` holds it. A place at ``/move_base_simple/goal``
-    is driven to in mode supervised, and so are behaviours, ``/flexbe/execute_behavior``, in all
-    modes but safe.
+    and ``/mission/waypoint``; ``/mission/pause`` holds it. A :class:`~rosglass.demo.goal.DriveGoal`
+    is driven to in mode supervised. Behaviours, ``/flexbe/execute_behavior``, are executed one at
+    a time, in all modes but safe.
 
     Args:
         node: Where all this is offered.
@@ -69,8 +70,10 @@ class Operation:
         self._state, self._drive, self._flippers, self._dock = state, drive, flippers, dock
         self._ending = threading.Event()
         self._paused, self._next = False, 0
-        self._goal: tuple[float, float] | None = None
-        self._behaviour = ""
+        self._goal = DriveGoal(node, self._refusal)
+        self._behaviour, self._lock = "", threading.Lock()
+        #: Why a behaviour is to end.
+        self._interruption = ""
         self._told: dict[str, tuple[Any, float]] = {}
         latched = QoS.latched()
         self._send = {
@@ -91,18 +94,12 @@ class Operation:
         self._parts += [
             node.create_service_server("/mission/pause", "std_srvs/srv/SetBool", self._on_pause),
             node.create_service_server("/mission/restart", trigger, self._on_restart),
-            node.create_subscription(
-                "/move_base_simple/goal", "geometry_msgs/msg/PoseStamped", self._on_goal, 1
-            ),
+            self._goal,
         ]
         if node.wire == "ros1":
+            kind = "flexbe_msgs/action/BehaviorExecution"
             self._parts.append(
-                node.create_action_server(
-                    "/flexbe/execute_behavior",
-                    "flexbe_msgs/action/BehaviorExecution",
-                    self._behave,
-                    accept=lambda goal: goal.behavior_name in BEHAVIOURS and not self._behaviour,
-                )
+                node.create_action_server("/flexbe/execute_behavior", kind, self._behave)
             )
 
     @property
@@ -117,12 +114,14 @@ class Operation:
             self._tell("/mode", self.mode)
             self._tell("/mission/waypoint", self._next)
             self._tell("/mission/state", self._proceed(state))
+            self._goal.confirm()
 
     def take_over(self) -> None:
         """Leave the driving to the operator, who has just driven."""
         if self.mode == "autonomous":
             self.mode = "supervised"
-        self._goal = None
+        self._interruption = "the operator drives"
+        self._goal.end(PREEMPTED, self._interruption)
 
     def close(self) -> None:
         """Withdraw all; safe to call twice."""
@@ -133,13 +132,13 @@ class Operation:
     def _proceed(self, state: RobotState) -> str:
         """Drive on for a moment; returns what the robot is about."""
         if state.emergency_stop:
-            self._goal = None
+            self._goal.end(ABORTED, "the emergency stop was pressed")
             return "emergency stop"
         if self._behaviour:
             return self._behaviour.lower()
-        if self._goal is not None:
-            if self._steer(state, self._goal):
-                self._goal = None
+        if (place := self._goal.place) is not None:
+            if self._steer(state, place):
+                self._goal.end(SUCCEEDED, "the goal is reached")
             return "driving to the goal"
         if self.mode != "autonomous":
             return "waiting for mode autonomous"
@@ -172,7 +171,9 @@ class Operation:
         def choose(_: Message) -> dict[str, Any]:
             self.mode = name
             if name == "safe":
-                self._goal = None
+                self._interruption = "the mode is safe now"
+            if name != "supervised":
+                self._goal.end(PREEMPTED, f"the mode is {name} now")
             self._drive(0.0, 0.0)
             self._tell("/mode", name)
             return {"success": True, "message": name}
@@ -188,19 +189,28 @@ class Operation:
         self._next, self._paused = 0, False
         return {"success": True, "message": "from the first waypoint"}
 
-    def _on_goal(self, message: Message) -> None:
-        place = message.pose.position
-        if message.header.frame_id.lstrip("/") not in ("map", "odom", ""):
-            raise Error(f"a goal in {message.header.frame_id!r} refused: expected it in 'map'")
-        if self.mode == "supervised" and math.isfinite(place.x) and math.isfinite(place.y):
-            self._goal = (place.x, place.y)
+    def _refusal(self) -> str:
+        """Return why no goal is driven to at present; empty when one is."""
+        if self._state().emergency_stop:
+            return "the emergency stop is latched; release it first"
+        if self._behaviour:
+            return f"busy with {self._behaviour!r}; cancel it first"
+        if self.mode != "supervised":
+            return f"no goals in mode {self.mode}; choose supervised"
+        return ""
 
     def _behave(self, goal: ServerGoal) -> dict[str, str]:
         name = goal.goal.behavior_name
+        if name not in BEHAVIOURS:
+            raise Error(f"there is no behaviour {name!r}; there are {', '.join(BEHAVIOURS)}")
         if self.mode == "safe":
-            raise Error("no behaviours in mode safe")
-        self._behaviour, self._goal = name, None
+            raise Error("no behaviours in mode safe; choose another mode")
+        with self._lock:
+            if self._behaviour:
+                raise Error(f"busy with {self._behaviour!r}; cancel it first")
+            self._behaviour, self._interruption = name, ""
         try:
+            self._goal.end(PREEMPTED, f"the behaviour {name!r} was started")
             start = self._state()
             {
                 "Look around": lambda: self._turn(goal, math.tau),
@@ -209,10 +219,10 @@ class Operation:
                 "Flippers flat": lambda: self._move_flippers(goal, 0.0),
                 "Return to dock": lambda: self._go(goal, self._dock),
             }[name]()
-            self._drive(0.0, 0.0)
             moved = math.dist((start.x, start.y), (self._state().x, self._state().y))
             return {"outcome": "cancelled" if goal.is_cancel_requested else f"{moved:.1f} m driven"}
         finally:
+            self._drive(0.0, 0.0)
             self._behaviour = ""
 
     def _steps(self, goal: ServerGoal) -> Any:
@@ -223,6 +233,8 @@ class Operation:
             state = self._state()
             if state.emergency_stop:
                 raise Error("the emergency stop is latched; release it first")
+            if self._interruption:
+                raise Error(self._interruption)
             yield state
 
     def _turn(self, goal: ServerGoal, angle: float) -> None:

@@ -1,0 +1,27 @@
+// Whether the robot is heard, and what of it is shown though it is old: RViz itself goes on showing
+// what came last.
+import QtQuick 2.15
+import Ros 1.0
+
+Item {
+    id: contact
+    readonly property bool live: !place.stale
+    readonly property var problems: {
+        var found = []
+        if (Ros.connectionState !== "connected" && Ros.connectionState !== "uninitialized")
+            found.push("NO ROS MASTER: nothing new is found")
+        if (place.stale)
+            found.push(place.age < 0 ? "NO ROBOT: nothing was heard of it yet"
+                : "ROBOT SILENT for " + place.age.toFixed(0) + " s: it may be anywhere")
+        else
+            for (var name in sensors)
+                if (sensors[name].stale)
+                    found.push("NO " + name + ": what is shown of it is old")
+        return found
+    }
+    readonly property var sensors: ({"LASER": laser, "POINT CLOUD": cloud})
+
+    TfTransform { id: place; sourceFrame: "base_link"; targetFrame: rviz.fixedFrame; rate: 5; timeout: 1500 }
+    Subscriber { id: laser; topic: "/scan"; messageType: "sensor_msgs/LaserScan"; throttleRate: 2; timeout: 2000 }
+    Subscriber { id: cloud; topic: "/points"; messageType: "sensor_msgs/PointCloud2"; throttleRate: 1; timeout: 3000 }
+}

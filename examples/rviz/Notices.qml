@@ -1,0 +1,60 @@
+// What the operator must know of the 3D view, in its middle: what is old, and what became of a goal.
+import QtQuick 2.15
+import Ros 1.0
+
+Column {
+    id: notices
+    property Contact contact
+    spacing: 6
+
+    component Notice: Rectangle {
+        property alias text: label.text
+        property color tint: Theme.bad
+        anchors.horizontalCenter: parent.horizontalCenter
+        width: label.implicitWidth + 32; height: 30
+        radius: 6
+        color: Theme.bar
+        border { color: tint; width: 2 }
+        Text {
+            id: label
+            anchors.centerIn: parent
+            color: parent.tint
+            font { pixelSize: 14; weight: Font.DemiBold }
+        }
+    }
+    Repeater {
+        model: notices.contact.problems
+        Notice { text: modelData }
+    }
+
+    // A goal of RViz's tool 2D Nav Goal, as move_base tells of it.
+    Subscriber {
+        id: status
+        topic: "/move_base/status"; messageType: "actionlib_msgs/GoalStatusArray"; timeout: 2000
+        property string last
+        onNewMessage: {
+            var goals = message.status_list
+            if (goals.length === 0)
+                return
+            var goal = goals.at(goals.length - 1), now = goal.goal_id.id + " " + goal.status
+            // What is over was told before this interface came.
+            if (now !== last && (last || goal.status === 1))
+                told.show(goal.status, goal.text)
+            last = now
+        }
+    }
+    Notice {
+        id: told
+        objectName: "goal"
+        readonly property var words: ({4: "GOAL GIVEN UP: ", 5: "GOAL REFUSED: "})
+        visible: false
+        tint: Theme.accent
+        function show(status, reason) {
+            text = (words[status] || "Goal: ") + reason
+            tint = words[status] ? Theme.bad : status === 2 ? Theme.warn : Theme.accent
+            visible = true
+            hide.restart()
+        }
+        Timer { id: hide; interval: 8000; onTriggered: told.visible = false }
+    }
+}
