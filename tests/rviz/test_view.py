@@ -35,7 +35,7 @@ def view(app: Any, wait: Callable[..., None]) -> Any:
     """The camera at (4, 0, 3), moving within 0.2 s, and a node of ours."""
     app.connect()
     app.view.reset()
-    app.view.animation_duration = 0.2
+    app.view.settings.animation_duration = 0.2
     wait(lambda: app.view_services.problem == "" and app.session.node is not None)
     yield app.view
     app.view.reset()
@@ -214,8 +214,8 @@ def test_what_cannot_be_done_is_an_error(view: Any) -> None:
         lambda: view.set_mode(2),
         lambda: view.set_mode(True),
         lambda: view.track("nowhere"),
-        lambda: setattr(view, "animation_duration", -1),
-        lambda: setattr(view, "tracking_gain", math.nan),
+        lambda: setattr(view.settings, "animation_duration", -1),
+        lambda: setattr(view.settings, "tracking_gain", math.nan),
     ):
         with pytest.raises(Error):
             call()
@@ -226,7 +226,7 @@ def test_what_cannot_be_done_is_an_error(view: Any) -> None:
 def test_who_moves_the_camera_otherwise_ends_our_movement(
     app: Any, view: Any, wait: Callable[..., None]
 ) -> None:
-    view.animation_duration = 60.0
+    view.settings.animation_duration = 60.0
     view.move_eye((50, 50, 50))
     wait(100)
     app.window.manager.getViewManager().getCurrent().subProp("Yaw").setValue(1.0)
@@ -244,7 +244,7 @@ def test_a_config_that_is_loaded_ends_movement_and_tracking(
     app.save_config(file)
     view.track("map")
     view.set_mode(1, animate=False)
-    view.animation_duration = 60.0
+    view.settings.animation_duration = 60.0
     view.move_eye((50, 50, 50))
     app.load_config(file)
     assert not view.is_moving
@@ -288,9 +288,9 @@ def test_arrow_keys_shift_the_view_and_ctrl_d_changes_the_mode(
     assert view.mode == 1
     QTest.keyClick(panel, Qt.Key_D, Qt.ControlModifier)
     assert view.mode == 0
-    app.view_keys.enabled = False
+    view.settings.keys = False
     QTest.keyClick(panel, Qt.Key_D, Qt.ControlModifier)
-    app.view_keys.enabled = True
+    view.settings.keys = True
     assert view.mode == 0
 
 
@@ -347,7 +347,7 @@ def test_late_subscribers_hear_mode_and_tracked_frame(
 def test_the_camera_follows_a_frame(
     app: Any, robot: Robot, view: Any, camera: Any, wait: Callable[..., None]
 ) -> None:
-    view.tracking_gain = 1000.0
+    view.settings.tracking_gain = 1000.0
     robot.tf("rover", 1.0, 2.0, 0.0)
     wait(lambda: robot.call("set_tracked_frame", "TrackFrame", frame="rover") == "done")
     wait(lambda: near(camera(), (5, 2, 3)))
@@ -366,7 +366,7 @@ def test_the_camera_follows_a_frame(
     assert view.tracked_frame == "rover"
     orbit.subProp("Focal Point").subProp("X").setValue(9.0)
     wait(lambda: view.tracked_frame == "")
-    view.tracking_gain = 3.0
+    view.settings.tracking_gain = 3.0
 
 
 def test_a_frame_that_is_lost_is_told_once(
@@ -394,9 +394,9 @@ def test_topics_and_services_can_be_withdrawn(
     service = robot.namespace + "move_eye"
     names = app.session.node.services
     wait(lambda: service in str(names()))
-    app.view_services.services = False
+    view.settings.services = False
     wait(lambda: service not in str(names()))
-    app.view_services.services = True
+    view.settings.services = True
     wait(lambda: service in str(names()))
 
 

@@ -162,9 +162,7 @@ class Application:
         #: The keys that move it.
         self.view_keys = ViewKeys(self.window, self.view, self.overlays)
         #: How robots move it.
-        self.view_services = ViewServices(
-            self.view, self.session, f"{self.node_name}/hector_view_controller"
-        )
+        self.view_services = ViewServices(self.view, self.session, self.node_name)
         #: Whether the master of RViz is there.
         self.master = MasterWatch(options.master)
         self.master.problem_changed.connect(self._show_problem)

@@ -13,6 +13,7 @@ from rosglass.rviz.view import ViewMode
 if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime
     from rosglass.rviz.access import Access
+    from rosglass.rviz.orbit import Point
 
 __all__ = ["QmlView"]
 #: Qt reads lists of texts into what it has of them already, and so twice.
@@ -31,6 +32,8 @@ _MOVES = {
 class QmlView(Face):
     """The camera; places are in metres, of the fixed frame unless another one is given."""
 
+    CALLED = "rviz.view"
+
     modeChanged = Signal()
     trackedFrameChanged = Signal()
     problemChanged = Signal()
@@ -44,12 +47,16 @@ class QmlView(Face):
     def __init__(self, access: Access, runtime: Runtime, parent: QtCore.QObject) -> None:
         super().__init__(runtime, parent)
         self._view, self._views = access.view, access.views
-        self._told = (self._view.eye, self._view.focus)
+        self._told = self._places()
         self._view.mode_changed.connect(self.modeChanged)
         self._view.tracked_frame_changed.connect(self.trackedFrameChanged)
         self._view.problem_changed.connect(self._on_problem)
         self._views.kind_changed.connect(self.typeChanged)
         self._views.saved_changed.connect(self.savedViewsChanged)
+        settings = self._view.settings
+        kind = type(settings)
+        kind.animation_duration.of(settings).valueChanged.connect(self.animationDurationChanged)
+        kind.tracking_gain.of(settings).valueChanged.connect(self.trackingGainChanged)
         access.window.before_frame.connect(self._on_frame)
 
     def _set_mode(self, mode: QJSValue) -> None:
@@ -61,19 +68,11 @@ class QmlView(Face):
 
     def _set_duration(self, seconds: float) -> None:
         with self._telling("view.animationDuration"):
-            if not 0 <= seconds <= 60:
-                raise Error(f"expected seconds from 0 to 60, got {seconds!r}")
-            if seconds != self._view.animation_duration:
-                self._view.animation_duration = seconds
-                self.animationDurationChanged.emit()
+            self._view.settings.animation_duration = seconds
 
     def _set_gain(self, gain: float) -> None:
         with self._telling("view.trackingGain"):
-            if not 0 < gain <= 1000:
-                raise Error(f"expected a gain above 0, up to 1000, in 1/s, got {gain!r}")
-            if gain != self._view.tracking_gain:
-                self._view.tracking_gain = gain
-                self.trackingGainChanged.emit()
+            self._view.settings.tracking_gain = gain
 
     def _set_type(self, kind: str) -> None:
         with self._telling("view.type"):
@@ -96,13 +95,16 @@ class QmlView(Face):
     #: Seconds that a movement takes.
     animationDuration = Property(
         float,
-        lambda self: self._view.animation_duration,
+        lambda self: self._view.settings.animation_duration,
         _set_duration,
         notify=animationDurationChanged,
     )
     #: How quickly the camera follows, in 1/s.
     trackingGain = Property(
-        float, lambda self: self._view.tracking_gain, _set_gain, notify=trackingGainChanged
+        float,
+        lambda self: self._view.settings.tracking_gain,
+        _set_gain,
+        notify=trackingGainChanged,
     )
     #: The kind of RViz's view, e.g. ``rviz/Orbit``.
     type = Property(str, lambda self: self._views.kind, _set_type, notify=typeChanged)
@@ -199,9 +201,13 @@ class QmlView(Face):
         del problem
         self.problemChanged.emit()
 
+    def _places(self) -> tuple[Point, Point]:
+        seen = self._view.seen
+        return seen.eye, seen.focus
+
     @Slot()
     def _on_frame(self) -> None:
-        now = (self._view.eye, self._view.focus)
+        now = self._places()
         for new, old in zip(now, self._told, strict=True):
             if max(abs(n) for n in new - old) > _STILL:
                 self._told = now

@@ -16,6 +16,7 @@ from rosglass.errors import Error
 from rosglass.qt import QtCore, Signal
 from rosglass.rviz.current_view import FLAT, ORBIT, CurrentView
 from rosglass.rviz.orbit import STEEPEST, Orbit, Place, Point, ease, shortest_turn
+from rosglass.rviz.view_settings import ViewSettings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,10 +32,6 @@ _START = Orbit.between(Point(4.0, 0.0, 3.0), Point(0.0, 0.0, 0.0))
 #: Metres from the fixed frame's origin; RViz's numbers have 32 bits, and its renderer crashes
 #: where they are infinite.
 _FARTHEST = 1e8
-#: Seconds that a movement may take.
-_LONGEST = 60.0
-#: A gain at which the camera is there with the next frame.
-_HIGHEST_GAIN = 1000.0
 
 
 class ViewMode(enum.IntEnum):
@@ -76,7 +73,8 @@ class View(QtCore.QObject):
     def __init__(self, window: Window, frames: Frames) -> None:
         super().__init__()
         self._frames, self._current = frames, CurrentView(window)
-        self._duration, self._gain = 1.0, 3.0
+        #: How it is moved.
+        self.settings = ViewSettings()
         self._tracked, self._problem = "", ""
         #: Where the focus is held, seen from the tracked frame; None: where it is then.
         self._offset: Point | None = Point(0.0, 0.0, 0.0)
@@ -120,38 +118,17 @@ class View(QtCore.QObject):
     @property
     def eye(self) -> Point:
         """Where the camera is, in the fixed frame; in 2D, above what it shows."""
-        return self._current.read().eye
+        return self.seen.eye
 
     @property
     def focus(self) -> Point:
         """What the camera looks at, in the fixed frame."""
-        return self._current.read().focus
+        return self.seen.focus
 
     @property
-    def animation_duration(self) -> float:
-        """Seconds that a movement takes; 0 jumps.
-
-        Raises:
-            Error: Set to something that is not from 0 to 60.
-        """
-        return self._duration
-
-    @animation_duration.setter
-    def animation_duration(self, seconds: float) -> None:
-        self._duration = _number(seconds, "animation duration", "seconds", _LONGEST)
-
-    @property
-    def tracking_gain(self) -> float:
-        """How quickly the camera follows the tracked frame, in 1/s.
-
-        Raises:
-            Error: Set to something that is not from 0 to 1000.
-        """
-        return self._gain
-
-    @tracking_gain.setter
-    def tracking_gain(self, gain: float) -> None:
-        self._gain = _number(gain, "tracking gain", "1/s", _HIGHEST_GAIN)
+    def seen(self) -> Orbit:
+        """Where the camera is and what it looks at, read from RViz at once."""
+        return self._current.read()
 
     def move_eye(
         self,
@@ -296,7 +273,7 @@ class View(QtCore.QObject):
 
     def _set_off(self, goal: Orbit, animate: bool, *, flat: bool) -> None:
         start, self._base = self._current.read(), None
-        if not animate or not self._duration:
+        if not animate or not self.settings.animation_duration:
             self._arrive(goal, flat=flat)
             return
         if not (flat and self._current.kind == FLAT):
@@ -326,7 +303,7 @@ class View(QtCore.QObject):
             if self._way is not None:
                 self._go_on(now)
             elif self._tracked:
-                self._follow(min(self._gain * passed, 1.0))
+                self._follow(min(self.settings.tracking_gain * passed, 1.0))
         except (AttributeError, RuntimeError, TypeError):
             # As when another version of RViz names the properties of its views another way.
             _log.exception("RViz's camera cannot be moved")
@@ -338,7 +315,8 @@ class View(QtCore.QObject):
             self._go_along()
         way = self._way
         assert way is not None
-        progress = (now - way.began) / self._duration if self._duration else 1.0
+        duration = self.settings.animation_duration
+        progress = (now - way.began) / duration if duration else 1.0
         if progress >= 1:
             self._arrive(way.goal, flat=way.flat)
         else:
@@ -451,9 +429,3 @@ def _is_shifted(before: tuple[Any, ...], now: tuple[Any, ...]) -> bool:
     """Return whether what is looked at is elsewhere, by the states of the same view."""
     axes = 2 if now[0] == FLAT else 3
     return before[2 : 2 + axes] != now[2 : 2 + axes]
-
-
-def _number(value: float, what: str, unit: str, most: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 <= value <= most:
-        raise Error(f"the {what} is {value!r:.80}: expected {unit} from 0 to {most:g}")
-    return float(value)

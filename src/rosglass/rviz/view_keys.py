@@ -30,8 +30,6 @@ _ARROWS = {
 }
 #: Seconds; a frame that takes longer moves the camera no farther.
 _LONGEST_STEP = 0.2
-#: Metres per second.
-_FASTEST = 1000.0
 
 
 class ViewKeys(QtCore.QObject):
@@ -49,39 +47,13 @@ class ViewKeys(QtCore.QObject):
         super().__init__()
         self._window, self._view, self._overlays = window, view, overlays
         self._panel = window.panel
-        self._enabled, self._speed = True, 4.0
+        self._settings = view.settings
         self._held: set[int] = set()
         self._twice = False
         self._last_step = 0.0
         self._panel.installEventFilter(self)
         window.before_frame.connect(self._step)
         window.closing.connect(self.close)
-
-    @property
-    def enabled(self) -> bool:
-        """Whether the keys do anything."""
-        return self._enabled
-
-    @enabled.setter
-    def enabled(self, enabled: bool) -> None:
-        self._enabled = enabled
-        self._held.clear()
-
-    @property
-    def speed(self) -> float:
-        """Metres per second while a key is held.
-
-        Raises:
-            Error: Set to something that is not from 0 to 1000.
-        """
-        return self._speed
-
-    @speed.setter
-    def speed(self, speed: float) -> None:
-        wrong = isinstance(speed, bool) or not isinstance(speed, (int, float))
-        if wrong or not 0 <= speed <= _FASTEST:
-            raise Error(f"the speed is {speed!r:.80}: expected metres per second from 0 to 1000")
-        self._speed = float(speed)
 
     def close(self) -> None:
         """Leave the keys to RViz; safe to call twice."""
@@ -95,7 +67,7 @@ class ViewKeys(QtCore.QObject):
         kind = event.type()
         if kind in (_E.FocusOut, _E.Hide, _E.WindowDeactivate):
             self._held.clear()
-        if kind not in (_E.KeyPress, _E.KeyRelease, _E.ShortcutOverride) or not self._enabled:
+        if kind not in (_E.KeyPress, _E.KeyRelease, _E.ShortcutOverride) or not self._settings.keys:
             return False
         if self._is_elsewhere():
             self._held.clear()
@@ -144,7 +116,7 @@ class ViewKeys(QtCore.QObject):
             return
         now = time.monotonic()
         passed, self._last_step = min(now - self._last_step, _LONGEST_STEP), now
-        if self._is_elsewhere():
+        if self._is_elsewhere() or not self._settings.keys:
             # Who has the keys now gets to know when they are released.
             self._held.clear()
             return
@@ -153,7 +125,7 @@ class ViewKeys(QtCore.QObject):
         length = math.hypot(ahead, left)
         if not length or not passed:
             return
-        metres = self._speed * (2 if self._twice else 1) * passed / length
+        metres = self._settings.speed * (2 if self._twice else 1) * passed / length
         try:
             self._view.nudge(ahead * metres, left * metres)
         except Error as error:

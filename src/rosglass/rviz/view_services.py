@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.qos import QoS
 from rosglass.errors import Error
 from rosglass.qt import QtCore, Signal
+from rosglass.ros1.names import expand, split
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -34,9 +35,7 @@ class ViewServices(QtCore.QObject):
     Args:
         view: The camera.
         session: Whose node offers them; one of ROS 1.
-        namespace: Where; as RViz's own node would call itself.
-        topics: Whether the topics are published.
-        services: Whether the services are offered.
+        node_name: Full name of RViz's own node, which ``~`` stands for.
     """
 
     #: Why they are not there; empty when they are, or nothing has to be.
@@ -48,15 +47,13 @@ class ViewServices(QtCore.QObject):
         self,
         view: View,
         session: Session,
-        namespace: str = "/rviz/hector_view_controller",
-        *,
-        topics: bool = True,
-        services: bool = True,
+        node_name: str = "/rviz",
     ) -> None:
         super().__init__()
         self._view, self._session = view, session
-        self._namespace = namespace.rstrip("/")
-        self._wanted = {"topics": topics, "services": services}
+        self._settings = view.settings
+        self._rviz = split(node_name)
+        self._wanted = self._asked_for()
         self._problem = ""
         self._node: Node | None = None
         self._generation = 0
@@ -66,35 +63,18 @@ class ViewServices(QtCore.QObject):
         session.node_changed.connect(self._node_changed)
         view.mode_changed.connect(self._tell_mode)
         view.tracked_frame_changed.connect(self._tell_frame)
+        self._settings.properties.edited.connect(self._on_edited)
         self._node_changed()
 
     @property
     def namespace(self) -> str:
-        """Where topics and services are."""
-        return self._namespace
+        """Where topics and services are, as an absolute name; empty where that is no valid one."""
+        return self._wanted.namespace
 
     @property
     def problem(self) -> str:
         """Why they are not there; empty when they are, or nothing has to be."""
         return self._problem
-
-    @property
-    def topics(self) -> bool:
-        """Whether the topics are published."""
-        return self._wanted["topics"]
-
-    @topics.setter
-    def topics(self, wanted: bool) -> None:
-        self._want("topics", wanted)
-
-    @property
-    def services(self) -> bool:
-        """Whether the services are offered."""
-        return self._wanted["services"]
-
-    @services.setter
-    def services(self, wanted: bool) -> None:
-        self._want("services", wanted)
 
     def close(self) -> None:
         """Withdraw them; safe to call twice."""
@@ -102,9 +82,18 @@ class ViewServices(QtCore.QObject):
             self._closed = True
             self._shut()
 
-    def _want(self, what: str, wanted: bool) -> None:
-        if wanted != self._wanted[what] and not self._closed:
-            self._wanted[what] = wanted
+    def _asked_for(self) -> _Wanted:
+        settings, (above, name) = self._settings, self._rviz
+        try:
+            namespace = expand(settings.namespace, name, above).rstrip("/")
+        except Error as error:
+            return _Wanted(settings.topics, settings.services, "", str(error))
+        return _Wanted(settings.topics, settings.services, namespace, "")
+
+    def _on_edited(self) -> None:
+        wanted = self._asked_for()
+        if wanted != self._wanted and not self._closed:
+            self._wanted = wanted
             self._open()
 
     def _node_changed(self) -> None:
@@ -120,14 +109,17 @@ class ViewServices(QtCore.QObject):
 
     def _open(self) -> None:
         self._shut()
-        node, generation = self._node, self._generation
-        if node is None or not any(self._wanted.values()):
+        node, generation, wanted = self._node, self._generation, self._wanted
+        if node is None or not (wanted.topics or wanted.services):
             self._tell_problem("")
+            return
+        if wanted.wrong:
+            self._tell_problem(wanted.wrong)
             return
         if node.wire != "ros1":
             self._tell_problem(f"{node.url}: the services of the camera are of ROS 1")
             return
-        wanted, made = dict(self._wanted), _Made()
+        made = _Made()
 
         def done(result: _Made | Error) -> None:
             if generation != self._generation:
@@ -143,21 +135,21 @@ class ViewServices(QtCore.QObject):
 
         self._session.background(lambda: self._make(node, wanted, made), done)
 
-    def _make(self, node: Node, wanted: dict[str, bool], made: _Made) -> _Made:
+    def _make(self, node: Node, wanted: _Wanted, made: _Made) -> _Made:
         """Make topics and services, on the worker thread."""
         try:
-            if wanted["topics"]:
+            if wanted.topics:
                 for topic, kind in (
                     ("tracked_frame", "std_msgs/String"),
                     ("view_mode", f"{_PACKAGE}/ViewMode"),
                 ):
-                    name = f"{self._namespace}/{topic}"
+                    name = f"{wanted.namespace}/{topic}"
                     made.publishers[topic] = node.create_publisher(name, kind, QoS.latched())
                     made.handles.append(made.publishers[topic])
-            for name, kind, answer in self._services() if wanted["services"] else ():
+            for name, kind, answer in self._services() if wanted.services else ():
                 made.handles.append(
                     node.create_service_server(
-                        f"{self._namespace}/{name}",
+                        f"{wanted.namespace}/{name}",
                         f"{_PACKAGE}/srv/{kind}",
                         answer,
                         executor=self._session.executor,
@@ -212,7 +204,7 @@ class ViewServices(QtCore.QObject):
             try:
                 publisher.publish(**fields)
             except Error as error:
-                _log.warning("%s/%s: %s", self._namespace, topic, error)
+                _log.warning("%s/%s: %s", self.namespace, topic, error)
 
     def _tell_problem(self, problem: str) -> None:
         if problem != self._problem:
@@ -220,6 +212,15 @@ class ViewServices(QtCore.QObject):
             if problem:
                 _log.warning("robots cannot move the camera: %s", problem)
             self.problem_changed.emit(problem)
+
+
+class _Wanted(NamedTuple):
+    """What is to be there, and where; what is wrong with that."""
+
+    topics: bool
+    services: bool
+    namespace: str
+    wrong: str
 
 
 class _Made:
