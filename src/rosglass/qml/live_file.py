@@ -139,8 +139,10 @@ class LiveFile(QtCore.QObject):
             self._session.holding -= 1
             self._dropped(component)
 
+        # A signal of what QML has made, once looked at, has PySide2 keep its half of that for ever.
+        end = QtCore.QObject(root)
         # Component.onDestruction runs a little after this signal.
-        root.destroyed.connect(lambda: QtCore.QTimer.singleShot(0, dropped))
+        end.destroyed.connect(lambda: QtCore.QTimer.singleShot(0, dropped))
         root.deleteLater()
 
     def close(self, *, hold: bool = False) -> None:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rosglass.rviz.overlay import Overlay
     from rosglass.rviz.property_sources import Sources
 
-__all__ = ["Entry"]
+__all__ = ["Entry", "display_class", "tell_status"]
 
 _OK, _WARN, _ERROR = 0, 1, 2
 _QML = (QML_CLASS, REFERENCE_QML_CLASS)
@@ -54,7 +54,7 @@ def _classes() -> tuple[Any, Any]:
 
     # A plain display cannot be derived from in Python.
     class Display(bindings.DisplayGroup):  # type: ignore[name-defined,misc]
-        entry: Entry | None = None
+        entry: Any = None
 
         @quiet()
         def save(self, config: Any) -> None:
@@ -76,6 +76,24 @@ def _classes() -> tuple[Any, Any]:
     return Display, Held
 
 
+def display_class() -> Any:
+    """Return our kind of RViz's display; its `entry` is told to save and load."""
+    return _classes()[0]
+
+
+def tell_status(display: Any, row: str, level: int, text: str) -> None:
+    """Show a line below a display's status: 0 for what is fine, 1 for a warning, 2 for an error."""
+    core = pyqt()
+    core.QMetaObject.invokeMethod(
+        display,
+        "setStatusInternal",
+        core.Qt.DirectConnection,
+        core.Q_ARG(int, level),
+        core.Q_ARG("QString", row),
+        core.Q_ARG("QString", text),
+    )
+
+
 class Entry(QtCore.QObject):
     """One entry, with its overlay as soon as there is one.
 
@@ -88,8 +106,8 @@ class Entry(QtCore.QObject):
 
     #: Its check box, or that of a group it is in, was clicked; or it is to show something else.
     touched = Signal()
-    #: It has another name.
-    renamed = Signal()
+    #: It has another name; itself.
+    renamed = Signal(object)
     #: Something that RViz does not see, and its file would keep, is another now.
     edited = Signal()
     #: RViz has deleted it.
@@ -124,11 +142,18 @@ class Entry(QtCore.QObject):
         self._fill()
         self._own_tree = PropertyTree(self.own, self.display, sources)
         self._holder: Any = None
-        for found in self.own.properties.values():
-            found.valueChanged.connect(lambda value, name=found.path[0]: self._apply(name, value))
-        self.display.changed.connect(quiet()(self.touched.emit))
-        self.display.objectNameChanged.connect(quiet()(lambda _name: self.renamed.emit()))
-        self.display.destroyed.connect(quiet()(lambda *_: self._on_destroyed()))
+        renamed = quiet()(lambda _name: self.renamed.emit(self))
+        shown = [
+            (self.display.changed, quiet()(self.touched.emit)),
+            (self.display.objectNameChanged, renamed),
+            (self.display.destroyed, quiet()(lambda *_: self.gone.emit())),
+        ]
+        for signal, slot in shown:
+            signal.connect(slot)
+        #: Of the display, and of its own properties; Python does not see what connections hold.
+        self._watches: tuple[list[Any], list[Any]] = (shown, [])
+        for name in self.own.properties:
+            self._watch_own(name)
 
     @property
     def is_qml(self) -> bool:
@@ -162,6 +187,15 @@ class Entry(QtCore.QObject):
         if self.is_qml:
             about = "Show the file anew when it, or one that it uses, is saved."
             own.register("bool", "Live Reload", description=about)
+
+    def _watch_own(self, name: str) -> None:
+        changed = self.own.properties[name].valueChanged
+
+        def slot(value: Any) -> None:
+            self._apply(name, value)
+
+        changed.connect(slot)
+        self._watches[1].append((changed, slot))
 
     # The overlay.
 
@@ -215,10 +249,10 @@ class Entry(QtCore.QObject):
         self.overlay, self._taken_file = overlay, self.file
         if hasattr(overlay, "style_sheet") and "Style Sheet" not in self.own.properties:
             about = "A .qss file, a package:// URL of one, or a style sheet itself."
-            made = self.own.register(
+            self.own.register(
                 "string", "Style Sheet", default=overlay.style_sheet, description=about
             )
-            made.valueChanged.connect(lambda value: self._apply("Style Sheet", value))
+            self._watch_own("Style Sheet")
         properties = overlay.properties
         if self._registered:
             properties.load(self._registered)
@@ -259,6 +293,17 @@ class Entry(QtCore.QObject):
             take_out(self._holder)
         return overlay
 
+    def close(self) -> None:
+        """Let go of RViz's display, which is for others to take away; once, after :meth:`drop`."""
+        self._own_tree.close()
+        shown, own = self._watches
+        # Those of a display that is gone have ended with it.
+        for signal, slot in (*own, *(shown if self.alive else ())):
+            signal.disconnect(slot)
+        self._watches = ([], [])
+        if self.alive:
+            self.display.entry = None
+
     def reflect(self, overlay: Overlay) -> None:
         """Take the numbers of an overlay that a program has made, before :meth:`take`."""
         if isinstance(overlay, QmlOverlay):
@@ -295,9 +340,6 @@ class Entry(QtCore.QObject):
             self._holder = given_to_rviz(held(_CONFIGURATION, None, about, self.display))
             self._tree = PropertyTree(overlay.properties, self._holder, self._sources)
 
-    def _on_destroyed(self) -> None:
-        self.gone.emit()
-
     # Status.
 
     @property
@@ -307,15 +349,7 @@ class Entry(QtCore.QObject):
     def status(self, row: str, level: int, text: str) -> None:
         """Show a line below the entry's status."""
         if self.alive:
-            core = pyqt()
-            core.QMetaObject.invokeMethod(
-                self.display,
-                "setStatusInternal",
-                core.Qt.DirectConnection,
-                core.Q_ARG(int, level),
-                core.Q_ARG("QString", row),
-                core.Q_ARG("QString", text),
-            )
+            tell_status(self.display, row, level, text)
 
     def _show_problem(self, problem: str) -> None:
         self.status("Overlay", _OK, "OK")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from rosglass.qt import QtCore, Slot
+from rosglass.qt import QtCore, Signal, Slot
 from rosglass.rviz.display import Entry
 from rosglass.rviz.display_classes import (
     QML_CLASS,
@@ -43,16 +43,21 @@ class Entries(QtCore.QObject):
         import_paths: Further folders with QML modules.
     """
 
+    #: Placeholders have been looked for, and replaced.
+    replaced = Signal()
+
     def __init__(
         self, window: Window, stack: Stack, session: Session, import_paths: Sequence[Path] = ()
     ) -> None:
         super().__init__()
         self._window, self._stack, self._session = window, stack, session
         self._import_paths = import_paths
-        self._sources = Sources(session, lambda text: window.widget.statusBar().showMessage(text))
+        #: What choosers of properties offer.
+        self.sources = Sources(session, lambda text: window.widget.statusBar().showMessage(text))
         self._entries: list[Entry] = []
         #: Overlays that the program has brought, which outlive the displays of a config file.
         self._programs: list[Overlay] = []
+        self._guests: dict[str, Callable[[], Any]] = {}
         self._held = False
         self._scheduled = self._settling = self._closed = False
         self._watched: set[int] = set()
@@ -81,6 +86,16 @@ class Entries(QtCore.QObject):
         self._settle()
         return entry
 
+    def welcome(self, class_id: str, make: Callable[[], Any]) -> None:
+        """Have placeholders of a class be replaced by what is no overlay.
+
+        Args:
+            class_id: The class.
+            make: Returns an object with a `display`, which has that object as its `entry`.
+        """
+        self._guests[class_id] = make
+        self._replace_placeholders()
+
     def remove(self, entry: Entry) -> None:
         """Take an entry and its overlay away."""
         self._forget(entry)
@@ -91,7 +106,7 @@ class Entries(QtCore.QObject):
         if self._closed:
             return
         self._closed = True
-        self._sources.close()
+        self.sources.close()
         for entry in list(self._entries):
             self.remove(entry)
 
@@ -180,18 +195,20 @@ class Entries(QtCore.QObject):
         return name
 
     def _make(self, class_id: str) -> Entry:
-        entry = Entry(class_id, self._session, self._sources, self._import_paths)
+        entry = Entry(class_id, self._session, self.sources, self._import_paths)
         self._entries.append(entry)
         entry.touched.connect(self._schedule)
         entry.gone.connect(self._schedule)
-        entry.renamed.connect(lambda: self._rename(entry))
+        entry.renamed.connect(self._rename)
         entry.edited.connect(quiet()(self._window.manager.notifyConfigChanged))
         return entry
 
     def _forget(self, entry: Entry) -> None:
         if entry in self._entries:
             self._entries.remove(entry)
-            self._let_go(entry.drop())
+            overlay = entry.drop()
+            entry.close()
+            self._let_go(overlay)
 
     def _let_go(self, overlay: Overlay | None) -> None:
         if overlay is not None:
@@ -221,6 +238,7 @@ class Entries(QtCore.QObject):
             if entry.overlay in self._programs:
                 self._entries.remove(entry)
                 entry.drop()
+                entry.close()
 
     # Placeholders.
 
@@ -253,6 +271,7 @@ class Entries(QtCore.QObject):
     def _replace_placeholders(self, *_: Any) -> None:
         if not self._closed:
             quiet()(self._replace_all)()
+            self.replaced.emit()
             self._held = False
             self._schedule()
         self._looking = False
@@ -268,14 +287,16 @@ class Entries(QtCore.QObject):
             display = group.getDisplayAt(at)
             if display.metaObject().className() == "rviz::DisplayGroup":
                 yield from self._placeholders(sip.cast(display, bindings.DisplayGroup))
-            elif getattr(display, "entry", None) is None and _is_ours(display.getClassId()):
+            elif getattr(display, "entry", None) is None and self._is_ours(display):
                 yield display
 
     def _replace(self, placeholder: Any) -> None:
         config = rviz().Config()
         placeholder.save(config)
         above, row = placeholder.getParent(), placeholder.rowNumberInParent()
-        entry = self._make(str(placeholder.getClassId()))
+        class_id = str(placeholder.getClassId())
+        guest = self._guests.get(class_id)
+        entry = self._make(class_id) if guest is None else guest()
         entry.display.setName(placeholder.getName())
         manager = self._window.manager
         manager.addDisplay(entry.display, False)
@@ -292,6 +313,7 @@ class Entries(QtCore.QObject):
         if not modified:
             self._window.widget.setWindowModified(False)
 
-
-def _is_ours(class_id: str) -> bool:
-    return class_id in {QML_CLASS, REFERENCE_QML_CLASS} or maker_of(class_id) is not None
+    def _is_ours(self, display: Any) -> bool:
+        class_id = str(display.getClassId())
+        ours = {QML_CLASS, REFERENCE_QML_CLASS, *self._guests}
+        return class_id in ours or maker_of(class_id) is not None
