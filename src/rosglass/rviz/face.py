@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.errors import Error
 from rosglass.qml.js_values import object_of
 from rosglass.qml.plain import plain_from_js
 from rosglass.qt import QJSValue, QtCore, QtGui, QtQml, Slot
+from rosglass.rviz.spelling import spelled
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -25,16 +26,17 @@ class Face(QtCore.QObject):
 
     Args:
         runtime: Of the engine that sees it.
-        parent: What it ends with; without one, it lives until JavaScript has collected it.
+        parent: What it ends with.
     """
 
-    def __init__(self, runtime: Runtime, parent: QtCore.QObject | None) -> None:
+    #: What errors call it.
+    CALLED: ClassVar[str] = "the object"
+
+    def __init__(self, runtime: Runtime, parent: QtCore.QObject) -> None:
         super().__init__(parent)
         self._runtime = runtime
-        if parent is None:
-            runtime.keep(self)
-        else:
-            QtQml.QQmlEngine.setObjectOwnership(self, _OWN.CppOwnership)
+        QtQml.QQmlEngine.setObjectOwnership(self, _OWN.CppOwnership)
+        self._held: QJSValue | None = spelled(runtime, self)
 
     @contextlib.contextmanager
     def _telling(self, what: str) -> Iterator[None]:
@@ -56,7 +58,7 @@ class Face(QtCore.QObject):
         self.setParent(None)
         self._runtime.keep(self)
         # Only what JavaScript has known is ever collected by it.
-        self._to_js(self)
+        self._held = None
 
 
 def taking(least: int, most: int, result: Any = QJSValue) -> Callable[[Any], Any]:

@@ -19,6 +19,8 @@ __all__ = ["QmlDisplay", "QmlDisplays", "path_of"]
 class QmlDisplay(Face):
     """One display. Its name and class stay readable once it is removed."""
 
+    CALLED = "a display"
+
     #: Its name, status, or whether it is shown.
     changed = Signal()
     existsChanged = Signal()

@@ -29,6 +29,8 @@ _LARGEST = 1024
 class QmlTool(Face):
     """One tool. Its members stay readable once it is removed."""
 
+    CALLED = "a tool"
+
     isSelectedChanged = Signal()
     #: Its name or description.
     changed = Signal()
@@ -61,6 +63,8 @@ class QmlTool(Face):
 
 class QmlToolManager(Face):
     """RViz's tools."""
+
+    CALLED = "rviz.toolManager"
 
     toolsChanged = Signal()
     toolAdded = Signal(QtCore.QObject, arguments=["tool"])

@@ -15,6 +15,7 @@ from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 from rosglass.rviz.face import given
 from rosglass.rviz.property_kinds import KINDS, Kind
 from rosglass.rviz.saved_values import merged, writable
+from rosglass.rviz.spelling import spelled
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -59,6 +60,9 @@ class RegisteredProperty(QtCore.QObject):
         default: Its value as yet.
     """
 
+    #: What errors call it.
+    CALLED = "a registered property"
+
     valueChanged = Signal(_VARIANT)
     #: Its description, range, choices, or whether it can be changed or seen.
     aboutChanged = Signal()
@@ -75,6 +79,8 @@ class RegisteredProperty(QtCore.QObject):
         self._owner, self._name = owner, name
         self.container = parent
         self.kind = kind
+        #: What JavaScript has for it, if there is any.
+        self.for_js: QJSValue | None = None
         #: Properties below this one.
         self.properties: dict[str, RegisteredProperty] = {}
         self._value = default
@@ -383,6 +389,8 @@ class RegisteredProperties(QtCore.QObject):
         about: dict[str, Any],
     ) -> RegisteredProperty:
         made._tell(**about)
+        if self.runtime is not None:
+            made.for_js = spelled(self.runtime, made)
         siblings[made.path[-1]] = made
         saved: Any = self._saved
         for step in made.path:

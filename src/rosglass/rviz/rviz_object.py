@@ -17,13 +17,13 @@ from rosglass.rviz.qml_displays import QmlDisplays, path_of
 from rosglass.rviz.qml_tools import PROVIDER, QmlToolManager, ToolIcons
 from rosglass.rviz.qml_view import QmlView
 from rosglass.rviz.registered_properties import RegisteredProperties
+from rosglass.rviz.spelling import spelled
 from rosglass.rviz.window import config_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.rviz.overlay import Overlay
-    from rosglass.rviz.trackers import Tracker
 
 __all__ = ["RvizObject"]
 
@@ -38,6 +38,9 @@ class RvizObject(RegisteredProperties):
         overlay: The overlay.
         engine: Its engine, which has a session.
     """
+
+    #: What errors call it.
+    CALLED = "rviz"
 
     visibleChanged = Signal()
     isFullscreenChanged = Signal()
@@ -62,7 +65,7 @@ class RvizObject(RegisteredProperties):
         self._icons: ToolIcons | None = None
         QtQml.QQmlEngine.setObjectOwnership(self, QtQml.QQmlEngine.ObjectOwnership.CppOwnership)
         # QML may look at it for as long as there is an engine.
-        held = [self]
+        held = [self, spelled(runtime, self)]
         engine.destroyed.connect(lambda *_: held.clear())
         self._follow(overlay.arranged, self._on_arranged)
         access = runtime.session.shared.get(Access)
@@ -354,17 +357,17 @@ class RvizObject(RegisteredProperties):
                 point, whose = place(parts[0]), parts[1]
             else:
                 point, whose = place(parts[:3]), parts[3]
-            return self._js(self._track(point, "" if whose is None else whose))
+            return self._track(point, "" if whose is None else whose)
 
         return self._answer("createPositionTracker", work)
 
-    def _track(self, point: tuple[float, float, float], frame: str) -> Tracker:
+    def _track(self, point: tuple[float, float, float], frame: str) -> QJSValue:
         overlay, runtime = self._overlay, self.runtime
         trackers = self._access.trackers
         made = trackers.add(point, frame, lambda: overlay.scale, runtime)
-        if runtime is not None:
-            runtime.keep(made)
-        return made
+        assert runtime is not None
+        runtime.keep(made)
+        return spelled(runtime, made)
 
     def _answer(self, what: str, work: Callable[[], QJSValue]) -> QJSValue:
         answer: QJSValue = self._asked(what, work, QJSValue())

@@ -37,6 +37,9 @@ class Tracker(QtCore.QObject):
         runtime: Where errors are thrown; without one, they are raised.
     """
 
+    #: What errors call it.
+    CALLED = "a position tracker"
+
     #: It is seen elsewhere now.
     positionChanged = Signal(QtGui.QVector3D, arguments=["position"])
     pointChanged = Signal()
