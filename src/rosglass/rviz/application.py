@@ -29,6 +29,7 @@ from rosglass.rviz.overlay_menu import OverlayMenu
 from rosglass.rviz.qml_overlay import QmlOverlay
 from rosglass.rviz.qt5 import QtGui, QtWidgets
 from rosglass.rviz.stack import Stack
+from rosglass.rviz.view_entry import ViewEntry
 from rosglass.rviz.view_keys import ViewKeys
 from rosglass.rviz.view_services import ViewServices
 from rosglass.rviz.window import Window, config_file
@@ -163,6 +164,8 @@ class Application:
         self.view_keys = ViewKeys(self.window, self.view, self.overlays)
         #: How robots move it.
         self.view_services = ViewServices(self.view, self.session, self.node_name)
+        #: The settings of both in RViz's Displays panel.
+        self.view_entry = ViewEntry(self.window, self.entries, self.view, self.view_services)
         #: Whether the master of RViz is there.
         self.master = MasterWatch(options.master)
         self.master.problem_changed.connect(self._show_problem)
@@ -305,6 +308,7 @@ class Application:
             self._timer.stop,
             self.master.close,
             self.window.close,
+            self.view_entry.close,
             self.entries.close,
             self.overlays.close,
             self.view_services.close,

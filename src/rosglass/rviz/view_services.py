@@ -76,6 +76,11 @@ class ViewServices(QtCore.QObject):
         """Why they are not there; empty when they are, or nothing has to be."""
         return self._problem
 
+    @property
+    def is_open(self) -> bool:
+        """Whether there is anything now."""
+        return bool(self._handles)
+
     def close(self) -> None:
         """Withdraw them; safe to call twice."""
         if not self._closed:

@@ -1,0 +1,210 @@
+"""The view controller as an entry of RViz's Displays panel, which shows and keeps its settings."""
+# ruff: noqa: N802 - the names of what C++ calls are RViz's
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from rosglass.qt import QtCore, Slot
+from rosglass.rviz.display import display_class, tell_status
+from rosglass.rviz.host import pyqt
+from rosglass.rviz.properties import PropertyTree, given_to_rviz, quiet, take_out
+from rosglass.rviz.saved_values import plain_config
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rosglass.rviz.entries import Entries
+    from rosglass.rviz.view import View
+    from rosglass.rviz.view_services import ViewServices
+    from rosglass.rviz.window import Window
+
+__all__ = ["VIEW_CLASS", "ViewEntry"]
+
+#: Class id in ``.rviz`` files.
+VIEW_CLASS = "rosglass/ViewController"
+_NAME = "View Controller"
+_OK, _WARN = 0, 1
+
+
+@cache
+def _class() -> Any:
+    """Return our kind of RViz's display: one that cannot be switched off."""
+    base, core = display_class(), pyqt()
+
+    class Display(base):  # type: ignore[misc,valid-type]
+        @quiet()
+        def getViewData(self, column: int, role: int) -> Any:
+            if column == 1 and role == core.Qt.CheckStateRole:
+                return None
+            return base.getViewData(self, column, role)
+
+        @quiet(core.Qt.ItemFlags())
+        def getViewFlags(self, column: int) -> Any:
+            return base.getViewFlags(self, column) & ~core.Qt.ItemIsUserCheckable
+
+    return Display
+
+
+class _Entry:
+    """One entry; a second one, as when it was duplicated, shows the same settings."""
+
+    def __init__(self, view: View, entries: Entries, gone: Callable[[_Entry], None]) -> None:
+        self._settings = view.settings
+        #: RViz's display.
+        self.display: Any = given_to_rviz(_class()())
+        self.display.entry = self
+        self.display.setClassId(VIEW_CLASS)
+        self.display.setName(_NAME)
+        self.display.setIcon(_icon())
+        self.display.setDescription(
+            "How the camera is moved by keys, by interfaces and by robots. "
+            "Without this entry, it is as at first."
+        )
+        self._tree = PropertyTree(view.settings.properties, self.display, entries.sources)
+        self._ended = quiet()(lambda *_: gone(self))
+        self.display.destroyed.connect(self._ended)
+
+    @property
+    def alive(self) -> bool:
+        """Whether RViz still has it."""
+        return not pyqt("sip").isdeleted(self.display)
+
+    def save(self, config: Any) -> None:
+        """Write what a ``.rviz`` file keeps of it to RViz's ``Config``."""
+        for name, value in self._settings.save().items():
+            config.mapSetValue(name, value)
+
+    def load(self, config: Any) -> None:
+        """Take what a ``.rviz`` file has."""
+        self._settings.load(plain_config(config))
+
+    def close(self) -> None:
+        """Follow the settings no longer."""
+        self._tree.close()
+        if self.alive:
+            self.display.destroyed.disconnect(self._ended)
+
+
+class ViewEntry(QtCore.QObject):
+    """Shows the settings of the camera in the panel: by the menu Overlays, or as a file has it.
+
+    A file that has no entry, and removing it, leave the settings as a program has made them, or as
+    at first.
+
+    Args:
+        window: RViz.
+        entries: The entries of the overlays.
+        view: The camera.
+        services: What robots reach it by.
+    """
+
+    def __init__(
+        self, window: Window, entries: Entries, view: View, services: ViewServices
+    ) -> None:
+        super().__init__()
+        self._window, self._entries, self._view, self._services = window, entries, view, services
+        self._shown: list[_Entry] = []
+        self._loading = self._loaded = False
+        menu = window.menu("&Overlays")
+        self._action = menu.addAction("&View controller")
+        self._action.setCheckable(True)
+        self._action.setToolTip("Settings of the camera, among the displays")
+        self._choose = quiet()(self._on_action)
+        self._action.triggered.connect(self._choose)
+        window.config_loading.connect(self._on_loading)
+        window.config_loaded.connect(self._on_loaded)
+        window.closing.connect(self.close)
+        entries.replaced.connect(self._settle)
+        services.problem_changed.connect(self._tell)
+        services.opened.connect(self._tell)
+        view.problem_changed.connect(self._tell)
+        view.tracked_frame_changed.connect(self._tell)
+        entries.welcome(VIEW_CLASS, self._make)
+
+    @property
+    def shown(self) -> bool:
+        """Whether there is an entry; one that is set to False is removed."""
+        return bool(self._shown)
+
+    @shown.setter
+    def shown(self, shown: bool) -> None:
+        if shown and not self._shown:
+            self._window.manager.addDisplay(self._make().display, True)
+        elif not shown:
+            self.close()
+            self._settle()
+        self._action.setChecked(shown)
+
+    def close(self) -> None:
+        """Take the entry out of the panel; safe to call twice."""
+        shown, self._shown = self._shown, []
+        for entry in shown:
+            entry.close()
+            take_out(entry.display)
+
+    def _make(self) -> _Entry:
+        entry = _Entry(self._view, self._entries, self._on_gone)
+        self._shown.append(entry)
+        self._action.setChecked(True)
+        self._tell()
+        return entry
+
+    def _on_action(self, checked: bool) -> None:
+        self.shown = checked
+
+    def _on_gone(self, entry: _Entry) -> None:
+        if entry in self._shown:
+            self._shown.remove(entry)
+            entry.close()
+            # RViz is still at it.
+            QtCore.QTimer.singleShot(0, self._settle)
+
+    @Slot()
+    def _on_loading(self) -> None:
+        self._loading = True
+
+    @Slot()
+    def _on_loaded(self) -> None:
+        self._loaded = True
+
+    @Slot()
+    def _settle(self) -> None:
+        """Have the settings be as without an entry if there is none, once a file is loaded."""
+        if self._loading and not self._loaded:
+            return
+        self._loading = self._loaded = False
+        if not self._shown:
+            self._action.setChecked(False)
+            self._view.settings.load({})
+
+    @Slot()
+    def _tell(self, *_: Any) -> None:
+        services, view = self._services, self._view
+        where = services.namespace if services.is_open else "not connected, or switched off"
+        follows = view.tracked_frame or "nothing is followed"
+        for entry in self._shown:
+            for row, problem, fine in (
+                ("Robots", services.problem, where),
+                ("Tracked Frame", view.problem, follows),
+            ):
+                if entry.alive:
+                    tell_status(entry.display, row, _WARN if problem else _OK, problem or fine)
+
+
+@cache
+def _icon() -> Any:
+    """Return a camera, as RViz's binding has it."""
+    core, gui = pyqt(), pyqt("QtGui")
+    picture = gui.QPixmap(32, 32)
+    picture.fill(core.Qt.transparent)
+    painter = gui.QPainter(picture)
+    painter.setRenderHint(gui.QPainter.Antialiasing)
+    painter.setPen(gui.QPen(gui.QColor("#404850"), 2))
+    painter.setBrush(gui.QColor("#a8b4c0"))
+    painter.drawPolygon(*(core.QPointF(x, y) for x, y in ((17, 16), (29, 8), (29, 24))))
+    painter.setBrush(gui.QColor(33, 150, 243, 200))
+    painter.drawRoundedRect(core.QRectF(2, 8, 19, 16), 3, 3)
+    painter.end()
+    return gui.QIcon(picture)
