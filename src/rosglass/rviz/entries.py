@@ -17,6 +17,7 @@ from rosglass.rviz.host import pyqt, rviz
 from rosglass.rviz.properties import quiet, take_out
 from rosglass.rviz.property_sources import Sources
 from rosglass.rviz.qml_overlay import QmlOverlay
+from rosglass.rviz.watch import AfterEvent
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -61,12 +62,11 @@ class Entries(QtCore.QObject):
         self._held = False
         self._scheduled = self._settling = self._closed = False
         self._watched: set[int] = set()
-        self._looking = False
-        self._token: QtCore.QObject | None = None
+        # RViz's panel handles other events while it duplicates displays, too.
+        self._look_again = AfterEvent(self._replace_placeholders)
         stack.changed.connect(self._schedule)
         window.before_frame.connect(self._look)
         window.config_loading.connect(self._hold)
-        window.config_loaded.connect(self._look_for_placeholders)
         self._replace_placeholders()
 
     def __iter__(self) -> Iterator[Entry]:
@@ -234,6 +234,7 @@ class Entries(QtCore.QObject):
     def _hold(self) -> None:
         """Take the program's overlays out of the displays that RViz is about to delete."""
         self._held = True
+        self._look_again.ask()
         for entry in list(self._entries):
             if entry.overlay in self._programs:
                 self._entries.remove(entry)
@@ -251,30 +252,14 @@ class Entries(QtCore.QObject):
             address = int(pyqt("sip").unwrapinstance(model))
             if address not in self._watched:
                 self._watched.add(address)
-                model.rowsInserted.connect(quiet()(lambda *_: self._look_for_placeholders()))
+                model.rowsInserted.connect(quiet()(lambda *_: self._look_again.ask()))
 
-    @Slot()
-    def _look_for_placeholders(self, *_: Any) -> None:
-        """Replace placeholders when RViz is done with the event that made them.
-
-        Its panel handles other events while it duplicates displays, and then goes on with them.
-        Only what is deleted later waits for so long.
-        """
-        if not self._looking and not self._closed:
-            self._looking = True
-            # Python must not let go of it while C++ deletes it.
-            self._token = QtCore.QObject()
-            self._token.destroyed.connect(self._replace_placeholders)
-            self._token.deleteLater()
-
-    @Slot()
-    def _replace_placeholders(self, *_: Any) -> None:
+    def _replace_placeholders(self) -> None:
         if not self._closed:
             quiet()(self._replace_all)()
             self.replaced.emit()
             self._held = False
             self._schedule()
-        self._looking = False
 
     def _replace_all(self) -> None:
         found = list(self._placeholders(self._window.manager.getRootDisplayGroup()))

@@ -12,7 +12,7 @@ from rosglass.rviz.qt5 import QtCore as Qt5Core
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-__all__ = ["Hook", "address", "class_of", "is_a", "type_name"]
+__all__ = ["AfterEvent", "Hook", "address", "class_of", "is_a", "type_name"]
 
 
 class Hook(QtCore.QObject):
@@ -64,3 +64,32 @@ def type_name(item: Any) -> str:
     info = ctypes.c_void_p.from_address(table - word).value or 0
     name: bytes = ctypes.c_char_p.from_address(info + word).value or b""
     return name.decode()
+
+
+class AfterEvent:
+    """Calls a function once RViz is done with the event that it is handling.
+
+    RViz handles other events while it loads a file or duplicates displays, timers included, and
+    then goes on. Only what is deleted later waits for so long.
+
+    Args:
+        call: The function; called once, however often it was asked for until it has returned.
+    """
+
+    def __init__(self, call: Callable[[], None]) -> None:
+        self._call = call
+        self._token: QtCore.QObject | None = None
+
+    def ask(self) -> None:
+        """Have it called."""
+        if self._token is None:
+            # Python must not let go of it while C++ deletes it.
+            token = self._token = QtCore.QObject()
+            token.destroyed.connect(self._on_destroyed)
+            token.deleteLater()
+
+    def _on_destroyed(self, *_: Any) -> None:
+        try:
+            self._call()
+        finally:
+            self._token = None

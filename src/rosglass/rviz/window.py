@@ -14,6 +14,7 @@ from rosglass.qt import QtCore, Signal
 from rosglass.rviz.host import as_pyside, pyqt, rviz
 from rosglass.rviz.qt5 import QtCore as Qt5Core
 from rosglass.rviz.qt5 import QtWidgets
+from rosglass.rviz.watch import AfterEvent
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -73,6 +74,7 @@ class Window(QtCore.QObject):
         self.panel = self._find_panel(QtWidgets.QWidget)
         self._wrapped = as_pyside(self.manager, QtCore.QObject)
         self._loading = self._filled = False
+        self._loaded = AfterEvent(self._end_loading)
         self._normal: Any = None
         self._config = file
         self._menus: dict[str, Any] = {}
@@ -202,7 +204,12 @@ class Window(QtCore.QObject):
     def _on_status(self, status: str) -> None:
         if status == _LOADING:
             self._loading = True
+            # RViz does not say that it has failed.
+            self._loaded.ask()
             self.config_loading.emit()
+
+    def _end_loading(self) -> None:
+        self._loading = False
 
     def _on_config(self, path: str) -> None:
         self._config = path
