@@ -107,7 +107,7 @@ def app(
     sys.argv[:] = ["rosglass"]
     from rosglass.rviz import Application
 
-    app = Application()
+    app = Application(renderer=os.environ.get("TEST_RENDERER", "auto"))
     app.window.widget.setGeometry(0, 0, *SCREEN)
     app.window.widget.show()
     yield app
@@ -131,6 +131,29 @@ def wait(app: Application) -> Callable[..., None]:
             time.sleep(0.001)
 
     return wait_until
+
+
+@pytest.fixture
+def drawn(app: Application) -> Iterator[list[Any]]:
+    """What overlays took in each frame in which any was drawn."""
+    works: list[Any] = []
+    app.overlays.drawn.connect(works.append)
+    yield works
+    app.overlays.drawn.disconnect(works.append)
+
+
+@pytest.fixture
+def frames(app: Application, wait: Callable[..., None]) -> Callable[[int], None]:
+    """Wait for some frames of RViz."""
+
+    def frames(count: int) -> None:
+        seen: list[int] = []
+        slot = lambda: seen.append(1)  # noqa: E731
+        app.window.before_frame.connect(slot)
+        wait(lambda: len(seen) >= count)
+        app.window.before_frame.disconnect(slot)
+
+    return frames
 
 
 @pytest.fixture

@@ -17,13 +17,14 @@ Item {
 
 
 def main() -> None:
-    file = Path(sys.argv[1])
+    file, renderer = Path(sys.argv[1]), sys.argv[2]
     sys.argv[1:] = []
     file.write_text(QML, encoding="utf-8")
     from rosglass.qt import QtCore
     from rosglass.rviz import Application
+    from rosglass.rviz.renderer_choice import choice
 
-    app = Application()
+    app = Application(renderer=renderer)
     app.window.widget.setGeometry(0, 0, 600, 450)
     app.window.widget.show()
     overlay = app.add_qml(file)
@@ -45,7 +46,7 @@ def main() -> None:
         "inside": [colour(41, 31), colour(138, 88), colour(right - 9, bottom - 9)],
         "outside": [colour(38, 60), colour(142, 60), colour(right - 12, bottom - 2)],
         "problem": overlay.problem,
-        "scene": type(overlay._scene).__name__,
+        "renderer": choice.renderer,
     }
     app.close()
     print("SEEN", json.dumps(seen), flush=True)

@@ -17,19 +17,19 @@ PROGRAM = Path(__file__).with_name("hidpi_program.py")
 
 
 @pytest.mark.parametrize(
-    ("factor", "backend", "scene"),
-    [("2", "", "OpenGLScene"), ("1.5", "", "OpenGLScene"), ("2", "software", "SoftwareScene")],
+    ("factor", "renderer"),
+    [("2", "opengl"), ("1.5", "opengl"), ("2", "software"), ("1.5", "auto")],
 )
 def test_overlays_have_every_pixel_of_the_screen(
-    factor: str, backend: str, scene: str, master: str, tmp_path: Path
+    factor: str, renderer: str, master: str, tmp_path: Path
 ) -> None:
     environment = {k: v for k, v in os.environ.items() if k not in ("QT_QPA_PLATFORM", "DISPLAY")}
     environment |= {"HOME": str(tmp_path), "XDG_RUNTIME_DIR": str(tmp_path), "ROS_IP": "127.0.0.1"}
     environment |= {"ROS_MASTER_URI": master, "ROSGLASS_QT": "pyside2"}
-    environment |= {"QT_SCALE_FACTOR": factor, "QT_QUICK_BACKEND": backend}
+    environment |= {"QT_SCALE_FACTOR": factor}
     with contextlib.closing(VirtualScreen(1400, 1000)) as screen:
         done = subprocess.run(
-            [sys.executable, str(PROGRAM), str(tmp_path / "Test.qml")],
+            [sys.executable, str(PROGRAM), str(tmp_path / "Test.qml"), renderer],
             env=environment | {"DISPLAY": screen.display},
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -41,7 +41,7 @@ def test_overlays_have_every_pixel_of_the_screen(
     assert lines, done.stdout[-3000:]
     seen = json.loads(lines[0].removeprefix("SEEN "))
     assert seen["ratio"] == float(factor)
-    assert seen["scene"] == scene
+    assert seen["renderer"] == ("opengl" if renderer == "opengl" else "software")
     assert not seen["stretched"]
     assert seen["units"] == [True, True]
     assert seen["inside"] == ["#0080ff", "#0080ff", "#ff0000"]

@@ -76,6 +76,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--fullscreen", action="store_true", help="fill the screen")
     parser.add_argument("--splash", action="store_true", help="show RViz's splash screen")
+    parser.add_argument(
+        "--renderer",
+        choices=("auto", "opengl", "software"),
+        default="auto",
+        help="what draws interfaces in QML: OpenGL, Qt's software renderer (no shaders, particles "
+        "and VideoOutput), or the one that is faster here (auto, the default)",
+    )
     add_screenshot(parser, "RViz's window", after=3.0)
     add_definitions_option(parser)
     parser.set_defaults(arguments=[], ros_arguments=[], ros1=True)
@@ -128,10 +135,13 @@ def _show(args: argparse.Namespace, config: str, remappings: list[str], received
     for file in args.overlays:
         interface_file(file)
     from rosglass.rviz.application import Application
+    from rosglass.rviz.renderer_choice import choice
 
     install_message_handler()
     if received:
         return 128 + received[0]
+    for file in args.overlays:
+        choice.expect(file)
     app = Application(
         config,
         url=args.url,
@@ -139,6 +149,7 @@ def _show(args: argparse.Namespace, config: str, remappings: list[str], received
         fixed_frame=args.fixed_frame,
         fullscreen=args.fullscreen,
         splash=args.splash,
+        renderer=args.renderer,
         timeout=args.timeout,
         import_paths=args.import_paths,
         arguments=args.arguments,

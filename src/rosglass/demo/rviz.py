@@ -58,8 +58,6 @@ def main(seconds: float | None = None, picture: Path | None = None) -> int:
             screen = VirtualScreen(*_SIZE)
             stack.callback(screen.close)
             os.environ.update(DISPLAY=screen.display, QT_QPA_PLATFORM="xcb")
-            # The virtual screen has no graphics card: Qt's own software renderer is much faster.
-            os.environ.setdefault("QT_QUICK_BACKEND", "software")
             print(f"no display: RViz runs {seconds:g} s on a virtual screen", flush=True)
         url = _start_master(stack)
         mode = ("--mode", "autonomous") if headless else ()

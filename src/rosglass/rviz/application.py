@@ -28,6 +28,7 @@ from rosglass.rviz.master import MasterWatch, wait_for_master
 from rosglass.rviz.overlay_menu import OverlayMenu
 from rosglass.rviz.qml_overlay import QmlOverlay
 from rosglass.rviz.qt5 import QtGui, QtWidgets
+from rosglass.rviz.renderer_choice import choice
 from rosglass.rviz.stack import Stack
 from rosglass.rviz.view_entry import ViewEntry
 from rosglass.rviz.view_keys import ViewKeys
@@ -76,6 +77,8 @@ class Application:
         fixed_frame: The frame that RViz shows everything in, instead of the one in the config.
         fullscreen: Fill the screen.
         splash: Show RViz's splash screen.
+        renderer: What draws overlays in QML: ``opengl``, ``software`` (Qt's own renderer, without
+            shaders, particles and VideoOutput), or ``auto`` for the one that is faster here.
         timeout: Seconds to wait for the master; None for as long as it takes.
         import_paths: Further folders with QML modules; ``package://`` as well.
         arguments: What QML finds in ``Qt.application.arguments``.
@@ -104,6 +107,7 @@ class Application:
         fixed_frame: str = "",
         fullscreen: bool = False,
         splash: bool = False,
+        renderer: str = "auto",
         timeout: float | None = None,
         import_paths: Sequence[str | os.PathLike[str]] = (),
         arguments: Sequence[str] = (),
@@ -124,6 +128,7 @@ class Application:
             _check_frame(fixed_frame)
         self._import_paths = [import_folder(path) for path in import_paths]
         require_rviz()
+        choice.prefer(renderer)
         if config:
             config_file(config)
         #: The Qt application.

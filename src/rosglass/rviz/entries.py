@@ -17,6 +17,7 @@ from rosglass.rviz.host import pyqt, rviz
 from rosglass.rviz.properties import quiet, take_out
 from rosglass.rviz.property_sources import Sources
 from rosglass.rviz.qml_overlay import QmlOverlay
+from rosglass.rviz.renderer_choice import choice
 from rosglass.rviz.watch import AfterEvent
 
 if TYPE_CHECKING:
@@ -289,6 +290,8 @@ class Entries(QtCore.QObject):
         above.takeChildAt(row)
         above.addChild(entry.display, row)
         entry.display.load(config)
+        if isinstance(entry, Entry) and entry.file:
+            choice.expect(entry.file)
         placeholder.deleteLater()
 
     def _untouched(self, do: Callable[[], None]) -> None:

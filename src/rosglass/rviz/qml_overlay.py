@@ -11,11 +11,13 @@ from rosglass.errors import QmlError
 from rosglass.qml.error_view import ErrorView
 from rosglass.qml.live_file import LiveFile
 from rosglass.qt import is_alive
+from rosglass.rviz.opengl_needs import need_in_items
 from rosglass.rviz.overlay import Overlay
 from rosglass.rviz.qml_input import QmlInput
 from rosglass.rviz.qt5 import QtCore, QtQuick
+from rosglass.rviz.renderer_choice import choice
 from rosglass.rviz.rviz_object import RvizObject
-from rosglass.rviz.scene import make_scene
+from rosglass.rviz.scene import Scene
 
 if TYPE_CHECKING:
     import os
@@ -35,6 +37,8 @@ _IMPORTS = Path(__file__).with_name("imports")
 _ERRORS = Path(__file__).with_name("ErrorPanel.qml")
 #: In `Session.shared`: the overlays that talk through it.
 _USERS = "overlays"
+#: Milliseconds after a drawing until what has come since is looked at.
+_LOOK = 1000
 
 
 class QmlOverlay(QmlInput, Overlay):
@@ -50,7 +54,6 @@ class QmlOverlay(QmlInput, Overlay):
 
     Raises:
         QmlError: There is no such file or folder.
-        UnsupportedError: Neither OpenGL nor Qt's software renderer can draw here.
     """
 
     properties: RvizObject
@@ -76,12 +79,17 @@ class QmlOverlay(QmlInput, Overlay):
         #: What QML finds as ``rviz``.
         self.properties = RvizObject(self, self.engine)
         self.engine.rootContext().setContextProperty("rviz", self.properties)
-        self._scene = make_scene()
-        self._window = self._scene.window
-        self._scene.changed.connect(self.changed)
+        choice.expect(self.file)
+        # Made when it is known what is to be drawn: that decides what can draw it.
+        self._scene: Scene | None = None
+        self._window: Any = None
         self._shown_over: Window | None = None
         self._root: Any = None
-        self._error = ""
+        self._error = self._not_drawn = ""
+        self._look = QtCore.QTimer()
+        self._look.setSingleShot(True)
+        self._look.setInterval(_LOOK)
+        self._look.timeout.connect(self._look_for_needs)
         self._errors = ErrorView(self.engine, _ERRORS)
         self.arranged.connect(self._fit_errors)
         self._closed = self._loading = False
@@ -114,6 +122,7 @@ class QmlOverlay(QmlInput, Overlay):
         Raises:
             QmlError: It has errors, and is not watched. They are shown in its place all the same,
                 until :meth:`reload` finds them mended.
+            UnsupportedError: Neither OpenGL nor Qt's software renderer can draw here.
         """
         self.session.put_off()
         try:
@@ -177,11 +186,24 @@ class QmlOverlay(QmlInput, Overlay):
         # What was pressed, and had the keys, is about to go.
         self.renewed.emit(self)
         self._root = root
-        self._scene.show_item(root)
+        self._not_drawn = ""
+        self._require_scene(root).show_item(root)
+        self._look_for_needs()
+
+    def _look_for_needs(self) -> None:
+        """Tell of what is not drawn; it may have been made long after the rest."""
+        if choice.renderer != "software" or self._not_drawn or not is_alive(self._root):
+            return
+        # Popups are beside the root, and not in it.
+        need = need_in_items(self._window.contentItem(), self.file)
+        if need:
+            self._not_drawn = choice.tell_missing(need)
+            _log.warning("overlay %s: %s", self.name, self._not_drawn)
+            self.tell_problem(self.problem)
 
     def tell_problem(self, problem: str) -> None:
         """Say what is wrong with it; as long as its file has errors, it is they."""
-        super().tell_problem(problem or self._error)
+        super().tell_problem(problem or self._error or self._not_drawn)
 
     def _show_error(self, error: str) -> None:
         self._error = error
@@ -189,7 +211,8 @@ class QmlOverlay(QmlInput, Overlay):
         if self._closed:
             return
         if error:
-            self._errors.show(error, [self._window], below=self.loaded)
+            window = self._require_scene(None).window
+            self._errors.show(error, [window], below=self.loaded)
             self._fit_errors()
         else:
             self._errors.hide()
@@ -215,18 +238,33 @@ class QmlOverlay(QmlInput, Overlay):
         """Be shown over an RViz."""
         self._panel = window.panel
         self._shown_over = window
-        self._scene.show_in(window.panel)
+        if self._scene is not None:
+            self._scene.show_in(window.panel)
+
+    def _require_scene(self, root: Any) -> Scene:
+        """Return what draws it, made for what is the first to be drawn."""
+        if self._scene is None:
+            self._scene = Scene(choice.make(root, self.file))
+            self._window = self._scene.window
+            self._scene.changed.connect(self.changed)
+            self._scene.show_in(self._panel)
+        return self._scene
 
     def resize(self, width: int, height: int, ratio: float) -> None:
-        """Fit the interface to the 3D view."""
-        self._scene.resize(width, height, ratio)
-        self._ratio = self._scene.factor
+        """Fit the interface to the 3D view; one that was never loaded has nothing to fit."""
+        if self._scene is not None:
+            self._scene.resize(width, height, ratio)
+            self._ratio = self._scene.factor
 
     def draw(self) -> NDArray[np.uint32] | None:
         """Render the scene, and read it back."""
         self.session.go_on()
+        if self._scene is None:
+            return None
         pixels = self._scene.draw()
-        self.read_back = self._scene.read_back
+        self.read_back = self._scene.renderer.read_back
+        if not self._look.isActive():
+            self._look.start()
         return pixels
 
     def close(self) -> None:
@@ -234,15 +272,18 @@ class QmlOverlay(QmlInput, Overlay):
         if self._closed:
             return
         self._closed = True
+        self._look.stop()
         self.properties.close()
-        self._scene.changed.disconnect(self.changed)
+        if self._scene is not None:
+            self._scene.changed.disconnect(self.changed)
         self._users.remove(self)
         self._errors.hide()
         # QML sees it to its end.
         self.properties.setParent(self.engine)
         # The last overlay may shut its node down, one of several not.
         self._live.close(hold=bool(self._users))
-        self._scene.close()
+        if self._scene is not None:
+            self._scene.close()
         self._root = None
 
 

@@ -1,0 +1,104 @@
+"""What of an interface in QML is drawn by OpenGL alone, and not by Qt's software renderer."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rosglass.qt import QtQml
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+__all__ = ["need_in_file", "need_in_items"]
+
+#: Qt's classes (Qt 5.15, "Qt Quick Software Adaptation", and what draws by OpenGL itself), and what
+#: they are in QML.
+_CLASSES = {
+    "QQuickShaderEffect": "ShaderEffect",
+    "QQuickParticlePainter": "QtQuick.Particles",
+    "QDeclarativeVideoOutput": "VideoOutput",
+    "QQuick3DViewport": "View3D",
+    "QQuickWebEngineView": "WebEngineView",
+    "QQuickFramebufferObject": "QQuickFramebufferObject",
+}
+_WRITTEN = re.compile(
+    r"\b(ShaderEffect|VideoOutput|View3D|WebEngineView)\s*\{"
+    r"|^[ \t]*import\s+(QtGraphicalEffects|QtQuick\.Particles|QtQuick3D|QtWebEngine)\b",
+    re.MULTILINE,
+)
+_COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
+_USED = re.compile(r"\b([A-Z]\w*)\s*\{|[\"']([\w./-]+\.qml)[\"']")
+_FOLDER = re.compile(r"^[ \t]*import\s+[\"']([\w./-]+)[\"']", re.MULTILINE)
+
+
+def need_in_items(root: Any, file: Path) -> str:
+    """Return the first item that only OpenGL draws, as ``place: what``; empty for none.
+
+    Args:
+        root: What to look through.
+        file: The interface that it is of.
+    """
+    items = [root]
+    while items:
+        item = items.pop()
+        for name, written in _CLASSES.items():
+            if item.inherits(name):
+                return f"{_place(item, written, file)}: {written}"
+        items += item.childItems()
+    return ""
+
+
+def need_in_file(file: Path) -> str:
+    """Return what a file, or one that it uses, may come to show that only OpenGL draws.
+
+    Returns:
+        ``place: what``; empty for nothing.
+    """
+    for path, text in _files(file):
+        found = _WRITTEN.search(text)
+        if found is not None:
+            kind = found.lastindex or 0
+            return f"{path}:{_line(text, found.start(kind))}: {found[kind]}"
+    return ""
+
+
+def _files(file: Path) -> Iterator[tuple[Path, str]]:
+    """Iterate over a file and those of its folders that it uses, with their texts."""
+    waiting, seen = [file], {file}
+    while waiting:
+        path = waiting.pop()
+        text = _read(path)
+        yield path, text
+        folders = [path.parent, *(path.parent / name for name in _FOLDER.findall(text))]
+        names = {f"{kind}.qml" if kind else source for kind, source in _USED.findall(text)}
+        used = {(folder / name).resolve() for folder in folders for name in names}
+        waiting += sorted(one for one in used - seen if one.is_file())
+        seen |= used
+
+
+def _read(path: Path) -> str:
+    """Return a file's text without its comments, each line where it is."""
+    try:
+        text = path.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""
+    return _COMMENT.sub(lambda comment: "\n" * comment[0].count("\n"), text)
+
+
+def _place(item: Any, written: str, file: Path) -> str:
+    """Return where an item is written in the interface, with the line if it is found."""
+    while item is not None:
+        context = QtQml.QQmlEngine.contextForObject(item)
+        path = Path("" if context is None else context.baseUrl().toLocalFile())
+        if path.is_relative_to(file.parent):
+            text = _read(path)
+            found = re.search(rf"\b{written}\b", text)
+            return str(path) if found is None else f"{path}:{_line(text, found.start())}"
+        item = item.parentItem()
+    return str(file)
+
+
+def _line(text: str, index: int) -> int:
+    return text.count("\n", 0, index) + 1

@@ -1,0 +1,53 @@
+"""What only OpenGL draws; test_rendering_opengl.py runs it, in an RViz of its own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def colour(picture: Any, x: float, y: float) -> tuple[int, int, int]:
+    return tuple(picture.pixelColor(round(x), round(y)).getRgb()[:3])
+
+
+def test_opengl_is_used_as_it_was_asked_for(show: Any, drawn: list[Any], frames: Any) -> None:
+    from rosglass.rviz.renderer_choice import choice
+
+    show('Rectangle { width: 60; height: 60; color: "red" }')
+    frames(3)
+    assert choice.renderer == "opengl"
+    assert drawn[-1].read_back > 0
+
+
+def test_shaders_are_drawn(show: Any, grab: Any) -> None:
+    show(
+        """Item {
+        ShaderEffect { x: 140; y: 200; width: 60; height: 60
+            fragmentShader: "varying highp vec2 qt_TexCoord0; uniform lowp float qt_Opacity;
+                void main() { gl_FragColor = vec4(0.0, 1.0, 0.0, 1.0) * qt_Opacity; }" }
+        }"""
+    )
+    assert colour(grab(), 170, 230) == (0, 255, 0)
+
+
+def test_camera_pictures_are_drawn(app: Any, show: Any, grab: Any, wait: Any, master: str) -> None:
+    import rosglass
+
+    show(
+        """import QtMultimedia 5.15
+        import Ros2 1.0
+        Item {
+        VideoOutput { x: 20; y: 20; width: 64; height: 48; fillMode: VideoOutput.Stretch
+            source: ImageTransportSubscription { topic: "/test/camera/image" } }
+        Component.onCompleted: Ros2.init("camera_overlay") }"""
+    )
+    with rosglass.connect(master.replace("http", "ros1"), name="camera") as node:
+        publisher = node.create_publisher("/test/camera/image", "sensor_msgs/Image")
+        data = bytes((255, 128, 0)) * (64 * 48)
+        image = {"height": 48, "width": 64, "encoding": "rgb8", "step": 192, "data": data}
+
+        def arrived() -> bool:
+            publisher.publish(image)
+            wait(50)
+            return colour(grab(), 50, 40) == (255, 128, 0)
+
+        wait(arrived)
