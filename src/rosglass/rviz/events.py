@@ -9,7 +9,18 @@ from rosglass.rviz.qt5 import QtCore, QtGui
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-__all__ = ["DRAG", "KEYS", "MOUSE", "PRESS", "TOUCH", "position", "scaled"]
+__all__ = [
+    "BUTTONS",
+    "DRAG",
+    "FAR_OUTSIDE",
+    "KEYS",
+    "MOUSE",
+    "PRESS",
+    "TOUCH",
+    "position",
+    "release_outside",
+    "scaled",
+]
 
 _E = QtCore.QEvent
 #: A button of the mouse went down.
@@ -22,6 +33,22 @@ TOUCH = frozenset({_E.TouchBegin, _E.TouchUpdate, _E.TouchEnd, _E.TouchCancel})
 KEYS = frozenset({_E.KeyPress, _E.KeyRelease, _E.ShortcutOverride})
 #: Something is dragged here from elsewhere.
 DRAG = frozenset({_E.DragEnter, _E.DragMove, _E.Drop})
+
+#: Every button that a mouse may have.
+BUTTONS = [QtCore.Qt.MouseButton(1 << bit) for bit in range(27)]
+#: A place that is in no widget and no item.
+FAR_OUTSIDE = QtCore.QPointF(-1e5, -1e5)
+
+
+def release_outside(button: Any, left: Any) -> Any:
+    """Return a release for nothing.
+
+    Args:
+        button: What goes up.
+        left: The buttons that are still down.
+    """
+    none = QtCore.Qt.NoModifier
+    return QtGui.QMouseEvent(_E.MouseButtonRelease, FAR_OUTSIDE, button, left, none)
 
 
 def position(event: Any) -> Any:

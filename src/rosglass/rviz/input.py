@@ -22,6 +22,8 @@ __all__ = ["Input"]
 
 _E = Qt5Core.QEvent
 _NONE = Qt5Core.Qt.NoButton
+#: The mouse may be let go, and fingers lifted, without a word to RViz's window from then on.
+_LOSING = frozenset({_E.WindowDeactivate, _E.WindowBlocked, _E.Hide})
 #: Milliseconds after which it is noticed that the mouse went away without a word.
 _LOOK_AROUND = 100
 
@@ -134,8 +136,9 @@ class Input(QtCore.QObject):
         if not is_alive(self._panel):
             return False
         if watched is not self._panel:
-            if event.type() == _E.WindowDeactivate:
-                self._deactivated()
+            minimized = event.type() == _E.WindowStateChange and watched.isMinimized()
+            if event.type() in _LOSING or minimized:
+                self._lose()
             return False
         route = self._routes.get(event.type())
         # Without overlays, RViz is as if this were not here.
@@ -330,6 +333,9 @@ class Input(QtCore.QObject):
 
     def _focus_event(self, event: Any) -> bool:
         focused = self._focused
+        if event.type() == _E.FocusOut and event.reason() == Qt5Core.Qt.PopupFocusReason:
+            # A menu has all of the mouse while it is open.
+            self._lose()
         if focused is not None and event.reason() != Qt5Core.Qt.PopupFocusReason:
             with guarded(focused, "getting or losing the keys"):
                 focused.set_focus(event.type() == _E.FocusIn)
@@ -337,10 +343,14 @@ class Input(QtCore.QObject):
 
     # What happens around
 
-    def _deactivated(self) -> None:
+    def _lose(self) -> None:
+        """End what is pressed: nobody may ever tell that it is released."""
         if self._owner is not None and not isinstance(self._owner, Owner):
             owner, self._owner = self._owner, Owner.NOBODY
             self._leave(owner)
+        touched, self._touched = self._touched, None
+        if touched is not None:
+            self._leave(touched)
         self._hover(None)
 
     def _overlays_changed(self) -> None:

@@ -6,8 +6,18 @@ import time
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.qt import is_alive
-from rosglass.rviz.events import DRAG, KEYS, PRESS, TOUCH, position, scaled
-from rosglass.rviz.qt5 import QtCore, QtGui
+from rosglass.rviz.events import (
+    BUTTONS,
+    DRAG,
+    FAR_OUTSIDE,
+    KEYS,
+    PRESS,
+    TOUCH,
+    position,
+    release_outside,
+    scaled,
+)
+from rosglass.rviz.qt5 import QtCore, QtGui, shiboken
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -19,6 +29,7 @@ _TAKING = ("QQuickTapHandler", "QQuickDragHandler", "QQuickPointHandler", "QQuic
 _INPUT_METHOD = frozenset({_E.InputMethod, _E.InputMethodQuery})
 _FOR_SCENE = PRESS | TOUCH | DRAG | KEYS | _INPUT_METHOD
 _FOR_SCENE |= {_E.MouseMove, _E.MouseButtonRelease, _E.Wheel, _E.DragLeave}
+_TOUCH_ENDS = frozenset({_E.TouchEnd, _E.TouchCancel})
 #: Seconds for which the list of items that take note of the mouse is kept.
 _KEPT = 0.25
 
@@ -35,7 +46,10 @@ class QmlInput:
     _panel: Any = None
     #: Units of the window for one of the overlay.
     _ratio = 1.0
-    _pressed = False
+    #: The buttons that went down on an item and are not up yet.
+    _held = QtCore.Qt.NoButton
+    #: Where the fingers are that went down on an item, for the window's events.
+    _touch: _Touch | None = None
     _hoverable: Sequence[_Shown] = ()
     _listed = 0.0
 
@@ -58,12 +72,18 @@ class QmlInput:
 
     def _deliver(self, event: Any, at: Any) -> bool:
         window, kind = self._window, event.type()
-        taken = _send(window, scaled(event, self._ratio))
+        sent = scaled(event, self._ratio)
+        if kind in TOUCH:
+            self._touch = None if kind in _TOUCH_ENDS else _Touch.of(sent)
+        elif kind == _E.MouseButtonRelease:
+            self._held = event.buttons()
+        taken = _send(window, sent)
         if not is_alive(window):
             return taken
         if kind in PRESS:
             taken = taken or any(_takes_press(h, event.button()) for h in _handlers(window, at))
-            self._pressed = taken
+            if taken:
+                self._held = event.buttons()
         elif kind == _E.MouseMove:
             taken = taken or self._is_hovered(at) or self.cursor() is not None
         elif kind == _E.Wheel and not taken:
@@ -78,13 +98,36 @@ class QmlInput:
         window = self._window
         if not is_alive(window):
             return
-        if self._pressed:
-            self._pressed = False
-            window.contentItem().setEnabled(False)
-            window.contentItem().setEnabled(True)
+        if self._held or self._touch is not None:
+            self._let_go()
+        if not is_alive(window):
+            return
         QtCore.QCoreApplication.sendEvent(window, QtCore.QEvent(_E.Leave))
         if self._shown_in() is not None:
             self._shown_in().unsetCursor()
+
+    def _let_go(self) -> None:
+        """Have nothing pressed any more: items hear that it was cancelled."""
+        window, content = self._window, self._window.contentItem()
+        held, self._held = self._held, QtCore.Qt.NoButton
+        touch, self._touch = self._touch, None
+        # Handlers do not mind whether their item is enabled. A TapHandler lets go of what is
+        # released elsewhere, any other one of an event that comes while it is disabled itself.
+        disabled = [h for h in _all_handlers(content) if not _is_tap(h) and h.property("enabled")]
+        content.setEnabled(False)
+        for handler in filter(is_alive, disabled):
+            handler.setProperty("enabled", False)
+        for button in BUTTONS:
+            if int(held) & int(button) and is_alive(window):
+                held &= ~button
+                _send(window, release_outside(button, held))
+        if touch is not None and is_alive(window):
+            for event in touch.ended():
+                _send(window, event)
+        for handler in filter(is_alive, disabled):
+            handler.setProperty("enabled", True)
+        if is_alive(content):
+            content.setEnabled(True)
 
     def set_focus(self, focus: bool) -> None:
         """Give keys to the item that has the focus in its scope, or take them away."""
@@ -127,6 +170,33 @@ class _Shown(NamedTuple):
         )
 
 
+class _Touch(NamedTuple):
+    """Fingers, as they were last heard of."""
+
+    #: Of the QTouchDevice; PySide2's object for it ends with the event.
+    device: int
+    points: list[Any]
+
+    @classmethod
+    def of(cls, event: Any) -> _Touch:
+        """Remember an event."""
+        device = shiboken.getCppPointer(event.device())[0]
+        return cls(device, [QtGui.QTouchEvent.TouchPoint(p) for p in event.touchPoints()])
+
+    def ended(self) -> Iterator[Any]:
+        """Iterate over the events by which all of them go up far outside, for nothing."""
+        device = shiboken.wrapInstance(self.device, QtGui.QTouchDevice)
+        for point in self.points:
+            point.setState(QtCore.Qt.TouchPointReleased)
+            for put in (point.setPos, point.setScenePos):
+                put(FAR_OUTSIDE)
+        none = QtCore.Qt.NoModifier
+        yield QtGui.QTouchEvent(_E.TouchCancel, device, none)
+        yield QtGui.QTouchEvent(
+            _E.TouchEnd, device, none, QtCore.Qt.TouchPointReleased, self.points
+        )
+
+
 def _send(receiver: Any, event: Any) -> bool:
     event.setAccepted(False)
     QtCore.QCoreApplication.sendEvent(receiver, event)
@@ -158,6 +228,17 @@ def _shown(window: Any) -> Iterator[_Shown]:
             yield shown
             inside = (*clips, item) if item.clip() else clips
             waiting += [_Shown(child, inside) for child in item.childItems()]
+
+
+def _all_handlers(item: Any) -> Iterator[Any]:
+    """Iterate over the pointer handlers of an item and all in it."""
+    yield from (c for c in item.children() if c.metaObject().className().endswith("Handler"))
+    for child in item.childItems():
+        yield from _all_handlers(child)
+
+
+def _is_tap(handler: Any) -> bool:
+    return bool(handler.metaObject().className() == "QQuickTapHandler")
 
 
 def _handlers(window: Any, at: Any) -> Iterator[Any]:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Any
 
+from rosglass.qt import QT6, optional
 from rosglass.qt import QtCore as _QtCore
 from rosglass.qt import QtGui as _QtGui
 from rosglass.qt import QtQuick as _QtQuick
-from rosglass.qt import optional
 
-__all__ = ["QtCore", "QtGui", "QtQuick", "QtWidgets"]
+__all__ = ["QtCore", "QtGui", "QtQuick", "QtWidgets", "shiboken"]
 
 QtCore: Any = _QtCore
 QtGui: Any = _QtGui
 QtQuick: Any = _QtQuick
 QtWidgets: Any = optional("QtWidgets")
+shiboken: Any = import_module("shiboken6" if QT6 else "shiboken2")

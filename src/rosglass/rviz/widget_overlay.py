@@ -8,7 +8,7 @@ import numpy as np
 
 from rosglass.errors import Error
 from rosglass.qt import is_alive
-from rosglass.rviz.events import DRAG, KEYS, MOUSE, PRESS, position
+from rosglass.rviz.events import BUTTONS, DRAG, KEYS, MOUSE, PRESS, position, release_outside
 from rosglass.rviz.guard import guarded
 from rosglass.rviz.overlay import Overlay
 from rosglass.rviz.qt5 import QtCore, QtGui, QtWidgets
@@ -26,7 +26,6 @@ _E = QtCore.QEvent
 IGNORE_WHEEL = "IgnoreWheelEvents"
 _OTHERS = frozenset({_E.Wheel, _E.ContextMenu, _E.ToolTip, _E.DragLeave})
 _INPUT_METHOD = frozenset({_E.InputMethod, _E.InputMethodQuery})
-_FAR_OUTSIDE = QtCore.QPointF(-1e5, -1e5)
 
 
 class WidgetOverlay(Overlay):
@@ -190,16 +189,13 @@ class WidgetOverlay(Overlay):
         if not is_alive(self._scene):
             return
         viewport = self._view.viewport()
-        if self._buttons != QtCore.Qt.NoButton:
-            self._buttons = QtCore.Qt.NoButton
-            release = QtGui.QMouseEvent(
-                _E.MouseButtonRelease,
-                _FAR_OUTSIDE,
-                QtCore.Qt.LeftButton,
-                QtCore.Qt.NoButton,
-                QtCore.Qt.NoModifier,
-            )
-            QtCore.QCoreApplication.sendEvent(viewport, release)
+        held, self._buttons = self._buttons, QtCore.Qt.NoButton
+        for button in BUTTONS:
+            if int(held) & int(button) and is_alive(self._scene):
+                held &= ~button
+                QtCore.QCoreApplication.sendEvent(viewport, release_outside(button, held))
+        if not is_alive(self._scene):
+            return
         self._at = None
         QtCore.QCoreApplication.sendEvent(viewport, QtCore.QEvent(_E.Leave))
 
