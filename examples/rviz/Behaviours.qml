@@ -6,6 +6,8 @@ Column {
     id: behaviours
     spacing: 4
     property var client: Ros.createActionClient("flexbe_msgs/BehaviorExecutionAction", "/flexbe/execute_behavior")
+    property bool live
+    readonly property bool ready: client.connected && live
     property var goal: null
     property string name
     property string outcome
@@ -30,7 +32,7 @@ Column {
             objectName: "behaviour " + modelData
             width: behaviours.width; height: 24
             text: modelData
-            enabled: behaviours.client.connected && !behaviours.active
+            enabled: behaviours.ready && !behaviours.active
             checked: behaviours.active && behaviours.name === modelData
             onClicked: behaviours.start(modelData)
         }
@@ -38,10 +40,11 @@ Column {
     Text {
         width: behaviours.width
         elide: Text.ElideRight
-        text: !behaviours.client.connected ? "NO BEHAVIOUR SERVER" : behaviours.active
+        text: !behaviours.live ? "ROBOT SILENT" + (behaviours.active ? ": " + behaviours.name + " may go on" : "")
+            : !behaviours.client.connected ? "NO BEHAVIOUR SERVER" : behaviours.active
             ? behaviours.name + ": " + (behaviours.goal.feedback ? behaviours.goal.feedback.current_state : "on its way")
             : behaviours.name ? behaviours.name + ": " + behaviours.outcome : ""
-        color: behaviours.client.connected ? Theme.text : Theme.bad
+        color: behaviours.ready ? Theme.text : Theme.bad
         font.pixelSize: 11
     }
     Push {

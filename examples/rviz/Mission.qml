@@ -5,7 +5,6 @@ import Ros 1.0
 Column {
     id: mission
     spacing: 8
-    property string failure
     readonly property int count: path.message ? path.message.poses.length - 1 : 0
     readonly property int next: waypoint.message ? waypoint.message.data : 0
 
@@ -13,11 +12,7 @@ Column {
     Subscriber { id: waypoint; topic: "/mission/waypoint"; messageType: "std_msgs/Int32"; timeout: 2000 }
     Subscriber { id: path; topic: "/mission/path"; messageType: "nav_msgs/Path"; timeout: 0 }
 
-    function ask(name, type, request) {
-        Service.callAsync(name, type, request, function (response) {
-            failure = response && response.success ? "" : "the robot did not answer"
-        })
-    }
+    Request { id: request }
 
     Text {
         width: parent.width
@@ -52,9 +47,15 @@ Column {
     }
     Row {
         spacing: 5
-        Push { text: "Go on"; onClicked: mission.ask("/mission/pause", "std_srvs/SetBool", {data: false}) }
-        Push { text: "Pause"; onClicked: mission.ask("/mission/pause", "std_srvs/SetBool", {data: true}) }
-        Push { text: "Restart"; onClicked: mission.ask("/mission/restart", "std_srvs/Trigger", {}) }
+        Push { text: "Go on"; onClicked: request.ask("Go on", "/mission/pause", "std_srvs/SetBool", {data: false}) }
+        Push { text: "Pause"; onClicked: request.ask("Pause", "/mission/pause", "std_srvs/SetBool", {data: true}) }
+        Push { text: "Restart"; onClicked: request.ask("Restart", "/mission/restart", "std_srvs/Trigger", {}) }
     }
-    Text { width: parent.width; wrapMode: Text.Wrap; text: mission.failure; color: Theme.bad; font.pixelSize: 11 }
+    Text {
+        width: parent.width
+        wrapMode: Text.Wrap
+        text: request.note
+        color: request.failed ? Theme.bad : Theme.dim
+        font.pixelSize: 11
+    }
 }

@@ -8,7 +8,7 @@ Column {
     spacing: 6
 
     component Notice: Rectangle {
-        property alias text: label.text
+        property string text
         property color tint: Theme.bad
         anchors.horizontalCenter: parent.horizontalCenter
         width: label.implicitWidth + 32; height: 30
@@ -16,7 +16,7 @@ Column {
         color: Theme.bar
         border { color: tint; width: 2 }
         Text {
-            id: label
+            id: label; text: parent.text
             anchors.centerIn: parent
             color: parent.tint
             font { pixelSize: 14; weight: Font.DemiBold }
@@ -33,12 +33,10 @@ Column {
         topic: "/move_base/status"; messageType: "actionlib_msgs/GoalStatusArray"; timeout: 2000
         property string last
         onNewMessage: {
-            var goals = message.status_list
-            if (goals.length === 0)
-                return
-            var goal = goals.at(goals.length - 1), now = goal.goal_id.id + " " + goal.status
+            var goals = message.status_list, goal = goals.length ? goals.at(goals.length - 1) : null
+            var now = goal ? goal.goal_id.id + " " + goal.status : "none"
             // What is over was told before this interface came.
-            if (now !== last && (last || goal.status === 1))
+            if (goal && now !== last && (last || goal.status === 1))
                 told.show(goal.status, goal.text)
             last = now
         }
@@ -50,9 +48,9 @@ Column {
         visible: false
         tint: Theme.accent
         function show(status, reason) {
-            text = (words[status] || "Goal: ") + reason
-            tint = words[status] ? Theme.bad : status === 2 ? Theme.warn : Theme.accent
-            visible = true
+            told.text = (words[status] || "Goal: ") + reason
+            told.tint = words[status] ? Theme.bad : status === 2 ? Theme.warn : Theme.accent
+            told.visible = true
             hide.restart()
         }
         Timer { id: hide; interval: 8000; onTriggered: told.visible = false }

@@ -6,9 +6,10 @@ Panel {
     id: panel
     title: "Mode"
     stale: mode.stale
-    note: failure
-    property string failure
+    note: request.failed ? "NO ANSWER" : request.note ? "…" : ""
+    alarming: request.failed
 
+    Request { id: request }
     Subscriber { id: mode; topic: "/mode"; messageType: "std_msgs/String"; timeout: 2000 }
     Column {
         anchors.fill: parent
@@ -21,9 +22,7 @@ Panel {
                 text: modelData
                 tint: modelData === "autonomous" ? Theme.accent : modelData === "safe" ? Theme.good : Theme.warn
                 checked: !mode.stale && mode.message.data === modelData
-                onClicked: Service.callAsync("/mode/" + modelData, "std_srvs/Trigger", {}, function (response) {
-                    panel.failure = response && response.success ? "" : "NOT CHANGED"
-                })
+                onClicked: request.ask(modelData, "/mode/" + modelData, "std_srvs/Trigger", {})
             }
         }
     }

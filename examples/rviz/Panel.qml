@@ -6,6 +6,8 @@ Rectangle {
     property string title
     property string note
     property bool stale: false
+    // Whether the note is a bad one.
+    property bool alarming: false
     property bool dims: true
     // Too little room beside the title: it is said below.
     readonly property bool narrow: width < 110
@@ -32,7 +34,7 @@ Rectangle {
         x: panel.narrow ? (panel.width - width) / 2 : panel.width - width - 9
         y: panel.narrow ? panel.height - height - 7 : 6
         text: panel.stale ? "NO DATA" : panel.note
-        color: panel.stale ? Theme.bad : Theme.dim
-        font { pixelSize: 10; weight: panel.stale ? Font.Bold : Font.Normal }
+        color: panel.stale || panel.alarming ? Theme.bad : Theme.dim
+        font { pixelSize: 10; weight: panel.stale || panel.alarming ? Font.Bold : Font.Normal }
     }
 }

@@ -7,15 +7,15 @@ Column {
     id: settings
     spacing: 10
     property bool live
-    property string failure
     // ROS keeps parameters on the master: they are there when the robot is not.
     readonly property bool known: speed.ready && live
 
     Parameter {
         id: speed
         nodeName: "/robot"; name: "max_speed"
-        onRejected: settings.failure = reason
+        onRejected: refused.text = reason
     }
+    Request { id: request }
     Subscriber { id: lamp; topic: "/flashlight/state"; messageType: "std_msgs/Bool"; timeout: 2000 }
 
     Text {
@@ -24,12 +24,29 @@ Column {
         font.pixelSize: 12
     }
     Slider {
+        id: slider
         objectName: "speed"
         width: parent.width; height: 24
         enabled: settings.known
         from: 0.1; to: 1.2
         value: speed.value || 0
-        onPressedChanged: if (!pressed) speed.value = value
+        opacity: enabled ? 1 : 0.3
+        onPressedChanged: if (pressed) refused.text = ""; else speed.value = value
+        background: Rectangle {
+            y: (parent.height - height) / 2
+            width: parent.width; height: 6; radius: 3
+            color: Theme.button
+            Rectangle {
+                width: slider.handle.x + 8; height: parent.height; radius: 3
+                color: Theme.accent
+            }
+        }
+        handle: Rectangle {
+            x: slider.visualPosition * (slider.width - width)
+            y: (slider.height - height) / 2
+            width: 18; height: 18; radius: 9
+            color: slider.pressed ? Theme.accent : Theme.text
+        }
     }
     Push {
         objectName: "flashlight"
@@ -37,9 +54,14 @@ Column {
         text: lamp.stale ? "Flashlight: unknown" : lamp.message.data ? "Flashlight is on" : "Flashlight is off"
         checked: !lamp.stale && lamp.message.data
         tint: Theme.warn
-        onClicked: Service.callAsync("/flashlight/set", "std_srvs/SetBool", {data: !checked}, function (response) {
-            settings.failure = response && response.success ? "" : "the robot did not answer"
-        })
+        onClicked: request.ask("Flashlight", "/flashlight/set", "std_srvs/SetBool", {data: !checked})
     }
-    Text { width: parent.width; wrapMode: Text.Wrap; text: settings.failure; color: Theme.bad; font.pixelSize: 11 }
+    Text {
+        width: parent.width
+        wrapMode: Text.Wrap
+        text: request.note
+        color: request.failed ? Theme.bad : Theme.dim
+        font.pixelSize: 11
+    }
+    Text { id: refused; width: parent.width; wrapMode: Text.Wrap; color: Theme.bad; font.pixelSize: 11 }
 }

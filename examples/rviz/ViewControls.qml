@@ -10,6 +10,7 @@ Panel {
     // A robot that is silent is not followed: RViz keeps showing where it was.
     stale: !live
     dims: false
+    alarming: note === "NO ROBOT"
     note: failure || rviz.view.problem ? "NO ROBOT" : rviz.view.trackedFrame ? "following" : ""
 
     function look(eye) {

@@ -13,13 +13,14 @@ from rosglass.errors import Error, TypeNotFoundError, UnsupportedError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rosglass.comm import Node, ServerGoal
+    from rosglass.comm import Node, ParameterEvent, ServerGoal
     from rosglass.demo.simulation import RobotState
     from rosglass.messages import Message
 
 __all__ = ["Duties"]
 
 _log = logging.getLogger("rosglass.demo.robot")
+_NAME = "max_speed"
 _PERIOD = 0.1
 #: Radians per second, and how near is near enough.
 _TURN, _NEAR = 0.8, 0.03
@@ -44,18 +45,21 @@ class Duties:
         switch: Callable[[bool], None],
         drive: Callable[[float, float], None],
     ) -> None:
-        self._node, self._state, self._switch, self._drive = node, state, switch, drive
+        self._state, self._switch, self._drive = state, switch, drive
         self._ending = threading.Event()
         what, limits = "Highest speed in metres per second", Range(_SLOWEST, _FASTEST)
         try:
-            node.parameters.declare(
-                "max_speed", _FASTEST, ParameterDescriptor(description=what, range=limits)
+            speed = node.parameters.declare(
+                _NAME, _FASTEST, ParameterDescriptor(description=what, range=limits)
             )
         except UnsupportedError:
             # ROS 1 knows no ranges.
-            node.parameters.declare("max_speed", _FASTEST, ParameterDescriptor(description=what))
+            speed = node.parameters.declare(_NAME, _FASTEST, ParameterDescriptor(description=what))
+        # Kept: on ROS 1, asking takes the master, without which a robot must go on, and stop.
+        self._max_speed = speed
         self._parts: list[Any] = [
-            node.create_service_server("/flashlight/set", "std_srvs/srv/SetBool", self._on_switch)
+            node.parameters.on_change(self._on_parameters),
+            node.create_service_server("/flashlight/set", "std_srvs/srv/SetBool", self._on_switch),
         ]
         try:
             kind = "turtlesim/action/RotateAbsolute"
@@ -66,15 +70,21 @@ class Duties:
     @property
     def max_speed(self) -> float:
         """Highest speed in metres per second; the slowest while it is set to nonsense."""
-        value = self._node.parameters.get("max_speed")
-        good = isinstance(value, (int, float)) and _SLOWEST <= value <= _FASTEST
-        return float(value) if good else _SLOWEST  # type: ignore[arg-type]
+        value = self._max_speed
+        if isinstance(value, (int, float)) and _SLOWEST <= value <= _FASTEST:
+            return float(value)
+        return _SLOWEST
 
     def close(self) -> None:
         """Withdraw them; safe to call twice."""
         self._ending.set()
         for part in self._parts:
             part.close()
+
+    def _on_parameters(self, event: ParameterEvent) -> None:
+        self._max_speed = {**event.new, **event.changed}.get(_NAME, self._max_speed)
+        if _NAME in event.deleted:
+            self._max_speed = None
 
     def _on_switch(self, request: Message) -> dict[str, Any]:
         self._switch(request.data)

@@ -103,11 +103,15 @@ class ParameterNamespace:
         return ParameterDescriptor(name, kind, told, dynamic_typing=True)
 
     def watch(
-        self, callback: Callable[[ParameterEvent], None], executor: Executor, where: str
+        self,
+        callback: Callable[[ParameterEvent], None],
+        executor: Executor,
+        where: str,
+        before: dict[str, Any] | None = None,
     ) -> Handle:
-        """Call `callback` with each change from now on."""
+        """Call `callback` with each change since the values `before`, or since they are known."""
         check_plain(callback, where)
-        return _Changes(self, callback, executor)
+        return _Changes(self, callback, executor, before)
 
 
 class _Changes(Handle):
@@ -118,9 +122,10 @@ class _Changes(Handle):
         namespace: ParameterNamespace,
         callback: Callable[[ParameterEvent], None],
         executor: Executor,
+        before: dict[str, Any] | None,
     ) -> None:
         self._name = namespace.name
-        self._before: dict[str, Any] | None = None
+        self._before = before
         self._listeners: Listeners[ParameterEvent] = Listeners(where=namespace.name)
         self._listeners.add(callback, executor)
         self._subscription = namespace.server.subscribe(namespace.name, self._take, IMMEDIATE)

@@ -164,7 +164,8 @@ class Ros1Parameters(Parameters):
         """Call `callback` with each change, whoever makes it; quick ones may be merged."""
         self._core.check_open()
         chosen = executor or self._core.dispatcher
-        return self._namespace.watch(callback, chosen, f"{self.node}: on_change()")
+        where, before = f"{self.node}: on_change()", dict(flat(self._namespace.tree(_TIMEOUT)))
+        return self._namespace.watch(callback, chosen, where, before)
 
     def load(self, path: str | PathLike[str]) -> None:
         """Set what a file has, as ``rosparam load FILE /node`` does; declared or not.

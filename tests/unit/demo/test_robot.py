@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip("cv2", reason="the simulated camera needs the extra `camera`")
 
 import rosglass
-from rosglass.comm import Durability, QoS
+from rosglass.comm import Durability, ParameterEvent, QoS
 from rosglass.demo.robot import Robot, RobotOptions
 from rosglass.demo.simulation import FLIPPERS
 from rosglass.errors import Error
@@ -50,14 +50,19 @@ class Settings:
     """Parameters that anybody may set."""
 
     def __init__(self) -> None:
-        self.values: dict[str, Any] = {}
+        self.told: list[Callable[[Any], None]] = []
 
-    def declare(self, name: str, value: Any, descriptor: Any) -> None:
+    def declare(self, name: str, value: Any, descriptor: Any) -> Any:
         assert descriptor.range.low <= value <= descriptor.range.high
-        self.values[name] = value
+        return value
 
-    def get(self, name: str) -> Any:
-        return self.values[name]
+    def on_change(self, callback: Callable[[Any], None]) -> Listener:
+        self.told.append(callback)
+        return Listener()
+
+    def set(self, **values: Any) -> None:
+        for tell in self.told:
+            tell(ParameterEvent("/robot", {}, values, ()))
 
 
 class StubNode:
@@ -321,10 +326,10 @@ def test_the_flashlight_is_a_service_too(node: StubNode, robot: Robot) -> None:
 
 
 def test_the_highest_speed_is_a_parameter(node: StubNode, robot: Robot) -> None:
-    node.parameters.values["max_speed"] = 0.1
+    node.parameters.set(max_speed=0.1)
     until(lambda: node.command("/cmd_vel", linear={"x": 1.0}) or robot.state.speed > 0.05)
     assert robot.state.speed <= 0.11
-    node.parameters.values["max_speed"] = 1.2
+    node.parameters.set(max_speed=1.2)
 
 
 def test_a_robot_that_fails_ends_instead_of_driving_on() -> None:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from rosglass.comm import ConnectionState
 from rosglass.demo.robot import Robot, RobotOptions
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
 
 @pytest.fixture
@@ -21,6 +23,13 @@ def robot(connect: Any) -> Iterator[tuple[Any, Robot]]:
     made.close()
 
 
+def until(condition: Callable[[], Any]) -> None:
+    end = time.monotonic() + 30
+    while not condition():
+        assert time.monotonic() < end, "it did not happen within 30 s"
+        time.sleep(0.01)
+
+
 def test_it_starts_and_says_how_fast_it_may_drive(robot: tuple[Any, Robot]) -> None:
     node, _ = robot
     assert node.parameters.get("max_speed") == 1.2
@@ -28,9 +37,24 @@ def test_it_starts_and_says_how_fast_it_may_drive(robot: tuple[Any, Robot]) -> N
 
 @pytest.mark.parametrize(
     ("value", "used"),
-    [(0.4, 0.4), (1, 1.0), (100.0, 0.1), (-1.0, 0.1), (math.nan, 0.1), ("fast", 0.1)],
+    [(0.4, 0.4), (1, 1.0), (100.0, 0.1), (-1.0, 0.1), (math.nan, 0.1), ("fast", 0.1), (None, 0.1)],
 )
 def test_nonsense_makes_it_slow(robot: tuple[Any, Robot], value: Any, used: float) -> None:
     node, made = robot
+    assert made._duties.max_speed == 1.2
     node.parameters.set({"max_speed": value})
-    assert made._duties.max_speed == used
+    until(lambda: made._duties.max_speed == used)
+
+
+def test_it_drives_and_stops_without_the_master(robot: tuple[Any, Robot], master: Any) -> None:
+    node, made = robot
+    made.start()
+    node.parameters.set({"max_speed": 0.4})
+    until(lambda: made._duties.max_speed == 0.4)
+    master.stop()
+    until(lambda: node.status().state is not ConnectionState.CONNECTED)
+    until(lambda: made._drive(1.0, 0.0) or made.state.speed > 0.3)
+    assert made.state.speed < 0.5
+    made._on_stop(type("Bool", (), {"data": True}))
+    assert made.state.emergency_stop
+    assert not made.wait(0.3)
