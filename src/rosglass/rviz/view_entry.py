@@ -13,8 +13,6 @@ from rosglass.rviz.properties import PropertyTree, given_to_rviz, quiet, take_ou
 from rosglass.rviz.saved_values import plain_config
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from rosglass.rviz.entries import Entries
     from rosglass.rviz.view import View
     from rosglass.rviz.view_services import ViewServices
@@ -50,7 +48,7 @@ def _class() -> Any:
 class _Entry:
     """One entry; a second one, as when it was duplicated, shows the same settings."""
 
-    def __init__(self, view: View, entries: Entries, gone: Callable[[_Entry], None]) -> None:
+    def __init__(self, view: View, entries: Entries) -> None:
         self._settings = view.settings
         #: RViz's display.
         self.display: Any = given_to_rviz(_class()())
@@ -63,8 +61,6 @@ class _Entry:
             "Without this entry, it is as at first."
         )
         self._tree = PropertyTree(view.settings.properties, self.display, entries.sources)
-        self._ended = quiet()(lambda *_: gone(self))
-        self.display.destroyed.connect(self._ended)
 
     @property
     def alive(self) -> bool:
@@ -83,8 +79,6 @@ class _Entry:
     def close(self) -> None:
         """Follow the settings no longer."""
         self._tree.close()
-        if self.alive:
-            self.display.destroyed.disconnect(self._ended)
 
 
 class ViewEntry(QtCore.QObject):
@@ -116,6 +110,7 @@ class ViewEntry(QtCore.QObject):
         window.config_loading.connect(self._on_loading)
         window.config_loaded.connect(self._on_loaded)
         window.closing.connect(self.close)
+        window.before_frame.connect(self._look)
         entries.replaced.connect(self._settle)
         services.problem_changed.connect(self._tell)
         services.opened.connect(self._tell)
@@ -145,21 +140,24 @@ class ViewEntry(QtCore.QObject):
             take_out(entry.display)
 
     def _make(self) -> _Entry:
-        entry = _Entry(self._view, self._entries, self._on_gone)
+        entry = _Entry(self._view, self._entries)
         self._shown.append(entry)
         self._action.setChecked(True)
         self._tell()
         return entry
 
-    def _on_action(self, checked: bool) -> None:
-        self.shown = checked
+    def _on_action(self, *_: Any) -> None:
+        self.shown = not self.shown
 
-    def _on_gone(self, entry: _Entry) -> None:
-        if entry in self._shown:
+    @Slot()
+    def _look(self) -> None:
+        """See what RViz has deleted, which no signal tells to Python."""
+        gone = [entry for entry in self._shown if not entry.alive]
+        for entry in gone:
             self._shown.remove(entry)
             entry.close()
-            # RViz is still at it.
-            QtCore.QTimer.singleShot(0, self._settle)
+        if gone:
+            self._settle()
 
     @Slot()
     def _on_loading(self) -> None:
@@ -175,7 +173,7 @@ class ViewEntry(QtCore.QObject):
         if self._loading and not self._loaded:
             return
         self._loading = self._loaded = False
-        if not self._shown:
+        if not any(entry.alive for entry in self._shown):
             self._action.setChecked(False)
             self._view.settings.load({})
 
