@@ -87,7 +87,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     add_definitions_option(parser)
     parser.set_defaults(arguments=[], ros_arguments=[], ros1=True)
     parser.epilog = (
-        "How the camera moves, which keys move it, and where robots reach it is set in RViz, by the "
+        "How the camera moves, by keys as well, and where robots reach it is set in RViz, by the "
         "menu Overlays > View controller, and kept in the .rviz file; with --name rviz they reach "
         "it at /rviz/hector_view_controller. "
         "Needs RViz 1 and the system's own Python: docs/rviz.md. What follows --ros-args is for "
