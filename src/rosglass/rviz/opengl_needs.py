@@ -92,7 +92,8 @@ def _place(item: Any, written: str, file: Path) -> str:
     while item is not None:
         context = QtQml.QQmlEngine.contextForObject(item)
         path = Path("" if context is None else context.baseUrl().toLocalFile())
-        if path.is_relative_to(file.parent):
+        # What JavaScript makes of a text claims to be of a file `inline`.
+        if path.is_relative_to(file.parent) and path.is_file():
             text = _read(path)
             found = re.search(rf"\b{written}\b", text)
             return str(path) if found is None else f"{path}:{_line(text, found.start())}"

@@ -186,16 +186,18 @@ class QmlOverlay(QmlInput, Overlay):
         # What was pressed, and had the keys, is about to go.
         self.renewed.emit(self)
         self._root = root
-        self._not_drawn = ""
         self._require_scene(root).show_item(root)
-        self._look_for_needs()
+        self._not_drawn = ""
+        self.tell_problem("")
+        self._tell_not_drawn(root)
 
     def _look_for_needs(self) -> None:
-        """Tell of what is not drawn; it may have been made long after the rest."""
-        if choice.renderer != "software" or self._not_drawn or not is_alive(self._root):
-            return
-        # Popups are beside the root, and not in it.
-        need = need_in_items(self._window.contentItem(), self.file)
+        """Tell of what is not drawn that has been made since; popups are not in the root."""
+        if not self._not_drawn and is_alive(self._window):
+            self._tell_not_drawn(self._window.contentItem())
+
+    def _tell_not_drawn(self, item: Any) -> None:
+        need = need_in_items(item, self.file) if choice.renderer == "software" else ""
         if need:
             self._not_drawn = choice.tell_missing(need)
             _log.warning("overlay %s: %s", self.name, self._not_drawn)

@@ -1,0 +1,169 @@
+"""Which renderer draws the overlays of a program: one for all, chosen for the first of them."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from rosglass.errors import Error
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+PLAIN = 'Item { Rectangle { x: 40; y: 30; width: 100; height: 60; color: "#0080ff" } }'
+SHADER = 'ShaderEffect { fragmentShader: "void main() { gl_FragColor = vec4(1.0); }" }'
+LATER = """Item {
+    id: root
+    Timer { running: true; interval: 300; onTriggered: Qt.createQmlObject(
+        'import QtQuick 2.15; Shader' + 'Effect { width: 9; height: 9 }', root) }
+}"""
+CONFIG = """Visualization Manager:
+  Displays:
+    - {Class: rosglass/QmlOverlay, Enabled: true, Name: Plain, Path: %s}
+    - {Class: rosglass/QmlOverlay, Enabled: true, Name: Shader, Path: %s}
+"""
+
+
+@pytest.fixture
+def qml(tmp_path: Path) -> Callable[..., Path]:
+    def write(name: str, text: str, imports: str = "") -> Path:
+        file = tmp_path / f"{name}.qml"
+        file.write_text(f"import QtQuick 2.15\n{imports}\n{text}\n")
+        return file
+
+    return write
+
+
+@pytest.fixture
+def chosen(screen: str, master: str, tmp_path: Path) -> Callable[..., str]:
+    """Show overlays in an RViz of their own for a moment; returns what is said of the choice."""
+
+    def run(*arguments: Any, **env: str) -> str:
+        picture = tmp_path / "picture.png"
+        command = [sys.executable, "-m", "rosglass.cli", "-v", "rviz", *map(str, arguments)]
+        given = {"PATH": os.environ["PATH"], "DISPLAY": screen, "HOME": str(tmp_path)}
+        given |= {"XDG_RUNTIME_DIR": str(tmp_path), "ROS_MASTER_URI": master, "ROS_IP": "127.0.0.1"}
+        done = subprocess.run(
+            [*command, "--screenshot", str(picture), "--after", "2"],
+            env=given | env,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+        assert done.returncode == 0, done.stdout
+        assert picture.exists()
+        said = [line for line in done.stdout.splitlines() if "drawn" in line]
+        assert sum("INFO" in line for line in said) == 1
+        return "\n".join(said)
+
+    return run
+
+
+def test_without_a_graphics_card_the_software_renderer_draws(
+    qml: Any, chosen: Callable[..., str]
+) -> None:
+    said = chosen("--overlay", qml("Plain", PLAIN))
+    assert "overlays are drawn by Qt's software renderer: no graphics card" in said
+    assert "llvmpipe" in said
+    assert "not drawn" not in said
+
+
+def test_an_overlay_that_needs_opengl_has_it_for_all(qml: Any, chosen: Callable[..., str]) -> None:
+    shader = qml("Shader", f"Item {{ {SHADER} }}")
+    said = chosen("--overlay", qml("Plain", PLAIN), "--overlay", shader)
+    assert f"overlays are drawn by OpenGL: {shader}:3: ShaderEffect needs it" in said
+
+
+def test_an_overlay_of_the_config_that_needs_opengl_has_it_for_all(
+    qml: Any, chosen: Callable[..., str], tmp_path: Path
+) -> None:
+    shader = qml("Shader", f"Item {{ {SHADER} }}")
+    config = tmp_path / "test.rviz"
+    config.write_text(CONFIG % (qml("Plain", PLAIN), shader))
+    assert f"by OpenGL: {shader}:3: ShaderEffect" in chosen(config)
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_what_is_not_drawn_is_told_with_its_place_and_what_to_do(
+    late: bool, qml: Any, chosen: Callable[..., str]
+) -> None:
+    shader = qml("Shader", LATER if late else f"Item {{ {SHADER} }}")
+    said = chosen("--overlay", shader, **({} if late else {"QT_QUICK_BACKEND": "software"}))
+    assert "overlays are drawn by Qt's software renderer" in said
+    assert ("QT_QUICK_BACKEND=software" in said) == (not late)
+    assert f"overlay Shader: {shader}{'' if late else ':3'}: ShaderEffect is not drawn" in said
+    assert said.count("is not drawn") == 1
+    assert "--renderer opengl" in said
+
+
+@pytest.mark.parametrize(("wanted", "name"), [("opengl", "OpenGL"), ("software", "Qt's software")])
+def test_what_the_user_asks_for_counts_for_more_than_anything_else(
+    wanted: str, name: str, qml: Any, chosen: Callable[..., str]
+) -> None:
+    file = qml("Shader", f"Item {{ {SHADER} }}") if wanted == "software" else qml("Plain", PLAIN)
+    other = {"QT_QUICK_BACKEND": "software"} if wanted == "opengl" else {}
+    said = chosen("--overlay", file, "--renderer", wanted, **other)
+    assert f"overlays are drawn by {name}" in said
+    assert "it was asked for" in said
+    assert ("is not drawn" in said) == (wanted == "software")
+
+
+def test_a_renderer_cannot_be_another_one_later(
+    app: Any, wait: Callable[..., None], qml: Any
+) -> None:
+    from rosglass.rviz.renderer_choice import choice
+
+    overlay = app.add_qml(qml("Plain", PLAIN))
+    assert choice.renderer == "software"
+    assert overlay.problem == ""
+    choice.prefer("software")
+    choice.prefer("auto")
+    with pytest.raises(Error, match="has chosen software for all"):
+        choice.prefer("opengl")
+    with pytest.raises(Error, match="expected one of auto, opengl, software"):
+        choice.prefer("vulkan")
+    shader = app.add_qml(qml("Shader", f"Item {{ {SHADER} }}"))
+    assert "ShaderEffect is not drawn" in shader.problem
+    shader.file.write_text(f"import QtQuick 2.15\n{PLAIN}")
+    shader.reload()
+    assert shader.problem == ""
+
+
+def test_a_graphics_card_is_used(monkeypatch: pytest.MonkeyPatch, app: Any, qml: Any) -> None:
+    from rosglass.rviz import renderer_choice
+
+    monkeypatch.setattr(renderer_choice, "_taken", lambda: "")
+    monkeypatch.setattr(renderer_choice, "_graphics_device", lambda: "NVIDIA H200/PCIe/SSE2")
+    made = renderer_choice.RendererChoice()
+    assert made._choose(None, qml("Plain", PLAIN)) == ("opengl", "NVIDIA H200/PCIe/SSE2")
+
+
+@pytest.mark.parametrize(
+    ("text", "imports", "need"),
+    [
+        ("Item { }", "import QtGraphicalEffects 1.15", ":2: QtGraphicalEffects"),
+        ("Item { }", "import QtQuick.Particles 2.15", ":2: QtQuick.Particles"),
+        ("Item { Component { VideoOutput { } } }", "", ":3: VideoOutput"),
+        ('Item { Loader { source: "Late.qml" } }', "", "Late.qml:3: ShaderEffect"),
+        ("Item { Late { } }", "", "Late.qml:3: ShaderEffect"),
+        ("Item { // ShaderEffect { }\n/* VideoOutput { */ }", "", ""),
+        ("Item { ShaderEffectSource { } Image { layer.enabled: true } }", "", ""),
+        ('Item { Text { text: "http://a/b" } }', "", ""),
+    ],
+)
+def test_what_may_come_to_need_opengl_is_found_in_the_files(
+    text: str, imports: str, need: str, qml: Any
+) -> None:
+    from rosglass.rviz.opengl_needs import need_in_file
+
+    qml("Late", f"Item {{ {SHADER} }}")
+    found = need_in_file(qml("Main", text, imports))
+    assert found.endswith(need)
+    assert bool(found) == bool(need)
