@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from rosglass.comm import Time
+from rosglass.comm import ConnectionState, Status, Time
 from rosglass.tf import StaticTransformBroadcaster, Transform, TransformBroadcaster
 
 if TYPE_CHECKING:
@@ -133,6 +133,16 @@ def test_what_a_dead_robot_left_behind_is_stale(live: Bench, robot: Robot, wait:
     wait(page.valid)
     wait(200)
     assert page.seenLive() == 0
+
+
+def test_what_still_comes_without_the_master_is_live(live: Bench, robot: Robot, wait: Any) -> None:
+    root: Any = live.load(FOLLOWING)
+    wait(lambda: root.shown().startswith("true,false"))
+    live.session._set_status(Status(ConnectionState.LOST, "no master"))
+    assert root.shown().startswith("true,true")
+    wait(lambda: root.shown().startswith("true,false"))
+    robot.close()
+    wait(lambda: root.shown().startswith("true,true"))
 
 
 def test_static_transforms_stay_fresh(live: Bench, robot: Robot, wait: Any) -> None:

@@ -65,6 +65,8 @@ class TfTransform(Element):
         self._updated = 0.0
         #: When it was seen to move; None before.
         self._arrived: float | None = None
+        #: When the connection was lost; what comes all the same is live, as without ROS 1's master.
+        self._lost: float | None = None
         self._valid, self._stale, self._age = False, True, -1.0
         self._timer = QtCore.QTimer(self)
         self._timer.setSingleShot(True)
@@ -283,7 +285,8 @@ class TfTransform(Element):
         if age != self._age:
             self._age = age
             self.ageChanged.emit()
-        lost = self._session is None or self._session.state != "connected"
+        connected = self._session is not None and self._session.state == "connected"
+        lost = not connected and (arrived is None or self._lost is None or arrived <= self._lost)
         late = arrived is None or age > self._timeout / 1000 + self._interval
         old = moving and self._timeout > 0 and late
         stale = self._transform is None or self._have is None or lost or old
@@ -292,15 +295,16 @@ class TfTransform(Element):
             self.staleChanged.emit()
 
     @Slot()
+    def _on_connection(self) -> None:
+        self._lost = self._steady()
+        self._judge()
+
+    @Slot()
     def _on_tick(self) -> None:
         missing = self._have is not None and self._transform is None
         if missing and not self._timer.isActive() and time.monotonic() - self._updated > _AGAIN:
             # The reason may be another one by now: frames that are not asked for tell nobody.
             self._refresh()
-        self._judge()
-
-    @Slot()
-    def _on_connection(self) -> None:
         self._judge()
 
     def _problem_changed(self) -> None:
