@@ -65,6 +65,41 @@ def test_full_screen(app: Any, wait: Any) -> None:
     assert told == [True, False]
 
 
+def whole_view(app: Any) -> bool:
+    """Return whether the 3D view fills the window."""
+    return bool(app.window.panel.size() == app.window.widget.size())
+
+
+def test_the_3d_view_alone(app: Any, wait: Any, hand: Any, tmp_path: Path) -> None:
+    window = app.window
+    app.save_config(tmp_path / "a.rviz")
+    wait(lambda: window.widget.menuBar().isVisible() and not whole_view(app))
+    window.bare.on = True
+    wait(lambda: whole_view(app))
+    assert not window.modified
+    # It is saved as it was: another RViz is to have its menus and panels.
+    app.save_config(tmp_path / "b.rviz")
+    assert (tmp_path / "b.rviz").read_text() == (tmp_path / "a.rviz").read_text()
+    app.load_config(tmp_path / "b.rviz")
+    wait(lambda: whole_view(app))
+    window.fullscreen = True
+    wait(lambda: window.fullscreen)
+    window.fullscreen = False
+    wait(lambda: not window.fullscreen)
+    wait(lambda: whole_view(app))
+    # What is wrong with the master is told all the same.
+    window.bare.warn(True)
+    wait(lambda: window.widget.statusBar().isVisible() and not whole_view(app))
+    window.bare.warn(False)
+    wait(lambda: whole_view(app))
+    hand.click(300, 300)
+    hand.key("F10")
+    wait(lambda: window.widget.menuBar().isVisible() and not window.bare.on)
+    assert window.widget.statusBar().isVisible()
+    app.save_config(tmp_path / "c.rviz")
+    assert (tmp_path / "c.rviz").read_text() == (tmp_path / "a.rviz").read_text()
+
+
 def test_menus_in_the_menu_bar(app: Any) -> None:
     menu = app.window.menu("&Robot")
     menu.addAction("Dock")

@@ -311,6 +311,7 @@ def test_the_fixed_frame_is_told(app: Any, qml: Any) -> None:
 def test_the_overlay_and_the_window(app: Any, qml: Any, wait: Any) -> None:
     here = qml(
         "Item { property bool shown: rviz.visible; property bool full: rviz.isFullscreen;"
+        "property bool bare: rviz.isBare;"
         "property real rate: rviz.frameRate; property string how: rviz.status }"
     )
     assert here.root.property("shown") is True
@@ -322,6 +323,11 @@ def test_the_overlay_and_the_window(app: Any, qml: Any, wait: Any) -> None:
     assert app.window.fullscreen
     here.run("rviz.isFullscreen = false")
     wait(lambda: not here.root.property("full"))
+    here.run("rviz.isBare = true")
+    wait(lambda: here.root.property("bare"))
+    assert app.window.bare.on
+    app.window.bare.on = False
+    wait(lambda: not here.root.property("bare"))
     wait(lambda: here.root.property("rate") > 0)
     assert here.root.property("how") in ("ok", "warn", "error")
     wait(lambda: "Fixed Frame" in here.run("return rviz.statusText"))

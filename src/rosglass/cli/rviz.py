@@ -75,6 +75,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="show everything in this frame, instead of the one in the config",
     )
     parser.add_argument("--fullscreen", action="store_true", help="fill the screen")
+    parser.add_argument(
+        "--bare",
+        action="store_true",
+        help="show the 3D view alone, without RViz's menu, tool bar and panels (F10 brings them)",
+    )
     parser.add_argument("--splash", action="store_true", help="show RViz's splash screen")
     parser.add_argument(
         "--renderer",
@@ -151,6 +156,7 @@ def _show(args: argparse.Namespace, config: str, remappings: list[str], received
         name=args.name,
         fixed_frame=args.fixed_frame,
         fullscreen=args.fullscreen,
+        bare=args.bare,
         splash=args.splash,
         renderer=args.renderer,
         timeout=args.timeout,

@@ -76,6 +76,7 @@ class Application:
             the end.
         fixed_frame: The frame that RViz shows everything in, instead of the one in the config.
         fullscreen: Fill the screen.
+        bare: Show the 3D view alone, without menu, tool bar, docked panels and status bar.
         splash: Show RViz's splash screen.
         renderer: What draws overlays in QML: ``opengl``, ``software`` (Qt's own renderer, without
             shaders, particles and VideoOutput), or ``auto`` for the one that is faster here.
@@ -106,6 +107,7 @@ class Application:
         session: Session | None = None,
         fixed_frame: str = "",
         fullscreen: bool = False,
+        bare: bool = False,
         splash: bool = False,
         renderer: str = "auto",
         timeout: float | None = None,
@@ -148,6 +150,7 @@ class Application:
             _raise_signal(received[0])
         if not answers:
             raise ConnectionLostError(f"the ROS master at {options.master} is not waited for")
+        self.window.bare.on = bare
         self._owns_session = session is None
         #: The node that QML talks through.
         self.session = session or Session(
@@ -364,6 +367,7 @@ class Application:
         self._problem.setText("Restart RViz" if self.master.replaced else "No ROS master")
         self._problem.setToolTip(problem)
         self._problem.setVisible(bool(problem))
+        self.window.bare.warn(bool(problem))
 
 
 def _qt_application(arguments: Sequence[str]) -> Any:

@@ -44,6 +44,7 @@ class RvizObject(RegisteredProperties):
 
     visibleChanged = Signal()
     isFullscreenChanged = Signal()
+    isBareChanged = Signal()
     fixedFrameChanged = Signal()
     displaysChanged = Signal()
     displayAdded = Signal(QtCore.QObject, arguments=["display"])
@@ -71,6 +72,7 @@ class RvizObject(RegisteredProperties):
         access = runtime.session.shared.get(Access)
         if access is not None:
             self._follow(access.window.fullscreen_changed, self._on_fullscreen)
+            self._follow(access.window.bare.changed, self._on_bare)
             self._follow(access.window.config_loaded, self._on_config_loaded)
             self._follow(access.fixed_frame_changed, self._on_fixed_frame)
             self._follow(access.frame_rate_changed, self._on_frame_rate)
@@ -140,6 +142,12 @@ class RvizObject(RegisteredProperties):
 
         self._asked("isFullscreen", work)
 
+    def _set_bare(self, bare: bool) -> None:
+        def work() -> None:
+            self._access.window.bare.on = bare
+
+        self._asked("isBare", work)
+
     def _set_fixed_frame(self, frame: str) -> None:
         def work() -> None:
             self._access.fixed_frame = frame
@@ -153,6 +161,13 @@ class RvizObject(RegisteredProperties):
         lambda self: self._asked("isFullscreen", lambda: self._access.window.fullscreen, False),
         _set_fullscreen,
         notify=isFullscreenChanged,
+    )
+    #: Whether RViz's window has nothing but the 3D view in it.
+    isBare = Property(
+        bool,
+        lambda self: self._asked("isBare", lambda: self._access.window.bare.on, False),
+        _set_bare,
+        notify=isBareChanged,
     )
     fixedFrame = Property(
         str,
@@ -390,6 +405,10 @@ class RvizObject(RegisteredProperties):
     @Slot()
     def _tell_fullscreen(self) -> None:
         self.isFullscreenChanged.emit()
+
+    @Slot()
+    def _on_bare(self) -> None:
+        self.isBareChanged.emit()
 
     @Slot(str)
     def _on_config_loaded(self, file: str) -> None:

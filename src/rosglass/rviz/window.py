@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.errors import Error
 from rosglass.qml.places import locate
 from rosglass.qt import QtCore, Signal
+from rosglass.rviz.bare import BareView
 from rosglass.rviz.host import as_pyside, pyqt, rviz
 from rosglass.rviz.qt5 import QtCore as Qt5Core
 from rosglass.rviz.qt5 import QtWidgets
@@ -78,7 +79,10 @@ class Window(QtCore.QObject):
         self._normal: Any = None
         self._config = file
         self._menus: dict[str, Any] = {}
-        self._close_watch = _CloseWatch(self._tell_closing)
+        #: Whether there is nothing but the 3D view in the window.
+        self.bare = BareView(self.widget)
+        self.menu("&Panels").addAction(self.bare.action)
+        self._close_watch = _CloseWatch(self.bare, self._tell_closing)
         self.widget.installEventFilter(self._close_watch)
         self._connect(self._wrapped, "preUpdate()", self.before_frame.emit)
         self._connect(self._wrapped, "statusUpdate(QString)", self._on_status)
@@ -133,7 +137,9 @@ class Window(QtCore.QObject):
             Error: There is no such folder, or writing failed.
         """
         file = str(Path(config).absolute() if config else self._config)
-        if not self.frame.saveDisplayConfig(file):
+        with self.bare.lifted():
+            saved = self.frame.saveDisplayConfig(file)
+        if not saved:
             raise Error(f"{file}: RViz could not save its config: {self.frame.getErrorMessage()}")
 
     @property
@@ -192,6 +198,7 @@ class Window(QtCore.QObject):
         elif self._filled:
             self._filled = False
             self.widget.setGeometry(self._normal)
+        self.bare.again()
         self.fullscreen_changed.emit(fullscreen)
 
     def _fill_screen(self) -> None:
@@ -214,6 +221,7 @@ class Window(QtCore.QObject):
     def _on_config(self, path: str) -> None:
         self._config = path
         loading, self._loading = self._loading, False
+        self.bare.again()
         if loading:
             self.config_loaded.emit(path)
 
@@ -241,19 +249,21 @@ class _CloseWatch(QtCore.QObject):
     """Tells when a window was closed, and not when the user said no to that.
 
     Args:
+        bare: What is hidden must be seen when RViz saves its config.
         closed: Called after RViz has accepted.
     """
 
-    def __init__(self, closed: Callable[[], None]) -> None:
+    def __init__(self, bare: BareView, closed: Callable[[], None]) -> None:
         super().__init__()
-        self._closed, self._asking = closed, False
+        self._bare, self._closed, self._asking = bare, closed, False
 
     def eventFilter(self, watched: QtCore.QObject, event: QtCore.QEvent) -> bool:  # noqa: N802
         """See Qt; RViz decides, and may ask the user, while the event is sent once more."""
         if event.type() != QtCore.QEvent.Type.Close or self._asking:
             return False
         self._asking = True
-        QtCore.QCoreApplication.sendEvent(watched, event)
+        with self._bare.lifted():
+            QtCore.QCoreApplication.sendEvent(watched, event)
         self._asking = False
         if event.isAccepted():
             self._closed()
