@@ -75,6 +75,16 @@ def test_without_a_graphics_card_the_software_renderer_draws(
     assert "not drawn" not in said
 
 
+def test_pictures_do_not_decide_before_the_files_are_read(
+    qml: Any, chosen: Callable[..., str], tmp_path: Path
+) -> None:
+    (tmp_path / "dot.ppm").write_text("P3 1 1 255 255 0 0")
+    # Qt takes a renderer for good when it makes the first of these, before any window.
+    both = 'Item { Image { source: "dot.ppm" } ComboBox { model: 3 } Window { } }'
+    file = qml("Picture", both, "import QtQuick.Controls 2.15\nimport QtQuick.Window 2.15")
+    assert "overlays are drawn by Qt's software renderer: no graphics" in chosen("--overlay", file)
+
+
 def test_an_overlay_that_needs_opengl_has_it_for_all(qml: Any, chosen: Callable[..., str]) -> None:
     shader = qml("Shader", f"Item {{ {SHADER} }}")
     said = chosen("--overlay", qml("Plain", PLAIN), "--overlay", shader)
@@ -136,13 +146,13 @@ def test_a_renderer_cannot_be_another_one_later(
     assert shader.problem == ""
 
 
-def test_a_graphics_card_is_used(monkeypatch: pytest.MonkeyPatch, app: Any, qml: Any) -> None:
+def test_a_graphics_card_is_used(monkeypatch: pytest.MonkeyPatch, app: Any) -> None:
     from rosglass.rviz import renderer_choice
 
     monkeypatch.setattr(renderer_choice, "_taken", lambda: "")
     monkeypatch.setattr(renderer_choice, "_graphics_device", lambda: "NVIDIA H200/PCIe/SSE2")
     made = renderer_choice.RendererChoice()
-    assert made._choose(None, qml("Plain", PLAIN)) == ("opengl", "NVIDIA H200/PCIe/SSE2")
+    assert made._choose([]) == ("opengl", "NVIDIA H200/PCIe/SSE2")
 
 
 @pytest.mark.parametrize(
@@ -153,17 +163,27 @@ def test_a_graphics_card_is_used(monkeypatch: pytest.MonkeyPatch, app: Any, qml:
         ("Item { Component { VideoOutput { } } }", "", ":3: VideoOutput"),
         ('Item { Loader { source: "Late.qml" } }', "", "Late.qml:3: ShaderEffect"),
         ("Item { Late { } }", "", "Late.qml:3: ShaderEffect"),
+        ("Item { Glow { } }", "import Our.Looks 1.0", "Our/Looks/Shining.qml:2: ShaderEffect"),
+        ("Item { Glow { } }", 'import "Our/Looks"', "Our/Looks/Shining.qml:2: ShaderEffect"),
+        ("Item { Button { } }", "import Our.Looks 1.0", ""),
+        ("Item { Button { } ComboBox { } }", "import QtQuick.Controls 2.15", ""),
         ("Item { // ShaderEffect { }\n/* VideoOutput { */ }", "", ""),
         ("Item { ShaderEffectSource { } Image { layer.enabled: true } }", "", ""),
         ('Item { Text { text: "http://a/b" } }', "", ""),
     ],
 )
 def test_what_may_come_to_need_opengl_is_found_in_the_files(
-    text: str, imports: str, need: str, qml: Any
+    text: str, imports: str, need: str, qml: Any, tmp_path: Path
 ) -> None:
+    from rosglass.qt import QtQml
     from rosglass.rviz.opengl_needs import need_in_file
 
     qml("Late", f"Item {{ {SHADER} }}")
-    found = need_in_file(qml("Main", text, imports))
+    module = tmp_path / "Our" / "Looks"
+    module.mkdir(parents=True)
+    (module / "qmldir").write_text("module Our.Looks\nGlow 1.0 Shining.qml\n")
+    (module / "Shining.qml").write_text(f"import QtQuick 2.15\n{SHADER}")
+    places = [str(tmp_path), *QtQml.QQmlEngine().importPathList()]
+    found = need_in_file(qml("Main", text, imports), places)
     assert found.endswith(need)
     assert bool(found) == bool(need)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.qt import QtQml
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
 __all__ = ["need_in_file", "need_in_items"]
 
@@ -31,6 +31,8 @@ _WRITTEN = re.compile(
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
 _USED = re.compile(r"\b([A-Z]\w*)\s*\{|[\"']([\w./-]+\.qml)[\"']")
 _FOLDER = re.compile(r"^[ \t]*import\s+[\"']([\w./-]+)[\"']", re.MULTILINE)
+_MODULE = re.compile(r"^[ \t]*import\s+([A-Za-z][\w.]*)\s*([\d.]*)", re.MULTILINE)
+_LISTED = re.compile(r"^[ \t]*(?:singleton\s+)?([A-Z]\w*)\s+[\d.]+\s+(\S+\.qml)\s*$", re.MULTILINE)
 
 
 def need_in_items(root: Any, file: Path) -> str:
@@ -50,13 +52,17 @@ def need_in_items(root: Any, file: Path) -> str:
     return ""
 
 
-def need_in_file(file: Path) -> str:
+def need_in_file(file: Path, import_paths: Sequence[str]) -> str:
     """Return what a file, or one that it uses, may come to show that only OpenGL draws.
+
+    Args:
+        file: The file.
+        import_paths: Folders with QML modules.
 
     Returns:
         ``place: what``; empty for nothing.
     """
-    for path, text in _files(file):
+    for path, text in _files(file, [Path(folder) for folder in import_paths]):
         found = _WRITTEN.search(text)
         if found is not None:
             kind = found.lastindex or 0
@@ -64,18 +70,34 @@ def need_in_file(file: Path) -> str:
     return ""
 
 
-def _files(file: Path) -> Iterator[tuple[Path, str]]:
-    """Iterate over a file and those of its folders that it uses, with their texts."""
+def _files(file: Path, import_paths: Sequence[Path]) -> Iterator[tuple[Path, str]]:
+    """Iterate over a file and those that it uses, of its folders and of modules, with texts."""
     waiting, seen = [file], {file}
     while waiting:
         path = waiting.pop()
         text = _read(path)
         yield path, text
         folders = [path.parent, *(path.parent / name for name in _FOLDER.findall(text))]
-        names = {f"{kind}.qml" if kind else source for kind, source in _USED.findall(text)}
-        used = {(folder / name).resolve() for folder in folders for name in names}
-        waiting += sorted(one for one in used - seen if one.is_file())
-        seen |= used
+        modules = _MODULE.findall(text)
+        folders += [f for name, version in modules for f in _folders(name, version, import_paths)]
+        found = {place for folder in folders for place in _used(text, folder)}
+        waiting += sorted(one for one in found - seen if one.is_file())
+        seen |= found
+
+
+def _folders(module: str, version: str, import_paths: Sequence[Path]) -> list[Path]:
+    """Return where a module may be, as Qt 5 looks for it."""
+    place = module.replace(".", "/")
+    major = version.partition(".")[0]
+    names = [place, f"{place}.{version}", f"{place}.{major}"] if version else [place]
+    return [path / name for path in import_paths for name in names if (path / name).is_dir()]
+
+
+def _used(text: str, folder: Path) -> Iterator[Path]:
+    """Iterate over the files that a folder may have for the types and files named in a text."""
+    listed = dict(_LISTED.findall(_read(folder / "qmldir")))
+    for kind, source in _USED.findall(text):
+        yield (folder / (source or listed.get(kind, f"{kind}.qml"))).resolve()
 
 
 def _read(path: Path) -> str:

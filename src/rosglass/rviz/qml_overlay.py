@@ -54,6 +54,7 @@ class QmlOverlay(QmlInput, Overlay):
 
     Raises:
         QmlError: There is no such file or folder.
+        UnsupportedError: Neither OpenGL nor Qt's software renderer can draw here.
     """
 
     properties: RvizObject
@@ -80,9 +81,9 @@ class QmlOverlay(QmlInput, Overlay):
         self.properties = RvizObject(self, self.engine)
         self.engine.rootContext().setContextProperty("rviz", self.properties)
         choice.expect(self.file)
-        # Made when it is known what is to be drawn: that decides what can draw it.
-        self._scene: Scene | None = None
-        self._window: Any = None
+        self._scene = Scene(choice.make(self.engine.importPathList()))
+        self._window = self._scene.window
+        self._scene.changed.connect(self.changed)
         self._shown_over: Window | None = None
         self._root: Any = None
         self._error = self._not_drawn = ""
@@ -122,7 +123,6 @@ class QmlOverlay(QmlInput, Overlay):
         Raises:
             QmlError: It has errors, and is not watched. They are shown in its place all the same,
                 until :meth:`reload` finds them mended.
-            UnsupportedError: Neither OpenGL nor Qt's software renderer can draw here.
         """
         self.session.put_off()
         try:
@@ -186,7 +186,7 @@ class QmlOverlay(QmlInput, Overlay):
         # What was pressed, and had the keys, is about to go.
         self.renewed.emit(self)
         self._root = root
-        self._require_scene(root).show_item(root)
+        self._scene.show_item(root)
         self._not_drawn = ""
         self.tell_problem("")
         self._tell_not_drawn(root)
@@ -213,8 +213,7 @@ class QmlOverlay(QmlInput, Overlay):
         if self._closed:
             return
         if error:
-            window = self._require_scene(None).window
-            self._errors.show(error, [window], below=self.loaded)
+            self._errors.show(error, [self._window], below=self.loaded)
             self._fit_errors()
         else:
             self._errors.hide()
@@ -240,29 +239,16 @@ class QmlOverlay(QmlInput, Overlay):
         """Be shown over an RViz."""
         self._panel = window.panel
         self._shown_over = window
-        if self._scene is not None:
-            self._scene.show_in(window.panel)
-
-    def _require_scene(self, root: Any) -> Scene:
-        """Return what draws it, made for what is the first to be drawn."""
-        if self._scene is None:
-            self._scene = Scene(choice.make(root, self.file))
-            self._window = self._scene.window
-            self._scene.changed.connect(self.changed)
-            self._scene.show_in(self._panel)
-        return self._scene
+        self._scene.show_in(window.panel)
 
     def resize(self, width: int, height: int, ratio: float) -> None:
-        """Fit the interface to the 3D view; one that was never loaded has nothing to fit."""
-        if self._scene is not None:
-            self._scene.resize(width, height, ratio)
-            self._ratio = self._scene.factor
+        """Fit the interface to the 3D view."""
+        self._scene.resize(width, height, ratio)
+        self._ratio = self._scene.factor
 
     def draw(self) -> NDArray[np.uint32] | None:
         """Render the scene, and read it back."""
         self.session.go_on()
-        if self._scene is None:
-            return None
         pixels = self._scene.draw()
         self.read_back = self._scene.renderer.read_back
         if not self._look.isActive():
@@ -276,16 +262,14 @@ class QmlOverlay(QmlInput, Overlay):
         self._closed = True
         self._look.stop()
         self.properties.close()
-        if self._scene is not None:
-            self._scene.changed.disconnect(self.changed)
+        self._scene.changed.disconnect(self.changed)
         self._users.remove(self)
         self._errors.hide()
         # QML sees it to its end.
         self.properties.setParent(self.engine)
         # The last overlay may shut its node down, one of several not.
         self._live.close(hold=bool(self._users))
-        if self._scene is not None:
-            self._scene.close()
+        self._scene.close()
         self._root = None
 
 

@@ -1,7 +1,8 @@
 """Which of Qt Quick's renderers draws overlays: OpenGL, or Qt's own, without a graphics card.
 
-Qt takes one for the whole process when its first window of Qt Quick is made. Where the screen's
-OpenGL is computed by the processor itself, Qt's own renderer is several times as fast.
+Qt takes one for the whole process when the first window, or picture, of Qt Quick is made: only the
+files tell by then what will be in it. Where the screen's OpenGL is computed by the processor
+itself, Qt's own renderer is several times as fast.
 """
 
 from __future__ import annotations
@@ -9,16 +10,17 @@ from __future__ import annotations
 import logging
 import os
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rosglass.errors import Error, QmlError, UnsupportedError
 from rosglass.qml.places import interface_file
 from rosglass.rviz.host import ogre
-from rosglass.rviz.opengl_needs import need_in_file, need_in_items
+from rosglass.rviz.opengl_needs import need_in_file
 from rosglass.rviz.qt5 import QtGui, QtQuick
 from rosglass.rviz.renderers import OpenGLRenderer, SoftwareRenderer
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from rosglass.rviz.renderers import Renderer
@@ -36,7 +38,7 @@ _SOFTWARE = ("software", "softwarecontext")
 
 
 class RendererChoice:
-    """The one choice of a process, made when its first overlay in QML is."""
+    """The one choice of a process, made with its first overlay in QML."""
 
     def __init__(self) -> None:
         self._wanted = "auto"
@@ -72,8 +74,11 @@ class RendererChoice:
         self._wanted = renderer
         for variable in _VARIABLES:
             os.environ.pop(variable, None)
-        if renderer == "software":
-            QtQuick.QQuickWindow.setSceneGraphBackend("software")
+        if renderer == "software" and not _ask_for_software():
+            raise Error(
+                "renderer 'software': something of Qt Quick in this process has chosen opengl for "
+                "all; make the rosglass.rviz.Application before it"
+            )
 
     def expect(self, file: str | os.PathLike[str]) -> None:
         """Take note of a file that is to be shown sooner or later; what it needs counts as well."""
@@ -82,39 +87,37 @@ class RendererChoice:
         with suppress(QmlError):
             self._expected.append(interface_file(file))
 
-    def make(self, root: Any, file: Path) -> Renderer:
+    def make(self, import_paths: Sequence[str]) -> Renderer:
         """Return what draws a scene; the first call chooses for all.
 
         Args:
-            root: What is drawn; None for nothing yet.
-            file: Where that is written.
+            import_paths: Folders with QML modules that the expected files use.
 
         Raises:
             UnsupportedError: OpenGL was asked for, and Qt cannot use it here.
         """
         if not self.renderer:
-            self.renderer, self.reason = self._choose(root, file)
-            if self.renderer == "software":
-                _ask_for_software()
-            else:
+            self.renderer, self.reason = self._choose(import_paths)
+            if self.renderer == "software" and not _ask_for_software():
+                self.renderer, self.reason = "opengl", _BEFORE
+            if self.renderer == "opengl":
                 self._try_opengl()
             _log.info("overlays are drawn by %s: %s", _NAMES[self.renderer], self.reason)
         return SoftwareRenderer() if self.renderer == "software" else OpenGLRenderer()
 
-    def _choose(self, root: Any, file: Path) -> tuple[str, str]:
+    def _choose(self, import_paths: Sequence[str]) -> tuple[str, str]:
         if self._wanted != "auto":
             return self._wanted, "it was asked for"
         taken = _taken()
         if taken:
-            return taken, "a window of Qt Quick that was made before has chosen it"
+            return taken, _BEFORE
         for variable in _VARIABLES:
             if os.environ.get(variable) in _SOFTWARE:
                 return "software", f"{variable}={os.environ[variable]}"
         device = _graphics_device()
         if not any(name in device.lower() for name in _COMPUTED):
             return "opengl", device
-        need = "" if root is None else need_in_items(root, file)
-        need = need or next(filter(None, map(need_in_file, self._expected)), "")
+        need = next(filter(None, (need_in_file(f, import_paths) for f in self._expected)), "")
         if need:
             return "opengl", f"{need} needs it; {device} computes it, which is slow"
         return "software", f"no graphics card, OpenGL would be computed by {device}"
@@ -123,9 +126,8 @@ class RendererChoice:
         try:
             OpenGLRenderer()
         except UnsupportedError as error:
-            if self._wanted != "auto" or _taken():
+            if self._wanted != "auto" or not _ask_for_software():
                 raise
-            _ask_for_software()
             self.renderer, self.reason = "software", str(error)
 
     def tell_missing(self, need: str) -> str:
@@ -137,6 +139,7 @@ class RendererChoice:
 
 
 _NAMES = {"opengl": "OpenGL", "software": "Qt's software renderer"}
+_BEFORE = "something of Qt Quick that was made before has chosen it"
 #: That of this process.
 choice = RendererChoice()
 
@@ -149,9 +152,12 @@ def _taken() -> str:
     return "software" if backend in _SOFTWARE else "opengl"
 
 
-def _ask_for_software() -> None:
-    if not _taken():
-        QtQuick.QQuickWindow.setSceneGraphBackend("software")
+def _ask_for_software() -> bool:
+    """Return whether the process has the software renderer, taken now if it is not too late."""
+    window = QtQuick.QQuickWindow
+    if window.sceneGraphBackend() not in _SOFTWARE:
+        window.setSceneGraphBackend("software")
+    return window.sceneGraphBackend() in _SOFTWARE
 
 
 def _graphics_device() -> str:
