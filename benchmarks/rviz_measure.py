@@ -5,6 +5,7 @@ A measured process gets its orders as JSON in its arguments and prints its figur
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import itertools
 import json
@@ -23,6 +24,8 @@ __all__ = ["fit_view", "memory", "processor", "run_for", "uncapped", "works_duri
 
 VIEW = (1280, 800)
 QML = Path(__file__).with_name("rviz_overlay.qml")
+#: Uses everything that an interface can have of RViz.
+EVERYTHING = Path(__file__).with_name("rviz_cycles.qml")
 DASHBOARD = Path(__file__).parents[1] / "examples/rviz"
 
 
@@ -170,30 +173,124 @@ def dashboard(order: dict[str, Any]) -> dict[str, Any]:
     return figures
 
 
+def frames(app: Any, count: int = 1) -> None:
+    """Have RViz draw now, and Qt carry out what it was asked to do later."""
+    from rosglass.rviz.host import pyqt
+
+    core = pyqt()
+    for _ in range(count):
+        core.QMetaObject.invokeMethod(app.window.manager, "onUpdate", core.Qt.DirectConnection)
+        run_for(0.0, app)
+
+
+def left_over(app: Any) -> dict[str, float]:
+    """Return what a process holds: MiB without what malloc keeps for later, objects, files."""
+    for overlay in app.overlays:
+        # JavaScript lets go of what it has known when it likes.
+        overlay.engine.collectGarbage()
+    frames(app, 3)
+    gc.collect()
+    ctypes.CDLL(None).malloc_trim(0)
+    return {
+        "memory": memory(),
+        "objects": len(gc.get_objects()),
+        "files": sum(1 for _ in Path("/proc/self/fd").iterdir()),
+        "threads": sum(1 for _ in Path("/proc/self/task").iterdir()),
+    }
+
+
+def steps(app: Any) -> dict[str, Callable[[int], None]]:
+    """Return what is done again and again, by name."""
+    from rosglass.rviz import Popup, WidgetOverlay
+    from rosglass.rviz.qt5 import QtWidgets
+
+    steady = app.add_qml(EVERYTHING, "steady")
+
+    def overlay(_number: int) -> None:
+        made = app.add_qml(EVERYTHING, "passing")
+        frames(app)
+        app.overlays.remove(made)
+        frames(app)
+
+    def widget(number: int) -> None:
+        made = app.add(WidgetOverlay(controls(QtWidgets), "passing"))
+        frames(app)
+        made.scale = 0.5 + number % 3
+        frames(app)
+        app.overlays.remove(made)
+        frames(app)
+
+    def popup(_number: int) -> None:
+        made = app.add(Popup(controls(QtWidgets), "passing"))
+        frames(app)
+        app.overlays.remove(made)
+        frames(app)
+
+    def entry(_number: int) -> None:
+        made = app.entries.add_qml(str(EVERYTHING), "passing")
+        frames(app)
+        app.entries.remove(made)
+        frames(app)
+
+    def reload(_number: int) -> None:
+        assert steady.reload()
+        frames(app)
+
+    def scale(number: int) -> None:
+        steady.scale = 0.5 + number % 3
+        frames(app)
+
+    def resize(number: int) -> None:
+        app.window.widget.resize(640 + number % 7 * 8, 480 + number % 5 * 8)
+        frames(app)
+
+    def resize_alone(number: int) -> None:
+        steady.visible = False
+        resize(number)
+
+    return {
+        "QML added, removed": overlay,
+        "widgets added, scaled, removed": widget,
+        "popup added, removed": popup,
+        "entry added, removed": entry,
+        "QML reloaded": reload,
+        "QML scaled": scale,
+        "window resized": resize,
+        "window resized, nothing shown": resize_alone,
+    }
+
+
+def controls(widgets: Any) -> Any:
+    """Return a widget with some others in it."""
+    box = widgets.QWidget()
+    layout = widgets.QVBoxLayout(box)
+    for part in (widgets.QPushButton("x"), widgets.QComboBox(), widgets.QLineEdit()):
+        layout.addWidget(part)
+    return box
+
+
 def cycles(order: dict[str, Any]) -> dict[str, Any]:
-    """Add, resize, reload and remove overlays again and again; return the memory meanwhile."""
+    """Have overlays come, change and go again and again; return what each kind leaves behind."""
     from rosglass.rviz import Application
 
     app = Application()
     app.window.widget.setGeometry(0, 0, 640, 480)
     app.window.widget.show()
-    steady = app.add_qml(QML, "steady")
     run_for(1.0, app)
-    used: list[float] = []
-    for number in range(order["cycles"]):
-        overlay = app.add_qml(QML, "passing")
-        run_for(0.04, app)
-        overlay.scale = 0.5 + number % 3
-        app.window.widget.resize(640 + number % 7 * 8, 480 + number % 5 * 8)
-        steady.load()
-        run_for(0.04, app)
-        app.overlays.remove(overlay)
-        run_for(0.0, app)
-        if number % 50 == 49:
-            gc.collect()
-            used.append(memory())
+    found: dict[str, Any] = {}
+    for name, step in steps(app).items():
+        for number in range(order["warm_up"]):
+            step(number)
+        before, started = left_over(app), time.perf_counter()
+        for number in range(order["cycles"]):
+            step(number)
+        took = time.perf_counter() - started
+        after = left_over(app)
+        found[name] = {key: after[key] - before[key] for key in before}
+        found[name]["ms"] = 1000 * took / order["cycles"]
+        print(name, found[name], flush=True)
     app.close()
-    return {"memory": used}
+    return found
 
 
 def main() -> None:
