@@ -163,6 +163,68 @@ def test_mistakes_with_tools_say_what_to_do(tools: Any, qml: Any) -> None:
     assert len(tools.all) == 2
 
 
+MISTAKES = {
+    "rviz.loadConfig()": "rviz.loadConfig(file): file must be given",
+    "rviz.setProperty('Grid/Color')": "setProperty(path, value): value must be given",
+    "rviz.pick()": "rviz.pick(x[, y[, radius]]): x must be given",
+    "rviz.pick(1)": "y: expected a number, in units of the overlay, got null",
+    "rviz.pick({x: 1, y: 2}, 'r')": "radius: expected a number",
+    "rviz.addDisplay()": "rviz.addDisplay(classId[, name[, enabled]]): classId must be given",
+    "rviz.addDisplay('rviz/Measure')": "rviz/Measure is a tool: use addTool",
+    "rviz.addDisplay('rosglass/QmlOverlay')": "is an overlay: the menu Overlays, --overlay",
+    "rviz.display('Grid').set('Alpha')": "display.set(path, value): value must be given",
+    "rviz.display('Grid').enabled = 'no'": "display.enabled: expected true or false, got 'no'",
+    "rviz.display('Grid').name = 5": "display.name: expected a name, a text of one line, got 5",
+    "rviz.fixedFrame = 5": "rviz.fixedFrame: expected the name of a frame, e.g. 'map', got 5",
+    "rviz.fixedFrame = ''": "expected the name of a frame, e.g. 'map', got ''",
+    "rviz.isFullscreen = 'no'": "rviz.isFullscreen: expected true or false, got 'no'",
+    "rviz.isBare = 0": "rviz.isBare: expected true or false, got 0",
+    "rviz.config = [true, null]": "expected a map, e.g. {speed: 1}, got [true, null]",
+    "rviz.getProperty('Grids/Color')": "panel is called 'Grids'; did you mean Grid?",
+    "rviz.getProperty('Nope')": "called 'Nope'; there are: Global Options, Grid, Overlay0",
+    "rviz.getProperty('Grid')": "'Grid' is a display; name one of its properties, e.g. 'Grid/",
+    "rviz.setProperty('Grid/Offset', 5)": "expected x, y, z, e.g. {x: 0, y: 0, z: 0}, got 5",
+    "rviz.loadConfig('http://x/y.rviz')": "expected the path of a file, got 'http://x/y.rviz'",
+    "rviz.saveConfig('package://x/y.rviz')": "expected the path of a file to save to, got 'pack",
+    "rviz.saveConfig('/nope/x.rviz')": "could not save its config: there is no folder /nope",
+    "rviz.createPositionTracker(0, 0)": "e.g. Qt.vector3d(1, 2, 0), got [0, 0]",
+    "rviz.createPositionTracker(0, 0, 0).frame = 5": "tracker.frame: expected the name of a frame",
+    "rviz.removeDisplay(rviz.toolManager)": "a display or its name, got rviz.toolManager",
+    "rviz.toolManager.currentTool = 'Move Camera'": "did you mean 'rviz/MoveCamera'?",
+    "rviz.toolManager.addTool('rviz/Grid')": "rviz/Grid is a display: use addDisplay",
+    "rviz.registerIntProperty()": "the name must be a text, e.g. 'Speed'",
+    "rviz.registerIntProperty('I').readOnly = 1": "property I.readOnly: expected true or false",
+    "rviz.registerRosTopicProperty('T', '/a', 'std_msgs')": "expected the name of a type, e.g.",
+}
+
+
+def test_every_mistake_names_the_thing_and_what_would_fit(
+    tools: Any, displays: Any, qml: Any
+) -> None:
+    here = qml()
+    said = {script: here.fails(script) for script in MISTAKES}
+    wrong = {s: t for s, t in said.items() if MISTAKES[s] not in t}
+    assert wrong == {}
+
+
+def test_what_takes_anything_can_still_be_bound(app: Any, displays: Any, qml: Any) -> None:
+    here = qml(
+        """Item { id: root; property bool on: false; property string where: "odom"
+        property bool shown: rviz.display("Grid").enabled
+        Binding { target: rviz.display("Grid"); property: "enabled"; value: root.on }
+        Binding { target: rviz; property: "fixedFrame"; value: root.where } }"""
+    )
+    grid = displays.find("Grid")
+    assert (grid.enabled, here.root.property("shown"), app.rviz.fixed_frame) == (
+        False,
+        False,
+        "odom",
+    )
+    here.root.setProperty("on", True)
+    here.root.setProperty("where", "map")
+    assert (grid.enabled, here.root.property("shown"), app.rviz.fixed_frame) == (True, True, "map")
+
+
 def test_tool_icons(tools: Any, qml: Any, wait: Any) -> None:
     here = qml(
         """Row { property alias a: a; property alias b: b; property alias c: c
@@ -295,7 +357,7 @@ def test_properties_of_displays(app: Any, displays: Any, qml: Any) -> None:
     assert "a finite number" in fails("root.grid.set('Offset/X', NaN)")
     assert "a finite number" in fails("root.grid.set('Offset', [0, Infinity, 0])")
     assert "a finite number" in fails("root.grid.set('Cell Size', 1e300)")
-    assert "it is 1.0 now" in fails("root.grid.set('Alpha', 7)")
+    assert "has made it 1.0" in fails("root.grid.set('Alpha', 7)")
     assert "has no value of its own" in fails("rviz.setProperty('Global Options', 7)")
 
 
@@ -423,7 +485,7 @@ def test_picking(app: Any, displays: Any, qml: Any, wait: Any) -> None:
     assert near[0] is None
     assert near[1] is not None
     assert "in units of the overlay" in here.fails("rviz.pick('a', 2)")
-    assert "expected x, y" in here.fails("rviz.pick(NaN, 2)")
+    assert "expected finite x and y" in here.fails("rviz.pick(NaN, 2)")
 
 
 def test_the_view(app: Any, qml: Any, wait: Any) -> None:

@@ -15,10 +15,10 @@ OBJECTS = {
     "rviz": ("rviz", "fixedFrame"),
     "rviz.toolManager": ("rviz.toolManager", "currentTool"),
     "rviz.view": ("rviz.view", "animationDuration"),
-    "rviz.toolManager.tools[0]": ("a tool", "shortcutKey"),
-    "rviz.displays[0]": ("a display", "enabled"),
-    "rviz.createPositionTracker(0, 0, 0)": ("a position tracker", "position"),
-    "rviz.registerIntProperty('Count', 3)": ("a registered property", "readOnly"),
+    "rviz.toolManager.tools[0]": ("tool", "shortcutKey"),
+    "rviz.displays[0]": ("display", "enabled"),
+    "rviz.createPositionTracker(0, 0, 0)": ("tracker", "position"),
+    "rviz.registerIntProperty('Count', 3)": ("property", "readOnly"),
 }
 
 

@@ -469,7 +469,8 @@ class Session(QtCore.QObject):
         before = (self.state, self.detail)
         self._status = status
         if (self.state, self.detail) != before or not self.is_initialized:
-            _log.info("%s", ": ".join(filter(None, (self.state, self.detail))))
+            told = (self.state, self.detail)
+            _log.info("%s", told[1] if told[1].startswith(told[0]) else ": ".join(filter(None, told)))
             self.connection_changed.emit()
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -299,7 +300,9 @@ class Entry(QtCore.QObject):
         shown, own = self._watches
         # Those of a display that is gone have ended with it.
         for signal, slot in (*own, *(shown if self.alive else ())):
-            signal.disconnect(slot)
+            # RViz disconnects a display from everything before it removes it.
+            with suppress(TypeError):
+                signal.disconnect(slot)
         self._watches = ([], [])
         if self.alive:
             self.display.entry = None

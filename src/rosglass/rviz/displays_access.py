@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rosglass.comm.similar import similar
 from rosglass.errors import Error
 from rosglass.qt import QtCore, Signal
 from rosglass.rviz import property_access
 from rosglass.rviz.host import as_pyside
 from rosglass.rviz.plugins import DISPLAY, declared, require_class_id
 from rosglass.rviz.qt5 import QtWidgets
+from rosglass.rviz.shown import shown
 from rosglass.rviz.tools import failure
 from rosglass.rviz.watch import Hook, address, class_of
 
@@ -242,7 +244,21 @@ class Displays(QtCore.QObject):
             if names.startswith(f"{display.name}/"):
                 rest = names[len(display.name) + 1 :]
                 return property_access.find(display.require(), rest, display.name)
+        self._require_first(names)
         return property_access.find(self._root, names, "RViz")
+
+    def _require_first(self, path: str) -> None:
+        """Raise an Error where nothing in the panel has the first name of a path."""
+        first, _, below = path.partition("/")
+        displays = [display.name for display in self._displays]
+        known = [*(str(c.getName()) for c in property_access.children(self._root)), *displays]
+        display = self.find(first)
+        if display is not None and not below:
+            example = f"{first}/{next(property_access.children(display.handle)).getName()}"
+            raise Error(f"{first!r} is a display; name one of its properties, e.g. {example!r}")
+        if first not in known:
+            hint = similar(first, known) or f"; there are: {', '.join(known)}"
+            raise Error(f"nothing in the Displays panel is called {shown(first)}{hint}")
 
     def add(self, class_id: str, name: str = "", *, enabled: bool = True) -> Display:
         """Add a display, as the last one.
@@ -354,4 +370,4 @@ def _walk(group: Any) -> Iterator[tuple[Any, bool]]:
 def _plain_name(name: object) -> str:
     if isinstance(name, str) and name.strip() and len(name) <= _LONGEST and name.isprintable():
         return name
-    raise Error(f"expected a name, a text of one line, got {name!r:.80}")
+    raise Error(f"expected a name, a text of one line, got {shown(name)}")

@@ -9,7 +9,7 @@ from rosglass.rviz.host import pyqt
 
 if TYPE_CHECKING:
     from rosglass.rviz.property_sources import Sources
-    from rosglass.rviz.registered_properties import RegisteredProperty
+    from rosglass.rviz.registered_property import RegisteredProperty
 
 __all__ = ["make_editor"]
 

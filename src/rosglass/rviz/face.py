@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import inspect
+from functools import wraps
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.errors import Error
 from rosglass.qml.js_values import object_of
 from rosglass.qml.plain import plain_from_js
 from rosglass.qt import QJSValue, QtCore, QtGui, QtQml, Slot
+from rosglass.rviz.shown import shown
 from rosglass.rviz.spelling import spelled
 
 if TYPE_CHECKING:
@@ -16,8 +19,10 @@ if TYPE_CHECKING:
 
     from rosglass.qml.runtime import Runtime
 
-__all__ = ["Face", "given", "place", "taking"]
+__all__ = ["VARIANT", "Face", "given", "place", "switch_of", "taking", "text_of"]
 
+#: The type of a property that takes anything, and says itself what it does not.
+VARIANT: Any = "QVariant"
 _OWN: Any = QtQml.QQmlEngine.ObjectOwnership
 
 
@@ -30,7 +35,7 @@ class Face(QtCore.QObject):
     """
 
     #: What errors call it.
-    CALLED: ClassVar[str] = "the object"
+    CALLED: ClassVar[str] = "object"
 
     def __init__(self, runtime: Runtime, parent: QtCore.QObject) -> None:
         super().__init__(parent)
@@ -38,13 +43,17 @@ class Face(QtCore.QObject):
         QtQml.QQmlEngine.setObjectOwnership(self, _OWN.CppOwnership)
         self._held: QJSValue | None = spelled(runtime, self)
 
+    def throw(self, text: str) -> None:
+        """Throw an error into the JavaScript that is running."""
+        self._runtime.throw(text)
+
     @contextlib.contextmanager
     def _telling(self, what: str) -> Iterator[None]:
         """Throw an error into the JavaScript that is running."""
         try:
             yield
         except Error as error:
-            self._runtime.throw(f"{what}: {error}")
+            self.throw(f"{what}: {error}")
 
     def _to_js(self, item: QtCore.QObject | None) -> QJSValue:
         """Return an object for JavaScript; null for None."""
@@ -62,13 +71,27 @@ class Face(QtCore.QObject):
 
 
 def taking(least: int, most: int, result: Any = QJSValue) -> Callable[[Any], Any]:
-    """Make a method callable from QML with so many arguments of any kind."""
+    """Make a method callable from QML with so many arguments of any kind; fewer are told."""
 
     def decorate(function: Any) -> Any:
-        for count in range(least, most + 1):
-            answer = {} if result is None else {"result": result}
-            function = Slot(*[QJSValue] * count, **answer)(function)
-        return function
+        names = list(inspect.signature(function).parameters)[1:]
+        said = [name.replace("class_id", "classId") for name in names]
+        optional = "".join(f"[, {name}" for name in said[least:]) + "]" * (most - least)
+        usage = f"{function.__name__}({', '.join(said[:least])}{optional})"
+
+        @wraps(function)
+        def call(self: Any, *arguments: Any, **named: Any) -> Any:
+            given_names = {*names[: len(arguments)], *named}
+            missing = [said[at] for at in range(least) if names[at] not in given_names]
+            if missing:
+                self.throw(f"{self.CALLED}.{usage}: {' and '.join(missing)} must be given")
+                return None if result is None else QJSValue()
+            return function(self, *arguments, **named)
+
+        answer = {} if result is None else {"result": result}
+        for count in range(most + 1):
+            call = Slot(*[QJSValue] * count, **answer)(call)
+        return call
 
     return decorate
 
@@ -92,8 +115,40 @@ def given(value: QJSValue | None) -> Any:
     return found
 
 
-def place(value: Any, what: str = "a point") -> tuple[float, float, float]:
+def text_of(value: Any, wanted: str = "a text") -> str:
+    """Return a text that is given for a property; Qt would make one of anything.
+
+    Args:
+        value: What was given.
+        wanted: What it is to be, in words.
+
+    Raises:
+        Error: It is none.
+    """
+    found = given(value) if isinstance(value, QJSValue) else value
+    if not isinstance(found, str):
+        raise Error(f"expected {wanted}, got {shown(found)}")
+    return found
+
+
+def switch_of(value: Any) -> bool:
+    """Return true or false as given for a property; Qt would make one of anything.
+
+    Raises:
+        Error: It is neither.
+    """
+    found = given(value) if isinstance(value, QJSValue) else value
+    if not isinstance(found, bool):
+        raise Error(f"expected true or false, got {shown(found)}")
+    return found
+
+
+def place(value: Any, what: str = "") -> tuple[float, float, float]:
     """Return a point that is given as a vector, an object with x, y and z, or a list of three.
+
+    Args:
+        value: What was given.
+        what: What to call it in the error, if it is not the only point.
 
     Raises:
         Error: It is none, or its numbers are not finite.
@@ -106,7 +161,8 @@ def place(value: Any, what: str = "a point") -> tuple[float, float, float]:
         for part in parts
     )
     if not fits:
+        called = f"{what}: " if what else ""
         raise Error(
-            f"{what}: expected x, y and z in metres, e.g. Qt.vector3d(1, 2, 0), got {value!r:.80}"
+            f"{called}expected x, y and z in metres, e.g. Qt.vector3d(1, 2, 0), got {shown(value)}"
         )
     return float(parts[0]), float(parts[1]), float(parts[2])

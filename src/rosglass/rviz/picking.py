@@ -13,6 +13,7 @@ from rosglass.rviz.camera import Camera
 from rosglass.rviz.gl import keep_context, read_depth, read_pixels
 from rosglass.rviz.host import ogre
 from rosglass.rviz.qt5 import QtGui
+from rosglass.rviz.shown import shown
 
 if TYPE_CHECKING:
     import os
@@ -53,8 +54,8 @@ class Picker:
         """
         if not all(math.isfinite(number) for number in (x, y, radius)) or not 0 <= radius <= 100:
             raise Error(
-                f"expected x, y and a radius from 0 to 100 in units of the view, "
-                f"got {(x, y, radius)!r}"
+                "expected finite x and y, and a radius from 0 to 100, in units of the view, got "
+                f"{shown([x, y, radius])[1:-1]}"
             )
         ratio = self._window.view_size()[2]
         width, height = self._size()

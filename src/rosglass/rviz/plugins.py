@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 from rosglass.comm.similar import similar
 from rosglass.errors import Error
 from rosglass.interfaces.folders import workspace
+from rosglass.rviz.shown import shown
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["DISPLAY", "TOOL", "VIEW", "Plugin", "declared", "require_class_id"]
 
 DISPLAY, TOOL, VIEW = "rviz::Display", "rviz::Tool", "rviz::ViewController"
+_EXAMPLES = {DISPLAY: "rviz/Grid", TOOL: "rviz/Measure", VIEW: "rviz/Orbit"}
 #: Where Debian has its packages, which rospack finds without any variable.
 _SYSTEM = "/usr/share"
 _LONGEST = 200
@@ -60,8 +62,8 @@ def require_class_id(class_id: object, base: str) -> str:
         if slash and all(p.replace("_", "").isalnum() and p.isascii() for p in (package, name)):
             return class_id
     near = similar(class_id, declared(base)) if isinstance(class_id, str) else ""
-    example = next(iter(declared(base)), "rviz/Name")
-    raise Error(f"expected the id of a class, e.g. {example!r}, got {class_id!r:.80}{near}")
+    example = _EXAMPLES[base]
+    raise Error(f"expected the id of a class, e.g. {example!r}, got {shown(class_id)}{near}")
 
 
 def _descriptions() -> Iterator[str]:

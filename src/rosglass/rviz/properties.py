@@ -14,7 +14,7 @@ from rosglass.errors import Error
 from rosglass.qt import is_alive
 from rosglass.rviz.editors import make_editor
 from rosglass.rviz.host import pyqt, rviz
-from rosglass.rviz.registered_properties import RegisteredProperty
+from rosglass.rviz.registered_property import RegisteredProperty
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -11,6 +11,7 @@ from rosglass.comm.similar import similar
 from rosglass.errors import Error
 from rosglass.qt import QtGui
 from rosglass.rviz.host import pyqt
+from rosglass.rviz.shown import shown
 from rosglass.rviz.watch import class_of, is_a
 
 if TYPE_CHECKING:
@@ -116,7 +117,7 @@ def write(item: Any, value: Any, name: str = "") -> None:
     item.setValue(given)
     now = read(item)
     if not _same(now, wanted):
-        raise Error(f"{name}: RViz does not take {_shown(value)}; it is {_shown(now)} now")
+        raise Error(f"{name}: RViz does not take {shown(value)}, and has made it {shown(now)}")
 
 
 def describe(item: Any, path: str = "") -> list[dict[str, Any]]:
@@ -170,20 +171,20 @@ def _convert(item: Any, kind: str, value: Any, name: str) -> tuple[Any, Any]:
         raise Error(f"{name} has no value of its own, only properties below it")
     if isinstance(now, bool):
         if not isinstance(value, bool):
-            raise Error(f"{name}: expected true or false, got {_shown(value)}")
+            raise Error(f"{name}: expected true or false, got {shown(value)}")
         return value, value
     if isinstance(now, (int, float)):
         number = _number(value, name)
         if isinstance(now, int):
             if number != int(number) or not _INT32[0] <= number <= _INT32[1]:
-                raise Error(f"{name}: expected a whole number of 32 bits, got {_shown(value)}")
+                raise Error(f"{name}: expected a whole number of 32 bits, got {shown(value)}")
             return int(number), int(number)
         return number, number
-    if not isinstance(value, str) or len(value) > _LONGEST or not value.isprintable():
-        raise Error(f"{name}: expected a text of one line, got {_shown(value)}")
     choices = _choices(item) if kind == "rviz::EnumProperty" else []
     if choices and value not in choices:
-        raise Error(f"{name}: expected one of {', '.join(choices)}, got {_shown(value)}")
+        raise Error(f"{name}: expected one of {', '.join(choices)}, got {shown(value)}")
+    if not isinstance(value, str) or len(value) > _LONGEST or not value.isprintable():
+        raise Error(f"{name}: expected a text of one line, got {shown(value)}")
     return value, value
 
 
@@ -204,7 +205,7 @@ def _number(value: Any, name: str) -> float:
         with np.errstate(over="ignore"):
             if math.isfinite(value) and np.isfinite(np.float32(value)):
                 return float(value)
-    raise Error(f"{name}: expected a finite number, got {_shown(value)}")
+    raise Error(f"{name}: expected a finite number, got {shown(value)}")
 
 
 def _colour(value: Any, name: str) -> tuple[str, str]:
@@ -213,7 +214,7 @@ def _colour(value: Any, name: str) -> tuple[str, str]:
         value = QtGui.QColor(*map(int, parts))
     colour = QtGui.QColor(value) if isinstance(value, (str, QtGui.QColor)) else QtGui.QColor()
     if not colour.isValid():
-        raise Error(f"{name}: expected a colour, e.g. '#ff8800' or 'orange', got {_shown(value)}")
+        raise Error(f"{name}: expected a colour, e.g. '#ff8800' or 'orange', got {shown(value)}")
     if colour.alpha() != 255:
         raise Error(f"{name}: RViz keeps no transparency with a colour; set the property Alpha")
     plain = (colour.red(), colour.green(), colour.blue())
@@ -224,7 +225,8 @@ def _vector(value: Any, names: str, name: str) -> tuple[dict[str, float], str]:
     if isinstance(value, (list, tuple)) and len(value) == len(names):
         value = dict(zip(names, value, strict=True))
     if not isinstance(value, dict) or set(value) != set(names):
-        raise Error(f"{name}: expected {', '.join(names)}, got {_shown(value)}")
+        example = shown({part: int(part == "w") for part in names})
+        raise Error(f"{name}: expected {', '.join(names)}, e.g. {example}, got {shown(value)}")
     parts = {part: _number(value[part], f"{name}/{part.upper()}") for part in names}
     return parts, "; ".join(f"{number:.9g}" for number in parts.values())
 
@@ -242,8 +244,3 @@ def _same(now: Any, wanted: Any) -> bool:
     if isinstance(wanted, float) and isinstance(now, (int, float)):
         return math.isclose(now, wanted, rel_tol=1e-5, abs_tol=1e-6)
     return bool(now == wanted)
-
-
-def _shown(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 80 else f"{text[:77]}..."

@@ -11,17 +11,14 @@ import numpy as np
 
 from rosglass.errors import Error
 from rosglass.qt import QtGui
+from rosglass.rviz.shown import shown
 
 __all__ = ["KINDS", "Kind"]
 
 _INT32 = (-(2**31), 2**31 - 1)
 _TOPIC = re.compile(r"([~/]?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*|/)?\Z")
+_TYPE = re.compile(r"([A-Za-z]\w*(/msg)?/[A-Za-z]\w*)?\Z", re.ASCII)
 _CONTROL = re.compile(r"[\0-\x08\x0b-\x1f\x7f\ud800-\udfff]")
-
-
-def _shown(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 class Kind:
@@ -76,7 +73,7 @@ class Kind:
         return self.read(saved)
 
     def _refusal(self, value: Any) -> Error:
-        return Error(f"expected {self.WANTED}, got {_shown(value)}")
+        return Error(f"expected {self.WANTED}, got {shown(value)}")
 
 
 class _Container(Kind):
@@ -110,7 +107,7 @@ class _Number(Kind, ABC):
         for name, value in options.items():
             given = self._number(value)
             if given is None:
-                raise Error(f"{name}: expected {self.WANTED}, got {_shown(value)}")
+                raise Error(f"{name}: expected {self.WANTED}, got {shown(value)}")
             setattr(self, name, given)
         if self.min > self.max:
             raise Error(f"min {self.min} is above max {self.max}; exchange them")
@@ -200,6 +197,15 @@ class _Topic(_String):
     NAME, OPTIONS = "topic", ("messageType",)
     WANTED = "the name of a topic, e.g. '/robot/scan'"
 
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        wanted = options.get("messageType", "")
+        if not isinstance(wanted, str) or not _TYPE.match(wanted):
+            example = "'sensor_msgs/LaserScan'"
+            raise Error(
+                f"messageType: expected the name of a type, e.g. {example}, got {shown(wanted)}"
+            )
+
     def read(self, value: Any) -> str:
         text = super().read(value)
         if not _TOPIC.match(text):
@@ -220,11 +226,11 @@ class _Enum(_String):
         choices = options.get("choices")
         if not isinstance(choices, (list, tuple)) or not choices:
             raise Error(
-                f"choices: expected a list of texts, e.g. ['slow', 'fast'], got {choices!r}"
+                f"choices: expected a list of texts, e.g. ['slow', 'fast'], got {shown(choices)}"
             )
         self.choices = [super(_Enum, self).read(choice) for choice in choices]
         if len(set(self.choices)) < len(self.choices):
-            raise Error(f"choices: {_shown(choices)} has one of them twice")
+            raise Error(f"choices: {shown(choices)} has one of them twice")
 
     @property
     def default(self) -> str:
@@ -232,7 +238,7 @@ class _Enum(_String):
 
     def read(self, value: Any) -> str:
         if value not in self.choices:
-            raise Error(f"expected one of {', '.join(self.choices)}, got {_shown(value)}")
+            raise Error(f"expected one of {', '.join(self.choices)}, got {shown(value)}")
         return str(value)
 
 
@@ -289,7 +295,7 @@ class _Parts(Kind, ABC):
             with np.errstate(over="ignore"):
                 narrow = np.float32(number)
             if not np.isfinite(narrow):
-                raise Error(f"{name}: expected a finite number, got {_shown(by_name[name])}")
+                raise Error(f"{name}: expected a finite number, got {shown(by_name[name])}")
             parts.append(number)
         return self._make(parts)
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from rosglass.qml.session import Session
     from rosglass.qml.tf_link import TfLink
-    from rosglass.rviz.registered_properties import RegisteredProperty
+    from rosglass.rviz.registered_property import RegisteredProperty
 
 __all__ = ["FIXED_FRAME", "Sources"]
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot
-from rosglass.rviz.face import Face, given, taking
+from rosglass.rviz.face import VARIANT, Face, given, switch_of, taking, text_of
+from rosglass.rviz.shown import shown
 
 if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime
@@ -19,7 +20,7 @@ __all__ = ["QmlDisplay", "QmlDisplays", "path_of"]
 class QmlDisplay(Face):
     """One display. Its name and class stay readable once it is removed."""
 
-    CALLED = "a display"
+    CALLED = "display"
 
     #: Its name, status, or whether it is shown.
     changed = Signal()
@@ -29,22 +30,22 @@ class QmlDisplay(Face):
         super().__init__(runtime, parent)
         self.display = display
 
-    def _set_name(self, name: str) -> None:
+    def _set_name(self, name: Any) -> None:
         with self._telling("display.name"):
-            self.display.name = name
+            self.display.name = text_of(name, "a name, a text of one line")
 
-    def _set_enabled(self, enabled: bool) -> None:
+    def _set_enabled(self, enabled: Any) -> None:
         with self._telling("display.enabled"):
-            self.display.enabled = enabled
+            self.display.enabled = switch_of(enabled)
 
     def _get_properties(self) -> QJSValue:
         display = self.display
         return self._runtime.value(display.properties() if display.exists else [])
 
     exists = Property(bool, lambda self: self.display.exists, notify=existsChanged)
-    name = Property(str, lambda self: self.display.name, _set_name, notify=changed)
+    name = Property(VARIANT, lambda self: self.display.name, _set_name, notify=changed)
     classId = Property(str, lambda self: self.display.class_id, constant=True)
-    enabled = Property(bool, lambda self: self.display.enabled, _set_enabled, notify=changed)
+    enabled = Property(VARIANT, lambda self: self.display.enabled, _set_enabled, notify=changed)
     #: ``ok``, ``warn`` or ``error``.
     status = Property(str, lambda self: self.display.status.level, notify=changed)
     #: What it says about itself, one line for each.
@@ -109,11 +110,11 @@ class QmlDisplays(Face):
         if isinstance(value, QmlDisplay):
             return value.display
         if not isinstance(value, str):
-            raise Error(f"expected a display or its name, got {value!r:.80}")
+            raise Error(f"expected a display or its name, got {shown(value)}")
         found = self.displays.find(value)
         if found is None:
             names = ", ".join(display.name for display in self.displays.all) or "none"
-            raise Error(f"there is no display {value!r:.80}; there are: {names}")
+            raise Error(f"there is no display {shown(value)}; there are: {names}")
         return found
 
     @Slot(object)
@@ -137,8 +138,12 @@ class QmlDisplays(Face):
             self._faces[display].changed.emit()
 
 
-def path_of(value: QJSValue) -> str | list[str]:
+def path_of(value: QJSValue, example: str = "Offset/X") -> str | list[str]:
     """Return a path that QML gives, a text or a list of texts.
+
+    Args:
+        value: What was given.
+        example: Such a path, for the error.
 
     Raises:
         Error: It is neither.
@@ -148,4 +153,4 @@ def path_of(value: QJSValue) -> str | list[str]:
     if all(isinstance(name, str) for name in names) and names:
         path: str | list[str] = found
         return path
-    raise Error(f"expected the path of a property, e.g. 'Offset/X', got {found!r:.80}")
+    raise Error(f"expected the path of a property, e.g. {example!r}, got {shown(found)}")

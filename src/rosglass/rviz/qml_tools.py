@@ -10,6 +10,7 @@ from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot
 from rosglass.rviz.face import Face, given, taking
 from rosglass.rviz.host import pyqt
 from rosglass.rviz.qt5 import QtGui, QtQuick
+from rosglass.rviz.shown import shown
 
 if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime
@@ -29,7 +30,7 @@ _LARGEST = 1024
 class QmlTool(Face):
     """One tool. Its members stay readable once it is removed."""
 
-    CALLED = "a tool"
+    CALLED = "tool"
 
     isSelectedChanged = Signal()
     #: Its name or description.
@@ -95,7 +96,7 @@ class QmlToolManager(Face):
         return self._to_js(None if current is None else self._face(current))
 
     def _set_current(self, value: QJSValue) -> None:
-        with self._telling("toolManager.currentTool"):
+        with self._telling("rviz.toolManager.currentTool"):
             self._wanted(value).select()
 
     #: In the order of their buttons.
@@ -108,7 +109,7 @@ class QmlToolManager(Face):
     @taking(0, 1)
     def addTool(self, class_id: QJSValue | None = None) -> QJSValue:
         """Add a tool of a class, and return it; without one, show RViz's dialog instead."""
-        with self._telling("toolManager.addTool"):
+        with self._telling("rviz.toolManager.addTool"):
             if class_id is None or class_id.isUndefined():
                 self._tools.ask_for_new()
             else:
@@ -118,10 +119,10 @@ class QmlToolManager(Face):
     @taking(1, 1)
     def getTool(self, class_id: QJSValue) -> QJSValue:
         """Return the first tool of a class; null where there is none."""
-        with self._telling("toolManager.getTool"):
+        with self._telling("rviz.toolManager.getTool"):
             wanted = given(class_id)
             if not isinstance(wanted, str):
-                raise Error(f"expected the id of a class, e.g. 'rviz/Measure', got {wanted!r:.80}")
+                raise Error(f"expected the id of a class, e.g. 'rviz/Measure', got {shown(wanted)}")
             tool = self._tools.find(wanted)
             return self._to_js(None if tool is None else self._face(tool))
         return self._to_js(None)
@@ -129,7 +130,7 @@ class QmlToolManager(Face):
     @taking(1, 1, None)
     def removeTool(self, tool: QJSValue) -> None:
         """Remove a tool; takes a tool, its place among the tools, or the id of a class."""
-        with self._telling("toolManager.removeTool"):
+        with self._telling("rviz.toolManager.removeTool"):
             self._tools.remove(self._wanted(tool))
 
     @Slot()
@@ -144,14 +145,17 @@ class QmlToolManager(Face):
         if isinstance(wanted, int) and not isinstance(wanted, bool):
             if 0 <= wanted < len(there):
                 return there[wanted]
-            raise Error(f"there is no tool {wanted}; there are {len(there)}, the first one is 0")
+            known = f"there are {len(there)}, the first one is 0" if there else "there are none"
+            raise Error(f"there is no tool {wanted}; {known}")
         if isinstance(wanted, str):
             found = self._tools.find(wanted)
             if found is not None:
                 return found
             known = ", ".join(tool.class_id for tool in there) or "none"
-            raise Error(f"there is no tool of the class {wanted!r:.80}; there are: {known}")
-        raise Error(f"expected a tool, its place, or the id of a class, got {wanted!r:.80}")
+            named = [t.class_id for t in there if wanted in (t.name, t.class_id.rpartition("/")[2])]
+            hint = f"; did you mean {named[0]!r}?" if named else f"; there are: {known}"
+            raise Error(f"there is no tool of the class {shown(wanted)}{hint}")
+        raise Error(f"expected a tool, its place, or the id of a class, got {shown(wanted)}")
 
     @Slot(object)
     def _on_added(self, tool: Tool) -> None:

@@ -6,15 +6,16 @@ Of the object ``rviz`` in QML, and of every overlay in Python; nothing here need
 
 from __future__ import annotations
 
-import logging
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
 from rosglass.qml.plain import plain_from_js
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
-from rosglass.rviz.face import given
-from rosglass.rviz.property_kinds import KINDS, Kind
+from rosglass.rviz.face import VARIANT
+from rosglass.rviz.property_kinds import KINDS
+from rosglass.rviz.registered_property import RegisteredProperty, answering, python_value
 from rosglass.rviz.saved_values import merged, writable
+from rosglass.rviz.shown import shown
 from rosglass.rviz.spelling import spelled
 
 if TYPE_CHECKING:
@@ -22,175 +23,17 @@ if TYPE_CHECKING:
 
     from rosglass.qml.runtime import Runtime
 
-__all__ = ["RegisteredProperties", "RegisteredProperty"]
+__all__ = ["RegisteredProperties"]
 
-_log = logging.getLogger("rosglass.rviz")
-#: Qt takes the name of the type.
-_VARIANT: Any = "QVariant"
 #: Options that every kind has.
 _COMMON = ("description", "readOnly", "hidden")
 
 
-def _python(value: Any) -> Any:
-    """Return what JavaScript gave, as Python and Qt have it.
-
-    Raises:
-        ConversionError: It is a function, refers to itself, or is too large.
-    """
-    return given(value) if isinstance(value, QJSValue) else value
-
-
-def _answering(runtime: Runtime | None, what: str, error: Error, *given_by_js: Any) -> None:
-    """Throw an error into the JavaScript that is running; where none is, raise it."""
-    # Where JavaScript's own getters have thrown, it no longer tells where it is.
-    sure = any(isinstance(value, QJSValue) for value in given_by_js)
-    if runtime is None or not (sure or runtime.caller().file != "<python>"):
-        raise Error(f"{what}: {error}") from error
-    runtime.throw(f"{what}: {error}")
-
-
-class RegisteredProperty(QtCore.QObject):
-    """One property; made by :class:`RegisteredProperties` only.
-
-    Args:
-        owner: Whose it is.
-        parent: The property that it stands below; None for none.
-        name: Its name there.
-        kind: What it holds.
-        default: Its value as yet.
-    """
-
-    #: What errors call it.
-    CALLED = "a registered property"
-
-    valueChanged = Signal(_VARIANT)
-    #: Its description, range, choices, or whether it can be changed or seen.
-    aboutChanged = Signal()
-
-    def __init__(
-        self,
-        owner: RegisteredProperties,
-        parent: RegisteredProperty | None,
-        name: str,
-        kind: Kind,
-        default: Any,
-    ) -> None:
-        super().__init__(owner)
-        self._owner, self._name = owner, name
-        self.container = parent
-        self.kind = kind
-        #: What JavaScript has for it, if there is any.
-        self.for_js: QJSValue | None = None
-        #: Properties below this one.
-        self.properties: dict[str, RegisteredProperty] = {}
-        self._value = default
-        self._about: dict[str, Any] = {"description": "", "readOnly": False, "hidden": False}
-
-    @property
-    def path(self) -> tuple[str, ...]:
-        """Its name, after those of the properties that it stands below."""
-        return (*(self.container.path if self.container else ()), self._name)
-
-    def get(self) -> Any:
-        """Return the value."""
-        return self._value
-
-    def set(self, value: Any) -> None:
-        """Change the value, also of one that is read-only to people.
-
-        Raises:
-            Error: The property cannot hold it.
-        """
-        new = self.kind.read(_python(value))
-        if new != self._value or type(new) is not type(self._value):
-            self._value = new
-            self.valueChanged.emit(new)
-            self._owner.edited.emit()
-
-    def _set_value(self, value: Any) -> None:
-        try:
-            self.set(value)
-        except Error as error:
-            _answering(self._owner.runtime, f"property {'/'.join(self.path)}", error, value)
-
-    #: The value; one that does not fit throws.
-    value = Property(_VARIANT, get, _set_value, notify=valueChanged)
-    name = Property(str, lambda self: self._name, constant=True)
-    #: Of `bool`, `int`, `float`, `string`, `path`, `topic`, `frame`, `enum`, `color`, `vector`,
-    #: `quaternion` and `container`.
-    kindName = Property(str, lambda self: self.kind.NAME, constant=True)
-
-    def _get_description(self) -> str:
-        return cast("str", self._about["description"])
-
-    def _set_description(self, text: str) -> None:
-        self._tell(description=text)
-
-    description = Property(str, _get_description, _set_description, notify=aboutChanged)
-
-    def _get_read_only(self) -> bool:
-        return cast("bool", self._about["readOnly"])
-
-    def _set_read_only(self, read_only: bool) -> None:
-        self._tell(readOnly=read_only)
-
-    #: People cannot change it; the interface can.
-    readOnly = Property(bool, _get_read_only, _set_read_only, notify=aboutChanged)
-
-    def _get_hidden(self) -> bool:
-        return cast("bool", self._about["hidden"])
-
-    def _set_hidden(self, hidden: bool) -> None:
-        self._tell(hidden=hidden)
-
-    #: It is not shown in the panel.
-    hidden = Property(bool, _get_hidden, _set_hidden, notify=aboutChanged)
-
-    def _tell(self, **about: Any) -> None:
-        if not about.items() <= self._about.items():
-            self._about.update(about)
-            self.aboutChanged.emit()
-
-    def adopt(self, kind: Kind, about: dict[str, Any]) -> None:
-        """Take over what a later registration says; a value out of its range becomes the default.
-
-        Args:
-            kind: Of the same class as before.
-            about: `description`, `readOnly` and `hidden`, as far as they are given.
-        """
-        changed = kind.options != self.kind.options
-        self.kind = kind
-        self._tell(**about)
-        if changed:
-            self.aboutChanged.emit()
-            try:
-                kind.read(self._value)
-            except Error as error:
-                _log.warning("property %s: %s; it is %r now", self._name, error, kind.default)
-                self.set(kind.default)
-
-    def restore(self, saved: Any) -> None:
-        """Take the value that a file has for it; one that does not fit is told in the log."""
-        own = saved.get("Value") if self.properties and isinstance(saved, dict) else saved
-        if isinstance(saved, dict) and "Value" in saved and self.kind.HOLDS_OTHERS:
-            own = saved["Value"]
-        if self.kind.NAME == "container" or own is None:
-            return
-        try:
-            value = self.kind.restore(own)
-        except Error as error:
-            _log.warning(
-                "property %s: the file's value is left out: %s", "/".join(self.path), error
-            )
-            return
-        self.set(value)
-
-
 def _slot(most: int) -> Callable[[Any], Any]:
-    """Make a method callable from QML with one up to `most` arguments of any kind."""
+    """Make a method callable from QML with up to `most` arguments of any kind."""
 
     def decorate(function: Any) -> Any:
-        for count in range(1, most + 1):
+        for count in range(most + 1):
             function = Slot(*[QJSValue] * count, result=QtCore.QObject)(function)
         return function
 
@@ -243,7 +86,7 @@ class RegisteredProperties(QtCore.QObject):
         """
         value = plain_from_js(config) if isinstance(config, QJSValue) else config
         if not isinstance(value, dict):
-            raise Error(f"expected a map, e.g. {{speed: 1}}, got {value!r:.80}")
+            raise Error(f"expected a map, e.g. {{speed: 1}}, got {shown(value)}")
         new = writable(value, "config")
         if new != self._config or repr(new) != repr(self._config):
             self._config = new
@@ -254,10 +97,10 @@ class RegisteredProperties(QtCore.QObject):
         try:
             self.set_config(config)
         except Error as error:
-            _answering(self.runtime, "rviz.config", error, config)
+            answering(self.runtime, "rviz.config", error, config)
 
     #: Assign whole maps: a change inside of what was read is not seen.
-    config = Property(_VARIANT, get_config, _set_config, notify=configChanged)
+    config = Property(VARIANT, get_config, _set_config, notify=configChanged)
 
     # Registering.
 
@@ -332,9 +175,11 @@ class RegisteredProperties(QtCore.QObject):
     ) -> RegisteredProperty | None:
         names = ("name", *order) if "description" in order else ("name", *order, "description")
         try:
-            return self.register(kind, **_named(names, [_python(a) for a in arguments], options))
+            return self.register(
+                kind, **_named(names, [python_value(a) for a in arguments], options)
+            )
         except Error as error:
-            _answering(self.runtime, f"rviz.{function}", error, *arguments)
+            answering(self.runtime, f"rviz.{function}", error, *arguments)
             return None
 
     def register(
@@ -359,7 +204,7 @@ class RegisteredProperties(QtCore.QObject):
             Error: Something does not fit; the error says what, and what would.
         """
         if not isinstance(name, str) or not name.strip():
-            raise Error(f"the name must be a text, e.g. 'Speed', got {name!r:.80}")
+            raise Error(f"the name must be a text, e.g. 'Speed', got {shown(name)}")
         about, narrow = self._sorted(kind, name, options)
         try:
             made = KINDS[kind](**narrow)
@@ -413,8 +258,8 @@ class RegisteredProperties(QtCore.QObject):
             wanted = {"description": str, "readOnly": bool, "hidden": bool}.get(option)
             wanted = {"messageType": str, "includeFixedFrame": bool}.get(option, wanted)
             if wanted is not None and not isinstance(value, wanted):
-                shown = "a text" if wanted is str else "true or false"
-                raise Error(f"{name}: {option}: expected {shown}, got {value!r:.80}")
+                words = "a text" if wanted is str else "true or false"
+                raise Error(f"{name}: {option}: expected {words}, got {shown(value)}")
         about = {key: options[key] for key in _COMMON if key in options}
         return about, {key: options[key] for key in own if key in options}
 
@@ -424,12 +269,12 @@ class RegisteredProperties(QtCore.QObject):
         if parent is None:
             return self.properties
         if not isinstance(parent, RegisteredProperty) or not is_alive(parent):
-            raise Error(f"{name}: the parent must be a registered property, got {parent!r:.80}")
+            raise Error(f"{name}: the parent must be a registered property, got {shown(parent)}")
         if parent not in set(self.all()):
             raise Error(f"{name}: the parent {parent.path[-1]} belongs to another overlay")
         if not parent.kind.HOLDS_OTHERS:
-            shown = f"{parent.path[-1]} is a {parent.kind.NAME}"
-            raise Error(f"{name}: {shown}, which holds no others; register a container for them")
+            what = f"{parent.path[-1]} is a {parent.kind.NAME}"
+            raise Error(f"{name}: {what}, which holds no others; register a container for them")
         if name == "Value" and parent.kind.NAME != "container":
             raise Error(f"{name}: files keep the parent's own value by this name; take another one")
         return parent.properties
@@ -492,16 +337,16 @@ def _named(names: tuple[str, ...], given: list[Any], options: dict[str, Any]) ->
     found = dict(options)
     if given and (given[0] is None or isinstance(given[0], QtCore.QObject)):
         found["parent"] = given.pop(0)
-    shown = f"[parent,] {', '.join(names)}, {{options}}"
+    usage = f"[parent,] {', '.join(names)}, {{options}}"
     # The default of a vector is a map as well.
     at_last = min(2, len(names) - 1)
     if len(given) > at_last and isinstance(given[-1], dict):
         found.update(given.pop())
     if len(given) > len(names):
-        raise Error(f"{len(given)} arguments are too many; it takes {shown}")
+        raise Error(f"{len(given)} arguments are too many; it takes {usage}")
     for name, value in zip(names, given, strict=False):
         if name in found:
-            raise Error(f"{name} is given twice; it takes {shown}")
+            raise Error(f"{name} is given twice; it takes {usage}")
         if value is not None:
             found[name] = value
     return found

@@ -12,11 +12,12 @@ from rosglass.qml.runtime import runtime_of
 from rosglass.qt import Property, QJSValue, QtCore, QtQml, Signal, Slot
 from rosglass.rviz.access import Access
 from rosglass.rviz.displays_access import Status
-from rosglass.rviz.face import given, place, taking
+from rosglass.rviz.face import VARIANT, given, place, switch_of, taking, text_of
 from rosglass.rviz.qml_displays import QmlDisplays, path_of
 from rosglass.rviz.qml_tools import PROVIDER, QmlToolManager, ToolIcons
 from rosglass.rviz.qml_view import QmlView
 from rosglass.rviz.registered_properties import RegisteredProperties
+from rosglass.rviz.shown import shown
 from rosglass.rviz.spelling import spelled
 from rosglass.rviz.window import config_file
 
@@ -29,6 +30,7 @@ __all__ = ["RvizObject"]
 
 _log = logging.getLogger("rosglass.rviz")
 _LIST: Any = "QVariantList"
+_PATH = "Grid/Color"
 
 
 class RvizObject(RegisteredProperties):
@@ -122,9 +124,13 @@ class RvizObject(RegisteredProperties):
         try:
             return work()
         except Error as error:
-            if self.runtime is not None:
-                self.runtime.throw(f"rviz.{what}: {error}")
+            self.throw(f"rviz.{what}: {error}")
             return otherwise
+
+    def throw(self, text: str) -> None:
+        """Throw an error into the JavaScript that is running."""
+        if self.runtime is not None:
+            self.runtime.throw(text)
 
     def _js(self, item: QtCore.QObject | None) -> QJSValue:
         if item is None or self.runtime is None or self.runtime.engine is None:
@@ -136,41 +142,45 @@ class RvizObject(RegisteredProperties):
 
     # The overlay and the window.
 
-    def _set_fullscreen(self, fullscreen: bool) -> None:
+    def _set_fullscreen(self, fullscreen: Any) -> None:
         def work() -> None:
-            self._access.window.fullscreen = fullscreen
+            self._access.window.fullscreen = switch_of(fullscreen)
 
         self._asked("isFullscreen", work)
 
-    def _set_bare(self, bare: bool) -> None:
+    def _set_bare(self, bare: Any) -> None:
         def work() -> None:
-            self._access.window.bare.on = bare
+            self._access.window.bare.on = switch_of(bare)
 
         self._asked("isBare", work)
 
-    def _set_fixed_frame(self, frame: str) -> None:
+    def _set_fixed_frame(self, frame: Any) -> None:
         def work() -> None:
-            self._access.fixed_frame = frame
+            wanted = "the name of a frame, e.g. 'map'"
+            name = text_of(frame, wanted)
+            if not name:
+                raise Error(f"expected {wanted}, got {shown(name)}")
+            self._access.fixed_frame = name
 
         self._asked("fixedFrame", work)
 
     #: Whether this overlay is shown.
     visible = Property(bool, lambda self: self._overlay.visible, notify=visibleChanged)
     isFullscreen = Property(
-        bool,
+        VARIANT,
         lambda self: self._asked("isFullscreen", lambda: self._access.window.fullscreen, False),
         _set_fullscreen,
         notify=isFullscreenChanged,
     )
     #: Whether RViz's window has nothing but the 3D view in it.
     isBare = Property(
-        bool,
+        VARIANT,
         lambda self: self._asked("isBare", lambda: self._access.window.bare.on, False),
         _set_bare,
         notify=isBareChanged,
     )
     fixedFrame = Property(
-        str,
+        VARIANT,
         lambda self: self._asked("fixedFrame", lambda: self._access.fixed_frame, ""),
         _set_fixed_frame,
         notify=fixedFrameChanged,
@@ -200,8 +210,9 @@ class RvizObject(RegisteredProperties):
         def work() -> None:
             whole = given(window)
             if whole is not None and not isinstance(whole, bool):
-                raise Error(f"window: expected true or false, got {whole!r:.80}")
-            self._access.picker.screenshot(_file(given(file)), window=whole is True)
+                raise Error(f"window: expected true or false, got {shown(whole)}")
+            path = _file(given(file), "to save to")
+            self._access.picker.screenshot(path, window=whole is True)
 
         self._asked("screenshot", work)
 
@@ -234,7 +245,7 @@ class RvizObject(RegisteredProperties):
             wanted, window = given(file), self._access.window
             if wanted is None and not window.config:
                 raise Error("no config file is loaded; say where to save it")
-            window.save_config("" if wanted is None else _file(wanted))
+            window.save_config("" if wanted is None else _file(wanted, "to save to"))
 
         self._asked("saveConfig", work)
 
@@ -270,9 +281,8 @@ class RvizObject(RegisteredProperties):
         """Return the first display of a name; null where there is none."""
 
         def work() -> QJSValue:
-            wanted, faces = given(name), self._display_faces
-            if not isinstance(wanted, str):
-                raise Error(f"expected the name of a display, got {wanted!r:.80}")
+            faces = self._display_faces
+            wanted = text_of(name, "the name of a display, e.g. 'Grid'")
             found = faces.displays.find(wanted)
             return self._js(None if found is None else faces.face(found))
 
@@ -288,13 +298,13 @@ class RvizObject(RegisteredProperties):
         """Add a display of a class, and return it."""
 
         def work() -> QJSValue:
-            wanted, shown, on = given(class_id), given(name), given(enabled)
+            wanted, title, on = given(class_id), given(name), given(enabled)
             if on is not None and not isinstance(on, bool):
-                raise Error(f"enabled: expected true or false, got {on!r:.80}")
-            if shown is not None and not isinstance(shown, str):
-                raise Error(f"name: expected a text, got {shown!r:.80}")
+                raise Error(f"enabled: expected true or false, got {shown(on)}")
+            if title is not None and not isinstance(title, str):
+                raise Error(f"name: expected a text, got {shown(title)}")
             faces = self._display_faces
-            made = faces.displays.add(wanted, shown or "", enabled=on is not False)
+            made = faces.displays.add(wanted, title or "", enabled=on is not False)
             return self._js(faces.face(made))
 
         return self._answer("addDisplay", work)
@@ -312,14 +322,14 @@ class RvizObject(RegisteredProperties):
     @taking(1, 1)
     def getProperty(self, path: QJSValue) -> QJSValue:
         """Return the value of any property, e.g. of ``Global Options/Background Color``."""
-        return self._answer(
-            "getProperty", lambda: self._value(self._access.displays.get(path_of(path)))
-        )
+        displays = self._access.displays
+        return self._answer("getProperty", lambda: self._value(displays.get(path_of(path, _PATH))))
 
     @taking(2, 2, None)
     def setProperty(self, path: QJSValue, value: QJSValue) -> None:
         """Change any property, as if it were done in the panel."""
-        self._asked("setProperty", lambda: self._access.displays.set(path_of(path), given(value)))
+        displays = self._access.displays
+        self._asked("setProperty", lambda: displays.set(path_of(path, _PATH), given(value)))
 
     # Points.
 
@@ -340,8 +350,10 @@ class RvizObject(RegisteredProperties):
             if isinstance(at[0], dict) and {"x", "y"} <= set(at[0]):
                 at = [at[0]["x"], at[0]["y"], at[1]]
             at[2] = 0.0 if at[2] is None else at[2]
-            if not all(isinstance(n, (int, float)) and not isinstance(n, bool) for n in at):
-                raise Error(f"expected x and y in units of the overlay, got {at[:2]!r:.80}")
+            for name, number in zip(("x", "y", "radius"), at, strict=True):
+                if isinstance(number, bool) or not isinstance(number, (int, float)):
+                    wanted = "expected a number, in units of the overlay"
+                    raise Error(f"{name}: {wanted}, got {shown(number)}")
             found = self._access.picker.pick(*(number * scale for number in at))
             if found is None:
                 return self._js(None)
@@ -371,7 +383,7 @@ class RvizObject(RegisteredProperties):
             if isinstance(parts[0], (dict, list)):
                 point, whose = place(parts[0]), parts[1]
             else:
-                point, whose = place(parts[:3]), parts[3]
+                point, whose = place([part for part in parts[:3] if part is not None]), parts[3]
             return self._track(point, "" if whose is None else whose)
 
         return self._answer("createPositionTracker", work)
@@ -423,13 +435,20 @@ class RvizObject(RegisteredProperties):
         self.frameRateChanged.emit()
 
 
-def _file(value: Any) -> str:
+def _file(value: Any, use: str = "") -> str:
     """Return a file that QML names by a path or a ``file:`` address.
+
+    Args:
+        value: What was given.
+        use: What it is for, where ``package://`` will not do.
 
     Raises:
         Error: It is neither.
     """
     if isinstance(value, str) and value and "\0" not in value and len(value) <= 4096:
         address = QtCore.QUrl(value)
-        return address.toLocalFile() if address.isLocalFile() else value
-    raise Error(f"expected the path of a file, got {value!r:.80}")
+        if address.isLocalFile():
+            return address.toLocalFile()
+        if "://" not in value or (not use and value.startswith("package://")):
+            return value
+    raise Error(f"expected the path of a file{f' {use}' if use else ''}, got {shown(value)}")

@@ -102,7 +102,7 @@ def _missing(value: QJSValue, name: str) -> str:
     item = object_of(value)
     # An object of JavaScript's may inherit from ours.
     known = _members(item) if isinstance(item, QtCore.QObject) else []
-    called = getattr(item, "CALLED", "the object")
+    called = getattr(item, "CALLED", "object")
     return f"{called} has no member {name!r:.80}{similar(name, known)}"
 
 

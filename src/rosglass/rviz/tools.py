@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm.similar import similar
 from rosglass.errors import Error
 from rosglass.qt import QtCore, Signal
+from rosglass.rviz.display_classes import QML_CLASS, REFERENCE_QML_CLASS
 from rosglass.rviz.host import pyqt
-from rosglass.rviz.plugins import TOOL, declared, require_class_id
+from rosglass.rviz.plugins import DISPLAY, TOOL, declared, require_class_id
 from rosglass.rviz.watch import Hook, address, type_name
 
 if TYPE_CHECKING:
@@ -235,5 +236,10 @@ def failure(handle: Any, class_id: str, base: str) -> str:
     known = declared(base)
     if class_id in known:
         return f"{class_id} could not be loaded; RViz's log says why"
+    for other, what in ((DISPLAY, "a display: use addDisplay"), (TOOL, "a tool: use addTool")):
+        if other != base and class_id in declared(other):
+            return f"{class_id} is {what}"
+    if class_id in (QML_CLASS, REFERENCE_QML_CLASS):
+        return f"{class_id} is an overlay: the menu Overlays, --overlay and app.add_qml() add them"
     hint = similar(class_id, known) or f"; there are: {', '.join(known)}"
     return f"no package has the class {class_id}{hint}"

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 from rosglass.errors import Error
 from rosglass.qt import Property, QJSValue, QtCore, QtGui, Signal, is_alive
 from rosglass.rviz.camera import Camera
-from rosglass.rviz.face import given, place
+from rosglass.rviz.face import VARIANT, given, place
+from rosglass.rviz.shown import shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -38,7 +39,7 @@ class Tracker(QtCore.QObject):
     """
 
     #: What errors call it.
-    CALLED = "a position tracker"
+    CALLED = "tracker"
 
     #: It is seen elsewhere now.
     positionChanged = Signal(QtGui.QVector3D, arguments=["position"])
@@ -71,7 +72,7 @@ class Tracker(QtCore.QObject):
         try:
             at = self._owner.seen(self._point, self._frame, self._scale())
         except Error as error:
-            problem = f"frame {self._frame}: {error}"
+            problem = str(error)
         if _differ(at, self._position):
             self._position = at
             self.positionChanged.emit(QtGui.QVector3D(*at))
@@ -98,7 +99,7 @@ class Tracker(QtCore.QObject):
             Error: It is no name.
         """
         if not isinstance(frame, str) or len(frame) > 1000:
-            raise Error(f"expected the name of a frame, got {frame!r:.80}")
+            raise Error(f"expected the name of a frame, e.g. 'base_link', got {shown(frame)}")
         if frame != self._frame:
             self._frame = frame
             self.frameChanged.emit()
@@ -108,9 +109,9 @@ class Tracker(QtCore.QObject):
         with _answering(self._runtime, "tracker.point"):
             self.move(given(point) if isinstance(point, QJSValue) else point)
 
-    def _set_frame(self, frame: str) -> None:
+    def _set_frame(self, frame: Any) -> None:
         with _answering(self._runtime, "tracker.frame"):
-            self.use_frame(frame)
+            self.use_frame(given(frame) if isinstance(frame, QJSValue) else frame)
 
     def _get_point(self) -> QJSValue | tuple[float, float, float]:
         if self._runtime is None:
@@ -120,7 +121,7 @@ class Tracker(QtCore.QObject):
     #: x, y and z in metres, of `frame`; may be changed.
     point = Property(QJSValue, _get_point, _set_point, notify=pointChanged)
     #: A frame of the robot that the point moves with; empty for RViz's fixed frame.
-    frame = Property(str, lambda self: self._frame, _set_frame, notify=frameChanged)
+    frame = Property(VARIANT, lambda self: self._frame, _set_frame, notify=frameChanged)
     #: x and y in units of the overlay, z the distance from the camera in metres; all NaN while it
     #: is behind the camera.
     position = Property(

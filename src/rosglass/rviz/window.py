@@ -137,6 +137,9 @@ class Window(QtCore.QObject):
             Error: There is no such folder, or writing failed.
         """
         file = str(Path(config).absolute() if config else self._config)
+        folder = Path(file).parent
+        if not folder.is_dir():
+            raise Error(f"{file}: RViz could not save its config: there is no folder {folder}")
         with self.bare.lifted():
             saved = self.frame.saveDisplayConfig(file)
         if not saved:
