@@ -237,6 +237,36 @@ def view(app: Any) -> Callable[[str], float]:
 
 
 @pytest.fixture
+def steered(app: Any, wait: Callable[..., None]) -> Iterator[Any]:
+    """The camera as we move it, at (4, 0, 3), within 0.2 s; and a node of ours."""
+    app.connect()
+    view = app.view
+    view.reset()
+    view.settings.load({"Animation Duration": 0.2})
+    wait(lambda: app.view_services.is_open)
+    yield view
+    view.settings.by_program.clear()
+    view.settings.load({})
+    view.reset()
+    app.window.manager.setFixedFrame("map")
+    wait(50)
+
+
+@pytest.fixture
+def eye(app: Any) -> Callable[[], tuple[float, float, float]]:
+    """Return where Ogre's camera is once RViz has drawn."""
+    from rosglass.rviz.camera import Camera
+
+    made = Camera(app.window)
+
+    def where() -> tuple[float, float, float]:
+        made.update()
+        return made.eye
+
+    return where
+
+
+@pytest.fixture
 def show(app: Any, wait: Callable[..., None], tmp_path: Path) -> Callable[..., Any]:
     """Show QML text over the 3D view; returns its root."""
 
@@ -250,6 +280,102 @@ def show(app: Any, wait: Callable[..., None], tmp_path: Path) -> Callable[..., A
         return overlay._root
 
     return show
+
+
+class Panel:
+    """RViz's Displays panel; places in it are names, each below the one before."""
+
+    def __init__(self, app: Any) -> None:
+        self.app = app
+
+    @property
+    def tree(self) -> Any:
+        """The view, which is another one after each config."""
+        from rosglass.rviz.host import pyqt
+
+        views = self.app.window.frame.findChildren(pyqt("QtWidgets").QTreeView)
+        return next(v for v in views if v.model().index(0, 0).data() == "Global Options")
+
+    @property
+    def model(self) -> Any:
+        return self.tree.model()
+
+    def rows(self, *path: str) -> Any:
+        """Return the index of the name of what is at a place."""
+        from rosglass.rviz.host import pyqt
+
+        model, at = self.model, pyqt().QModelIndex()
+        for name in path:
+            found = [model.index(row, 0, at) for row in range(model.rowCount(at))]
+            at = next(one for one in found if one.data() == name)
+        return at
+
+    def texts(self, *path: str) -> dict[str, Any]:
+        """Return names and values below a place, as they are shown."""
+        model, at = self.model, self.rows(*path)
+        return {
+            model.index(row, 0, at).data(): model.index(row, 1, at).data()
+            for row in range(model.rowCount(at))
+        }
+
+    def edit(self, value: Any, *path: str) -> None:
+        self.model.setData(self.rows(*path).siblingAtColumn(1), value)
+
+    def check(self, on: bool, *path: str) -> None:
+        from rosglass.rviz.host import pyqt
+
+        core, at = pyqt().Qt, self.rows(*path).siblingAtColumn(1)
+        assert self.model.setData(at, core.Checked if on else core.Unchecked, core.CheckStateRole)
+
+    def select(self, *path: str) -> None:
+        from rosglass.rviz.host import pyqt
+
+        # RViz's panel asks for the current one, and crashes without.
+        flags = pyqt().QItemSelectionModel
+        chosen = flags.ClearAndSelect | flags.Rows
+        self.tree.selectionModel().setCurrentIndex(self.rows(*path), chosen)
+
+    def click(self, name: str) -> None:
+        """Click a button below the tree."""
+        from rosglass.rviz.host import pyqt
+
+        kind = pyqt("QtWidgets").QPushButton
+        above = self.tree.parent()
+        while not above.findChildren(kind):
+            above = above.parent()
+        next(b for b in above.findChildren(kind) if b.text() == name).click()
+
+    def drag(self, path: tuple[str, ...], row: int, into: tuple[str, ...] = ()) -> None:
+        """Drop what is at a place before a row of another, as the view does it."""
+        from rosglass.rviz.host import pyqt
+
+        data = self.model.mimeData([self.rows(*path)])
+        assert self.model.dropMimeData(data, pyqt().Qt.MoveAction, row, 0, self.rows(*into))
+
+
+@pytest.fixture
+def panel(app: Any) -> Panel:
+    return Panel(app)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    """The file of the interface that `show_file` shows."""
+    return tmp_path / "Ui.qml"
+
+
+@pytest.fixture
+def show_file(request: pytest.FixtureRequest, app: Any, file: Path) -> Callable[..., Any]:
+    """Show QML text over the 3D view, after the test module's own imports; returns the overlay.
+
+    Errors tell the line, so the imports are each module's own.
+    """
+
+    def show_file(text: str, **options: Any) -> Any:
+        file.write_text(request.module.IMPORTS + text)
+        return app.add_qml(file, **options)
+
+    return show_file
 
 
 @pytest.fixture(autouse=True)

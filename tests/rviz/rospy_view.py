@@ -20,13 +20,14 @@ told_lock = threading.Lock()
 transforms = {}
 
 
-def do_call(service, type, request):
+def do_call(service, type, request, times=1):
     kind = getattr(hector_rviz_plugins.srv, type)
     made = kind._request_class()
     genpy.message.fill_message_args(made, [request])
     rospy.wait_for_service(service, 20)
     try:
-        rospy.ServiceProxy(service, kind)(made)
+        for _ in range(times):
+            rospy.ServiceProxy(service, kind)(made)
     except rospy.ServiceException as error:
         return f"{error}"
     return "done"
@@ -58,8 +59,8 @@ def do_tf(parent, child, translation, rotation):
     transforms[parent].publish(TFMessage([made]))
 
 
-def do_md5(type):
-    return getattr(hector_rviz_plugins.srv, type)._md5sum
+def do_md5(kind, type):
+    return getattr(getattr(hector_rviz_plugins, kind), type)._md5sum
 
 
 rospy.init_node("robot", disable_signals=True)

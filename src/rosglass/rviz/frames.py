@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rosglass.comm.similar import similar
 from rosglass.errors import Error, LookupException, TransformException
 from rosglass.qml.tf_link import TfLink
 from rosglass.qt import QtCore, Signal
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
 __all__ = ["FIXED_FRAME", "Frames"]
 
+#: How many frames a message names.
+_NAMED = 8
 #: How RViz's properties name the fixed frame.
 FIXED_FRAME = "<Fixed Frame>"
 
@@ -66,14 +69,31 @@ class Frames(QtCore.QObject):
         if frame in ("", FIXED_FRAME, fixed):
             return Transform(frame_id=fixed, child_frame_id=fixed)
         if self._link is None:
-            raise LookupException(f"{frame}: no transforms yet, there is no connection to a robot")
+            raise LookupException(
+                f"the frame {frame!r} is not known yet: there is no connection to the robot"
+            )
         if self._link.problem:
-            raise Error(f"{frame}: {self._link.problem}")
+            raise Error(f"the frame {frame!r} is not known: {self._link.problem}")
         try:
             return self._link.buffer.lookup_transform(fixed, frame, time)
         except TransformException as error:
-            # What is wrong may be the fixed frame: who asked has named only the other one.
-            raise type(error)(f"{frame} in {fixed}: {error}") from None
+            raise type(error)(self._explain(frame, fixed, error)) from None
+
+    def _explain(self, frame: str, fixed: str, error: TransformException) -> str:
+        """Return what is wrong; it may be the fixed frame, which who asked has not named."""
+        known = [] if self._link is None else sorted(self._link.buffer.tree())
+        if not fixed:
+            return f"RViz has no fixed frame, in which {frame!r} could be placed; choose one"
+        if not known:
+            return f"there is no frame {frame!r}: nothing is received on /tf and /tf_static"
+        there = f"there are {', '.join(known[:_NAMED])}" + (", ..." if known[_NAMED:] else "")
+        if frame not in known:
+            return f"there is no frame {frame!r}{similar(frame, known) or f'; {there}'}"
+        if fixed not in known:
+            return (
+                f"{frame!r} has no place, as RViz's fixed frame {fixed!r} does not exist; {there}"
+            )
+        return f"the frame {frame!r} cannot be placed in RViz's fixed frame {fixed!r}: {error}"
 
     def close(self) -> None:
         """Let the transforms go; safe to call twice."""

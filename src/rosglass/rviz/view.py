@@ -388,7 +388,7 @@ class View(QtCore.QObject):
         if problem != self._problem:
             self._problem = problem
             if problem:
-                _log.warning("the camera cannot follow %s", problem)
+                _log.warning("the camera cannot follow %s: %s", self._tracked, problem)
             self.problem_changed.emit(problem)
 
     def _in_fixed(self, place: Sequence[float], frame: str) -> Point:
