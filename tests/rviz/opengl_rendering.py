@@ -29,6 +29,17 @@ def test_shaders_are_drawn(show: Any, grab: Any) -> None:
     assert colour(grab(), 170, 230) == (0, 255, 0)
 
 
+def test_layers_are_drawn_without_holes_below_them(show: Any, grab: Any) -> None:
+    show(
+        """Rectangle { width: 300; height: 300; color: "#0080ff"
+        Item { x: 40; y: 40; width: 60; height: 60; layer.enabled: true; opacity: 0.5
+            Rectangle { width: 30; height: 60; color: "#0080ff" } }
+        }"""
+    )
+    picture = grab()
+    assert colour(picture, 55, 70) == colour(picture, 85, 70) == (0, 128, 255)
+
+
 def test_camera_pictures_are_drawn(app: Any, show: Any, grab: Any, wait: Any, master: str) -> None:
     import rosglass
 

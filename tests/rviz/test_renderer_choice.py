@@ -59,7 +59,7 @@ def chosen(screen: str, master: str, tmp_path: Path) -> Callable[..., str]:
         )
         assert done.returncode == 0, done.stdout
         assert picture.exists()
-        said = [line for line in done.stdout.splitlines() if "drawn" in line]
+        said = [line for line in done.stdout.splitlines() if " drawn" in line]
         assert sum("INFO" in line for line in said) == 1
         return "\n".join(said)
 
@@ -168,7 +168,10 @@ def test_a_graphics_card_is_used(monkeypatch: pytest.MonkeyPatch, app: Any) -> N
         ("Item { Button { } }", "import Our.Looks 1.0", ""),
         ("Item { Button { } ComboBox { } }", "import QtQuick.Controls 2.15", ""),
         ("Item { // ShaderEffect { }\n/* VideoOutput { */ }", "", ""),
-        ("Item { ShaderEffectSource { } Image { layer.enabled: true } }", "", ""),
+        ("Item { Image { layer.enabled: true } }", "", ":3: layer.enabled"),
+        ("Item { layer { enabled: true } }", "", ":3: layer"),
+        ("Item { ShaderEffectSource { } }", "", ":3: ShaderEffectSource"),
+        ("Item { property int layer: 3 }", "", ""),
         ('Item { Text { text: "http://a/b" } }', "", ""),
     ],
 )

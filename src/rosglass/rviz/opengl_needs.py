@@ -13,10 +13,11 @@ if TYPE_CHECKING:
 
 __all__ = ["need_in_file", "need_in_items"]
 
-#: Qt's classes (Qt 5.15, "Qt Quick Software Adaptation", and what draws by OpenGL itself), and what
-#: they are in QML.
+#: Qt's classes, and what they are in QML: those of Qt 5.15's "Qt Quick Software Adaptation", those
+#: that draw by OpenGL themselves, and layers, which leave holes in what is below them.
 _CLASSES = {
     "QQuickShaderEffect": "ShaderEffect",
+    "QQuickShaderEffectSource": "layer|ShaderEffectSource",
     "QQuickParticlePainter": "QtQuick.Particles",
     "QDeclarativeVideoOutput": "VideoOutput",
     "QQuick3DViewport": "View3D",
@@ -24,7 +25,8 @@ _CLASSES = {
     "QQuickFramebufferObject": "QQuickFramebufferObject",
 }
 _WRITTEN = re.compile(
-    r"\b(ShaderEffect|VideoOutput|View3D|WebEngineView)\s*\{"
+    r"\b(ShaderEffect|ShaderEffectSource|VideoOutput|View3D|WebEngineView|layer)\s*\{"
+    r"|\b(layer\.enabled)\b"
     r"|^[ \t]*import\s+(QtGraphicalEffects|QtQuick\.Particles|QtQuick3D|QtWebEngine)\b",
     re.MULTILINE,
 )
@@ -47,7 +49,7 @@ def need_in_items(root: Any, file: Path) -> str:
         item = items.pop()
         for name, written in _CLASSES.items():
             if item.inherits(name):
-                return f"{_place(item, written, file)}: {written}"
+                return f"{_place(item, written, file)}: {written.replace('|', ' or ')}"
         items += item.childItems()
     return ""
 
@@ -117,7 +119,7 @@ def _place(item: Any, written: str, file: Path) -> str:
         # What JavaScript makes of a text claims to be of a file `inline`.
         if path.is_relative_to(file.parent) and path.is_file():
             text = _read(path)
-            found = re.search(rf"\b{written}\b", text)
+            found = re.search(rf"\b({written})\b", text)
             return str(path) if found is None else f"{path}:{_line(text, found.start())}"
         item = item.parentItem()
     return str(file)

@@ -133,7 +133,7 @@ class RendererChoice:
     def tell_missing(self, need: str) -> str:
         """Return what to say of an interface that needs OpenGL, and does not get it."""
         return (
-            f"{need} is not drawn: all overlays are drawn by Qt's software renderer here "
+            f"{need} is not drawn, or wrongly: Qt's software renderer draws all overlays here "
             f"({self.reason}); start with --renderer opengl, or Application(renderer='opengl')"
         )
 
