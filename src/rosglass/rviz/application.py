@@ -364,7 +364,7 @@ class Application:
             self._problem = QtWidgets.QLabel()
             self._problem.setStyleSheet("color: white; background: #a02020; padding: 2px")
             self.window.widget.statusBar().insertWidget(0, self._problem)
-        self._problem.setText("Restart RViz" if self.master.replaced else "No ROS master")
+        self._problem.setText(self.master.advice)
         self._problem.setToolTip(problem)
         self._problem.setVisible(bool(problem))
         self.window.bare.warn(bool(problem))

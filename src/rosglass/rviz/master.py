@@ -152,6 +152,15 @@ class MasterWatch(QtCore.QObject):
         """What is wrong with the master; empty when it is all right."""
         return self._problem
 
+    @property
+    def advice(self) -> str:
+        """What the operator is to do, in a line; empty when there is nothing wrong."""
+        if not self._problem:
+            return ""
+        if self.replaced:
+            return "The ROS master was started anew: restart RViz, its displays get nothing new"
+        return "No answer from the ROS master: mend the network, or start roscore and RViz anew"
+
     def close(self) -> None:
         """Watch no more."""
         self._asker.close()

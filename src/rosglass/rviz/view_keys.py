@@ -92,9 +92,10 @@ class ViewKeys(QtCore.QObject):
         if key not in _ARROWS:
             return False
         if not pressed:
+            ours = key in self._held
             if not event.isAutoRepeat():
                 self._held.discard(key)
-            return True
+            return ours
         if event.modifiers() & ~(_Qt.ShiftModifier | _Qt.KeypadModifier):
             return False
         self._twice = bool(event.modifiers() & _Qt.ShiftModifier)

@@ -1,0 +1,105 @@
+"""The camera's topics and services, and what RViz says, when the ROS master is started anew."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import time
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from rosglass.errors import ConnectionLostError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+PATIENCE = 40.0
+SERVICE = "/rviz/hector_view_controller/set_view_mode"
+
+
+@pytest.fixture
+def address(tmp_path: Path) -> Iterator[tuple[str, Any]]:
+    """Address of a master of the test's own, and what starts it, after its end as well."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    home = str(tmp_path / "ros")
+    running: list[subprocess.Popen[bytes]] = []
+
+    def start() -> None:
+        for server in running:
+            server.kill()
+            server.wait()
+        env = {"PATH": "/usr/bin:/bin", "HOME": home, "ROS_HOME": home, "ROS_IP": "127.0.0.1"}
+        command = ["/usr/bin/rosmaster", "--core", "-p", str(port)]
+        null = subprocess.DEVNULL
+        running.append(subprocess.Popen(command, env=env, stdout=null, stderr=null))
+
+    start()
+    yield f"127.0.0.1:{port}", start
+    running[-1].kill()
+    running[-1].wait()
+
+
+@pytest.fixture
+def rviz(screen: str, address: tuple[str, Any], tmp_path: Path) -> Iterator[Any]:
+    home = tmp_path / "home"
+    home.mkdir(mode=0o700)
+    env = {
+        "PATH": os.environ["PATH"],
+        "HOME": str(home),
+        "XDG_RUNTIME_DIR": str(home),
+        "DISPLAY": screen,
+        "ROS_IP": "127.0.0.1",
+    }
+    command = [sys.executable, "-m", "rosglass.cli", "rviz", "--name", "rviz"]
+    with (tmp_path / "log").open("w") as log:
+        process = subprocess.Popen(
+            [*command, "--url", f"ros1://{address[0]}"], env=env, stdout=log, stderr=log
+        )
+    yield process
+    process.kill()
+    process.wait()
+
+
+def test_the_services_come_back_without_a_restart(rviz: Any, address: tuple[str, Any]) -> None:
+    import rosglass
+
+    url, start = address
+    for mode in (1, 0):
+        with rosglass.connect(f"ros1://{url}", "robot") as robot:
+            client = robot.create_service_client(SERVICE, "hector_rviz_plugins/srv/SetViewMode")
+            assert client.wait_for_server(PATIENCE)
+            client.call({"mode": {"mode": mode}}, timeout=PATIENCE)
+            heard: list[int] = []
+            robot.create_subscription(
+                "/rviz/hector_view_controller/view_mode",
+                "hector_rviz_plugins/msg/ViewMode",
+                lambda message, heard=heard: heard.append(message.mode),
+            )
+            end = time.monotonic() + PATIENCE
+            while mode not in heard and time.monotonic() < end:
+                time.sleep(0.05)
+            assert heard[-1] == mode
+        start()
+    assert rviz.poll() is None
+
+
+def test_rviz_says_what_to_do(app: Any, wait: Any) -> None:
+    watch = app.master
+    wait(lambda: watch._number != -1)
+    usual = watch._number
+    watch._on_answer(ConnectionLostError("http://robot:11311 does not answer"))
+    assert app._problem.text() == watch.advice
+    assert "start roscore and RViz anew" in watch.advice
+    assert "does not answer" in app._problem.toolTip()
+    watch._on_answer(usual + 1)
+    assert "restart RViz" in app._problem.text()
+    assert app._problem.isVisible()
+    watch._on_answer(usual)
+    assert watch.advice == ""
+    assert not app._problem.isVisible()
