@@ -12,15 +12,10 @@ from rosglass.qt import QT6, QtCore, QtQuick, is_alive, optional
 if TYPE_CHECKING:
     from rosglass.qml.image_rendering import Picture
 
-__all__ = ["SURFACE_TYPE", "Sink"]
+__all__ = ["Sink"]
 
 #: Pixels to which the size of an item is rounded up: resizing it changes little.
 _STEP = 8
-#: What Qt 5's VideoOutput looks for in a property called ``videoSurface``. PySide 6 takes no other
-#: type than QObject for a video sink. Qt 6 loads its QtMultimedia only when a camera is shown.
-SURFACE_TYPE: Any = QtCore.QObject
-if not QT6 and (_multimedia := optional("QtMultimedia")) is not None:
-    SURFACE_TYPE = _multimedia.QAbstractVideoSurface
 
 
 class Sink:

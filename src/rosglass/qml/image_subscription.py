@@ -10,7 +10,7 @@ from rosglass.errors import Error
 from rosglass.qml.callbacks import Deferred
 from rosglass.qml.element import DEFAULT_TIMEOUT, changed_enough
 from rosglass.qml.image_look import LookElement
-from rosglass.qml.image_sinks import SURFACE_TYPE, Sink
+from rosglass.qml.image_sinks import Sink
 from rosglass.qml.log import plain_path
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive, optional
 
@@ -156,7 +156,8 @@ class ImageTransportSubscription(LookElement):
     enabled = Property(bool, lambda self: self._enabled, _set_enabled, notify=enabledChanged)
     timeout = Property(int, lambda self: self._timeout, _set_timeout, notify=timeoutChanged)
     videoSink = Property(QtCore.QObject, _get_sink, _set_sink, notify=videoSinkChanged)
-    videoSurface = Property(SURFACE_TYPE, _get_sink, _set_sink, notify=videoSinkChanged)
+    #: What Qt 5's VideoOutput looks for.
+    videoSurface = Property(QtCore.QObject, _get_sink, _set_sink, notify=videoSinkChanged)
 
     # Properties that QML reads.
 

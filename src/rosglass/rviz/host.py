@@ -6,8 +6,12 @@ of one is wrapped anew for the other (reference: docs/architecture.md, section 6
 
 from __future__ import annotations
 
+import contextlib
 import importlib
+import importlib.util
+import sys
 from functools import cache
+from importlib.machinery import PathFinder
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rosglass.errors import UnsupportedError
@@ -15,11 +19,13 @@ from rosglass.qt import BINDING, QtCore
 from rosglass.rviz.requirements import PACKAGES, require_bindings
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from types import ModuleType
 
 __all__ = ["as_pyqt", "as_pyside", "ogre", "ogre_overlay", "pyqt", "require_rviz", "rviz"]
 
 _T = TypeVar("_T", bound=QtCore.QObject)
+_BINDINGS = "rviz.librviz_sip"
 
 
 def require_rviz() -> None:
@@ -40,8 +46,15 @@ def require_rviz() -> None:
 
 
 def _load(name: str) -> ModuleType:
-    try:
+    with _telling(name):
         return importlib.import_module(name)
+
+
+@contextlib.contextmanager
+def _telling(name: str) -> Iterator[None]:
+    """Tell what to do where something cannot be loaded."""
+    try:
+        yield
     except ImportError as error:
         raise UnsupportedError(
             f"{name} is installed but cannot be loaded: {error}; install anew what it comes with: "
@@ -52,7 +65,17 @@ def _load(name: str) -> ModuleType:
 @cache
 def rviz() -> Any:
     """Return RViz's bindings (``rviz.bindings``)."""
-    return _load("rviz").bindings
+    # The package itself would load each module that PyQt5 has.
+    package = importlib.util.find_spec("rviz")
+    places = (package and package.submodule_search_locations) or ()
+    found = PathFinder.find_spec(_BINDINGS, list(places))
+    if found is None or found.loader is None or _BINDINGS in sys.modules:
+        return _load("rviz").bindings
+    with _telling("rviz"):
+        made = importlib.util.module_from_spec(found)
+        sys.modules[_BINDINGS] = made
+        found.loader.exec_module(made)
+    return made.rviz
 
 
 @cache

@@ -31,7 +31,8 @@ def quiet(otherwise: Any = None) -> Callable[[Any], Any]:
     """Make a function that C++ calls log what it raises, and return something else instead."""
 
     def decorate(function: Any) -> Any:
-        @wraps(function)
+        # To make the help text of one of its functions, PySide2 loads whatever it knows.
+        @wraps(function, assigned=("__name__", "__qualname__"))
         def call(*arguments: Any) -> Any:
             try:
                 return function(*arguments)
