@@ -200,7 +200,7 @@ def test_status_says_where_robots_reach_the_camera(
 def test_wrong_settings_say_what_is_right(settings: Any) -> None:
     wrong = {
         "animation_duration": (-1, "Animation Duration: expected a number from 0 to 60, got -1"),
-        "tracking_gain": (float("nan"), "Tracking Gain: expected a number from 0 to 1000, got nan"),
+        "tracking_gain": (float("nan"), "Tracking Gain: expected a number from 0 to 1000, got NaN"),
         "speed": ("fast", "Movement Speed: expected a number from 0 to 1000, got 'fast'"),
         "keys": (1, "Keyboard Navigation: expected true or false, got 1"),
         "namespace": ("a b", "Namespace: name 'a b': ' ' at position 1; only letters, digits"),

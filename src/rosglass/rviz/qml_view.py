@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
 from rosglass.qt import Property, QJSValue, QtCore, QtGui, Signal, Slot
-from rosglass.rviz.face import Face, given, place, taking
+from rosglass.rviz.face import VARIANT, Face, given, place, taking, text_of
+from rosglass.rviz.shown import shown
 from rosglass.rviz.view import ViewMode
+from rosglass.rviz.view_settings import ViewSettings
 
 if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime
@@ -21,6 +23,7 @@ _LIST: Any = "QVariantList"
 
 #: Metres below which the camera counts as standing still.
 _STILL = 1e-4
+_FRAME = "the name of a frame, or '' for none"
 _MOVES = {
     "frame": str,
     "animate": bool,
@@ -54,29 +57,32 @@ class QmlView(Face):
         self._views.kind_changed.connect(self.typeChanged)
         self._views.saved_changed.connect(self.savedViewsChanged)
         settings = self._view.settings
-        kind = type(settings)
-        kind.animation_duration.of(settings).valueChanged.connect(self.animationDurationChanged)
-        kind.tracking_gain.of(settings).valueChanged.connect(self.trackingGainChanged)
+        for setting, changed in (
+            (ViewSettings.animation_duration, self.animationDurationChanged),
+            (ViewSettings.tracking_gain, self.trackingGainChanged),
+        ):
+            setting.of(settings).valueChanged.connect(changed)
         access.window.before_frame.connect(self._on_frame)
 
     def _set_mode(self, mode: QJSValue) -> None:
-        self.setMode(mode)
+        with self._telling("rviz.view.mode"):
+            self._view.set_mode(_mode(mode))
 
-    def _set_tracked(self, frame: str) -> None:
-        with self._telling("view.trackedFrame"):
-            self._view.track(frame)
+    def _set_tracked(self, frame: Any) -> None:
+        with self._telling("rviz.view.trackedFrame"):
+            self._view.track(text_of(frame, _FRAME))
 
-    def _set_duration(self, seconds: float) -> None:
-        with self._telling("view.animationDuration"):
-            self._view.settings.animation_duration = seconds
+    def _set_duration(self, seconds: Any) -> None:
+        with self._telling("rviz.view.animationDuration"):
+            ViewSettings.animation_duration.give(self._view.settings, _plain(seconds))
 
-    def _set_gain(self, gain: float) -> None:
-        with self._telling("view.trackingGain"):
-            self._view.settings.tracking_gain = gain
+    def _set_gain(self, gain: Any) -> None:
+        with self._telling("rviz.view.trackingGain"):
+            ViewSettings.tracking_gain.give(self._view.settings, _plain(gain))
 
-    def _set_type(self, kind: str) -> None:
-        with self._telling("view.type"):
-            self._views.kind = kind
+    def _set_type(self, kind: Any) -> None:
+        with self._telling("rviz.view.type"):
+            self._views.kind = text_of(kind, "a kind of view, e.g. 'rviz/Orbit'")
 
     #: 0 in 3D, 1 in 2D, seen from above.
     mode = Property(
@@ -86,7 +92,7 @@ class QmlView(Face):
     MODE_2D = Property(int, lambda _self: int(ViewMode.MODE_2D), constant=True)
     #: The frame that the camera follows; empty for none.
     trackedFrame = Property(
-        str, lambda self: self._view.tracked_frame, _set_tracked, notify=trackedFrameChanged
+        VARIANT, lambda self: self._view.tracked_frame, _set_tracked, notify=trackedFrameChanged
     )
     #: Why the tracked frame cannot be followed now; empty when it can.
     problem = Property(str, lambda self: self._view.problem, notify=problemChanged)
@@ -94,20 +100,20 @@ class QmlView(Face):
     focus = Property(QtGui.QVector3D, lambda self: QtGui.QVector3D(*self._view.focus), notify=moved)
     #: Seconds that a movement takes.
     animationDuration = Property(
-        float,
+        VARIANT,
         lambda self: self._view.settings.animation_duration,
         _set_duration,
         notify=animationDurationChanged,
     )
     #: How quickly the camera follows, in 1/s.
     trackingGain = Property(
-        float,
+        VARIANT,
         lambda self: self._view.settings.tracking_gain,
         _set_gain,
         notify=trackingGainChanged,
     )
     #: The kind of RViz's view, e.g. ``rviz/Orbit``.
-    type = Property(str, lambda self: self._views.kind, _set_type, notify=typeChanged)
+    type = Property(VARIANT, lambda self: self._views.kind, _set_type, notify=typeChanged)
     viewTypes = Property(_LIST, lambda self: self._views.kinds, constant=True)
     #: Names of the saved views.
     savedViews = Property(_LIST, lambda self: self._views.saved, notify=savedViewsChanged)
@@ -120,7 +126,7 @@ class QmlView(Face):
             eye: x, y and z.
             options: `frame`, `animate`, `stopTracking`, `switchTo3D`.
         """
-        with self._telling("view.moveEye"):
+        with self._telling("rviz.view.moveEye"):
             how = _options(options, _MOVES)
             self._view.move_eye(
                 place(given(eye), "eye"),
@@ -141,7 +147,7 @@ class QmlView(Face):
             focus: x, y and z.
             options: `frame`, `animate`, `stopTracking`.
         """
-        with self._telling("view.moveEyeAndFocus"):
+        with self._telling("rviz.view.moveEyeAndFocus"):
             how = _options(options, {key: _MOVES[key] for key in list(_MOVES)[:3]})
             self._view.move_eye_and_focus(
                 place(given(eye), "eye"),
@@ -154,46 +160,40 @@ class QmlView(Face):
     @taking(1, 2, None)
     def setMode(self, mode: QJSValue, animate: QJSValue | None = None) -> None:
         """Switch between 3D (0) and 2D (1); without animation where `animate` is false."""
-        with self._telling("view.setMode"):
-            wanted = given(mode)
-            if not isinstance(wanted, int):
-                raise Error(f"expected view.MODE_3D (0) or view.MODE_2D (1), got {wanted!r:.80}")
+        with self._telling("rviz.view.setMode"):
             how = given(animate)
             if how is not None and not isinstance(how, bool):
-                raise Error(f"animate: expected true or false, got {how!r:.80}")
-            self._view.set_mode(wanted, animate=how is not False)
+                raise Error(f"animate: expected true or false, got {shown(how)}")
+            self._view.set_mode(_mode(mode), animate=how is not False)
 
     @taking(1, 1, None)
     def track(self, frame: QJSValue) -> None:
         """Have the camera follow a frame, and turn with it; an empty name ends that."""
-        with self._telling("view.track"):
-            wanted = given(frame)
-            if not isinstance(wanted, str):
-                raise Error(f"expected the name of a frame, got {wanted!r:.80}")
-            self._view.track(wanted)
+        with self._telling("rviz.view.track"):
+            self._view.track(text_of(frame, _FRAME))
 
     @Slot()
     def reset(self) -> None:
         """Show the fixed frame's origin in 3D, as at first, and follow nothing."""
-        with self._telling("view.reset"):
+        with self._telling("rviz.view.reset"):
             self._view.reset()
 
     @taking(1, 1, None)
     def saveView(self, name: QJSValue) -> None:
         """Keep what is shown under a name, as the panel Views does."""
-        with self._telling("view.saveView"):
+        with self._telling("rviz.view.saveView"):
             self._views.save(given(name))
 
     @taking(1, 1, None)
     def showView(self, name: QJSValue) -> None:
         """Show a saved view; takes its name, or its place."""
-        with self._telling("view.showView"):
+        with self._telling("rviz.view.showView"):
             self._views.show(given(name))
 
     @taking(1, 1, None)
     def removeView(self, name: QJSValue) -> None:
         """Remove a saved view; takes its name, or its place."""
-        with self._telling("view.removeView"):
+        with self._telling("rviz.view.removeView"):
             self._views.remove(given(name))
 
     @Slot(str)
@@ -215,16 +215,27 @@ class QmlView(Face):
                 return
 
 
+def _plain(value: Any) -> Any:
+    return given(value) if isinstance(value, QJSValue) else value
+
+
+def _mode(value: QJSValue) -> int:
+    wanted = given(value)
+    if isinstance(wanted, bool) or not isinstance(wanted, int):
+        raise Error(f"expected rviz.view.MODE_3D (0) or MODE_2D (1), got {shown(wanted)}")
+    return wanted
+
+
 def _options(given_options: QJSValue | None, known: dict[str, type]) -> dict[str, Any]:
     found = given(given_options)
     if found is None:
         return {}
     if not isinstance(found, dict):
-        raise Error(f"options: expected {{{', '.join(known)}}}, got {found!r:.80}")
+        raise Error(f"options: expected {{{', '.join(known)}}}, got {shown(found)}")
     for name, value in found.items():
         if name not in known:
-            raise Error(f"there is no option {name!r:.80}; there are {', '.join(known)}")
+            raise Error(f"there is no option {shown(name)}; there are {', '.join(known)}")
         if not isinstance(value, known[name]):
             wanted = "a text" if known[name] is str else "true or false"
-            raise Error(f"{name}: expected {wanted}, got {value!r:.80}")
+            raise Error(f"{name}: expected {wanted}, got {shown(value)}")
     return found

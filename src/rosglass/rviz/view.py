@@ -16,6 +16,7 @@ from rosglass.errors import Error
 from rosglass.qt import QtCore, Signal
 from rosglass.rviz.current_view import FLAT, ORBIT, CurrentView
 from rosglass.rviz.orbit import STEEPEST, Orbit, Place, Point, ease, shortest_turn
+from rosglass.rviz.shown import shown
 from rosglass.rviz.view_settings import ViewSettings
 
 if TYPE_CHECKING:
@@ -185,7 +186,9 @@ class View(QtCore.QObject):
         """
         start, end = self._in_fixed(eye, frame), self._in_fixed(focus, frame)
         if start == end:
-            raise Error(f"eye and focus are both at {tuple(start)}; the camera must look somewhere")
+            raise Error(
+                f"eye and focus are both at {shown(list(start))}; the camera must look somewhere"
+            )
         goal = Orbit.between(start, end, self._end_of_movement().yaw)
         self._hold(goal, stop_tracking)
         self._set_off(goal, animate, flat=False)
@@ -201,7 +204,7 @@ class View(QtCore.QObject):
             Error: There is no such mode.
         """
         if isinstance(mode, bool) or mode not in (0, 1):
-            raise Error(f"there is no view mode {mode!r}: expected 0 (3D) or 1 (2D)")
+            raise Error(f"there is no view mode {shown(mode)}: expected 0 (3D) or 1 (2D)")
         wanted = ViewMode(mode)
         if wanted is self.mode:
             return
@@ -221,7 +224,7 @@ class View(QtCore.QObject):
             Error: The frame is not known.
         """
         if not isinstance(frame, str):
-            raise Error(f"a frame is named by a text, not by {frame!r:.80}")
+            raise Error(f"a frame is named by a text, not by {shown(frame)}")
         if frame:
             self._frames.locate(frame)
         if frame == self._tracked:
@@ -395,16 +398,18 @@ class View(QtCore.QObject):
         try:
             x, y, z = (float(number) for number in place)
         except (TypeError, ValueError):
-            raise Error(f"expected x, y and z in metres, got {place!r:.80}") from None
+            raise Error(f"expected x, y and z in metres, got {shown(place)}") from None
         if not all(math.isfinite(number) for number in (x, y, z)):
-            raise Error(f"expected finite metres, got {(x, y, z)}")
+            raise Error(f"expected finite metres, got {shown([x, y, z])}")
         if not isinstance(frame, str):
-            raise Error(f"a frame is named by a text, not by {frame!r:.80}")
+            raise Error(f"a frame is named by a text, not by {shown(frame)}")
         point = Point(x, y, z)
         if frame:
             point = Point(*self._frames.locate(frame).apply_point(point))
         if max(abs(number) for number in point) > _FARTHEST:
-            raise Error(f"{(x, y, z)} is more than {_FARTHEST:g} m from the fixed frame's origin")
+            raise Error(
+                f"{shown([x, y, z])} is more than {_FARTHEST:g} m from the fixed frame's origin"
+            )
         return point
 
     def _place_of(self, frame: str) -> Place:

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
 from rosglass.errors import Error
 from rosglass.ros1.names import expand
 from rosglass.rviz.registered_properties import RegisteredProperties
+from rosglass.rviz.shown import shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rosglass.rviz.registered_properties import RegisteredProperty
+    from rosglass.rviz.registered_property import RegisteredProperty
 
 __all__ = ["ViewSettings"]
 
@@ -59,14 +60,24 @@ class _Setting(Generic[_T]):
 
     def __set__(self, settings: ViewSettings, value: _T) -> None:
         try:
+            self.give(settings, value)
+        except Error as error:
+            raise Error(f"{self.name}: {error}") from None
+
+    def give(self, settings: ViewSettings, value: object) -> None:
+        """Set it, for a program; the error does not name it.
+
+        Raises:
+            Error: It cannot be that.
+        """
+        try:
             read = self.of(settings).kind.read(value)
             self._check(read)
-        except Error as error:
-            wanted = str(error)
-            if "max" in self.options:
-                low, high = self.options["min"], self.options["max"]
-                wanted = f"expected a number from {low:g} to {high:g}, got {value!r:.80}"
-            raise Error(f"{self.name}: {wanted}") from None
+        except Error:
+            if "max" not in self.options:
+                raise
+            low, high = self.options["min"], self.options["max"]
+            raise Error(f"expected a number from {low:g} to {high:g}, got {shown(value)}") from None
         settings.by_program[self.name] = read
         self.of(settings).set(read)
 

@@ -8,6 +8,7 @@ from rosglass.comm.similar import similar
 from rosglass.errors import Error
 from rosglass.qt import QtCore, Signal
 from rosglass.rviz.plugins import VIEW, declared
+from rosglass.rviz.shown import shown
 from rosglass.rviz.watch import Hook
 
 if TYPE_CHECKING:
@@ -52,9 +53,10 @@ class Views(QtCore.QObject):
     def kind(self, kind: str) -> None:
         # RViz crashes at one that it does not know.
         if kind not in declared(VIEW):
-            hint = similar(kind, self.kinds) if isinstance(kind, str) else ""
-            there = ", ".join(self.kinds)
-            raise Error(f"there is no kind of view {kind!r:.80}{hint}; there are {there}")
+            raise Error(
+                f"there is no kind of view {shown(kind)}{self._hint(kind)}; "
+                f"there are {', '.join(self.kinds)}"
+            )
         if kind != self.kind:
             self._manager.setCurrentViewControllerType(kind)
         self.settle()
@@ -72,7 +74,7 @@ class Views(QtCore.QObject):
             Error: It is no name.
         """
         if not (isinstance(name, str) and name.strip() and name.isprintable()):
-            raise Error(f"expected a name for the view, a text of one line, got {name!r:.80}")
+            raise Error(f"expected a name for the view, a text of one line, got {shown(name)}")
         if len(name) > _LONGEST:
             raise Error(f"expected a name of at most {_LONGEST} characters")
         if name in self.saved:
@@ -111,14 +113,21 @@ class Views(QtCore.QObject):
         if saved != self._told[1]:
             self.saved_changed.emit()
 
+    def _hint(self, kind: object) -> str:
+        if not isinstance(kind, str) or not kind:
+            return ""
+        base = kind.lower().rpartition("/")[2]
+        like = [one for one in self.kinds if one.lower().endswith("/" + base)]
+        return f"; did you mean {like[0]}?" if like else similar(kind, self.kinds)
+
     def _index(self, name: Any) -> int:
         saved = self.saved
         if isinstance(name, str) and name in saved:
             return saved.index(name)
         if isinstance(name, int) and not isinstance(name, bool) and 0 <= name < len(saved):
             return name
-        there = f"there are {', '.join(saved)}" if saved else "none is saved yet"
-        raise Error(f"there is no saved view {name!r:.80}; {there}")
+        there = f"saved are {', '.join(map(repr, saved))}" if saved else "none is saved yet"
+        raise Error(f"there is no saved view {shown(name)}; {there}")
 
     def _on_change(self) -> None:
         if not self._scheduled:
