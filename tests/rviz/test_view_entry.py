@@ -197,6 +197,24 @@ def test_status_says_where_robots_reach_the_camera(
     wait(lambda: "/relative/move_eye" in node.services())
 
 
+def test_tracked_frame_and_mode_are_shown_and_set(
+    app: Any, settings: Any, steered: Any, wait: Callable[..., None], caplog: Any
+) -> None:
+    app.view_entry.shown = True
+    entry = displays(app)["View Controller"]
+    steered.set_mode(1, animate=False)
+    steered.track("map")
+    assert entry.subProp("2D Mode").getValue()
+    assert entry.subProp("Tracked Frame").getValue() == "map"
+    entry.subProp("2D Mode").setValue(False)
+    wait(lambda: steered.mode == 0 and not steered.is_moving)
+    entry.subProp("Tracked Frame").setValue("nowhere")
+    assert "Tracked Frame: there is no frame 'nowhere'" in caplog.text
+    assert entry.subProp("Tracked Frame").getValue() == steered.tracked_frame == "map"
+    entry.subProp("Tracked Frame").setValue("")
+    assert steered.tracked_frame == ""
+
+
 def test_wrong_settings_say_what_is_right(settings: Any) -> None:
     wrong = {
         "animation_duration": (-1, "Animation Duration: expected a number from 0 to 60, got -1"),

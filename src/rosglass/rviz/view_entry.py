@@ -6,11 +6,14 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+from rosglass.errors import Error
 from rosglass.qt import QtCore, Slot
 from rosglass.rviz.display import display_class, tell_status
 from rosglass.rviz.host import pyqt
 from rosglass.rviz.properties import PropertyTree, given_to_rviz, quiet, take_out
+from rosglass.rviz.registered_properties import RegisteredProperties
 from rosglass.rviz.saved_values import plain_config
+from rosglass.rviz.view import ViewMode
 
 if TYPE_CHECKING:
     from rosglass.rviz.entries import Entries
@@ -48,7 +51,7 @@ def _class() -> Any:
 class _Entry:
     """One entry; a second one, as when it was duplicated, shows the same settings."""
 
-    def __init__(self, view: View, entries: Entries) -> None:
+    def __init__(self, view: View, now: RegisteredProperties, entries: Entries) -> None:
         self._settings = view.settings
         #: RViz's display.
         self.display: Any = given_to_rviz(_class()())
@@ -60,7 +63,10 @@ class _Entry:
             "How the camera is moved by keys, by interfaces and by robots. "
             "Without this entry, it is as at first."
         )
-        self._tree = PropertyTree(view.settings.properties, self.display, entries.sources)
+        self._trees = [
+            PropertyTree(owner, self.display, entries.sources)
+            for owner in (now, view.settings.properties)
+        ]
 
     @property
     def alive(self) -> bool:
@@ -78,7 +84,8 @@ class _Entry:
 
     def close(self) -> None:
         """Follow the settings no longer."""
-        self._tree.close()
+        for tree in self._trees:
+            tree.close()
 
 
 class ViewEntry(QtCore.QObject):
@@ -101,6 +108,14 @@ class ViewEntry(QtCore.QObject):
         self._window, self._entries, self._view, self._services = window, entries, view, services
         self._shown: list[_Entry] = []
         self._loading = self._loaded = False
+        #: What no file keeps.
+        self._now = RegisteredProperties()
+        about = "What the camera follows and turns with; empty for nothing."
+        self._frame = self._now.register("frame", "Tracked Frame", description=about)
+        about = "Whether it is seen straight from above, without perspective."
+        self._flat = self._now.register("bool", "2D Mode", description=about)
+        self._frame.valueChanged.connect(self._track)
+        self._flat.valueChanged.connect(self._flatten)
         menu = window.menu("&Overlays")
         self._action = menu.addAction("&View controller")
         self._action.setCheckable(True)
@@ -116,6 +131,7 @@ class ViewEntry(QtCore.QObject):
         services.opened.connect(self._tell)
         view.problem_changed.connect(self._tell)
         view.tracked_frame_changed.connect(self._tell)
+        view.mode_changed.connect(self._tell)
         entries.welcome(VIEW_CLASS, self._make)
 
     @property
@@ -140,7 +156,7 @@ class ViewEntry(QtCore.QObject):
             take_out(entry.display)
 
     def _make(self) -> _Entry:
-        entry = _Entry(self._view, self._entries)
+        entry = _Entry(self._view, self._now, self._entries)
         self._shown.append(entry)
         self._action.setChecked(True)
         self._tell()
@@ -156,7 +172,7 @@ class ViewEntry(QtCore.QObject):
         for entry in gone:
             self._shown.remove(entry)
             entry.close()
-        if gone:
+        if gone and not self._loading:
             self._settle()
 
     @Slot()
@@ -177,9 +193,21 @@ class ViewEntry(QtCore.QObject):
             self._action.setChecked(False)
             self._view.settings.load({})
 
+    def _track(self, frame: str) -> None:
+        try:
+            self._view.track(frame)
+        except Error as error:
+            self._entries.sources.complain(f"Tracked Frame: {error}")
+            self._frame.set(self._view.tracked_frame)
+
+    def _flatten(self, flat: bool) -> None:
+        self._view.set_mode(ViewMode.MODE_2D if flat else ViewMode.MODE_3D)
+
     @Slot()
     def _tell(self, *_: Any) -> None:
         services, view = self._services, self._view
+        self._frame.set(view.tracked_frame)
+        self._flat.set(view.mode is ViewMode.MODE_2D)
         where = services.namespace if services.is_open else "not connected, or switched off"
         follows = view.tracked_frame or "nothing is followed"
         for entry in self._shown:
