@@ -39,60 +39,9 @@ def entries(app: Any, wait: Callable[..., None]) -> Iterator[Any]:
     wait(50)
 
 
-def tree(app: Any) -> Any:
-    """Return the tree of the Displays panel, which is another one after each config."""
-    from rosglass.rviz.host import pyqt
-
-    views = app.window.frame.findChildren(pyqt("QtWidgets").QTreeView)
-    return next(v for v in views if v.model().index(0, 0).data() == "Global Options")
-
-
-@pytest.fixture
-def panel(app: Any) -> Any:
-    return tree(app)
-
-
-def rows(model: Any, *path: str) -> Any:
-    """Return the index of the name of what is at a path."""
-    from rosglass.rviz.host import pyqt
-
-    at = pyqt().QModelIndex()
-    for name in path:
-        found = [model.index(row, 0, at) for row in range(model.rowCount(at))]
-        at = next(one for one in found if one.data() == name)
-    return at
-
-
-def texts(model: Any, *path: str) -> dict[str, Any]:
-    """Return names and values below a path, as they are shown."""
-    at = rows(model, *path)
-    return {
-        model.index(row, 0, at).data(): model.index(row, 1, at).data()
-        for row in range(model.rowCount(at))
-    }
-
-
 def only(entries: Any) -> Any:
     (entry,) = list(entries)
     return entry
-
-
-def click_button(panel: Any, name: str) -> None:
-    from rosglass.rviz.host import pyqt
-
-    above = panel.parent()
-    while not above.findChildren(pyqt("QtWidgets").QPushButton):
-        above = above.parent()
-    buttons = above.findChildren(pyqt("QtWidgets").QPushButton)
-    next(b for b in buttons if b.text() == name).click()
-
-
-def select(panel: Any, index: Any) -> None:
-    from rosglass.rviz.host import pyqt
-
-    # RViz's panel asks for the current one, and crashes without.
-    flags = pyqt().QItemSelectionModel
-    panel.selectionModel().setCurrentIndex(index, flags.ClearAndSelect | flags.Rows)
 
 
 def test_an_overlay_has_an_entry(
@@ -100,15 +49,14 @@ def test_an_overlay_has_an_entry(
 ) -> None:
     app.add_qml(file, z=3, scale=1.5, opacity=0.5)
     wait(lambda: len(list(entries)) == 1)
-    model = panel.model()
-    shown = texts(model, "Dashboard")
+    shown = panel.texts("Dashboard")
     assert shown["Path"] == str(file)
     assert (shown["Z-Index"], shown["Scale"], shown["Opacity"]) == (3, 1.5, 0.5)
-    assert texts(model, "Dashboard", "Configuration") == {"Speed": 1.0}
+    assert panel.texts("Dashboard", "Configuration") == {"Speed": 1.0}
     status = next(name for name in shown if name.startswith("Status"))
     assert status == "Status: Ok"
-    assert texts(model, "Dashboard", status) == {"Overlay": "OK", "Qml": "OK"}
-    assert not rows(model, "Dashboard").data(1).isNull()
+    assert panel.texts("Dashboard", status) == {"Overlay": "OK", "Qml": "OK"}
+    assert not panel.rows("Dashboard").data(1).isNull()
 
 
 def test_the_check_box_shows_and_hides(
@@ -119,9 +67,8 @@ def test_the_check_box_shows_and_hides(
     overlay = app.add_qml(file)
     wait(lambda: len(list(entries)) == 1)
     assert grab().pixelColor(90, 60).getRgb()[:3] == BLUE
-    model = panel.model()
-    at = rows(model, "Dashboard").siblingAtColumn(1)
-    assert model.setData(at, pyqt().Qt.Unchecked, pyqt().Qt.CheckStateRole)
+    at = panel.rows("Dashboard").siblingAtColumn(1)
+    panel.check(False, "Dashboard")
     wait(lambda: not overlay.visible)
     assert grab().pixelColor(90, 60).getRgb()[:3] == GREY
     overlay.visible = True
@@ -134,40 +81,35 @@ def test_edits_in_the_panel_reach_the_overlay_and_back(
 ) -> None:
     overlay = app.add_qml(file)
     wait(lambda: len(list(entries)) == 1)
-    model = panel.model()
 
-    def edit(value: Any, *path: str) -> None:
-        model.setData(rows(model, "Dashboard", *path).siblingAtColumn(1), value)
-
-    edit(7, "Z-Index")
-    edit(2.5, "Scale")
-    edit(1.25, "Configuration", "Speed")
+    panel.edit(7, "Dashboard", "Z-Index")
+    panel.edit(2.5, "Dashboard", "Scale")
+    panel.edit(1.25, "Dashboard", "Configuration", "Speed")
     assert (overlay.z, overlay.scale) == (7, 2.5)
     assert overlay.root.property("speed").property("value") == 1.25
-    edit(99.0, "Scale")
-    edit(-1.0, "Configuration", "Speed")
+    panel.edit(99.0, "Dashboard", "Scale")
+    panel.edit(-1.0, "Dashboard", "Configuration", "Speed")
     assert overlay.scale == 2.5
-    assert texts(model, "Dashboard")["Scale"] == 2.5
-    assert texts(model, "Dashboard", "Configuration") == {"Speed": 1.25}
+    assert panel.texts("Dashboard")["Scale"] == 2.5
+    assert panel.texts("Dashboard", "Configuration") == {"Speed": 1.25}
     overlay.scale = 0.5
-    assert texts(model, "Dashboard")["Scale"] == 0.5
+    assert panel.texts("Dashboard")["Scale"] == 0.5
 
 
 def test_errors_are_told_as_status(
     app: Any, file: Path, wait: Callable[..., None], panel: Any, entries: Any
 ) -> None:
-    model = panel.model()
     entry = entries.add_qml(str(file.with_name("Missing.qml")))
-    wait(lambda: "Status: Error" in texts(model, "Missing"))
-    assert "there is no such file" in texts(model, "Missing", "Status: Error")["Qml"]
+    wait(lambda: "Status: Error" in panel.texts("Missing"))
+    assert "there is no such file" in panel.texts("Missing", "Status: Error")["Qml"]
     file.write_text("import QtQuick 2.15\nItem { wrong: 1 }\n")
     entry.own.properties["Path"].set(str(file))
-    wait(lambda: f"{file}:2" in texts(model, "Missing", "Status: Error")["Qml"])
+    wait(lambda: f"{file}:2" in panel.texts("Missing", "Status: Error")["Qml"])
     file.write_text(QML)
     entry.overlay.reload()
-    wait(lambda: "Status: Ok" in texts(model, "Missing"))
+    wait(lambda: "Status: Ok" in panel.texts("Missing"))
     entry.own.properties["Path"].set("")
-    wait(lambda: "Status: Warn" in texts(model, "Missing"))
+    wait(lambda: "Status: Warn" in panel.texts("Missing"))
     assert entry.overlay is None
     assert list(app.overlays) == []
 
@@ -178,9 +120,9 @@ def test_remove_duplicate_and_rename_by_the_panel(
     app.add_qml(file)
     wait(lambda: len(list(entries)) == 1)
     only(entries).overlay.properties.properties["Speed"].set(1.75)
-    select(panel, rows(panel.model(), "Dashboard"))
+    panel.select("Dashboard")
     wait(50)
-    click_button(panel, "Duplicate")
+    panel.click("Duplicate")
     wait(lambda: len(list(app.overlays)) == 2)
     first, second = entries
     assert second.overlay.properties.properties["Speed"].get() == 1.75
@@ -188,15 +130,15 @@ def test_remove_duplicate_and_rename_by_the_panel(
     second.display.setName("Second")
     wait(lambda: second.overlay.name == "Second")
     gone = second.overlay
-    select(panel, rows(panel.model(), "Second"))
+    panel.select("Second")
     wait(50)
-    click_button(panel, "Remove")
+    panel.click("Remove")
     wait(lambda: gone not in list(app.overlays))
     assert list(entries) == [first]
     app.overlays.remove(first.overlay)
     wait(lambda: not list(entries))
     with pytest.raises(StopIteration):
-        rows(panel.model(), "Dashboard")
+        panel.rows("Dashboard")
 
 
 def test_saved_and_restored_at_its_place(
@@ -324,7 +266,7 @@ def test_displays_that_are_made_without_a_file_hold_nothing_up(
 
 
 def test_what_a_program_has_added_outlives_a_config(
-    app: Any, file: Path, wait: Callable[..., None], entries: Any, tmp_path: Path
+    app: Any, file: Path, wait: Callable[..., None], entries: Any, panel: Any, tmp_path: Path
 ) -> None:
     empty, saved = tmp_path / "empty.rviz", tmp_path / "saved.rviz"
     app.save_config(empty)
@@ -339,7 +281,7 @@ def test_what_a_program_has_added_outlives_a_config(
         app.load_config(config)
         wait(lambda before=before: [e.overlay for e in entries if e is not before] == [overlay])  # type: ignore[misc]
         assert [list(app.overlays), overlay.root, overlay.z] == [[overlay], root, z]
-        assert texts(tree(app).model(), "Dashboard")["Z-Index"] == z
+        assert panel.texts("Dashboard")["Z-Index"] == z
 
 
 def test_own_classes_come_back(

@@ -25,19 +25,8 @@ def seen(picture: Any, x: int = 90, y: int = 290) -> tuple[int, ...]:
 
 
 @pytest.fixture
-def file(tmp_path: Path) -> Path:
-    return tmp_path / "Ui.qml"
-
-
-@pytest.fixture
-def show(app: Any, file: Path) -> Callable[..., Any]:
-    """Show QML text over the 3D view."""
-
-    def show(text: str, **options: Any) -> Any:
-        file.write_text(IMPORTS + text)
-        return app.add_qml(file, **options)
-
-    return show
+def show(show_file: Callable[..., Any]) -> Callable[..., Any]:
+    return show_file
 
 
 @pytest.fixture

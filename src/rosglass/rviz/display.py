@@ -213,7 +213,11 @@ class Entry(QtCore.QObject):
             if self.is_qml:
                 paths = self._import_paths
                 self.take(QmlOverlay(self.file, self._session, name, import_paths=paths))
-            elif make is not None:
+            elif make is None:
+                advice = f"its class {self.class_id} is unknown; rosglass.rviz.register() it"
+                self._failed = f"the program has shown no overlay {name!r} yet, and {advice}"
+                self.status(self._row, _WARN, self._failed)
+            else:
                 self.take(make(name))
         except Exception as error:
             self._failed = str(error) or repr(error)

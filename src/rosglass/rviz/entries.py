@@ -59,6 +59,9 @@ class Entries(QtCore.QObject):
         self._entries: list[Entry] = []
         #: Overlays that the program has brought, which outlive the displays of a config file.
         self._programs: list[Overlay] = []
+        #: As the panel has shown them last; what came since may belong between others.
+        self._order: list[Overlay] = []
+        self._new = False
         self._guests: dict[str, Callable[[], Any]] = {}
         self._held = False
         self._scheduled = self._settling = self._closed = False
@@ -147,11 +150,30 @@ class Entries(QtCore.QObject):
                 self._enter(overlay)
         for entry in list(self._entries):
             self._show(entry)
+        self._follow_panel()
+
+    def _follow_panel(self) -> None:
+        """Have overlays lie above each other as the panel shows them, once the user moves any."""
+        order = [
+            display.entry.overlay
+            for display in self._displays()
+            if isinstance(getattr(display, "entry", None), Entry) and display.entry.overlay
+        ]
+        before, self._order = self._order, order
+        moved = [o for o in before if o in order] != [o for o in order if o in before]
+        if moved or self._new:
+            self._stack.put_in_order(order)
+        if moved and not self._new:
+            # RViz itself does not count it as a change.
+            self._window.manager.notifyConfigChanged()
+        self._new = False
 
     def _enter(self, overlay: Overlay) -> None:
         """Give an overlay of the program's an entry: one that waits for it, or a new one."""
         if overlay not in self._programs:
             self._programs.append(overlay)
+            # A file may have one of a class that nobody has registered.
+            self._replace_all()
         class_id = QML_CLASS if isinstance(overlay, QmlOverlay) else class_id_of(type(overlay))
         for entry in self._entries:
             if entry.overlay is None and self._waits_for(entry, overlay, class_id):
@@ -182,6 +204,7 @@ class Entries(QtCore.QObject):
         if overlay not in list(self._stack):
             overlay.name = self._free_name(str(entry.display.getName()), overlay)
             self._stack.add(overlay)
+            self._new = True
         overlay.visible = enabled
 
     def _rename(self, entry: Entry) -> None:
@@ -234,7 +257,7 @@ class Entries(QtCore.QObject):
     @Slot()
     def _hold(self) -> None:
         """Take the program's overlays out of the displays that RViz is about to delete."""
-        self._held = True
+        self._held = self._new = True
         self._look_again.ask()
         for entry in list(self._entries):
             if entry.overlay in self._programs:
@@ -263,17 +286,18 @@ class Entries(QtCore.QObject):
             self._schedule()
 
     def _replace_all(self) -> None:
-        found = list(self._placeholders(self._window.manager.getRootDisplayGroup()))
-        for display in found:
-            self._untouched(partial(self._replace, display))
+        for display in list(self._displays()):
+            if getattr(display, "entry", None) is None and self._is_ours(display):
+                self._untouched(partial(self._replace, display))
 
-    def _placeholders(self, group: Any) -> Iterator[Any]:
-        bindings, sip = rviz(), pyqt("sip")
+    def _displays(self, group: Any = None) -> Iterator[Any]:
+        """Iterate over the displays in the order of the panel, those in groups included."""
+        group = self._window.manager.getRootDisplayGroup() if group is None else group
         for at in range(group.numDisplays()):
             display = group.getDisplayAt(at)
             if display.metaObject().className() == "rviz::DisplayGroup":
-                yield from self._placeholders(sip.cast(display, bindings.DisplayGroup))
-            elif getattr(display, "entry", None) is None and self._is_ours(display):
+                yield from self._displays(pyqt("sip").cast(display, rviz().DisplayGroup))
+            else:
                 yield display
 
     def _replace(self, placeholder: Any) -> None:
@@ -303,5 +327,6 @@ class Entries(QtCore.QObject):
 
     def _is_ours(self, display: Any) -> bool:
         class_id = str(display.getClassId())
-        ours = {QML_CLASS, REFERENCE_QML_CLASS, *self._guests}
+        programs = (class_id_of(type(o)) for o in self._programs if not isinstance(o, QmlOverlay))
+        ours = {QML_CLASS, REFERENCE_QML_CLASS, *self._guests, *programs}
         return class_id in ours or maker_of(class_id) is not None

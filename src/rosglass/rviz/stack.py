@@ -13,7 +13,7 @@ from rosglass.rviz.layer import HIGHEST_Z
 from rosglass.rviz.overlay import Overlay
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
     from rosglass.rviz.window import Window
 
@@ -102,6 +102,19 @@ class Stack(QtCore.QObject):
     def to_back(self, overlay: Overlay) -> None:
         """Put an overlay below all others of its kind, popups or not."""
         self._to_end(overlay, 0, min)
+
+    def put_in_order(self, overlays: Sequence[Overlay]) -> None:
+        """Have overlays of equal `z` lie above each other as they are given, the lowest first.
+
+        Args:
+            overlays: Some of those that there are; the others keep their places.
+        """
+        number = {id(overlay): at for at, overlay in enumerate(overlays)}
+        places = [at for at, e in enumerate(self._entries) if id(e.overlay) in number]
+        moved = sorted((self._entries[at] for at in places), key=lambda e: number[id(e.overlay)])
+        for at, entry in zip(places, moved, strict=True):
+            self._entries[at] = entry
+        self._arrange()
 
     def _to_end(self, overlay: Overlay, end: int, outermost: Callable[..., int]) -> None:
         alike = [e for e in self._entries if e.overlay.is_popup == overlay.is_popup]
