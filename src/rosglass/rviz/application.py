@@ -5,13 +5,10 @@ from __future__ import annotations
 import logging
 import os
 import signal
-import sys
 import threading
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import anonymous_name
-from rosglass.errors import ConnectionLostError, Error, InvalidNameError, UnsupportedError
+from rosglass.errors import ConnectionLostError, Error, UnsupportedError
 from rosglass.qml.display import require_display
 from rosglass.qml.interrupt import QuitOnSignal, end_process_within
 from rosglass.qml.places import import_folder
@@ -23,8 +20,10 @@ from rosglass.ros2.names import validate_node_name
 from rosglass.rviz import roscpp
 from rosglass.rviz.access import Access
 from rosglass.rviz.entries import Entries
+from rosglass.rviz.guard import log_what_is_raised
 from rosglass.rviz.host import require_rviz
 from rosglass.rviz.master import MasterWatch, wait_for_master
+from rosglass.rviz.nodes import connect_beside_rviz, name_node, shared_arguments
 from rosglass.rviz.overlay_menu import OverlayMenu
 from rosglass.rviz.qml_overlay import QmlOverlay
 from rosglass.rviz.qt5 import QtGui, QtWidgets
@@ -39,7 +38,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from types import TracebackType
 
-    from rosglass.comm.node import Node
     from rosglass.rviz.overlay import Overlay
 
 __all__ = ["Application"]
@@ -135,14 +133,14 @@ class Application:
             config_file(config)
         #: The Qt application.
         self.qt: Any = _qt_application(arguments)
-        self._excepthook = _log_what_is_raised()
+        self._unhook = log_what_is_raised()
         self._closed = self._running = self._fullscreen = False
         self._fullscreen = fullscreen
         received: list[int] = []
         with QuitOnSignal(received.append, _PATIENCE):
             answers = wait_for_master(options.master, timeout, lambda: bool(received))
             if answers:
-                _name_node(name or told.name, options)
+                name_node(name or told.name, options)
                 Application._made = True
                 #: RViz.
                 self.window = Window(config, splash=splash)
@@ -155,8 +153,8 @@ class Application:
         #: The node that QML talks through.
         self.session = session or Session(
             url or "ros1://",
-            connect=_connect_beside_rviz,
-            arguments=_shared_arguments(options),
+            connect=connect_beside_rviz,
+            arguments=shared_arguments(options),
         )
         #: RViz's tools, displays, views and camera.
         self.rviz = Access(self.window, self.session)
@@ -288,7 +286,7 @@ class Application:
         self.session.executor.post(lambda: QtCore.QCoreApplication.exit(code))
 
     def screenshot(self, file: str | os.PathLike[str]) -> None:
-        """Save a picture of RViz's window as it is on the screen, 3D view and overlays included.
+        """Save a picture of RViz's window, 3D view and overlays included.
 
         Args:
             file: PNG or JPEG, by the end of its name.
@@ -296,16 +294,7 @@ class Application:
         Raises:
             Error: The window is not shown, or the picture cannot be written.
         """
-        widget = self.window.widget
-        if not widget.isVisible() or widget.isMinimized():
-            raise Error(f"{file}: RViz's window is not shown; there is nothing to take")
-        image = widget.windowHandle().screen().grabWindow(widget.winId()).toImage()
-        target = Path(file)
-        if image.isNull() or not QtGui.QImage(image).save(str(target)):
-            raise Error(
-                f"{target}: the picture could not be written; its folder must exist and its name "
-                "end in .png or .jpg"
-            )
+        self.rviz.picker.screenshot(file, window=True)
 
     def close(self) -> None:
         """Take RViz and its overlays down, and close the node; safe to call twice."""
@@ -328,8 +317,7 @@ class Application:
         ]
         for step in steps:
             _attempt(step)
-        if sys.excepthook is _tell_raised:
-            sys.excepthook = self._excepthook
+        self._unhook()
 
     def __enter__(self) -> Application:
         return self
@@ -396,39 +384,6 @@ def _qt_application(arguments: Sequence[str]) -> Any:
     return made
 
 
-def _name_node(name: str, options: Ros1Options) -> None:
-    """Make RViz's node, unless the program has one of roscpp already."""
-    # Plugins of RViz may ask for it, too.
-    os.environ["ROS_MASTER_URI"] = options.master
-    if not roscpp.is_initialized():
-        roscpp.set_log_level(_log.getEffectiveLevel())
-        roscpp.initialize(name or anonymous_name("rviz"), _shared_arguments(options))
-
-
-def _shared_arguments(options: Ros1Options) -> list[str]:
-    """Return what was told to both nodes, for each has a name of its own."""
-    told = options.arguments
-    words = [f"{old}:={new}" for old, new in told.rules]
-    words += [f"_{key}:={value}" for key, value in told.parameters.items()]
-    words += [f"__ns:={told.namespace}"] if told.namespace else []
-    words += [f"__hostname:={options.address}"] if options.address else []
-    return words
-
-
-def _connect_beside_rviz(
-    url: str | None, name: str, namespace: str, arguments: Sequence[str] = ()
-) -> Node:
-    from rosglass.connection import connect  # noqa: PLC0415 - not before someone connects
-
-    full = f"{namespace.rstrip('/')}/{name}"
-    if full == roscpp.node_name():
-        raise InvalidNameError(
-            f"{full} is RViz's own node, which the master would end for a second one of its name; "
-            "give the overlays' node or RViz another name"
-        )
-    return connect(url, name, namespace, arguments=arguments)
-
-
 def _check_frame(frame: str) -> None:
     if not frame or frame != frame.strip() or frame.startswith("/"):
         raise Error(f"fixed_frame: {frame!r} is no name of a frame; expected e.g. 'map'")
@@ -440,18 +395,6 @@ def _attempt(step: Callable[[], object]) -> None:
         step()
     except Exception:
         _log.exception("ending RViz: a part of it failed, the rest goes on")
-
-
-def _log_what_is_raised() -> Any:
-    """Keep PyQt5 from aborting the process when something raises in a slot or virtual function."""
-    before = sys.excepthook
-    if before is sys.__excepthook__:
-        sys.excepthook = _tell_raised
-    return before
-
-
-def _tell_raised(kind: type[BaseException], error: BaseException, trace: Any) -> None:
-    _log.error("%s: %s", kind.__name__, error, exc_info=(kind, error, trace))
 
 
 def _raise_signal(number: int) -> None:

@@ -1,4 +1,4 @@
-"""RViz goes on whatever an overlay raises: it is told in the log, and as the overlay's problem."""
+"""RViz goes on whatever is raised: it is told in the log, and as the problem of its overlay."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import traceback
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from rosglass.rviz.overlay import Overlay
 
-__all__ = ["guarded"]
+__all__ = ["guarded", "log_what_is_raised"]
 
 _log = logging.getLogger("rosglass.rviz")
 
@@ -55,3 +55,26 @@ def guarded(overlay: Overlay, doing: str) -> Iterator[None]:
         tell(type(error), error, error.__traceback__)
     finally:
         sys.excepthook = before
+
+
+def log_what_is_raised() -> Callable[[], None]:
+    """Keep PyQt5 from aborting the process when something raises in a slot or virtual function.
+
+    Returns:
+        Ends it.
+    """
+    before = sys.excepthook
+    if before is not sys.__excepthook__:
+        # The program has one of its own.
+        return lambda: None
+    sys.excepthook = _tell_raised
+
+    def end() -> None:
+        if sys.excepthook is _tell_raised:
+            sys.excepthook = before
+
+    return end
+
+
+def _tell_raised(kind: type[BaseException], error: BaseException, trace: Any) -> None:
+    _log.error("%s: %s", kind.__name__, error, exc_info=(kind, error, trace))
