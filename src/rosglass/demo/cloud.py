@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 __all__ = ["Cloud"]
 
 #: Metres between two points, of what stands and of the ground.
-_SPACING, _GROUND_SPACING = 0.09, 0.16
+_SPACING, _GROUND_SPACING = 0.14, 0.16
+#: Bare concrete is left to the map: what is drawn of it would cost the most, and tell the least.
+_COLOURED, _RAISED = 30, 0.02
 #: How far the robot can tell colours, metres.
 _REACH = 5.5
 #: sensor_msgs/PointField's number of 32-bit floats.
@@ -115,6 +117,7 @@ def _ground(world: World) -> tuple[Floats, Pixels]:
         for x0, y0, x1, y1 in prism.segments():
             covered &= (x1 - x0) * (y - y0) - (y1 - y0) * (x - x0) >= 0
         inside |= covered
-    kept = ~inside & (world.ramp.ground(x, y) == 0)
     places = np.column_stack([x, y, world.ground(x, y)])
+    telling = (np.ptp(colours, axis=1) > _COLOURED) | (places[:, 2] > _RAISED)
+    kept = ~inside & (world.ramp.ground(x, y) == 0) & telling
     return places[kept], colours[kept].astype(np.uint8)

@@ -271,7 +271,7 @@ def _path() -> dict[str, Any]:
     poses = [
         {
             "header": header(now, "map"),
-            "pose": {"position": {"x": x, "y": y, "z": 0.03}, "orientation": upright},
+            "pose": {"position": {"x": x, "y": y, "z": 0.1}, "orientation": upright},
         }
         for x, y in places
     ]

@@ -23,18 +23,6 @@ _SIZE = (1280, 800)
 _PATIENCE = 20.0
 # The system ends what is started so when this program ends, even when it is killed.
 _LEASH = ("setpriv", "--pdeathsig", "TERM")
-_SHOT = """
-import sys
-from rosglass.rviz import Application
-from rosglass.qt import QtCore
-config, overlay, url, picture, seconds = sys.argv[1:]
-with Application(config, url=url, name="rviz") as app:
-    app.add_qml(overlay)
-    app.window.widget.setGeometry(0, 0, 1280, 800)
-    QtCore.QTimer.singleShot(int(1000 * float(seconds)) - 1000, lambda: app.screenshot(picture))
-    QtCore.QTimer.singleShot(int(1000 * float(seconds)), app.quit)
-    sys.exit(app.run(end_process=True))
-"""
 
 
 def main(seconds: float | None = None, picture: Path | None = None) -> int:
@@ -61,15 +49,14 @@ def main(seconds: float | None = None, picture: Path | None = None) -> int:
             print(f"no display: RViz runs {seconds:g} s on a virtual screen", flush=True)
         url = _start_master(stack)
         mode = ("--mode", "autonomous") if headless else ()
-        robot = start_robot(url, ("--equipped", "--fps", "20", *mode))
+        robot = start_robot(url, ("--equipped", "--fps", "15", *mode))
         stack.callback(robot.close)
-        files = (str(_FOLDER / "figure1.rviz"), str(_FOLDER / "Dashboard.qml"))
-        if seconds is None:
-            arguments = ["-m", "rosglass", "rviz", files[0], "--overlay", files[1], "--url", url]
-        else:
-            shot = str(picture or "rviz-demo.png")
-            arguments = ["-c", _SHOT, *files, url, shot, str(seconds)]
-        rviz = Child([*_LEASH, sys.executable, *arguments], "RViz")
+        files = (str(_FOLDER / "figure1.rviz"), "--overlay", str(_FOLDER / "Dashboard.qml"))
+        ending = []
+        if seconds is not None:
+            ending = ["--screenshot", str(picture or "rviz-demo.png"), "--after", str(seconds)]
+        command = ["-m", "rosglass", "rviz", *files, "--bare", "--url", url, *ending]
+        rviz = Child([*_LEASH, sys.executable, *command], "RViz")
         # Both at a time: whoever has ended RViz waits.
         stack.callback(_close, rviz, robot)
         code = _wait(rviz)
