@@ -1,0 +1,125 @@
+"""What an equipped robot has: description, cloud, cameras, battery, and a stop that holds."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("cv2", reason="the simulated camera needs the extra `camera`")
+
+from rosglass.demo.equipment import CAMERAS
+from rosglass.demo.robot import Robot, RobotOptions
+from rosglass.errors import Error
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from conftest import StubNode
+
+OPTIONS = RobotOptions(raw=False, compressed=False, equipped=True, fps=5)
+
+
+@pytest.fixture(scope="module")
+def alive(stub_node: type[StubNode]) -> Iterator[tuple[Any, Robot]]:
+    class Node(stub_node):  # type: ignore[misc, valid-type]
+        def __init__(self) -> None:
+            super().__init__()
+            self.parameter_server = self
+            self.set_parameters: dict[str, Any] = {}
+
+        def set(self, name: str, value: Any) -> None:
+            self.set_parameters[name] = value
+
+    node = Node()
+    robot = Robot(node, OPTIONS)
+    robot.start()
+    yield node, robot
+    robot.close()
+
+
+def until(condition: Callable[[], Any]) -> None:
+    end = time.monotonic() + 30
+    while not condition():
+        assert time.monotonic() < end, "did not happen in time"
+        time.sleep(0.01)
+
+
+def test_its_description_is_where_rviz_looks(alive: tuple[Any, Robot]) -> None:
+    assert alive[0].set_parameters["/robot_description"].startswith("<?xml")
+
+
+def test_there_is_no_such_mode(stub_node: type[StubNode]) -> None:
+    options = RobotOptions(raw=False, compressed=False, equipped=True, mode="Safe")
+    with pytest.raises(Error, match=r"no mode 'Safe'; there are autonomous, supervised, safe"):
+        Robot(stub_node(), options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", CAMERAS)
+def test_cameras_show_different_moving_pictures(alive: tuple[Any, Robot], name: str) -> None:
+    node, _ = alive
+    told = node.last(f"/{name}_camera/image_raw")
+    assert (told.height, told.width, told.step, told.encoding) == (240, 320, 960, "rgb8")
+    assert told.header.frame_id == f"{name}_camera_link"
+    picture = np.frombuffer(bytes(told.data), np.uint8).reshape(240, 320, 3)
+    assert picture.std() > 10
+    others = [node.last(f"/{other}_camera/image_raw") for other in CAMERAS if other != name]
+    assert all(bytes(other.data) != bytes(told.data) for other in others)
+
+
+def test_nothing_is_drawn_while_nobody_looks(alive: tuple[Any, Robot]) -> None:
+    node, _ = alive
+    topics = ["/points", *(f"/{name}_camera/image_raw" for name in CAMERAS)]
+    for topic in topics:
+        node.publishers[topic].listeners = 0
+    time.sleep(0.2)
+    before = [len(node.publishers[topic].sent) for topic in topics]
+    time.sleep(1.0)
+    assert [len(node.publishers[topic].sent) for topic in topics] == before
+    for topic in topics:
+        node.publishers[topic].listeners = 1
+    for topic in topics:
+        node.last(topic)
+
+
+def test_the_cloud_grows_into_what_the_laser_sees(alive: tuple[Any, Robot]) -> None:
+    until(lambda: alive[0].last("/points").width > 500)
+
+
+def test_safe_is_slow(alive: tuple[Any, Robot]) -> None:
+    node, robot = alive
+    node.ask("/mode/safe")
+    until(lambda: node.command("/cmd_vel", linear={"x": 1.0}) or robot.state.speed > 0.2)
+    for _ in range(30):
+        node.command("/cmd_vel", linear={"x": 1.0})
+        time.sleep(0.01)
+    assert robot.state.speed < 0.31
+    node.ask("/mode/supervised")
+
+
+def test_the_emergency_stop_ends_the_mission_and_holds(alive: tuple[Any, Robot]) -> None:
+    node, robot = alive
+    node.ask("/mode/autonomous")
+    until(lambda: abs(robot.state.speed) + abs(robot.state.turn) > 0.1)
+    node.command("/emergency_stop", data=True)
+    until(lambda: node.last("/emergency_stop/state").data)
+    until(lambda: abs(robot.state.speed) + abs(robot.state.turn) < 0.01)
+    until(lambda: node.last("/mission/state").data == "emergency stop")
+    place = robot.state.x, robot.state.y
+    for command in ("/mode/supervised", "/mode/autonomous"):
+        node.ask(command)
+        node.command("/cmd_vel", linear={"x": 0.5})
+        time.sleep(0.2)
+    assert (robot.state.x, robot.state.y) == place
+    node.command("/emergency_stop", data=False)
+    until(lambda: node.last("/mission/state").data == "waiting for mode autonomous")
+
+
+def test_the_battery_tells_charge_and_voltage(alive: tuple[Any, Robot]) -> None:
+    told = alive[0].last("/battery_state")
+    assert 0 < told.percentage <= 1
+    assert told.charge == pytest.approx(told.percentage * told.capacity)
+    assert 18 < told.voltage < 30
+    assert told.present
