@@ -145,14 +145,17 @@ def test_robots_move_the_camera(
     assert view.mode == 0
 
 
-def test_robots_hear_why_the_camera_is_not_moved(robot: Robot, view: Any) -> None:
+def test_robots_hear_why_the_camera_is_not_moved(robot: Robot, view: Any, caplog: Any) -> None:
     away = {"header": {"frame_id": "nowhere"}, "eye": {"x": 1.0}}
     assert "nowhere" in robot.call("move_eye", "MoveEye", **away)
     assert "nowhere" in robot.call("move_eye_and_focus", "MoveEyeAndFocus", **away)
     assert "nowhere" in robot.call("set_tracked_frame", "TrackFrame", frame="nowhere")
     assert "7" in robot.call("set_view_mode", "SetViewMode", mode={"mode": 7})
     assert "finite" in robot.call("move_eye", "MoveEye", eye={"x": math.inf})
+    assert "finite" in robot.call("move_eye", "MoveEye", eye={"y": math.nan})
     assert "look somewhere" in robot.call("move_eye_and_focus", "MoveEyeAndFocus")
+    # A robot's mistakes are no errors of ours.
+    assert [record for record in caplog.records if record.levelname == "ERROR"] == []
     assert near(view.eye, (4, 0, 3))
 
 

@@ -6,7 +6,7 @@ import logging
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.qos import QoS
-from rosglass.errors import Error
+from rosglass.errors import Error, ServiceError
 from rosglass.qt import QtCore, Signal
 from rosglass.ros1.names import expand, split
 
@@ -156,7 +156,7 @@ class ViewServices(QtCore.QObject):
                     node.create_service_server(
                         f"{wanted.namespace}/{name}",
                         f"{_PACKAGE}/srv/{kind}",
-                        answer,
+                        _refusing(answer),
                         executor=self._session.executor,
                     )
                 )
@@ -234,6 +234,18 @@ class _Made:
     def __init__(self) -> None:
         self.handles: list[Handle] = []
         self.publishers: dict[str, Publisher] = {}
+
+
+def _refusing(answer: Callable[[Message], None]) -> Callable[[Message], None]:
+    """Have what a callback cannot do be an answer, not a fault of ours."""
+
+    def call(request: Message) -> None:
+        try:
+            answer(request)
+        except Error as error:
+            raise ServiceError(str(error)) from error
+
+    return call
 
 
 def _close_all(handles: list[Handle]) -> None:
