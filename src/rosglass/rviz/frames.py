@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from typing import TYPE_CHECKING
 
 from rosglass.comm.similar import similar
@@ -20,6 +22,8 @@ __all__ = ["FIXED_FRAME", "Frames"]
 
 #: How many frames a message names.
 _NAMED = 8
+#: Seconds for which a message holds, and how many are kept.
+_FRESH, _CASES = 1.0, 100
 #: How RViz's properties name the fixed frame.
 FIXED_FRAME = "<Fixed Frame>"
 
@@ -40,6 +44,8 @@ class Frames(QtCore.QObject):
         self._session, self._window = session, window
         self._link: TfLink | None = None
         self._node: Node | None = None
+        #: What was told of what is missing, and when.
+        self._explained: dict[tuple[str, str, str], tuple[float, str]] = {}
         session.node_changed.connect(self._follow)
         self._follow()
 
@@ -77,7 +83,18 @@ class Frames(QtCore.QObject):
         try:
             return self._link.buffer.lookup_transform(fixed, frame, time)
         except TransformException as error:
-            raise type(error)(self._explain(frame, fixed, error)) from None
+            raise type(error)(self._explanation(frame, fixed, error)) from None
+
+    def _explanation(self, frame: str, fixed: str, error: TransformException) -> str:
+        """Return :meth:`_explain`'s text of the last second: who follows a frame asks each time."""
+        case, now = (frame, fixed, str(error)), time.monotonic()
+        told, text = self._explained.get(case, (-math.inf, ""))
+        if now - told > _FRESH:
+            text = self._explain(frame, fixed, error)
+            if len(self._explained) > _CASES:
+                self._explained.clear()
+            self._explained[case] = (now, text)
+        return text
 
     def _explain(self, frame: str, fixed: str, error: TransformException) -> str:
         """Return what is wrong; it may be the fixed frame, which who asked has not named."""
