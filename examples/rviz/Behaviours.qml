@@ -24,13 +24,15 @@ Column {
                 : end.state === ActionTerminalStates.PREEMPTED ? "cancelled"
                 : "failed: " + (end.text || "no answer")
         }, function () {})
+        if (goal === null)
+            outcome = "NOT SENT: no server is connected"
     }
 
     Repeater {
         model: ["Look around", "Turn around", "Flippers up", "Flippers flat", "Return to dock"]
         Push {
             objectName: "behaviour " + modelData
-            width: behaviours.width; height: 24
+            width: behaviours.width; height: 23
             text: modelData
             enabled: behaviours.ready && !behaviours.active
             checked: behaviours.active && behaviours.name === modelData
@@ -39,6 +41,8 @@ Column {
     }
     Text {
         width: behaviours.width
+        wrapMode: Text.Wrap
+        maximumLineCount: 2
         elide: Text.ElideRight
         text: !behaviours.live ? "ROBOT SILENT" + (behaviours.active ? ": " + behaviours.name + " may go on" : "")
             : !behaviours.client.connected ? "NO BEHAVIOUR SERVER" : behaviours.active

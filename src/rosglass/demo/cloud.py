@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["Cloud"]
 
 #: Metres between two points, of what stands and of the ground.
-_SPACING, _GROUND_SPACING = 0.14, 0.16
+_SPACING, _GROUND_SPACING = 0.11, 0.12
 #: Bare concrete is left to the map: what is drawn of it would cost the most, and tell the least.
 _COLOURED, _RAISED = 30, 0.02
 #: How far the robot can tell colours, metres.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import threading
 import time
@@ -25,6 +26,7 @@ MODES = ("autonomous", "supervised", "safe")
 #: The mission: a round through the yard, over the rubble. Map frame, metres.
 WAYPOINTS = ((-3.6, -1.8), (-2.2, -0.3), (-2.4, 2.6), (-4.4, 1.8), (-5.0, -1.0))
 BEHAVIOURS = ("Look around", "Turn around", "Flippers up", "Flippers flat", "Return to dock")
+_log = logging.getLogger("rosglass.demo.robot")
 _PERIOD = 0.1
 #: Seconds between two confirmations of what has not changed.
 _CONFIRM = 0.5
@@ -199,7 +201,16 @@ class Operation:
             return f"no goals in mode {self.mode}; choose supervised"
         return ""
 
-    def _behave(self, goal: ServerGoal) -> dict[str, str]:
+    def _behave(self, goal: Any) -> dict[str, str] | None:
+        """Execute a behaviour; the goal's client is told why it was not, or not to its end."""
+        try:
+            return self._execute(goal)
+        except Error as error:
+            _log.info("%s: %s", goal.goal.behavior_name, error)
+            goal.abort(text=str(error))
+            return None
+
+    def _execute(self, goal: ServerGoal) -> dict[str, str]:
         name = goal.goal.behavior_name
         if name not in BEHAVIOURS:
             raise Error(f"there is no behaviour {name!r}; there are {', '.join(BEHAVIOURS)}")

@@ -1,0 +1,135 @@
+"""The example's dashboard: nothing that is old is shown as live, and refusals are told."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+FOLDER = Path(__file__).parents[2] / "examples/rviz"
+
+
+class Dashboard:
+    """What the operator sees and does, by names."""
+
+    def __init__(self, root: Any) -> None:
+        self.root = root
+
+    def items(self) -> list[Any]:
+        found = [self.root]
+        for item in found:
+            found.extend(item.childItems())
+        return found
+
+    def seen(self) -> list[str]:
+        """Return all texts that are shown."""
+        texts = [item for item in self.items() if item.inherits("QQuickText")]
+        return [item.property("text") for item in texts if item.isVisible() and item.opacity() > 0]
+
+    def find(self, name: str) -> Any:
+        (item,) = [item for item in self.items() if item.objectName() == name]
+        return item
+
+    def click(self, name: str) -> None:
+        self.find(name).clicked.emit()
+
+    @property
+    def stale(self) -> dict[str, bool]:
+        """Return by title whether each panel says that it is old."""
+        panels = [item for item in self.items() if item.property("title")]
+        return {item.property("title"): item.property("stale") for item in panels}
+
+
+@pytest.fixture
+def robot(master: str) -> Iterator[subprocess.Popen[bytes]]:
+    command = [sys.executable, "-m", "rosglass.cli", "robot", "--equipped", "--fps", "10"]
+    url = master.replace("http:", "ros1:")
+    program = subprocess.Popen(
+        [*command, "--leash", "--url", url],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, "ROS_IP": "127.0.0.1"},
+    )
+    yield program
+    program.send_signal(signal.SIGCONT)
+    program.kill()
+    program.wait(30)
+
+
+@pytest.fixture
+def dashboard(app: Any, wait: Any, robot: subprocess.Popen[bytes]) -> Dashboard:
+    app.load_config(FOLDER / "figure1.rviz")
+    dashboard = Dashboard(app.add_qml(FOLDER / "Dashboard.qml")._root)
+    wait(lambda: live(dashboard), 60.0)
+    return dashboard
+
+
+def live(dashboard: Dashboard) -> bool:
+    known = dashboard.find("emergency stop").property("known")
+    quiet = not any("NO " in text or "SILENT" in text for text in dashboard.seen())
+    return bool(known and quiet and len(dashboard.stale) == 6 and not any(dashboard.stale.values()))
+
+
+@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGSTOP])
+def test_everything_says_that_the_robot_is_silent(
+    dashboard: Dashboard, robot: subprocess.Popen[bytes], wait: Any, end: signal.Signals
+) -> None:
+    robot.send_signal(end)
+    wait(lambda: all(dashboard.stale.values()))
+    wait(lambda: not dashboard.find("emergency stop").property("known"))
+    wait(lambda: any(text.startswith("ROBOT SILENT") for text in dashboard.seen()))
+    wait(lambda: "STATE UNKNOWN" in dashboard.seen())
+    assert "following" not in dashboard.seen()
+    assert dashboard.seen().count("NO PICTURE") == 2
+    dashboard.click("tab Behaviours")
+    wait(lambda: "ROBOT SILENT" in dashboard.seen())
+    assert not dashboard.find("behaviour Look around").isEnabled()
+    dashboard.click("tab Settings")
+    wait(lambda: "Highest speed   unknown" in dashboard.seen())
+    assert "Flashlight: unknown" in dashboard.seen()
+    assert not dashboard.find("speed").isEnabled()
+    # What is asked for all the same says that nobody answers.
+    dashboard.click("flashlight")
+    wait(lambda: any(text.startswith("Flashlight: NO ANSWER") for text in dashboard.seen()))
+    if end is signal.SIGSTOP:
+        robot.send_signal(signal.SIGCONT)
+        dashboard.click("tab Mission")
+        wait(lambda: live(dashboard))
+
+
+def test_what_the_robot_refuses_is_told(dashboard: Dashboard, master: str, wait: Any) -> None:
+    import rosglass
+
+    url = master.replace("http:", "ros1:")
+    with closing(rosglass.connect(url, name="goals")) as node:
+        goals = node.create_publisher("/move_base_simple/goal", "geometry_msgs/msg/PoseStamped")
+        wait(lambda: goals.subscription_count() > 0)
+
+        def send() -> None:
+            place = {"position": {"x": 1.0, "y": 1.0}, "orientation": {"w": 1.0}}
+            goals.publish(header={"frame_id": "map"}, pose=place)
+
+        send()
+        wait(lambda: "Goal: on the way to the goal" in dashboard.seen())
+        dashboard.click("mode autonomous")
+        wait(lambda: "Goal: the mode is autonomous now" in dashboard.seen())
+        send()
+        refusal = "GOAL REFUSED: no goals in mode autonomous; choose supervised"
+        wait(lambda: refusal in dashboard.seen())
+    dashboard.click("tab Behaviours")
+    dashboard.click("mode safe")
+    wait(lambda: dashboard.find("mode safe").property("checked"))
+    wait(lambda: dashboard.find("behaviour Look around").isEnabled())
+    dashboard.click("behaviour Look around")
+    told = "Look around: failed: no behaviours in mode safe; choose another mode"
+    wait(lambda: told in dashboard.seen())
