@@ -21,13 +21,20 @@ def main() -> None:
     sys.argv[1:] = []
     file.write_text(QML, encoding="utf-8")
     from rosglass.qt import QtCore
-    from rosglass.rviz import Application
+    from rosglass.rviz import Application, WidgetOverlay
+    from rosglass.rviz.qt5 import QtWidgets
     from rosglass.rviz.renderer_choice import choice
 
     app = Application(renderer=renderer)
     app.window.widget.setGeometry(0, 0, 600, 450)
     app.window.widget.show()
     overlay = app.add_qml(file)
+    square = QtWidgets.QLabel()
+    square.setStyleSheet("background: #00ff00")
+    root = QtWidgets.QWidget()
+    square.setParent(root)
+    square.setGeometry(20, 120, 41, 31)
+    app.add(WidgetOverlay(root))
     frames: list[int] = []
     app.window.before_frame.connect(lambda: frames.append(1))
     while len(frames) < 8:
@@ -45,6 +52,8 @@ def main() -> None:
         "units": [overlay._root.width() * ratio == width, overlay._root.height() * ratio == height],
         "inside": [colour(41, 31), colour(138, 88), colour(right - 9, bottom - 9)],
         "outside": [colour(38, 60), colour(142, 60), colour(right - 12, bottom - 2)],
+        "widget": [colour(21, 121), colour(59, 149)],
+        "beside": [colour(18, 130), colour(63, 130), colour(40, 118), colour(40, 153)],
         "problem": overlay.problem,
         "renderer": choice.renderer,
     }

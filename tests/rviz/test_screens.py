@@ -46,4 +46,6 @@ def test_overlays_have_every_pixel_of_the_screen(
     assert seen["units"] == [True, True]
     assert seen["inside"] == ["#0080ff", "#0080ff", "#ff0000"]
     assert not {"#0080ff", "#ff0000"} & set(seen["outside"])
+    assert seen["widget"] == ["#00ff00", "#00ff00"]
+    assert "#00ff00" not in seen["beside"]
     assert seen["problem"] == ""

@@ -52,6 +52,15 @@ def test_changed_tiles_are_those_that_differ() -> None:
     assert np.argwhere(changed_tiles(now[::-1], before[::-1])).tolist() == [[6, 5]]
 
 
+def test_only_where_it_may_differ_a_picture_is_compared() -> None:
+    before = picture(100, 70)
+    now = picture(100, 70, (0, 0, 100, 70))
+    changed = changed_tiles(now, before, [Rect(17, 20, 18, 21), Rect(90, 60, 100, 70)])
+    assert np.argwhere(changed).tolist() == [[2, 2], [7, 11], [7, 12], [8, 11], [8, 12]]
+    assert not changed_tiles(before, before.copy(), [Rect(0, 0, 100, 70)]).any()
+    assert not changed_tiles(now, before, []).any()
+
+
 def test_a_panel_is_one_rectangle_cut_at_the_edge() -> None:
     pixels = picture(100, 70, (32, 48, 100, 70))
     assert cover(covered_tiles(pixels), 100, 70) == [(32, 48, 100, 70)]

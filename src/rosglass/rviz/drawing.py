@@ -92,7 +92,7 @@ class Drawing:
         started = time.perf_counter()
         done, drawn = False, 0.0
         pixels: NDArray[np.uint32] | None = None
-        overlay.read_back = 0.0
+        overlay.read_back, overlay.painted = 0.0, None
         with guarded(overlay, "drawing"):
             if resized:
                 overlay.resize(*size)
@@ -101,7 +101,8 @@ class Drawing:
             _check(pixels, size)
             drawn = time.perf_counter() - started
             if pixels is not None:
-                layer.update(pixels)
+                # What failed to be shown before may be anywhere.
+                layer.update(pixels, None if self._failed else overlay.painted)
             done = True
         if done and self._failed:
             overlay.tell_problem("")

@@ -12,6 +12,8 @@ from rosglass.rviz.host import ogre, ogre_overlay
 from rosglass.rviz.tiles import TILE, Rect, changed_tiles, cover, uncovered, update_covered
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
 
 __all__ = ["HIGHEST_Z", "Layer"]
@@ -84,12 +86,15 @@ class Layer:
         whole = 1 if self._before is None else self._before.size
         return sum(rect.area for rect in self._rects) / max(whole, 1)
 
-    def update(self, pixels: NDArray[np.uint32]) -> list[Rect]:
+    def update(
+        self, pixels: NDArray[np.uint32], within: Iterable[Rect] | None = None
+    ) -> list[Rect]:
         """Show a picture.
 
         Args:
             pixels: Shape (height, width) of the view, each pixel 0xAARRGGBB with premultiplied
                 colours.
+            within: Where it may be another than the last one; None for anywhere.
 
         Returns:
             What has changed since the last picture, and was given to the graphics card.
@@ -105,7 +110,7 @@ class Layer:
             self._covered = np.zeros((-(-height // TILE), -(-width // TILE)), np.bool_)
             rects = [Rect(0, 0, width, height)]
         else:
-            rects = cover(changed_tiles(pixels, self._before), width, height, most=12)
+            rects = cover(changed_tiles(pixels, self._before, within), width, height, most=12)
         compared = time.perf_counter()
         for rect in rects:
             self._upload(pixels, rect)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rosglass.qt import QtGui
+    from rosglass.rviz.tiles import Rect
     from rosglass.rviz.window import Window
 
 __all__ = ["SCALES", "Overlay"]
@@ -63,6 +64,8 @@ class Overlay(QtCore.QObject):
         self.is_modal = False
         #: Seconds of the last :meth:`draw` that went into reading back what OpenGL drew.
         self.read_back = 0.0
+        #: Where the last :meth:`draw` has painted, if that is known; None for anywhere.
+        self.painted: list[Rect] | None = None
         self.z, self.scale, self.opacity = z, scale, opacity
 
     @property

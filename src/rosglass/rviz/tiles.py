@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from numpy.typing import NDArray
 
@@ -79,10 +79,28 @@ def update_covered(
         covered[first:last] = covered_tiles(pixels[first * TILE : last * TILE])
 
 
-def changed_tiles(pixels: NDArray[np.uint32], before: NDArray[np.uint32]) -> NDArray[np.bool_]:
-    """Return for each tile whether two pictures of one size differ in it."""
+def changed_tiles(
+    pixels: NDArray[np.uint32], before: NDArray[np.uint32], within: Iterable[Rect] | None = None
+) -> NDArray[np.bool_]:
+    """Return for each tile whether two pictures of one size differ in it.
+
+    Args:
+        pixels: One.
+        before: The other.
+        within: Where they may differ, and are compared; None for anywhere.
+    """
     height, width = pixels.shape
     tiles = np.zeros((-(-height // TILE), -(-width // TILE)), np.bool_)
+    if within is not None:
+        for rect in within:
+            rows = slice(rect.top // TILE, -(-rect.bottom // TILE))
+            columns = slice(rect.left // TILE, -(-rect.right // TILE))
+            place = (
+                slice(rows.start * TILE, rows.stop * TILE),
+                slice(columns.start * TILE, columns.stop * TILE),
+            )
+            tiles[rows, columns] |= covered_tiles(pixels[place] ^ before[place])
+        return tiles
     for top in range(0, height, _LOOK):
         now, then = pixels[top : top + _LOOK], before[top : top + _LOOK]
         # Most of a picture stays as it is, which is found out faster than what is another.

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from rosglass.errors import Error
 from rosglass.qt import is_alive
+from rosglass.rviz.canvas import Canvas
 from rosglass.rviz.events import BUTTONS, DRAG, KEYS, MOUSE, PRESS, position, release_outside
 from rosglass.rviz.guard import guarded
 from rosglass.rviz.overlay import Overlay
@@ -17,7 +16,10 @@ from rosglass.rviz.style_sheet import StyleSheet
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    import numpy as np
     from numpy.typing import NDArray
+
+    from rosglass.rviz.window import Window
 
 __all__ = ["WidgetOverlay", "make_widget"]
 
@@ -25,6 +27,8 @@ _E = QtCore.QEvent
 #: A widget with this dynamic property, or below one, leaves the wheel to what is below.
 IGNORE_WHEEL = "IgnoreWheelEvents"
 _OTHERS = frozenset({_E.Wheel, _E.ContextMenu, _E.ToolTip, _E.DragLeave})
+#: Classes of Qt that hear of the wish for a menu, and have none.
+_WITHOUT_MENU = (QtWidgets.QWidget, QtWidgets.QAbstractScrollArea, QtWidgets.QMainWindow)
 _INPUT_METHOD = frozenset({_E.InputMethod, _E.InputMethodQuery})
 
 
@@ -56,16 +60,20 @@ class WidgetOverlay(Overlay):
         #: The widget that fills the view.
         self.root: Any = made
         made.setAttribute(QtCore.Qt.WA_TranslucentBackground)
-        self._image = QtGui.QImage()
-        self._pixels: NDArray[np.uint32] = np.zeros((0, 0), np.uint32)
-        self._ratio = 1.0
-        self._stale = QtGui.QRegion()
         self._buttons = QtCore.Qt.NoButton
         self._at: Any = None
+        self._had_keys: Any = None
+        self._opened = self._focused = False
+        self._panel: Any = None
         self._scene = QtWidgets.QGraphicsScene()
         self._view = _HiddenView(self._scene)
+        self._canvas = Canvas(self._scene, made)
+        self._canvas.stale.connect(self.changed)
+        # Not the scene's `changed`: if anybody hears that, Qt takes all of an item for stale.
+        self._canvas.stale.connect(self._look_after_popups)
         self._proxy = self._scene.addWidget(made)
-        self._scene.changed.connect(self._mark)
+        # Otherwise all of it is painted whatever has changed.
+        self._proxy.setFlag(QtWidgets.QGraphicsItem.ItemUsesExtendedStyleOption)
         # Widgets of a window that is not active neither look nor act as if they had the keys.
         QtCore.QCoreApplication.sendEvent(self._scene, QtCore.QEvent(_E.WindowActivate))
         self._style = StyleSheet(self.name, self._use_style, self._style_failed)
@@ -101,45 +109,26 @@ class WidgetOverlay(Overlay):
 
     def resize(self, width: int, height: int, ratio: float) -> None:
         """Fit the widget to the 3D view."""
-        self._image = QtGui.QImage(width, height, QtGui.QImage.Format_ARGB32_Premultiplied)
-        self._image.fill(0)
-        self._pixels = np.frombuffer(self._image.bits(), np.uint32).reshape(height, width)
-        self._ratio = ratio
         units = QtCore.QRectF(0, 0, width / ratio, height / ratio)
         with guarded(self, "changing its size"):
             self._scene.setSceneRect(units)
             self._view.fit(units)
             self._proxy.setGeometry(units)
-        self._stale = QtGui.QRegion(self._image.rect())
+        self._canvas.fit(width, height, ratio)
 
     def draw(self) -> NDArray[np.uint32] | None:
         """Paint what has changed."""
-        stale, self._stale = self._stale, QtGui.QRegion()
-        if stale.isEmpty() or not is_alive(self._scene):
+        if not is_alive(self._scene):
             return None
-        painter = QtGui.QPainter(self._image)
-        try:
-            painter.setClipRegion(stale)
-            painter.setCompositionMode(QtGui.QPainter.CompositionMode_Source)
-            painter.fillRect(stale.boundingRect(), QtCore.Qt.transparent)
-            painter.setCompositionMode(QtGui.QPainter.CompositionMode_SourceOver)
-            painter.setRenderHint(QtGui.QPainter.Antialiasing)
-            box = QtCore.QRectF(stale.boundingRect())
-            part = QtCore.QRectF(box.topLeft() / self._ratio, box.size() / self._ratio)
-            with guarded(self, "painting"):
-                self._scene.render(painter, box, part, QtCore.Qt.IgnoreAspectRatio)
-        finally:
-            painter.end()
-        return self._pixels
-
-    def _mark(self, areas: list[Any]) -> None:
-        for area in areas:
-            scaled = QtCore.QRectF(area.topLeft() * self._ratio, area.size() * self._ratio)
-            self._stale += scaled.adjusted(-1, -1, 1, 1).toAlignedRect() & self._image.rect()
-        if not self._stale.isEmpty():
-            self.changed.emit()
+        with guarded(self, "painting"):
+            self.painted = self._canvas.paint()
+        return self._canvas.pixels if self.painted else None
 
     # Input
+
+    def attach(self, window: Window) -> None:
+        """Be shown over an RViz."""
+        self._panel = window.panel
 
     def deliver(self, event: Any) -> bool:
         """Give the event to the widget it is for."""
@@ -150,23 +139,27 @@ class WidgetOverlay(Overlay):
             return self._deliver_key(event)
         if kind not in MOUSE and kind not in DRAG and kind not in _OTHERS:
             return False
+        if kind == _E.ContextMenu and event.reason() == QtGui.QContextMenuEvent.Keyboard:
+            return self._menu_by_key(event)
         at = position(event)
         if at is not None:
             self._at = at
             self._view.put_under(event, at)
         if kind == _E.Wheel and _has(self._widget_at(at), _ignores_wheel):
             return False
-        opened = self._has_popup()
+        opened = bool(self._popups())
         if kind in PRESS and not opened:
             _focus_clicked(self._widget_at(at))
-        event.setAccepted(False)
-        QtCore.QCoreApplication.sendEvent(self._view.viewport(), event)
-        taken = bool(event.isAccepted())
+        self._remember_keys(opened)
+        taken = self._view.give(event)
         if not is_alive(self._scene):
             return taken
         if kind in PRESS:
             # Qt takes one that no widget wants for accepted. One beside a popup closes that.
             taken = opened or self._scene.mouseGrabberItem() is not None
+            # The event that opens a menu is the next one.
+            opens_menu = event.button() == QtCore.Qt.RightButton
+            taken = taken or (opens_menu and _has(self._widget_at(at), _has_menu))
         if kind in MOUSE:
             self._buttons = event.buttons() if taken or kind not in PRESS else self._buttons
         if kind == _E.MouseMove and event.buttons() == QtCore.Qt.NoButton:
@@ -174,15 +167,46 @@ class WidgetOverlay(Overlay):
         return taken
 
     def _deliver_key(self, event: Any) -> bool:
-        item = self._scene.focusItem()
+        receiver = self._with_keys()
+        self._remember_keys(bool(self._popups()))
         event.setAccepted(False)
         if event.type() in (_E.KeyPress, _E.KeyRelease):
+            self._put_under_keys(receiver)
             QtCore.QCoreApplication.sendEvent(self._scene, event)
-        elif _as_widget(item) is not None:
-            receiver = _as_widget(item).widget()
-            receiver = receiver.focusWidget() or receiver
+        elif receiver is not None:
             QtCore.QCoreApplication.sendEvent(receiver, event)
         return bool(event.isAccepted())
+
+    def _menu_by_key(self, event: Any) -> bool:
+        receiver = self._with_keys()
+        if receiver is None:
+            return False
+        self._put_under_keys(receiver)
+        at = receiver.inputMethodQuery(QtCore.Qt.ImCursorRectangle)
+        at = at.center() if isinstance(at, QtCore.QRect) else receiver.rect().center()
+        made = QtGui.QContextMenuEvent(event.reason(), at, receiver.mapToGlobal(at))
+        made.setAccepted(False)
+        QtCore.QCoreApplication.sendEvent(receiver, made)
+        return bool(made.isAccepted())
+
+    def _with_keys(self) -> Any:
+        """Return the widget that gets the keys; None where none does."""
+        shown = _as_widget(self._scene.focusItem())
+        return None if shown is None else shown.widget().focusWidget() or shown.widget()
+
+    def _remember_keys(self, opened: bool) -> None:
+        """Know who had the keys before a popup: Qt gives them to nobody when it has closed."""
+        if not opened:
+            self._had_keys = self._with_keys()
+
+    def _put_under_keys(self, receiver: Any) -> None:
+        """Have what a widget opens by a key, e.g. a menu, stand beside it."""
+        if receiver is not None and is_alive(self._panel):
+            shown = receiver.window().graphicsProxyWidget()
+            middle = receiver.mapTo(receiver.window(), receiver.rect().center())
+            at = shown.mapToScene(QtCore.QPointF(middle))
+            seen = self._panel.mapToGlobal((at * self.scale).toPoint())
+            self._view.move(seen - at.toPoint())
 
     def leave(self) -> None:
         """End hovering, and let go without effect of what is pressed."""
@@ -201,6 +225,7 @@ class WidgetOverlay(Overlay):
 
     def set_focus(self, focus: bool) -> None:
         """Give keys to the widget that had them last, or take them away."""
+        self._focused = focus
         if is_alive(self._scene):
             event = QtGui.QFocusEvent(_E.FocusIn if focus else _E.FocusOut)
             QtCore.QCoreApplication.sendEvent(self._scene, event)
@@ -212,14 +237,41 @@ class WidgetOverlay(Overlay):
             return None
         return widget.cursor()
 
-    def _has_popup(self) -> bool:
-        """Return whether the list of a combo box or a menu is open."""
-        popup = QtCore.Qt.Popup
-        return any(
-            item.isVisible() and item.isWindow() and item.windowFlags() & popup == popup
-            for item in map(_as_widget, self._scene.items())
-            if item is not None
-        )
+    def _popups(self) -> list[Any]:
+        """Return the lists of combo boxes and the menus that are open."""
+        windows = QtWidgets.QApplication.topLevelWidgets()
+        opened = [w for w in windows if w.windowType() == QtCore.Qt.Popup and w.isVisible()]
+        embedded = [w for w in opened if w.graphicsProxyWidget() is not None]
+        return [w for w in embedded if w.graphicsProxyWidget().scene() is self._scene]
+
+    def _look_after_popups(self, *_: Any) -> None:
+        """Keep them inside the 3D view; give the keys back to who had them when none is open."""
+        popups = self._popups()
+        opened, self._opened = self._opened, bool(popups)
+        if popups:
+            self._fit(popups)
+        elif opened and self._focused and is_alive(self._had_keys):
+            holder = self._with_keys()
+            if holder is None or holder.window() is not self.root:
+                self._had_keys.setFocus(QtCore.Qt.PopupFocusReason)
+
+    def _fit(self, popups: list[Any]) -> None:
+        # Qt has made them fit to the screen.
+        room = self._scene.sceneRect()
+        for popup in popups:
+            shown, opener = popup.graphicsProxyWidget(), popup.parentWidget()
+            box = shown.mapRectToScene(shown.rect())
+            fit = QtCore.QRectF(box.topLeft(), box.size().boundedTo(room.size()))
+            if fit.left() < 0 and opener in popups:
+                # On the other side of the menu that it belongs to.
+                menu = opener.graphicsProxyWidget()
+                fit.moveLeft(menu.mapRectToScene(menu.rect()).right())
+            fit.moveLeft(max(0.0, min(fit.left(), room.width() - fit.width())))
+            fit.moveTop(max(0.0, min(fit.top(), room.height() - fit.height())))
+            if fit != box:
+                shown.setGeometry(
+                    QtCore.QRectF(shown.pos() + fit.topLeft() - box.topLeft(), fit.size())
+                )
 
     def _widget_at(self, at: Any) -> Any:
         item = _as_widget(self._scene.itemAt(at, QtGui.QTransform()))
@@ -232,7 +284,10 @@ class WidgetOverlay(Overlay):
         """Delete the widgets."""
         self._style.close()
         if is_alive(self._scene):
-            self._scene.changed.disconnect(self._mark)
+            self._canvas.stale.disconnect(self.changed)
+            self._canvas.stale.disconnect(self._look_after_popups)
+            self._canvas.setScene(None)
+            self._canvas.deleteLater()
             self._view.setScene(None)
             self._scene.deleteLater()
             self._view.deleteLater()
@@ -255,6 +310,16 @@ class _HiddenView(QtWidgets.QGraphicsView):  # type: ignore[misc]
         self.resize(size)
         # Nobody lays out what is hidden.
         self.viewport().resize(size)
+
+    def give(self, event: Any) -> bool:
+        """Return whether something in the scene takes an event."""
+        event.setAccepted(False)
+        if event.type() in DRAG or event.type() == _E.DragLeave:
+            # The application would give it to what is dragged over, which this is not.
+            self.viewportEvent(event)
+        else:
+            QtCore.QCoreApplication.sendEvent(self.viewport(), event)
+        return bool(event.isAccepted())
 
     def put_under(self, event: Any, at: Any) -> None:
         """Stand where an event on the screen is at a place of the view: Qt asks the screen."""
@@ -324,6 +389,17 @@ def _has(widget: Any, quality: Callable[[Any], bool]) -> bool:
             return True
         widget = widget.parentWidget()
     return False
+
+
+def _has_menu(widget: Any) -> bool:
+    """Return whether a widget opens a menu by the mouse's right button."""
+    policy = widget.contextMenuPolicy()
+    if policy == QtCore.Qt.ActionsContextMenu:
+        return bool(widget.actions())
+    if policy == QtCore.Qt.DefaultContextMenu:
+        classes = (c for c in type(widget).__mro__ if c not in _WITHOUT_MENU)
+        return any("contextMenuEvent" in vars(c) for c in classes)
+    return bool(policy == QtCore.Qt.CustomContextMenu)
 
 
 def _ignores_wheel(widget: Any) -> bool:
