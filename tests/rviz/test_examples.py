@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 FOLDER = Path(__file__).parents[2] / "examples/rviz"
 PATIENCE = 60.0
-#: What RViz may take to end, on a machine that does other things, too.
-ENDING = 8.0
+#: What RViz may take to end: after 1.7 s it ends in any case.
+ENDING = 3.0
 #: Where things are on a screen of 1280x800.
 STOP, BEHAVIOURS, FLIPPERS_UP = (90, 720), (1153, 560), (1153, 648)
 PICTURES = {"front camera": (432, 566, 256, 180), "rear camera": (747, 566, 256, 180)}
