@@ -274,7 +274,9 @@ class Input(QtCore.QObject):
         return self._owner is not Owner.RVIZ
 
     def _offer_to_owner(self, event: Any) -> bool:
-        """Handle what only follows from where the mouse is."""
+        """Handle what only follows from where the mouse is, or from what has the keys."""
+        if event.type() == _E.ContextMenu and event.reason() == QtGui.QContextMenuEvent.Keyboard:
+            return self._key(event)
         if self._owner is Owner.RVIZ:
             return False
         which = self._owner or self._hovered

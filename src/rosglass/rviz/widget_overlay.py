@@ -197,7 +197,7 @@ class WidgetOverlay(Overlay):
     def _remember_keys(self, opened: bool) -> None:
         """Know who had the keys before a popup: Qt gives them to nobody when it has closed."""
         if not opened:
-            self._had_keys = self._with_keys()
+            self._had_keys = self._with_keys() or self._had_keys
 
     def _put_under_keys(self, receiver: Any) -> None:
         """Have what a widget opens by a key, e.g. a menu, stand beside it."""
