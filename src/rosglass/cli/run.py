@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rosglass.cli.connecting import add_definitions_option
+from rosglass.cli.connecting import add_definitions_option, seconds
 from rosglass.errors import QmlError, UnsupportedError
 
 if TYPE_CHECKING:
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "add_import_paths",
+    "add_longest_script",
     "add_screenshot",
     "configure",
     "format_log",
@@ -58,6 +59,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="fill the screen, ignore what would close the window (Alt-F4), and hide the pointer "
         "while it is not moved; Ctrl-C, SIGTERM and Qt.quit() end it",
     )
+    add_longest_script(parser)
     add_screenshot(parser, "the window", after=2.0)
     add_definitions_option(parser)
     parser.set_defaults(arguments=[], ros_arguments=[])
@@ -87,6 +89,18 @@ def add_import_paths(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         help="a folder with QML modules, searched besides QML_IMPORT_PATH; may be repeated",
+    )
+
+
+def add_longest_script(parser: argparse.ArgumentParser) -> None:
+    """Declare the option that says for how long JavaScript may keep the screen from living."""
+    parser.add_argument(
+        "--longest-script",
+        metavar="SECONDS",
+        type=seconds,
+        default=5.0,
+        help="how long JavaScript may compute at a time before it is ended, for the screen stands "
+        "still meanwhile; 0 for no limit (default: %(default)g)",
     )
 
 
@@ -122,6 +136,7 @@ def run(args: argparse.Namespace) -> int:
             after=args.after,
             verbose=args.verbose > 1,
             end_process=True,
+            longest_script=args.longest_script,
             url=args.url,
             name=args.name,
             import_paths=args.import_paths,
@@ -143,6 +158,7 @@ def show(
     after: float = 2.0,
     verbose: bool = False,
     end_process: bool = False,
+    longest_script: float = 5.0,
     **options: Any,
 ) -> int:
     """Show a QML file in a window until it is closed.
@@ -153,6 +169,7 @@ def show(
         after: Seconds until the screenshot.
         verbose: Show what is logged for developers, too.
         end_process: End the process soon after the interface, whatever still runs in it.
+        longest_script: Of :class:`rosglass.qml.Session`.
         options: Of :class:`rosglass.qml.Application`.
 
     Returns:
@@ -174,7 +191,7 @@ def show(
     # Nothing of what is made until the window is there becomes garbage.
     gc.disable()
     try:
-        return _show(file, screenshot, after, verbose, end_process, options)
+        return _show(file, screenshot, after, verbose, end_process, longest_script, options)
     finally:
         gc.enable()
         # PySide takes down what is left in any order at the end of the program, and may crash.
@@ -187,6 +204,7 @@ def _show(
     after: float,
     verbose: bool,
     end_process: bool,
+    longest_script: float,
     options: dict[str, Any],
 ) -> int:
     from rosglass.qml.application import Application
@@ -196,6 +214,7 @@ def _show(
     format_log(verbose)
     install_message_handler()
     app = Application(file, **options)
+    app.session.longest_script = longest_script
 
     def shown() -> None:
         gc.enable()

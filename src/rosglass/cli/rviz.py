@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from rosglass.cli.completion import complete_files
 from rosglass.cli.connecting import add_definitions_option, seconds
-from rosglass.cli.run import add_import_paths, add_screenshot, format_log
+from rosglass.cli.run import add_import_paths, add_longest_script, add_screenshot, format_log
 from rosglass.errors import Error, QmlError
 
 if TYPE_CHECKING:
@@ -88,6 +88,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="what draws interfaces in QML: OpenGL, Qt's software renderer (no shaders, particles "
         "and VideoOutput), or the one that is faster here (auto, the default)",
     )
+    add_longest_script(parser)
     add_screenshot(parser, "RViz's window", after=3.0)
     add_definitions_option(parser)
     parser.set_defaults(arguments=[], ros_arguments=[], ros1=True)
@@ -164,6 +165,7 @@ def _show(args: argparse.Namespace, config: str, remappings: list[str], received
         arguments=args.arguments,
         ros_arguments=[*remappings, *args.ros_arguments],
     )
+    app.session.longest_script = args.longest_script
     with app:
         _add_overlays(app, args)
         if received:

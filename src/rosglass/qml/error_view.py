@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rosglass.qt import QtCore, QtQml, is_alive
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-    from pathlib import Path
 
-__all__ = ["ErrorView"]
+__all__ = ["ERRORS", "ERRORS_BELOW", "PANEL", "SCRIPT_ENDED", "ErrorView"]
 
-_HEADINGS = (
-    "This interface has errors. It is shown once they are mended.",
-    "The interface below is the last one without errors.",
-)
+#: The QML file of an item that is no larger than its text, and can be closed.
+PANEL = Path(__file__).with_name("ErrorPanel.qml")
+#: Headings, by what is below.
+ERRORS = "This interface has errors. It is shown once they are mended."
+ERRORS_BELOW = "The interface below is the last one without errors."
+SCRIPT_ENDED = "The interface below goes on, but a part of what it should have done was left out."
 
 
 class ErrorView:
@@ -33,20 +35,20 @@ class ErrorView:
         self.items: list[Any] = []
         self._contents: list[Any] = []
 
-    def show(self, text: str, windows: Iterable[Any], *, below: bool) -> None:
+    def show(self, text: str, windows: Iterable[Any], heading: str) -> None:
         """Show errors; others that are shown already go.
 
         Args:
             text: The errors.
             windows: Where to show them.
-            below: Whether there is an interface below them.
+            heading: What they mean for what is below.
         """
         self.hide()
         url = QtCore.QUrl.fromLocalFile(str(self._look))
         component = self._component = QtQml.QQmlComponent(self._engine, url)
         for window in windows:
             item: Any = component.create()
-            item.setProperty("heading", _HEADINGS[below])
+            item.setProperty("heading", heading)
             item.setProperty("text", text)
             # PySide2 takes an item for gone as soon as nobody in Python knows what it is in.
             content = window.contentItem()

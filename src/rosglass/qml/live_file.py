@@ -9,6 +9,7 @@ from rosglass.errors import QmlError
 from rosglass.qml.load_errors import error_list
 from rosglass.qml.modules import install
 from rosglass.qml.places import import_folder, interface_file
+from rosglass.qml.watchdog import Watchdog
 from rosglass.qml.watcher import Watcher
 from rosglass.qt import QT6, QtCore, QtQml, Signal, is_alive
 
@@ -46,6 +47,8 @@ class LiveFile(QtCore.QObject):
 
     #: It is to be made anew: it has changed, or :meth:`is_ready` said no before, and would not now.
     due = Signal()
+    #: JavaScript of it was ended, for it kept the screen from living: what, where, and what to do.
+    script_ended = Signal(str)
 
     def __init__(
         self,
@@ -67,6 +70,7 @@ class LiveFile(QtCore.QObject):
         for path in [*_environment_paths(), *map(str, reversed(self._folders))]:
             self.engine.addImportPath(path)
         install(self.engine, session)
+        Watchdog.of(session).watch(self.engine, self.script_ended.emit)
         session.call_ended.connect(self._go_on)
         self._watcher: Watcher | None = None
         # Before anything is read, so that no change in between goes unnoticed.
@@ -156,6 +160,7 @@ class LiveFile(QtCore.QObject):
         self.watch = False
         self._closed = True
         self._session.call_ended.disconnect(self._go_on)
+        Watchdog.of(self._session).forget(self.engine)
         made, self.made = self.made, None
         if made is not None and hold:
             self.drop(made)

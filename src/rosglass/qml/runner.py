@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import QmlError
-from rosglass.qml.error_view import ErrorView
+from rosglass.qml.error_view import ERRORS, ERRORS_BELOW, PANEL, SCRIPT_ENDED, ErrorView
 from rosglass.qml.live_file import LiveFile
 from rosglass.qml.runtime import runtime_of
 from rosglass.qt import QtCore, QtGui, QtQuick, Slot, is_alive, send_deferred_deletes
@@ -83,6 +83,8 @@ class Runner(QtCore.QObject):
         #: Whether `window` is ours, around an interface that is no window itself.
         self._own = False
         self._errors = ErrorView(self.engine, _ERRORS)
+        self._notice = ErrorView(self.engine, PANEL)
+        self._live.script_ended.connect(self._tell_script_ended)
         self._kiosk: Kiosk | None = None
         app: Any = QtCore.QCoreApplication.instance()
         if kiosk and app is not None:
@@ -128,6 +130,7 @@ class Runner(QtCore.QObject):
             self._show_errors(str(error))
             return False
         self._errors.hide()
+        self._notice.hide()
 
         def show() -> None:
             self._show(made.root, list(before.values()))
@@ -168,6 +171,7 @@ class Runner(QtCore.QObject):
             self._kiosk = None
         window, self.window = self.window, None
         self._errors.hide()
+        self._notice.hide()
         self._live.close()
         if is_alive(window) and window is not None:
             window.deleteLater()
@@ -255,7 +259,12 @@ class Runner(QtCore.QObject):
             window.deleteLater()
 
     def _show_errors(self, text: str) -> None:
-        self._errors.show(text, self.windows(), below=self._live.made is not None)
+        heading = ERRORS if self._live.made is None else ERRORS_BELOW
+        self._errors.show(text, self.windows(), heading)
+
+    @Slot(str)
+    def _tell_script_ended(self, text: str) -> None:
+        self._notice.show(text, self.windows(), SCRIPT_ENDED)
 
     def _no_graphics(self, error: Any, message: str) -> None:  # noqa: ARG002 - Qt's signature
         _log.error("the window cannot be drawn: %s; try QT_QUICK_BACKEND=software", message)

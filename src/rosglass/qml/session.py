@@ -112,6 +112,8 @@ class Session(QtCore.QObject):
         self.streams: dict[Any, Any] = {}
         #: What elements share, other than pictures, by what it is.
         self.shared: dict[Any, Any] = {}
+        #: Seconds that JavaScript may compute at a time before it is ended; 0 for no limit.
+        self.longest_script = 5.0
         #: When throttled streams fetch their pictures.
         self.balancer = LoadBalancer()
         #: While any, QML's wish to shut down is ignored: its successor, or others, need the node.
@@ -470,7 +472,9 @@ class Session(QtCore.QObject):
         self._status = status
         if (self.state, self.detail) != before or not self.is_initialized:
             told = (self.state, self.detail)
-            _log.info("%s", told[1] if told[1].startswith(told[0]) else ": ".join(filter(None, told)))
+            _log.info(
+                "%s", told[1] if told[1].startswith(told[0]) else ": ".join(filter(None, told))
+            )
             self.connection_changed.emit()
 
 

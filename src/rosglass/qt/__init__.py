@@ -25,6 +25,7 @@ __all__ = [
     "QtQuick",
     "Signal",
     "Slot",
+    "address",
     "choose_binding",
     "is_alive",
     "optional",
@@ -128,6 +129,11 @@ def optional(module: str) -> Any:
 def is_alive(item: QtCore.QObject | None) -> bool:
     """Return whether a QObject still exists on the C++ side."""
     return item is not None and bool(_shiboken.isValid(item))
+
+
+def address(item: QtCore.QObject) -> int:
+    """Return where the C++ object is; for C functions, and for what Qt tells in no other way."""
+    return int(_shiboken.getCppPointer(item)[0])
 
 
 def run_event_loop(loop: QtCore.QCoreApplication | QtCore.QEventLoop) -> int:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import QmlError
-from rosglass.qml.error_view import ErrorView
+from rosglass.qml.error_view import ERRORS, ERRORS_BELOW, PANEL, SCRIPT_ENDED, ErrorView
 from rosglass.qml.live_file import LiveFile
 from rosglass.qt import is_alive
 from rosglass.rviz.opengl_needs import need_in_items
@@ -34,7 +34,6 @@ __all__ = ["QmlOverlay"]
 
 _log = logging.getLogger("rosglass.rviz")
 _IMPORTS = Path(__file__).with_name("imports")
-_ERRORS = Path(__file__).with_name("ErrorPanel.qml")
 #: In `Session.shared`: the overlays that talk through it.
 _USERS = "overlays"
 #: Milliseconds after a drawing until what has come since is looked at.
@@ -91,12 +90,13 @@ class QmlOverlay(QmlInput, Overlay):
         self._look.setSingleShot(True)
         self._look.setInterval(_LOOK)
         self._look.timeout.connect(self._look_for_needs)
-        self._errors = ErrorView(self.engine, _ERRORS)
+        self._errors = ErrorView(self.engine, PANEL)
         self.arranged.connect(self._fit_errors)
         self._closed = self._loading = False
         self._users: list[QmlOverlay] = session.shared.setdefault(_USERS, [])
         self._users.append(self)
         self._live.due.connect(self.reload)
+        self._live.script_ended.connect(self._tell_script_ended)
 
     @property
     def root(self) -> Any:
@@ -213,10 +213,18 @@ class QmlOverlay(QmlInput, Overlay):
         if self._closed:
             return
         if error:
-            self._errors.show(error, [self._window], below=self.loaded)
+            self._errors.show(error, [self._window], ERRORS_BELOW if self.loaded else ERRORS)
             self._fit_errors()
         else:
             self._errors.hide()
+        self.changed.emit()
+
+    def _tell_script_ended(self, text: str) -> None:
+        if self._closed or self._error:
+            return
+        self.tell_problem(text)
+        self._errors.show(text, [self._window], SCRIPT_ENDED)
+        self._fit_errors()
         self.changed.emit()
 
     def _fit_errors(self) -> None:

@@ -1,0 +1,394 @@
+"""Noticing that the screen stands still, and ending the JavaScript that keeps it from living."""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+import sysconfig
+import threading
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rosglass.qml.js_stack import JsStack
+from rosglass.qml.log import Caller, log_from_qml
+from rosglass.qt import QtCore, Slot, is_alive
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import FrameType
+
+    from rosglass.qml.session import Session
+    from rosglass.qt import QtQml
+
+__all__ = ["Watchdog"]
+
+_log = logging.getLogger("rosglass.qml")
+#: Milliseconds between two signs of life of the GUI thread.
+_BEAT = 250
+#: Seconds between two looks at them; and between two looks at what it does while there are none.
+_LOOK, _CLOSE_LOOK = 0.5, 0.1
+#: For how many seconds JavaScript is told to end, one after the other: until it has, for it goes on
+#: where it is when it is told no longer; and not longer, for what it does next must not be told so.
+#: At first nobody else runs Python meanwhile, who could keep this thread from noticing.
+_HOLDS = (0.0005,) * 6
+#: The same while others may: JavaScript that calls Python cannot end before.
+_SHARED_HOLDS = (0.001, 0.001, 0.004, 0.004, 0.016, 0.032)
+#: Seconds after which a thread lets others run Python, in either case.
+_NEVER, _AT_ONCE = 1.0, 1e-5
+#: How often that is tried, and the seconds before: a thread that has slept is not kept waiting.
+_TRIES, _REST = 60, 0.002
+#: Seconds within which it is seen whether the GUI thread computes right now.
+_GLANCE = 50e-6
+#: Seconds between two looks above which the whole process stood still.
+_GAP = 1.0
+#: The part of its time that a thread computes at least, when it does not wait for something.
+_BUSY = 0.05
+#: On a machine with too much to do, JavaScript is given up to so many times as long.
+_PATIENCE = 4
+_OURS = str(Path(__file__).parents[1])
+_LIBRARIES = (sysconfig.get_paths()["stdlib"], *{sysconfig.get_paths()[p] for p in ("purelib",)})
+_ADVICE = "let it end, or do its work in pieces by a Timer"
+
+
+class _Watched(NamedTuple):
+    """An engine.
+
+    Attributes:
+        engine: The engine.
+        stack: Its stack.
+        tell: Told on the GUI thread what was done to it.
+        waiting: What was the innermost function when the event loop was last seen to run; others
+            than 0 wait for something in an event loop of their own.
+    """
+
+    engine: QtQml.QQmlEngine
+    stack: JsStack
+    tell: Callable[[str], None]
+    waiting: list[int]
+
+    @property
+    def is_running(self) -> bool:
+        """Whether JavaScript runs, or something in C++ or Python that it has called."""
+        return self.stack.is_known and self.stack.frame != self.waiting[0]
+
+    def hold(self, seconds: float) -> None:
+        """Tell JavaScript to end, until it has, or until some seconds have passed."""
+        outermost, handler = self.handler
+        if not handler:
+            return
+        frame, waiting = self.stack.pointer, self.waiting[0] or None
+        # The next one may have begun already when it is looked whether any runs.
+        function = self.stack.function_of(outermost)
+        tell, clock = self.engine.setInterrupted, time.perf_counter
+        until = clock() + seconds
+        tell(True)
+        try:
+            # Each part of a microsecond that this takes counts.
+            while frame.value != waiting and function.value == handler and clock() < until:
+                pass
+        finally:
+            tell(False)
+
+    @property
+    def handler(self) -> tuple[int, int]:
+        """The frame and the function that was called first; 0 while none runs."""
+        return self.stack.handler(self.waiting[0])
+
+
+class _Use(NamedTuple):
+    """What a thread did until now.
+
+    Attributes:
+        computed: Seconds that it computed.
+        ready: Seconds that it would have computed, if other programs had not.
+        runs: Whether it is at it now.
+    """
+
+    computed: float
+    ready: float
+    runs: bool
+
+
+class Watchdog(QtCore.QObject):
+    """Watches the GUI thread for a session, as long as it is given engines.
+
+    Lives on the GUI thread, which gives signs of life by a timer. A thread of its own looks for
+    them. While there are none it adds up for how long the GUI thread has computed in JavaScript,
+    and ends that when it is longer than :attr:`Session.longest_script`; native code and Python are
+    only told.
+
+    JavaScript that Python calls by functions of Qt that keep Python's lock cannot be ended, for
+    no thread of Python runs then; the interface's handlers, timers and bindings are not called
+    that way.
+
+    Args:
+        session: Whose interfaces it watches.
+    """
+
+    def __init__(self, session: Session) -> None:
+        super().__init__()
+        self._session = session
+        self._watched: dict[int, _Watched] = {}
+        self._main, self._number = threading.get_ident(), threading.get_native_id()
+        self._clock = _thread_clock(self._main)
+        self._use = _watch_thread(self._number, self._clock)
+        affinity = getattr(os, "sched_getaffinity", None)
+        self._alone = affinity is not None and len(affinity(0)) == 1
+        #: When the event loop was last seen to run, and in which frame of Python; whether it is
+        #: known to run at all.
+        self._beaten = time.monotonic()
+        self._loop: tuple[int, object] | None = None
+        self._lives = False
+        #: When the thread last looked, and seconds in which it could not.
+        self._looked, self._blind = self._beaten, 0.0
+        self._told = ""
+        self._end = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._timer = QtCore.QTimer(self)
+        self._timer.setInterval(_BEAT)
+        self._timer.timeout.connect(self._beat)
+        session.call_ended.connect(self._on_call_ended)
+        app = QtCore.QCoreApplication.instance()
+        if app is not None:
+            app.aboutToQuit.connect(self._on_quit)
+
+    @classmethod
+    def of(cls, session: Session) -> Watchdog:
+        """Return the watchdog of a session, made if need be."""
+        found = session.shared.get(cls)
+        if not isinstance(found, Watchdog):
+            found = session.shared[cls] = Watchdog(session)
+        return found
+
+    def watch(self, engine: QtQml.QQmlEngine, tell: Callable[[str], None]) -> None:
+        """Watch an engine, too.
+
+        Args:
+            engine: The engine; :meth:`forget` it before it goes.
+            tell: Told on the GUI thread what was done to it, or that Python stood in its way.
+        """
+        stack = JsStack(engine)
+        self._watched[id(engine)] = _Watched(engine, stack, tell, [stack.frame])
+        if self._thread is None:
+            self._beaten = self._looked = time.monotonic()
+            self._lives = False
+            self._end.clear()
+            self._timer.start()
+            self._thread = threading.Thread(
+                target=self._run, args=(self._end,), name="watchdog", daemon=True
+            )
+            self._thread.start()
+
+    def forget(self, engine: QtQml.QQmlEngine) -> None:
+        """Watch an engine no longer; safe to call twice."""
+        watched = self._watched.pop(id(engine), None)
+        if watched is not None:
+            watched.stack.close()
+        if not self._watched and self._thread is not None:
+            self._timer.stop()
+            self._end.set()
+            self._end = threading.Event()
+            self._thread.join(timeout=1.0)
+            self._thread = None
+
+    # The GUI thread.
+
+    @Slot()
+    def _beat(self) -> None:
+        now = time.monotonic()
+        still, self._beaten = now - self._beaten, now
+        caller = sys._getframe().f_back
+        self._loop = _identity(caller) if caller is not None else None
+        for watched in self._watched.values():
+            watched.waiting[0] = watched.stack.frame
+        lived, self._lives = self._lives, True
+        told, self._told = self._told, ""
+        blind, self._blind = self._blind, 0.0
+        limit = self._session.longest_script
+        if not lived or not limit or still < limit:
+            return
+        if told:
+            _log.warning("the screen stood still for %.1f s in all: %s", still, told)
+        elif max(blind, now - self._looked) > limit / 2:
+            _log.warning(
+                "the screen stood still for %.1f s, and the whole program with it: the process was "
+                "stopped, or a function in C++ kept Python's lock",
+                still,
+            )
+
+    @Slot()
+    def _on_call_ended(self) -> None:
+        """A function of JavaScript that waited is about to go on."""
+        self._beaten = time.monotonic()
+        for watched in self._watched.values():
+            watched.waiting[0] = 0
+
+    @Slot()
+    def _on_quit(self) -> None:
+        # Whether the event loop runs once more, nobody knows.
+        self._lives = False
+
+    # The thread that watches.
+
+    def _run(self, end: threading.Event) -> None:
+        while not end.wait(_LOOK):
+            self._look()
+            if self._looked - self._beaten > 2 * _LOOK:
+                try:
+                    self._look_closely(end)
+                except Exception:
+                    _log.exception("internal error: the screen is watched no longer")
+                    return
+
+    def _look(self) -> float:
+        """Say that the thread looks; returns the seconds since, 0 when it could not look."""
+        now = time.monotonic()
+        passed, self._looked = now - self._looked, now
+        if passed <= _GAP:
+            return passed
+        self._blind += passed
+        return 0.0
+
+    def _look_closely(self, end: threading.Event) -> None:
+        """Look at what the GUI thread does, until it lives again."""
+        beaten, before = self._beaten, self._use()
+        still, script, handler = self._looked - beaten - self._blind, 0.0, (0, 0)
+        while self._beaten == beaten and not end.wait(_CLOSE_LOOK):
+            passed, used = self._look(), self._use()
+            computed, ready = used.computed - before.computed, used.ready - before.ready
+            before = used
+            limit = self._session.longest_script
+            if not limit:
+                return
+            if not passed:
+                # Nobody knows what it did.
+                continue
+            still += passed
+            running = [watched for watched in tuple(self._watched.values()) if watched.is_running]
+            # The stack grows downwards: what is called last is lowest.
+            innermost = min(running, key=lambda watched: watched.stack.frame, default=None)
+            if innermost is not None and (used.runs or computed > _BUSY * passed):
+                last, handler = handler, innermost.handler
+                script = (script if handler == last else 0.0) + computed + ready / _PATIENCE
+                if script < limit:
+                    continue
+                if self._beaten == beaten and self._end_script(innermost, script):
+                    return
+            if self._lives and still >= limit and not self._told and self._beaten == beaten:
+                self._tell_still(still, innermost)
+
+    def _end_script(self, watched: _Watched, seconds: float) -> bool:
+        """Have JavaScript end that runs now; returns whether it did."""
+        callers, handler = watched.stack.callers(), watched.handler
+        ended, alone, shared = False, list(_HOLDS), list(_SHARED_HOLDS)
+        for _ in range(_TRIES):
+            time.sleep(_REST)
+            ended = watched.handler != handler
+            if ended:
+                break
+            # Told while it waits for this thread's processor, it would not be seen to end.
+            if not self._computes() and self._use().runs:
+                continue
+            if not shared:
+                break
+            interval = _NEVER if alone and self._computes() else _AT_ONCE
+            before = sys.getswitchinterval()
+            sys.setswitchinterval(interval)
+            try:
+                watched.hold((alone if interval == _NEVER else shared).pop(0))
+            finally:
+                sys.setswitchinterval(before)
+        if ended:
+            self._told = ""
+            self._tell_ended(watched, callers, seconds)
+        return ended
+
+    def _computes(self) -> bool:
+        """Return whether the GUI thread computes right now, beside this one."""
+        if self._alone:
+            return True
+        began, before = time.perf_counter(), self._clock()
+        while time.perf_counter() < began + _GLANCE:
+            pass
+        return self._clock() - before > _GLANCE / 5
+
+    def _tell_ended(self, watched: _Watched, callers: list[Caller], seconds: float) -> None:
+        where = callers[0] if callers else Caller("<unknown>", 0, "")
+        shown = dict.fromkeys(map(_told, [*callers[:3], *callers[-1:]]))
+        chain = ", called at ".join(shown)
+        text = (
+            f"JavaScript computed for {seconds:.1f} s and kept the screen from living; it was "
+            f"ended{f' in {chain}' if chain else ''}: {_ADVICE}"
+        )
+        log_from_qml("", logging.ERROR, text, where)
+        self._show(watched, text)
+
+    def _tell_still(self, seconds: float, watched: _Watched | None) -> None:
+        """Tell of what is not JavaScript, and can only be waited for."""
+        frame = sys._current_frames().get(self._main)
+        callers = watched.stack.callers() if watched is not None else []
+        called = f", called at {_told(callers[0])}" if callers else ""
+        if frame is None or _identity(frame) == self._loop:
+            text = f"native code of Qt, RViz or a plugin is at work{called}"
+        else:
+            text = f"Python is at work in {_python_place(frame)}{called}"
+        self._told = text
+        _log.warning("the screen has stood still for %.1f s: %s", seconds, text)
+
+    def _show(self, watched: _Watched, text: str) -> None:
+        def show() -> None:
+            if is_alive(watched.engine):
+                watched.tell(text)
+
+        self._session.executor.post(show)
+
+
+def _told(caller: Caller) -> str:
+    name = caller.function.removeprefix("expression for ")
+    return f"{caller.place}{f' ({name})' if name else ''}"
+
+
+def _identity(frame: FrameType) -> tuple[int, object]:
+    """Return what tells a frame from others, without keeping what it holds."""
+    return id(frame), frame.f_code
+
+
+def _python_place(frame: FrameType) -> str:
+    """Return where Python is, in the program's own files if it is called from there."""
+    found: FrameType | None = frame
+    while found is not None and found.f_code.co_filename.startswith((_OURS, *_LIBRARIES, "<")):
+        found = found.f_back
+    shown = found or frame
+    return f"{shown.f_code.co_filename}:{shown.f_lineno} ({shown.f_code.co_name})"
+
+
+def _thread_clock(ident: int) -> Callable[[], float]:
+    """Return what tells for how many seconds a thread has computed."""
+    of_thread: Any = getattr(time, "pthread_getcpuclockid", None)
+    if of_thread is None:
+        # On Windows, other threads than this one hardly ever compute while nothing is drawn.
+        return time.process_time
+    clock = of_thread(ident)
+    return lambda: time.clock_gettime(clock)
+
+
+def _watch_thread(number: int, clock: Callable[[], float]) -> Callable[[], _Use]:
+    """Return what tells what a thread does.
+
+    Args:
+        number: Of the thread, the system's.
+        clock: Tells for how many seconds it has computed.
+    """
+    # Linux, Documentation/scheduler/sched-stats.rst and proc_pid_stat(5).
+    times, state = (Path(f"/proc/self/task/{number}/{name}") for name in ("schedstat", "stat"))
+    if not times.exists():
+        return lambda: _Use(clock(), 0.0, False)
+
+    def look() -> _Use:
+        ready = int(times.read_bytes().split()[1]) / 1e9
+        runs = state.read_bytes().rpartition(b")")[2].split()[0] == b"R"
+        return _Use(clock(), ready, runs)
+
+    return look

@@ -1,0 +1,188 @@
+"""JavaScript without an end is ended, and told; what only takes long is not."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from memory_world import MemoryWorld
+
+from rosglass.qml import Session
+from rosglass.qml.runner import Runner
+from rosglass.qml.waiting import wait_for
+from rosglass.qml.watchdog import Watchdog
+from rosglass.qt import Property, QtCore, Signal, Slot
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+UI = """import QtQuick 2.15
+Item {
+    property var done: []
+    function begin() { work.start() }
+    function loop() { %s }
+    function after() { var n = 0; for (var i = 0; i < 9; i++) n += i; done = done.concat("after") }
+    Timer { id: work; interval: 1; onTriggered: {
+        done = ["begun"]
+        loop()
+        done = done.concat("went on")
+    } }
+    Timer { interval: 50; running: done.length > 0; onTriggered: after() }
+}"""
+#: The line of UI that loops.
+LINE = 5
+
+
+class Helper(QtCore.QObject):
+    """What an application gives its QML."""
+
+    told = Signal()
+
+    def __init__(self, session: Session) -> None:
+        super().__init__()
+        self._session = session
+
+    one = Property(int, lambda _: 1, notify=told)
+
+    @Slot(float)
+    def rest(self, seconds: float) -> None:
+        time.sleep(seconds)
+
+    @Slot(float)
+    def compute(self, seconds: float) -> None:
+        until = time.monotonic() + seconds
+        while time.monotonic() < until:
+            pass
+
+    @Slot(int)
+    def wait(self, milliseconds: int) -> None:
+        """Wait in an event loop, as Service.call does."""
+        wait_for(self._session, lambda ended: QtCore.QTimer.singleShot(milliseconds, ended))
+
+    @Slot()
+    def tell(self) -> None:
+        self.told.emit()
+
+
+@pytest.fixture
+def run(
+    app: Any, tmp_path: Path, caplog: Any, wait: Callable[..., None]
+) -> Iterator[Callable[..., Runner]]:
+    caplog.set_level("INFO", "rosglass.qml")
+    made: list[Runner] = []
+
+    def run(code: str, limit: float) -> Runner:
+        file = tmp_path / "Main.qml"
+        file.write_text(UI % code)
+        session = Session(connect=MemoryWorld().connect)
+        session.longest_script = limit
+        runner = Runner(file, session)
+        made.append(runner)
+        runner.helper = Helper(session)
+        runner.engine.rootContext().setContextProperty("helper", runner.helper)
+        runner.load()
+        runner.root = runner._live.made.root
+        # Until the event loop is known to run, only JavaScript is looked at.
+        wait(lambda: session.shared[Watchdog]._lives)
+        return runner
+
+    yield run
+    for runner in made:
+        runner.close()
+        runner.session.close()
+
+
+def done(runner: Runner) -> list[str]:
+    value: Any = runner.root.property("done")
+    return list(value.toVariant() if hasattr(value, "toVariant") else value)
+
+
+def panel(runner: Runner) -> str:
+    return "\n".join(item.property("text") for item in runner._notice.items)
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "while (true) {}",
+        "while (helper.one == 1) {}",
+        "[3, 2, 1].sort(function (a, b) { while (true) {} })",
+        "function deeper(n) { return n ? deeper(n - 1) + deeper(n - 1) : 1 } deeper(99)",
+        "try { while (true) {} } catch (error) { done = ['caught'] }",
+    ],
+)
+def test_a_loop_without_end_is_ended_and_told_with_its_place(
+    run: Callable[..., Runner], wait: Callable[..., None], caplog: Any, code: str
+) -> None:
+    runner = run(code, 0.5)
+    QtCore.QMetaObject.invokeMethod(runner.root, "begin")
+    wait(lambda: panel(runner))
+    place = f"{runner.file}:{LINE}"
+    # It ended in the middle, and what came later was not touched.
+    wait(lambda: "after" in done(runner))
+    assert done(runner) == ["begun", "after"]
+    assert f"{place} (" in panel(runner)
+    assert "called at" in panel(runner)
+    assert "onTriggered" in panel(runner)
+    (record,) = [r for r in caplog.records if "computed for" in r.getMessage()]
+    assert f"{record.pathname}:{record.lineno}" == place
+    assert record.getMessage() == panel(runner)
+    assert runner._notice.items[0].property("heading").startswith("The interface below goes on")
+
+
+def test_a_handler_of_a_signal_from_python_is_ended_too(
+    run: Callable[..., Runner], wait: Callable[..., None]
+) -> None:
+    runner = run("helper.told.connect(function () { while (true) {} }); helper.tell()", 0.5)
+    QtCore.QMetaObject.invokeMethod(runner.root, "begin")
+    wait(lambda: panel(runner))
+    assert f"{runner.file}:{LINE}" in panel(runner)
+
+
+@pytest.mark.parametrize("slot", ["rest", "compute"])
+def test_a_slow_function_in_python_is_told_and_what_called_it_goes_on(
+    run: Callable[..., Runner], wait: Callable[..., None], caplog: Any, slot: str
+) -> None:
+    # What Python computes for JavaScript counts as its own, so there it must stay below the limit.
+    runner = run(f"helper.{slot}({'2.5' if slot == 'rest' else '0.5'})", 1.0)
+    QtCore.QMetaObject.invokeMethod(runner.root, "begin")
+    wait(lambda: "after" in done(runner))
+    assert done(runner) == ["begun", "went on", "after"]
+    assert not panel(runner)
+    if slot == "rest":
+        wait(lambda: any("stood still for" in record.getMessage() for record in caplog.records))
+        assert f"Python is at work in {__file__}" in caplog.text
+        assert "(rest)" in caplog.text
+        assert f"called at {runner.file}:{LINE} (loop)" in caplog.text
+
+
+def test_a_call_that_waits_while_the_screen_lives_is_not_ended(
+    run: Callable[..., Runner], wait: Callable[..., None], caplog: Any
+) -> None:
+    runner = run("helper.wait(2500)", 0.5)
+    QtCore.QMetaObject.invokeMethod(runner.root, "begin")
+    wait(lambda: "went on" in done(runner))
+    assert "stood still" not in caplog.text
+    assert "computed for" not in caplog.text
+
+
+def test_javascript_that_loops_after_a_call_that_waited_is_ended(
+    run: Callable[..., Runner], wait: Callable[..., None]
+) -> None:
+    runner = run("helper.wait(700); while (true) {}", 0.5)
+    QtCore.QMetaObject.invokeMethod(runner.root, "begin")
+    wait(lambda: panel(runner))
+    assert "went on" not in done(runner)
+
+
+@pytest.mark.parametrize("limit", [0, 60])
+def test_javascript_that_takes_long_but_not_too_long_is_left_alone(
+    run: Callable[..., Runner], wait: Callable[..., None], caplog: Any, limit: float
+) -> None:
+    runner = run("var t = Date.now(); while (Date.now() - t < 2500) {}", limit)
+    QtCore.QMetaObject.invokeMethod(runner.root, "begin")
+    wait(lambda: "after" in done(runner))
+    assert done(runner) == ["begun", "went on", "after"]
+    assert "screen" not in caplog.text
