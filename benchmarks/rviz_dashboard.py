@@ -1,6 +1,6 @@
 """Measure what the dashboard of examples/rviz costs each of RViz's frames, with everything live.
 
-    .venv-system/bin/python benchmarks/rviz_dashboard.py [--seconds N] [--rounds N] [--software]
+    .venv-system/bin/python benchmarks/rviz_dashboard.py [--seconds N] [--rounds N] [--renderer R]
 
 Debian's rosmaster, the simulated robot on its mission (camera at 30 Hz, four more at 10 Hz of which
 one is shown, data at 20 Hz and more), and RViz with examples/rviz/figure1.rviz and Dashboard.qml in
@@ -34,28 +34,28 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=15, help="of each round (15)")
     parser.add_argument("--rounds", type=int, default=3, help="(3)")
     parser.add_argument(
-        "--software", action="store_true", help="have Qt's software renderer draw the dashboard"
+        "--renderer", default="auto", help="what draws it: auto (default), opengl or software"
     )
     args = parser.parse_args()
     works: list[dict[str, float]] = []
-    backend = {"QT_QUICK_BACKEND": "software"} if args.software else {}
     with tempfile.TemporaryDirectory() as home, ros_master(home) as master:
         url = master.replace("http:", "ros1:")
         robot = start_robot(url, ("--equipped", "--fps", "30", "--mode", "autonomous"))
         try:
             for number in range(args.rounds):
                 figures = ask(
-                    environment(master, home) | backend,
+                    environment(master, home),
                     120 + 3 * args.seconds,
                     what="dashboard",
                     seconds=args.seconds,
                     url=url,
+                    renderer=args.renderer,
                 )
                 works += figures["works"]
                 print(
                     f"round {number + 1}: {figures['frames'] / args.seconds:4.1f} frames/s, "
                     f"dashboard drawn in {len(figures['works']) / args.seconds:4.1f}/s, "
-                    f"CPU {figures['cpu']:3.0f} %",
+                    f"CPU {figures['cpu']:3.0f} %, renderer {figures['renderer']}",
                     flush=True,
                 )
         except subprocess.TimeoutExpired:

@@ -29,10 +29,16 @@ EVERYTHING = Path(__file__).with_name("rviz_cycles.qml")
 DASHBOARD = Path(__file__).parents[1] / "examples/rviz"
 
 
-def memory(pid: int | str = "self") -> float:
-    """Return the resident memory of a process in MiB."""
-    status = Path(f"/proc/{pid}/status").read_text(encoding="ascii")
-    return int(status.split("VmRSS:")[1].split()[0]) / 1024
+def memory(pid: int | str = "self", *, own: bool = False) -> float:
+    """Return the resident memory of a process in MiB.
+
+    Args:
+        pid: The process.
+        own: Without what it shares: the code of libraries, mostly.
+    """
+    told = Path(f"/proc/{pid}/smaps_rollup").read_text(encoding="ascii")
+    wanted = ("Private_Dirty:", "Private_Clean:") if own else ("Rss:",)
+    return sum(int(told.split(name)[1].split()[0]) for name in wanted) / 1024
 
 
 def processor(seconds: float, run: Callable[[float], None]) -> float:
@@ -115,8 +121,9 @@ def measure(order: dict[str, Any]) -> dict[str, Any]:
     """Measure RViz without overlay, with a static or with an animated one."""
     from rosglass.qt import QtCore
     from rosglass.rviz import Application
+    from rosglass.rviz.renderer_choice import choice
 
-    app = Application()
+    app = Application(renderer=order["renderer"])
     app.window.widget.setGeometry(0, 0, *VIEW)
     overlay = app.add_qml(QML) if order["what"] != "without" else None
     first: list[float] = []
@@ -144,17 +151,34 @@ def measure(order: dict[str, Any]) -> dict[str, Any]:
     figures["work"] = medians(works_during(app, lambda: done.append(uncapped(app, seconds))))
     figures["fps"], figures["frame"] = done[0]
     figures["covered"] = app.overlays.covered
+    figures["renderer"] = choice.renderer
     gc.collect()
-    figures["memory"] = memory()
+    figures["memory"], figures["own"] = memory(), memory(own=True)
     app.close()
     return figures
+
+
+def save_bare(order: dict[str, Any]) -> dict[str, Any]:
+    """Save a config with which RViz's own program shows as large a 3D view, and little else."""
+    from rosglass.rviz import Application
+
+    app = Application()
+    app.window.widget.show()
+    fit_view(app)
+    # RViz shows its menu and the handles of its docks all the same, 51 and twice 16 pixels large.
+    app.window.widget.resize(VIEW[0] + 32, VIEW[1] + 51)
+    run_for(0.5, app)
+    app.save_config(order["config"])
+    return {}
 
 
 def dashboard(order: dict[str, Any]) -> dict[str, Any]:
     """Measure the dashboard of examples/rviz beside a live robot."""
     from rosglass.rviz import Application
+    from rosglass.rviz.renderer_choice import choice
 
-    app = Application(DASHBOARD / "figure1.rviz", url=order["url"])
+    config = DASHBOARD / "figure1.rviz"
+    app = Application(config, url=order["url"], renderer=order["renderer"])
     app.add_qml(DASHBOARD / "Dashboard.qml")
     app.window.widget.setGeometry(0, 0, *VIEW)
     app.window.widget.show()
@@ -169,6 +193,7 @@ def dashboard(order: dict[str, Any]) -> dict[str, Any]:
 
     works = works_during(app, run)
     figures: dict[str, Any] = {"cpu": used[0], "frames": len(frames)}
+    figures["renderer"] = choice.renderer
     figures["works"] = [{**work._asdict(), "total": work.total} for work in works]
     return figures
 
@@ -298,7 +323,8 @@ def main() -> None:
     sys.argv[1:] = []
     with tempfile.TemporaryDirectory() as home:
         os.environ.update(HOME=home, XDG_RUNTIME_DIR=home)
-        figures = {"cycles": cycles, "dashboard": dashboard}.get(order["what"], measure)(order)
+        others = {"cycles": cycles, "dashboard": dashboard, "bare": save_bare}
+        figures = others.get(order["what"], measure)(order)
         Path(order["into"]).write_text(json.dumps(figures), encoding="utf-8")
     # What is measured is over; how a process ends is for others to test.
     os._exit(0)

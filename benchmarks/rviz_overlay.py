@@ -1,13 +1,15 @@
 """Measure what an interface over RViz's 3D view costs, and whether it leaves anything behind.
 
     .venv-system/bin/python benchmarks/rviz_overlay.py [--seconds N] [--rounds N] [--cycles N]
+        [--renderer auto|opengl|software]
 
 RViz without overlay, with a static and with an animated one take turns in processes of their own,
 each on a virtual screen (Xvfb) with software OpenGL, Debian's rosmaster beside them. RViz shows
 its grid in a 3D view of 1280x800 pixels, and nothing else. The overlay (`rviz_overlay.qml`) is a
 clock, tool buttons and a legend at the top and a dashboard at the bottom; animated, a needle, four
 bars and four numbers move all the time. `alone` is RViz's own program, /usr/bin/rviz, without
-Python.
+Python, with a 3D view of the same size: with software OpenGL, its pixels are memory of the process.
+Memory is what is resident; `own` is without what is shared with other programs, mostly libraries.
 
 CPU is that of the process at RViz's 30 frames per second, of one core. Uncapped frame rates are
 those of RViz drawing as fast as it can. The C++ reference's figures were measured on the same kind
@@ -48,6 +50,8 @@ CONTENDERS = ("without", "static", "animated")
 CHILD = str(Path(__file__).with_name("rviz_measure.py"))
 RVIZ = "/usr/bin/rviz"
 SCREEN = (1400, 1000)
+#: MiB that RViz takes at least when it has begun to draw.
+_STARTED = 170
 
 
 @contextlib.contextmanager
@@ -109,17 +113,20 @@ def ask(env: dict[str, str], timeout: float, **order: Any) -> dict[str, Any]:
         return figures
 
 
-def alone(env: dict[str, str], seconds: float) -> float:
-    """Return the memory of RViz's own program in MiB after some seconds."""
+def alone(env: dict[str, str], config: Path, seconds: float) -> tuple[float, float]:
+    """Return the memory of RViz's own program, all and its own in MiB, once it grows no more."""
     with contextlib.closing(VirtualScreen(*SCREEN)) as screen:
         process = subprocess.Popen(
-            [RVIZ],
+            [RVIZ, "-d", str(config)],
             env=env | {"DISPLAY": screen.display},
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-        time.sleep(seconds)
-        used = memory(process.pid)
+        before, now = -1.0, 0.0
+        while now - before > 0.1 or now < _STARTED:
+            time.sleep(seconds)
+            before, now = now, memory(process.pid)
+        used = now, memory(process.pid, own=True)
         process.kill()
         process.wait(10)
     return used
@@ -140,7 +147,7 @@ class Verdicts:
         print(f"{name:52} {figure:>24}  {ratio:8.2f}  {sign} {target:<6g} {verdict}")
 
 
-def report(rounds: dict[str, list[dict[str, Any]]], rviz: list[float]) -> Verdicts:
+def report(rounds: dict[str, list[dict[str, Any]]], rviz: list[tuple[float, float]]) -> Verdicts:
     """Print all figures."""
 
     def median(what: str, figure: str) -> float:
@@ -150,10 +157,12 @@ def report(rounds: dict[str, list[dict[str, Any]]], rviz: list[float]) -> Verdic
         print(
             f"{what:9} start {median(what, 'start'):5.0f} ms   CPU {median(what, 'cpu'):4.0f} %   "
             f"uncapped {median(what, 'fps'):5.1f} frames/s, median {median(what, 'frame'):5.2f} ms"
-            f"   memory {median(what, 'memory'):4.0f} MiB   "
-            f"blended {100 * median(what, 'covered'):.0f} % of the view"
+            f"   memory {median(what, 'memory'):4.0f} MiB, own {median(what, 'own'):.0f}   "
+            f"blended {100 * median(what, 'covered'):.0f} % of the view   "
+            f"renderer {rounds[what][-1]['renderer'] or 'none'}"
         )
-    print(f"{'alone':9} memory {statistics.median(rviz):4.0f} MiB")
+    alone_all, alone_own = (statistics.median(used) for used in zip(*rviz, strict=True))
+    print(f"{'alone':9} memory {alone_all:4.0f} MiB, of its own {alone_own:.0f}")
     for what in CONTENDERS:
         works = [r["work"] for r in rounds[what] if r["work"]]
         if works:
@@ -172,12 +181,14 @@ def report(rounds: dict[str, list[dict[str, Any]]], rviz: list[float]) -> Verdic
     )
     later = (median("static", "start") - median("without", "start")) / 1000
     told.line("visible after RViz's first frame", "seconds", later, 0.2, False)
-    used = median("static", "memory")
-    for name, than in (
-        ("RViz here", median("without", "memory")),
-        ("RViz alone", statistics.median(rviz)),
+    for kind, figure, rviz_alone in (
+        ("MiB", "memory", alone_all),
+        ("own MiB", "own", alone_own),
     ):
-        told.line(f"MiB more than {name}", f"{used:.0f} - {than:.0f}", used - than, 60, False)
+        used = median("static", figure)
+        for name, than in (("RViz here", median("without", figure)), ("RViz alone", rviz_alone)):
+            more = f"{used:.0f} - {than:.0f}"
+            told.line(f"{kind} more than {name}", more, used - than, 60, False)
     print(
         "C++: static 0.65 of the frame rate and 1.5 of the CPU, animated 0.43 of the frame rate; "
         "52 MiB more"
@@ -206,18 +217,25 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=5, help="of each figure (5)")
     parser.add_argument("--rounds", type=int, default=5, help="of all contenders (5)")
     parser.add_argument("--cycles", type=int, default=1000, help="of each kind of change (1000)")
+    parser.add_argument(
+        "--renderer", default="auto", help="of overlays: auto (default), opengl or software"
+    )
     args = parser.parse_args()
     with tempfile.TemporaryDirectory() as home, ros_master(home) as master:
         env = environment(master, home)
         rounds: dict[str, list[dict[str, Any]]] = {what: [] for what in CONTENDERS}
-        rviz = []
+        rviz: list[tuple[float, float]] = []
+        config = Path(home, "bare.rviz")
+        ask(env, 120, what="bare", config=str(config))
         for number in range(args.rounds + 1):
             for what in CONTENDERS:
-                figures = ask(env, 120 + 3 * args.seconds, what=what, seconds=args.seconds)
+                order = {"what": what, "seconds": args.seconds, "renderer": args.renderer}
+                figures = ask(env, 120 + 3 * args.seconds, **order)
                 # The first round warms caches up.
                 if number:
                     rounds[what].append(figures)
-            rviz.append(alone(env, 6))
+            if number:
+                rviz.append(alone(env, config, 3))
         told = report(rounds, rviz)
         if args.cycles:
             order = {"what": "cycles", "cycles": args.cycles, "warm_up": min(args.cycles, 100)}
