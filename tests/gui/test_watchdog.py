@@ -186,3 +186,20 @@ def test_javascript_that_takes_long_but_not_too_long_is_left_alone(
     wait(lambda: "after" in done(runner))
     assert done(runner) == ["begun", "went on", "after"]
     assert "screen" not in caplog.text
+
+
+def test_javascript_right_after_a_long_standstill_of_something_else_is_left_alone(
+    run: Callable[..., Runner], wait: Callable[..., None], caplog: Any
+) -> None:
+    runner = run("var n = 0; for (var i = 0; i < 1000; i++) n += i", 0.5)
+
+    def stand_still() -> None:
+        time.sleep(2.5)
+        runner.helper.compute(2.5)
+
+    QtCore.QTimer.singleShot(0, stand_still)
+    QtCore.QTimer.singleShot(0, lambda: QtCore.QMetaObject.invokeMethod(runner.root, "begin"))
+    wait(lambda: "after" in done(runner))
+    assert done(runner) == ["begun", "went on", "after"]
+    assert not panel(runner)
+    assert "(stand_still)" in caplog.text or "(compute)" in caplog.text
