@@ -35,10 +35,16 @@ class _Control(QtQuick.QQuickRenderControl):  # type: ignore[misc]
         finally:
             self._apart = False
 
-    def renderWindow(self, offset: Any) -> Any:  # noqa: ARG002, N802 - Qt's
-        if self._apart:
+    def renderWindow(self, offset: Any) -> Any:  # noqa: N802 - Qt's
+        if self._apart or not is_alive(self.panel):
             return None
-        return self.panel.window().windowHandle() if is_alive(self.panel) else None
+        window = self.panel.window()
+        if offset is not None:
+            # By it, items find their place on the screen.
+            at = self.panel.mapTo(window, Qt5Core.QPoint(0, 0))
+            offset.setX(at.x())
+            offset.setY(at.y())
+        return window.windowHandle()
 
 
 class Scene(QtCore.QObject):

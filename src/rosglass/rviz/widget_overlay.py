@@ -79,6 +79,7 @@ class WidgetOverlay(Overlay):
         self._style = StyleSheet(self.name, self._use_style, self._style_failed)
         if widget is None:
             self.setup(made)
+            _show_children(made)
         if style_sheet:
             self._style.use(style_sheet, watch=watch, strict=True)
 
@@ -362,6 +363,18 @@ def make_widget(widget: Any, name: str) -> Any:
     if made.graphicsProxyWidget() is not None:
         raise Error(f"overlay {name or made!r}: another overlay shows the widget already")
     return made
+
+
+def _show_children(root: Any) -> None:
+    """Show widgets put into a root that is shown already, unless they were hidden on purpose."""
+    shown_on_purpose = QtCore.Qt.WA_WState_ExplicitShowHide
+    for child in root.children():
+        if (
+            child.isWidgetType()
+            and not child.isWindow()
+            and not child.testAttribute(shown_on_purpose)
+        ):
+            child.show()
 
 
 def _as_widget(item: Any) -> Any:
