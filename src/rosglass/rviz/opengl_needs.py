@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +12,7 @@ from rosglass.qt import QtQml
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+    from collections.abc import Set as AbstractSet
 
 __all__ = ["need_in_file", "need_in_items"]
 
@@ -75,19 +78,23 @@ def need_in_file(file: Path, import_paths: Sequence[str]) -> str:
 def _files(file: Path, import_paths: Sequence[Path]) -> Iterator[tuple[Path, str]]:
     """Iterate over a file and those that it uses, of its folders and of modules, with texts."""
     waiting, seen = [file], {file}
+    folders: dict[Path, _Folder] = {}
     while waiting:
         path = waiting.pop()
         text = _read(path)
         yield path, text
-        folders = [path.parent, *(path.parent / name for name in _FOLDER.findall(text))]
+        places = [path.parent, *(path.parent / name for name in _FOLDER.findall(text))]
         modules = _MODULE.findall(text)
-        folders += [f for name, version in modules for f in _folders(name, version, import_paths)]
-        found = {place for folder in folders for place in _used(text, folder)}
-        waiting += sorted(one for one in found - seen if one.is_file())
-        seen |= found
+        places += [p for name, version in modules for p in _places(name, version, import_paths)]
+        for place in places:
+            if place not in folders:
+                folders[place] = _Folder(place)
+            found = folders[place].used(text) - seen
+            waiting += sorted(found)
+            seen |= found
 
 
-def _folders(module: str, version: str, import_paths: Sequence[Path]) -> list[Path]:
+def _places(module: str, version: str, import_paths: Sequence[Path]) -> list[Path]:
     """Return where a module may be, as Qt 5 looks for it."""
     place = module.replace(".", "/")
     major = version.partition(".")[0]
@@ -95,11 +102,27 @@ def _folders(module: str, version: str, import_paths: Sequence[Path]) -> list[Pa
     return [path / name for path in import_paths for name in names if (path / name).is_dir()]
 
 
-def _used(text: str, folder: Path) -> Iterator[Path]:
-    """Iterate over the files that a folder may have for the types and files named in a text."""
-    listed = dict(_LISTED.findall(_read(folder / "qmldir")))
-    for kind, source in _USED.findall(text):
-        yield (folder / (source or listed.get(kind, f"{kind}.qml"))).resolve()
+class _Folder:
+    """A folder with QML files: of an interface, or a module's."""
+
+    _names: AbstractSet[str] = frozenset()
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        with suppress(OSError):
+            self._names = set(os.listdir(path))  # noqa: PTH208 - faster, of hundreds of files
+        self._listed = dict(_LISTED.findall(_read(path / "qmldir")))
+
+    def used(self, text: str) -> set[Path]:
+        """Return its files for the types and files that are named in a text."""
+        found = set()
+        for kind, source in _USED.findall(text):
+            name = source or self._listed.get(kind, f"{kind}.qml")
+            if name in self._names:
+                found.add(self._path / name)
+            elif "/" in name and (self._path / name).is_file():
+                found.add((self._path / name).resolve())
+        return found
 
 
 def _read(path: Path) -> str:
