@@ -118,6 +118,9 @@ _TYPES = {
     QtCore.QtMsgType.QtCriticalMsg: logging.ERROR,
     QtCore.QtMsgType.QtFatalMsg: logging.CRITICAL,
 }
+_HINTS = {
+    "ReferenceError: rviz is not defined": "; it is over RViz alone: rosglass rviz --overlay FILE"
+}
 _handling = threading.local()
 
 
@@ -137,7 +140,8 @@ def _handle(mode: Any, context: Any, message: str) -> None:
         if category in {"qml", "js"} and level == logging.DEBUG:
             level = logging.INFO
         caller = Caller(plain_path(file), max(context.line, 0), context.function or "")
-        log_from_qml("", level, message.removeprefix(f"{file}:{context.line}: "), caller)
+        text = message.removeprefix(f"{file}:{context.line}: ")
+        log_from_qml("", level, text + _HINTS.get(text, ""), caller)
     finally:
         _handling.busy = False
 

@@ -1,16 +1,18 @@
 """Finding what an interface is told to use: its file, and folders of modules."""
 
 # Unlike pathlib's, these never raise.
-# ruff: noqa: PTH112, PTH113
+# ruff: noqa: PTH112, PTH113, PTH208
 
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 
+from rosglass.comm.similar import similar
 from rosglass.errors import QmlError
 
-__all__ = ["import_folder", "interface_file", "locate"]
+__all__ = ["import_folder", "interface_file", "locate", "near"]
 
 _PACKAGE = "package://"
 
@@ -58,10 +60,19 @@ def interface_file(place: str | os.PathLike[str]) -> Path:
         hint = f"name a file in it: {', '.join(inside[:5])}" if inside else "it has no QML files"
         raise QmlError(f"{shown}:0:0: this is a folder; {hint}")
     if not os.path.isfile(path):
-        raise QmlError(f"{shown}:0:0: there is no such file")
+        raise QmlError(f"{shown}:0:0: there is no such file{near(path)}")
+    if path.suffix == ".rviz":
+        raise QmlError(f"{shown}:0:0: a config file of RViz, no QML file: rosglass rviz {shown}")
     if path.suffix != ".qml":
         raise QmlError(f"{shown}:0:0: not a QML file, whose name would end in .qml")
     return path
+
+
+def near(path: Path) -> str:
+    """Return a hint at a file that may be meant, empty where there is none."""
+    with suppress(OSError, ValueError):
+        return similar(path.name, (n for n in os.listdir(path.parent) if n.endswith(path.suffix)))
+    return ""
 
 
 def import_folder(place: str | os.PathLike[str]) -> Path:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
-from rosglass.qml.places import locate
+from rosglass.qml.places import locate, near
 from rosglass.qt import QtCore, Signal
 from rosglass.rviz.bare import BareView
 from rosglass.rviz.host import as_pyside, pyqt, rviz
@@ -285,7 +285,7 @@ def config_file(place: str | os.PathLike[str]) -> Path:
     path = locate(place)
     if not path.is_file():
         wrong = "is a folder" if path.is_dir() else "does not exist"
-        raise Error(f"{path} {wrong}; expected a config file of RViz (.rviz)")
+        raise Error(f"{path} {wrong}; expected a config file of RViz (.rviz){near(path)}")
     if path.suffix == ".qml":
         raise Error(
             f"{path} is an interface, not a config file of RViz: rosglass rviz --overlay {path}"
