@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import socket
 import subprocess
@@ -376,6 +377,84 @@ def show_file(request: pytest.FixtureRequest, app: Any, file: Path) -> Callable[
         return app.add_qml(file, **options)
 
     return show_file
+
+
+class Qml:
+    """An overlay, and JavaScript that runs in its context."""
+
+    def __init__(self, overlay: Any, wait: Callable[..., None]) -> None:
+        from rosglass.rviz.qt5 import QtCore
+
+        self.overlay, self.wait, self._core = overlay, wait, QtCore
+        self.root = overlay._root
+
+    def run(self, script: str) -> Any:
+        """Return what a script gives, as Python has it; JavaScript's errors are raised."""
+        engine = self.overlay.engine
+        scope = engine.newQObject(self.root)
+        engine.globalObject().setProperty("root", scope)
+        engine.globalObject().setProperty("rviz", engine.newQObject(self.overlay.properties))
+        text = (
+            f"(function () {{ try {{ return JSON.stringify({{ v: (function () {{ {script} }})() }})"
+        )
+        text += "} catch (e) { return JSON.stringify({ e: '' + e }) } })()"
+        answer = json.loads(engine.evaluate(text).toString())
+        if "e" in answer:
+            raise AssertionError(answer["e"])
+        return answer.get("v")
+
+    def fails(self, script: str) -> str:
+        """Return the error that a script throws."""
+        with pytest.raises(AssertionError) as caught:
+            self.run(script)
+        return str(caught.value)
+
+    def refuses(self, mistakes: dict[str, str]) -> None:
+        """Check that each script throws an error with a text in it."""
+        said = {script: self.fails(script) for script in mistakes}
+        assert {s: said[s] for s, text in mistakes.items() if text not in said[s]} == {}
+
+
+@pytest.fixture
+def tools(app: Any) -> Any:
+    """Return RViz's tools, three of them."""
+    tools = app.rviz.tools
+    tools.remove_all()
+    for class_id in ("rviz/Interact", "rviz/MoveCamera", "rviz/Select"):
+        tools.add(class_id)
+    return tools
+
+
+@pytest.fixture
+def displays(app: Any, wait: Callable[..., None]) -> Any:
+    """Return RViz's displays, a grid alone, and take everything away again."""
+    displays = app.rviz.displays
+    for display in displays.all:
+        displays.remove(display)
+    displays.add("rviz/Grid", "Grid")
+    yield displays
+    for display in displays.all:
+        if display.exists:
+            displays.remove(display)
+    wait(20)
+
+
+@pytest.fixture
+def qml(app: Any, wait: Callable[..., None], tmp_path: Path) -> Callable[..., Qml]:
+    """Show QML text over the 3D view."""
+    count = iter(range(100))
+
+    def show(text: str = "Item {}", **options: Any) -> Qml:
+        name = f"Overlay{next(count)}"
+        file = tmp_path / f"{name}.qml"
+        file.write_text("import QtQuick 2.15\n" + text)
+        overlay = app.add_qml(file, **options)
+        frames: list[int] = []
+        app.window.before_frame.connect(lambda: frames.append(1))
+        wait(lambda: len(frames) > 2)
+        return Qml(overlay, wait)
+
+    return show
 
 
 @pytest.fixture(autouse=True)

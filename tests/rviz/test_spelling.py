@@ -32,7 +32,7 @@ def said(caplog: pytest.LogCaptureFixture) -> Callable[[], list[str]]:
 
 
 @pytest.mark.parametrize("what", OBJECTS)
-def test_each_object_tells(what: str, show: Any, said: Any) -> None:
+def test_each_object_tells(what: str, tools: Any, show: Any, said: Any) -> None:
     called, member = OBJECTS[what]
     wrong = f"{member}s"
     root = show(

@@ -13,10 +13,11 @@ from rosglass.rviz.plugins import DISPLAY, declared, require_class_id
 from rosglass.rviz.qt5 import QtWidgets
 from rosglass.rviz.shown import shown
 from rosglass.rviz.tools import failure
-from rosglass.rviz.watch import Hook, address, class_of
+from rosglass.rviz.watch import address, class_of
+from rosglass.rviz.watched import Watched
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from rosglass.rviz.window import Window
 
@@ -158,37 +159,27 @@ class Display:
         return self.handle
 
 
-class Displays(QtCore.QObject):
+class Displays(Watched):
     """The displays of an RViz, those in groups included.
 
-    Signals are sent when RViz has done with what it was doing, so that whoever hears them may add
-    and remove displays again. A display that is dragged to another group is another one then.
+    What changes of one is its name, its status, or whether it is shown; one that is dragged to
+    another group is another one then.
 
     Args:
         window: RViz.
     """
 
-    #: A display came: the :class:`Display`.
-    added = Signal(object)
-    #: A display went: the :class:`Display`.
-    removed = Signal(object)
-    #: Another name, status, or shown or not: the :class:`Display`.
-    changed = Signal(object)
     #: RViz's own status is another: the fixed frame is not known, for instance.
     status_changed = Signal()
 
     def __init__(self, window: Window) -> None:
-        super().__init__()
-        self._window = window
+        super().__init__(window)
         self._root = window.manager.getRootDisplayGroup()
-        self._displays: list[Display] = []
-        self._told: list[Display] = []
+        self._items: list[Display]
         self._status = status_of(self._root)
         self._groups: set[int] = set()
-        self._scheduled = False
-        self._hook = Hook(self._on_change)
         self._match()
-        self._told = list(self._displays)
+        self._told = list(self._items)
         self._timer = QtCore.QTimer(self)
         self._timer.setInterval(_PERIOD)
         self._timer.timeout.connect(self.settle)
@@ -197,7 +188,7 @@ class Displays(QtCore.QObject):
     @property
     def all(self) -> list[Display]:
         """The displays in the order of the panel."""
-        return list(self._displays)
+        return list(self._items)
 
     @property
     def classes(self) -> list[str]:
@@ -211,7 +202,7 @@ class Displays(QtCore.QObject):
 
     def find(self, name: str) -> Display | None:
         """Return the first display of a name."""
-        return next((display for display in self._displays if display.name == name), None)
+        return next((display for display in self._items if display.name == name), None)
 
     def get(self, path: str | Sequence[str]) -> Any:
         """Return the value of a property of any display, or of RViz.
@@ -240,7 +231,7 @@ class Displays(QtCore.QObject):
 
     def _find_property(self, path: str | Sequence[str]) -> Any:
         names = path if isinstance(path, str) else "/".join(map(str, path))
-        for display in self._displays:
+        for display in self._items:
             if names.startswith(f"{display.name}/"):
                 rest = names[len(display.name) + 1 :]
                 return property_access.find(display.require(), rest, display.name)
@@ -250,7 +241,7 @@ class Displays(QtCore.QObject):
     def _require_first(self, path: str) -> None:
         """Raise an Error where nothing in the panel has the first name of a path."""
         first, _, below = path.partition("/")
-        displays = [display.name for display in self._displays]
+        displays = [display.name for display in self._items]
         known = [*(str(c.getName()) for c in property_access.children(self._root)), *displays]
         display = self.find(first)
         if display is not None and not below:
@@ -281,7 +272,7 @@ class Displays(QtCore.QObject):
             raise Error(f"no display was added: {text}")
         self._match()
         at = address(handle)
-        made = next(display for display in self._displays if display.at == at)
+        made = next(display for display in self._items if display.at == at)
         self.settle()
         return made
 
@@ -311,37 +302,17 @@ class Displays(QtCore.QObject):
         for tree in self._window.widget.findChildren(QtWidgets.QTreeView):
             QtCore.QCoreApplication.sendPostedEvents(tree, event)
 
-    def settle(self) -> None:
-        """Tell what has changed since it was told last."""
-        self._scheduled = False
-        self._match()
-        before, self._told = self._told, list(self._displays)
-        for display in before:
-            if not display.exists:
-                self.removed.emit(display)
-        for display in self._told:
-            if display not in before:
-                self.added.emit(display)
-            elif display.refresh():
-                self.changed.emit(display)
-        status = self.status
-        if status != self._status:
-            self._status = status
-            self.status_changed.emit()
+    def _rest(self) -> Callable[[], None]:
+        status, told = self.status, self._status
+        self._status = status
+        return self.status_changed.emit if status != told else lambda: None
 
     def close(self) -> None:
         """Look no longer at what changes; safe to call twice."""
         self._timer.stop()
 
-    def _on_change(self) -> None:
-        self._match()
-        if not self._scheduled:
-            self._scheduled = True
-            QtCore.QTimer.singleShot(0, self.settle)
-
     def _match(self) -> None:
-        """Drop at once what RViz is about to delete, before its place goes to another object."""
-        known = {display.at: display for display in self._displays}
+        known = {display.at: display for display in self._items}
         found, groups = [], set()
         for handle, is_group in _walk(self._root):
             at = address(handle)
@@ -351,7 +322,7 @@ class Displays(QtCore.QObject):
                 groups.add(at)
                 if at not in self._groups:
                     self._hook.watch(handle, *_SIGNALS)
-        self._displays, self._groups = found, groups
+        self._items, self._groups = found, groups
         for display in known.values():
             display.handle = None
 

@@ -80,7 +80,7 @@ class QmlToolManager(Face):
         tools.added.connect(self._on_added)
         tools.removed.connect(self._on_removed)
         tools.selected.connect(self._on_selected)
-        tools.renamed.connect(self._on_renamed)
+        tools.changed.connect(self._on_changed)
 
     def _face(self, tool: Tool) -> QmlTool:
         face = self._faces.get(tool)
@@ -180,7 +180,7 @@ class QmlToolManager(Face):
         self.toolChanged.emit(None if current is None else self._face(current))
 
     @Slot(object)
-    def _on_renamed(self, tool: Tool) -> None:
+    def _on_changed(self, tool: Tool) -> None:
         if tool in self._faces:
             self._faces[tool].changed.emit()
 

@@ -6,13 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.similar import similar
 from rosglass.errors import Error
-from rosglass.qt import QtCore, Signal
+from rosglass.qt import Signal
 from rosglass.rviz.display_classes import QML_CLASS, REFERENCE_QML_CLASS
 from rosglass.rviz.host import pyqt
 from rosglass.rviz.plugins import DISPLAY, TOOL, declared, require_class_id
-from rosglass.rviz.watch import Hook, address, type_name
+from rosglass.rviz.watch import address, type_name
+from rosglass.rviz.watched import Watched
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rosglass.rviz.window import Window
 
 __all__ = ["Tool", "Tools", "failure"]
@@ -78,43 +81,30 @@ class Tool:
         return None if self.handle is None else self.handle.getIcon()
 
 
-class Tools(QtCore.QObject):
-    """The tools of an RViz.
-
-    Signals are sent when RViz has done with what it was doing, so that whoever hears them may add
-    and remove tools again.
+class Tools(Watched):
+    """The tools of an RViz; what changes of one is its name or its description.
 
     Args:
         window: RViz.
     """
 
-    #: A tool came: the :class:`Tool`.
-    added = Signal(object)
-    #: A tool went: the :class:`Tool`.
-    removed = Signal(object)
     #: Another tool has the mouse.
     selected = Signal()
-    #: Another name or description: the :class:`Tool`.
-    renamed = Signal(object)
 
     def __init__(self, window: Window) -> None:
-        super().__init__()
-        self._window = window
+        super().__init__(window)
         self._manager = window.manager.getToolManager()
-        self._tools: list[Tool] = []
-        self._told: list[Tool] = []
+        self._items: list[Tool]
         self._told_current: Tool | None = None
-        self._scheduled = False
-        self._hook = Hook(self._on_change)
         signals = ("toolAdded(Tool*)", "toolRemoved(Tool*)", "toolChanged(Tool*)")
         self._hook.watch(self._manager, *signals, "toolRefreshed(Tool*)")
         self._match()
-        self._told, self._told_current = list(self._tools), self.current
+        self._told, self._told_current = list(self._items), self.current
 
     @property
     def all(self) -> list[Tool]:
         """The tools in the order of their buttons."""
-        return list(self._tools)
+        return list(self._items)
 
     @property
     def classes(self) -> list[str]:
@@ -128,11 +118,11 @@ class Tools(QtCore.QObject):
         if handle is None:
             return None
         at = address(handle)
-        return next((t for t in self._tools if t.exists and address(t.handle) == at), None)
+        return next((t for t in self._items if t.exists and address(t.handle) == at), None)
 
     def find(self, class_id: str) -> Tool | None:
         """Return the first tool of a class."""
-        return next((tool for tool in self._tools if tool.class_id == class_id), None)
+        return next((tool for tool in self._items if tool.class_id == class_id), None)
 
     def select(self, tool: Tool) -> None:
         """Give a tool the mouse.
@@ -152,7 +142,7 @@ class Tools(QtCore.QObject):
         class_id = require_class_id(class_id, TOOL)
         handle = self._manager.addTool(class_id)
         text = failure(handle, class_id, TOOL)
-        made = next(tool for tool in reversed(self._tools) if tool.handle is not None)
+        made = next(tool for tool in reversed(self._items) if tool.handle is not None)
         if text:
             self._manager.removeTool(self._manager.numTools() - 1)
             self.settle()
@@ -173,7 +163,7 @@ class Tools(QtCore.QObject):
             Error: It was removed before.
         """
         self._handle(tool)
-        self._manager.removeTool(self._tools.index(tool))
+        self._manager.removeTool(self._items.index(tool))
         self.settle()
 
     def remove_all(self) -> None:
@@ -181,41 +171,21 @@ class Tools(QtCore.QObject):
         self._manager.removeAll()
         self.settle()
 
-    def settle(self) -> None:
-        """Tell what has changed since it was told last."""
-        self._scheduled = False
-        self._match()
-        before, self._told = self._told, list(self._tools)
+    def _rest(self) -> Callable[[], None]:
         current, told = self.current, self._told_current
         self._told_current = current
-        for tool in before:
-            if not tool.exists:
-                self.removed.emit(tool)
-        for tool in self._told:
-            if tool not in before:
-                self.added.emit(tool)
-            elif tool.refresh():
-                self.renamed.emit(tool)
-        if current is not told:
-            self.selected.emit()
+        return self.selected.emit if current is not told else lambda: None
 
     def _handle(self, tool: Tool) -> Any:
-        if tool.handle is None or tool not in self._tools:
+        if tool.handle is None or tool not in self._items:
             raise Error(f"the tool {tool.name} was removed")
         return tool.handle
 
-    def _on_change(self) -> None:
-        self._match()
-        if not self._scheduled:
-            self._scheduled = True
-            QtCore.QTimer.singleShot(0, self.settle)
-
     def _match(self) -> None:
-        """Drop at once what RViz is about to delete, before its place goes to another object."""
         manager = self._manager
         handles = [manager.getTool(index) for index in range(manager.numTools())]
-        known = {address(tool.handle): tool for tool in self._tools}
-        self._tools = [
+        known = {address(tool.handle): tool for tool in self._items}
+        self._items = [
             known.pop(address(handle)) if address(handle) in known else Tool(self, handle)
             for handle in handles
         ]
