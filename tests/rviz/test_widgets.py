@@ -207,3 +207,43 @@ def test_what_is_no_overlay_is_refused(app: Any) -> None:
     for option in ("z", "scale", "opacity"):
         with pytest.raises(Error, match=f"overlay Top: {option} .*'high'"):
             Overlay("Top", **{option: "high"})
+
+
+def test_slots_that_raise_at_any_time_are_told(
+    app: Any, wait: Callable[..., None], caplog: pytest.LogCaptureFixture
+) -> None:
+    from rosglass.rviz import WidgetOverlay
+    from rosglass.rviz.qt5 import QtCore, QtWidgets
+
+    class Clock(QtWidgets.QLabel):  # type: ignore[misc]
+        def __init__(self) -> None:
+            super().__init__("clock")
+            self.timer = QtCore.QTimer()
+            self.timer.timeout.connect(self.tick)
+
+        def tick(self) -> None:
+            raise ValueError("no time")
+
+    class Panel(WidgetOverlay):
+        def setup(self, root: Any) -> None:
+            self.clock = Clock()
+            QtWidgets.QVBoxLayout(root).addWidget(self.clock)
+            self.clock.timer.timeout.connect(self.count)
+
+        def count(self) -> None:
+            raise KeyError("count")
+
+    panel, other = app.add(Panel()), app.add(WidgetOverlay(QtWidgets.QLabel("x"), "Other"))
+    panel.clock.timer.start(30)
+    wait(lambda: "no time" in caplog.text and "KeyError" in caplog.text)
+    assert "test_widgets.py" in panel.problem
+    assert other.problem == ""
+    panel.clock.timer.stop()
+
+    def nobodys() -> None:
+        raise RuntimeError("of nobody")
+
+    QtCore.QTimer.singleShot(0, nobodys)
+    wait(lambda: "RuntimeError: of nobody" in caplog.text)
+    assert "test_widgets.py" in caplog.text.split("of nobody")[0].splitlines()[-1]
+    assert other.problem == ""

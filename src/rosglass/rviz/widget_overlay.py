@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
@@ -59,6 +60,8 @@ class WidgetOverlay(Overlay):
         super().__init__(name or own, **options)
         #: The widget that fills the view.
         self.root: Any = made
+        # By it, what a widget raises at any time is told as the problem of the right one.
+        made.rosglass_overlay = weakref.ref(self)
         made.setAttribute(QtCore.Qt.WA_TranslucentBackground)
         self._buttons = QtCore.Qt.NoButton
         self._at: Any = None
