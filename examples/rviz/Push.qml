@@ -6,6 +6,8 @@ Rectangle {
     property string text
     property url icon
     property bool checked: false
+    // Icon and text at the left, for buttons in a column.
+    property bool leading: false
     property int size: 11
     property color tint: Theme.accent
     signal clicked()
@@ -18,7 +20,8 @@ Rectangle {
     border.color: checked ? tint : area.containsMouse ? Theme.dim : Theme.edge
     Row {
         id: label
-        anchors.centerIn: parent
+        x: push.leading ? 9 : (push.width - width) / 2
+        anchors.verticalCenter: parent.verticalCenter
         spacing: 6
         Image {
             anchors.verticalCenter: parent.verticalCenter

@@ -8,6 +8,7 @@ Column {
         Push {
             objectName: "tool " + modelData.name
             width: 118; height: 28
+            leading: true
             text: modelData.name
             icon: modelData.iconSource
             checked: modelData.isSelected
