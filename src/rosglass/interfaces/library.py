@@ -22,7 +22,7 @@ from rosglass.interfaces.distributions import Distributions
 from rosglass.interfaces.folders import Folders, workspace
 from rosglass.interfaces.hashes import announced_hashes, check_definition, md5
 from rosglass.interfaces.idl import parse_idl
-from rosglass.interfaces.names import KINDS, join_name, split_name
+from rosglass.interfaces.names import KINDS, join_name, ros1_name, split_name
 from rosglass.interfaces.parser import parse
 from rosglass.interfaces.provider import MemoryProvider, Provider, difference
 from rosglass.interfaces.resolver import Resolver
@@ -448,6 +448,9 @@ class Library:
         if near[:1] == [wanted.lower()]:
             del near[1:]  # only the case is wrong
         close = [short[match] for match in near]
+        if ros == 1 and name.count("/") == 1:
+            # As ROS 1, and who asked, spell it.
+            close = [ros1_name(match) for match in close]
         text = f"looked in {'; '.join(looked) or 'nothing: there are no providers'}."
         if close:
             text += f" Did you mean {' or '.join(close)}?"

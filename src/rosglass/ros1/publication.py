@@ -202,9 +202,10 @@ class Publication(Member):
             DefinitionConflictError: It publishes another type.
         """
         if publisher.type.md5 != self.type.md5 or publisher.type.name != self.type.name:
+            first, second = ros1_name(self.type.name), ros1_name(publisher.type.name)
             raise DefinitionConflictError(
-                f"{self._core.name} publishes {self.topic} as {self.type.name} already, and ROS 1 "
-                f"has one type for a topic of a node: it cannot be {publisher.type.name}, too"
+                f"{self._core.name} publishes {self.topic} as {first} already, and ROS 1 has one "
+                f"type for a topic of a node: it cannot be {second}, too"
             )
         with self._lock:
             self.publishers = [*self.publishers, publisher]

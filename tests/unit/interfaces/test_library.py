@@ -91,6 +91,8 @@ def test_bad_world(library: Library) -> None:
         ("GEOMETRY_msgs/TWIST", 2, "Did you mean geometry_msgs/msg/Twist? "),
         ("geometry_msg/msg/Twist", 2, "Did you mean geometry_msgs/msg/Twist"),
         ("std_srv/srv/Trigger", 2, "std_srvs/srv/Trigger"),
+        ("std_msgs/Strin", 1, "Did you mean std_msgs/String or"),
+        ("std_msgs/msg/Strin", 1, "Did you mean std_msgs/msg/String or"),
         ("bond/Status", 2, "ROS 1 has it."),
         ("nobody_msgs/Knows", 2, "looked in distribution sets (jazzy, kilted"),
         ("nobody_msgs/Knows", 1, "looked in distribution sets (noetic)"),
