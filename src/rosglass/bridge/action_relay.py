@@ -7,7 +7,7 @@ import threading
 import time
 from concurrent.futures import wait
 from contextlib import suppress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rosglass.bridge.offered_relay import OfferedRelay
 from rosglass.comm import IMMEDIATE, ActionClient, ActionServer, GoalStatus
@@ -61,17 +61,8 @@ class ActionRelay(OfferedRelay[ActionClient, ActionServer, ActionType, ActionTra
     KIND = "action"
     PARTS = ("goal", "result", "feedback")
 
-    def __init__(
-        self,
-        source: Side,
-        target: Side,
-        name: str,
-        other: str,
-        *,
-        kind: str = "",
-        timeout: float = 10.0,
-    ) -> None:
-        super().__init__(source, target, name, other, kind=kind, timeout=timeout)
+    def __init__(self, source: Side, target: Side, name: str, other: str, **options: Any) -> None:
+        super().__init__(source, target, name, other, **options)
         self._lock = threading.Lock()
         #: By the message that its client sent, which accepting and executing it have in common.
         self._goals: dict[int, tuple[Message, _Goal]] = {}

@@ -6,6 +6,7 @@ import os
 import threading
 from typing import TYPE_CHECKING, Any
 
+from rosglass.comm import Handle
 from rosglass.errors import Error
 from rosglass.qml.display import require_display
 from rosglass.qml.interrupt import QuitOnSignal, end_process_within
@@ -24,7 +25,7 @@ __all__ = ["Application"]
 _PATIENCE = 1.7
 
 
-class Application:
+class Application(Handle):
     """An interface, the window it is in, and the node it talks through.
 
     The file is read by :meth:`load` or :meth:`run`; what QML is to find is made known before::
@@ -198,12 +199,6 @@ class Application:
     def _close_session(self) -> None:
         if self._owns_session:
             self.session.close()
-
-    def __enter__(self) -> Application:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 def _qt_application(file: Path, arguments: Sequence[str]) -> QtGui.QGuiApplication:

@@ -8,6 +8,7 @@ import signal
 import threading
 from typing import TYPE_CHECKING, Any
 
+from rosglass.comm import Handle
 from rosglass.errors import ConnectionLostError, Error, UnsupportedError
 from rosglass.qml.display import require_display
 from rosglass.qml.interrupt import QuitOnSignal, end_process_within
@@ -36,7 +37,6 @@ from rosglass.rviz.window import Window, config_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from types import TracebackType
 
     from rosglass.rviz.overlay import Overlay
 
@@ -51,7 +51,7 @@ _LONGEST_WITHOUT_NODE = 2000
 _LOOK = 300
 
 
-class Application:
+class Application(Handle):
     """RViz with its overlays, and the node that they talk through.
 
     ::
@@ -318,17 +318,6 @@ class Application:
         for step in steps:
             _attempt(step)
         self._unhook()
-
-    def __enter__(self) -> Application:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _on_closing(self) -> None:
         if self._running:
