@@ -34,11 +34,10 @@ def memory(pid: int | str = "self", *, own: bool = False) -> float:
 
     Args:
         pid: The process.
-        own: Without what it shares: the code of libraries, mostly.
+        own: What it has written itself alone: without the code of libraries, for instance.
     """
     told = Path(f"/proc/{pid}/smaps_rollup").read_text(encoding="ascii")
-    wanted = ("Private_Dirty:", "Private_Clean:") if own else ("Rss:",)
-    return sum(int(told.split(name)[1].split()[0]) for name in wanted) / 1024
+    return int(told.split("Private_Dirty:" if own else "Rss:")[1].split()[0]) / 1024
 
 
 def processor(seconds: float, run: Callable[[float], None]) -> float:

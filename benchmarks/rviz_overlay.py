@@ -9,7 +9,8 @@ its grid in a 3D view of 1280x800 pixels, and nothing else. The overlay (`rviz_o
 clock, tool buttons and a legend at the top and a dashboard at the bottom; animated, a needle, four
 bars and four numbers move all the time. `alone` is RViz's own program, /usr/bin/rviz, without
 Python, with a 3D view of the same size: with software OpenGL, its pixels are memory of the process.
-Memory is what is resident; `own` is without what is shared with other programs, mostly libraries.
+Memory is what is resident; `own` is what the process alone has written, so without the code of
+libraries.
 
 CPU is that of the process at RViz's 30 frames per second, of one core. Uncapped frame rates are
 those of RViz drawing as fast as it can. The C++ reference's figures were measured on the same kind
