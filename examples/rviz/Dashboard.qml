@@ -18,7 +18,7 @@ Item {
 
     Rectangle {
         anchors { left: parent.left; right: parent.right; bottom: parent.bottom }
-        height: Math.min(266, parent.height * 0.45)
+        height: Math.max(Math.min(250, parent.height * 0.45), Math.min(parent.height / 3, 420))
         // Opaque: what is blended takes long where no graphics card does it.
         color: Theme.bar
 
@@ -27,13 +27,13 @@ Item {
             spacing: Theme.gap
 
             ColumnLayout {
-                Layout.preferredWidth: 158; Layout.fillHeight: true
+                Layout.preferredWidth: 158; Layout.fillWidth: false; Layout.fillHeight: true
                 spacing: Theme.gap
                 ViewControls { live: contact.live; Layout.fillWidth: true; Layout.preferredHeight: 98 }
                 EmergencyStop { Layout.fillWidth: true; Layout.fillHeight: true }
             }
             ColumnLayout {
-                Layout.preferredWidth: 216; Layout.fillHeight: true
+                Layout.preferredWidth: 216; Layout.fillWidth: false; Layout.fillHeight: true
                 spacing: Theme.gap
                 Posture { Layout.fillWidth: true; Layout.fillHeight: true }
                 RowLayout {

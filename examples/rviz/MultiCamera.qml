@@ -22,18 +22,21 @@ Panel {
         timeout: 1000
     }
     ImageItem {
-        anchors { fill: parent; bottomMargin: 26 }
+        anchors { fill: parent; bottomMargin: choice.height + 5 }
         source: camera
     }
     Text {
-        anchors { centerIn: parent; verticalCenterOffset: -13 }
+        anchors { centerIn: parent; verticalCenterOffset: -choice.height / 2 }
         visible: camera.stale
         text: "NO PICTURE"
         color: Theme.bad
         font { pixelSize: 20; weight: Font.Black }
     }
-    Row {
+    Flow {
+        id: choice
         anchors { bottom: parent.bottom; horizontalCenter: parent.horizontalCenter }
+        // In one row where there is room.
+        width: Math.min(parent.width, 243)
         spacing: 3
         Repeater {
             model: panel.cameras
