@@ -179,6 +179,25 @@ def test_style_sheets_are_seen_edited_saved_and_restored(
     assert panel.texts("Legend")["Style Sheet"] == lime
 
 
+def test_a_widget_that_comes_after_the_file_has_what_was_saved(
+    app: Any, styled: Any, panel: Any, wait: Any, tmp_path: Path
+) -> None:
+    lime, saved = "#inner { background: lime; }", tmp_path / "saved.rviz"
+    overlay = styled(lime)
+    panel.edit(0.5, "Legend", "Opacity")
+    app.save_config(saved)
+    app.overlays.remove(overlay)
+    wait(lambda: not list(app.entries))
+    app.load_config(saved)
+    wait(100)
+    assert list(app.overlays) == []
+    again = styled()
+    assert (again.style_sheet, again.opacity) == (lime, 0.5)
+    assert len(list(app.entries)) == 1
+    shown = [panel.model.index(row, 0).data() for row in range(panel.model.rowCount())]
+    assert shown.count("Legend") == 1
+
+
 def test_a_style_sheet_that_is_not_there_is_told(
     app: Any, styled: Any, panel: Any, wait: Any, tmp_path: Path
 ) -> None:
