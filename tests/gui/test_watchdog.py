@@ -10,6 +10,7 @@ from memory_world import MemoryWorld
 
 from rosglass.qml import Session
 from rosglass.qml.runner import Runner
+from rosglass.qml.runtime import runtime_of
 from rosglass.qml.waiting import wait_for
 from rosglass.qml.watchdog import Watchdog
 from rosglass.qt import Property, QtCore, Signal, Slot
@@ -203,3 +204,22 @@ def test_javascript_right_after_a_long_standstill_of_something_else_is_left_alon
     assert done(runner) == ["begun", "went on", "after"]
     assert not panel(runner)
     assert "(stand_still)" in caplog.text or "(compute)" in caplog.text
+
+
+def test_a_function_that_python_calls_is_ended_and_is_an_error(
+    run: Callable[..., Runner], wait: Callable[..., None]
+) -> None:
+    runner = run("", 0.5)
+    runtime = runtime_of(runner.engine)
+    looping: Any = runner.engine.evaluate("(function () { while (true) {} })", str(runner.file))
+    result = runtime.call(looping, [])
+    assert result.isError()
+    assert "was ended" in result.toString()
+    wait(lambda: panel(runner))
+    assert f"{runner.file}:1" in panel(runner)
+    adding: Any = runner.engine.evaluate("(function (a, b) { return a + b })")
+    assert runtime.call(adding, [runtime.value(2), runtime.value(3)]).toNumber() == 5
+    failing: Any = runner.engine.evaluate("(function () {\n throw new Error('no') })", "/f.js")
+    error = runtime.call(failing, [])
+    assert error.toString() == "Error: no"
+    assert error.property("lineNumber").toInt() == 2

@@ -82,7 +82,7 @@ class Answers:
             raise Error(f"{self._what} is not a function")
         later = handler.property("length").toInt() > len(arguments)
         promise, respond, _ = self._runtime.promise() if later else (QJSValue(),) * 3
-        answer: QJSValue = handler.call([*arguments, respond] if later else arguments)
+        answer = self._runtime.call(handler, [*arguments, respond] if later else arguments)
         if answer.isError():
             file, line = answer.property("fileName"), answer.property("lineNumber")
             place = f"{file.toString()}:{line.toInt()}: " if not file.isUndefined() else ""

@@ -27,10 +27,11 @@ def call_back(runtime: Runtime, callback: QJSValue, *arguments: QJSValue) -> QJS
     """
     if runtime.engine is None or not callback.isCallable():
         return QJSValue()
-    result: QJSValue = callback.call(list(arguments))
+    result = runtime.call(callback, arguments)
     if not result.isError():
         return result
-    file = plain_path(result.property("fileName").toString())
+    known = result.hasProperty("fileName")
+    file = plain_path(result.property("fileName").toString()) if known else "<unknown>"
     line = result.property("lineNumber").toInt()
     log_from_qml("", logging.ERROR, result.toString(), Caller(file, max(line, 0), ""))
     return QJSValue()

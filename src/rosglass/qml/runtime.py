@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
 from rosglass.qml.dialect import Dialect
+from rosglass.qml.js_calls import JsCalls
 from rosglass.qml.log import Caller, plain_path
 from rosglass.qml.session import Session
 from rosglass.qml.to_js import describe, reader, to_json
@@ -16,6 +17,8 @@ from rosglass.qml.value_host import Host, LongArrays
 from rosglass.qt import QT6, QJSValue, QtCore, QtQml, is_alive
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rosglass.comm.qos import QoS
     from rosglass.comm.time import Duration, Time
     from rosglass.messages import Message
@@ -84,6 +87,20 @@ class Runtime(QtCore.QObject):
                 raise Error(f"helpers.js: {name}: {made.toString()}")
         found["makePromise"] = _evaluate(self._engine, _PROMISE)
         return found
+
+    @cached_property
+    def _calls(self) -> JsCalls:
+        return JsCalls(self._engine)
+
+    def call(self, function: QJSValue, arguments: Sequence[QJSValue]) -> QJSValue:
+        """Return what a function of QML returns, or the error that it throws.
+
+        Raises:
+            Error: The engine is gone.
+        """
+        if self.engine is None:
+            raise Error("the QML engine of this function is gone")
+        return self._calls.call(function, arguments)
 
     @property
     def engine(self) -> QtQml.QQmlEngine | None:

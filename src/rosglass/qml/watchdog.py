@@ -119,9 +119,9 @@ class Watchdog(QtCore.QObject):
     and ends that when it is longer than :attr:`Session.longest_script`; native code and Python are
     only told.
 
-    JavaScript that Python calls by functions of Qt that keep Python's lock cannot be ended, for
-    no thread of Python runs then; the interface's handlers, timers and bindings are not called
-    that way.
+    JavaScript that runs while a function of Qt keeps Python's lock cannot be ended, for no thread
+    of Python runs then: QQmlComponent.create, QObject.setProperty, QJSValue.call (for which there
+    is :class:`JsCalls`). The event loop, signals and QMetaObject.invokeMethod give it back.
 
     Args:
         session: Whose interfaces it watches.
