@@ -63,8 +63,8 @@ class Cloud:
         red, green, blue = (colours[:, k].astype(np.uint32) for k in range(3))
         self._rows[:, 3] = (red << 16 | green << 8 | blue).view(np.float32)
 
-    def look(self, state: RobotState, ranges: npt.NDArray[np.float32]) -> None:
-        """Take note of what is in sight.
+    def look(self, state: RobotState, ranges: npt.NDArray[np.float32]) -> bool:
+        """Take note of what is in sight; returns whether anything is new.
 
         Args:
             state: Where the robot is.
@@ -76,7 +76,9 @@ class Cloud:
         beams = np.rint(bearings % math.tau / LaserScanner.angle_increment).astype(int)
         # Tops and far sides of low things are met from above.
         free = ranges[beams % LaserScanner.beams] + 0.35
-        self._seen |= (distances < _REACH) & (distances < free)
+        new = (distances < _REACH) & (distances < free) & ~self._seen
+        self._seen |= new
+        return bool(new.any())
 
     def message(self, stamp: Time) -> dict[str, Any]:
         """Return ``sensor_msgs/msg/PointCloud2`` of what has been seen, with ``rgb``."""

@@ -24,6 +24,8 @@ __all__ = ["CAMERAS", "Equipment"]
 
 CAMERAS = ("rear", "left", "right", "thermal")
 _CLOUD_PERIOD, _CAMERA_PERIOD = 0.5, 0.1
+#: Seconds after which a cloud is sent again that has not changed.
+_CLOUD_CONFIRM = 1.4
 _WIDTH, _HEIGHT = 320, 240
 
 
@@ -83,13 +85,17 @@ class Equipment:
 
     def scan(self, ending: Callable[[float], bool]) -> None:
         """Send the cloud, until `ending`, which waits some seconds, says so."""
+        sent, changed = -math.inf, False
         while not ending(_CLOUD_PERIOD):
-            state = self._simulation.state
+            state, now = self._simulation.state, time.monotonic()
             if abs(state.pitch) + abs(state.roll) < 0.3:
                 ranges = self._scanner.scan(state.x, state.y, state.yaw, state.carrier_phase)
-                self._cloud.look(state, ranges)
-            if self._points.subscription_count():
+                changed |= self._cloud.look(state, ranges)
+            # Who shows it builds it anew each time.
+            due = changed or now - sent >= _CLOUD_CONFIRM
+            if due and self._points.subscription_count():
                 self._points.publish(self._cloud.message(Time.now()))
+                sent, changed = now, False
 
     def film(self, ending: Callable[[float], bool]) -> None:
         """Send the pictures that somebody wants, until `ending` says so."""

@@ -28,9 +28,9 @@ def cloud() -> Cloud:
     return Cloud(WORLD)
 
 
-def look(cloud: Cloud, x: float, y: float, yaw: float = 0.0) -> None:
+def look(cloud: Cloud, x: float, y: float, yaw: float = 0.0) -> bool:
     ranges = LaserScanner(WORLD, noise=0.0).scan(x, y, yaw, 0.0)
-    cloud.look(RobotState(x=x, y=y, yaw=yaw), ranges)
+    return cloud.look(RobotState(x=x, y=y, yaw=yaw), ranges)
 
 
 def message(cloud: Cloud) -> Any:
@@ -80,7 +80,8 @@ def test_its_layout_is_consistent(cloud: Cloud) -> None:
 
 
 def test_what_is_in_sight_is_told_and_kept(cloud: Cloud) -> None:
-    look(cloud, -3.6, -1.8)
+    assert look(cloud, -3.6, -1.8)
+    assert not look(cloud, -3.6, -1.8), "nothing is new"
     first = {tuple(place) for place in points(message(cloud))[0].tolist()}
     assert all(math.dist(place[:2], (-3.6, -1.8)) < 5.5 for place in first)
     look(cloud, 3.0, 2.0)
