@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from typing import Any
 
 import pytest
@@ -123,7 +124,7 @@ def test_popup_follows_a_point(hand: Any, app: Any, view: Any) -> None:
     assert not popup.content.isVisible()
     # Nor where nobody knows its frame, which is told.
     popup.follow(app.rviz.trackers, (0, 0, 0), frame="nowhere")
-    hand.wait(lambda: popup.problem.startswith("frame nowhere: "))
+    hand.wait(lambda: "the frame 'nowhere'" in popup.problem)
     assert not popup.content.isVisible()
     popup.move(50, 50)
     assert popup.problem == ""
@@ -220,3 +221,117 @@ def test_labels_that_pop_up_later_hide_no_question(hand: Any, show: Any, grab: A
     hand.wait(lambda: root.property("both"))
     picture = grab()
     assert picture.pixelColor(picture.width() // 2, picture.height() // 2).name() == "#00ff00"
+
+
+def test_popup_follows_a_moving_frame(hand: Any, app: Any, master: str) -> None:
+    import rosglass
+    from rosglass.comm import Time
+    from rosglass.rviz.camera import Camera
+    from rosglass.rviz.popup import Popup
+
+    app.fixed_frame = "map"
+    app.connect()
+    popup = app.add(Popup(label(), "Robot"))
+    popup.follow(app.rviz.trackers, (0, 0, 0), frame="popup_test")
+    with closing(rosglass.connect(master.replace("http:", "ros1:"), name="popup_test")) as node:
+        publisher = node.create_publisher("/tf", "tf2_msgs/msg/TFMessage", 10)
+        for x in (0.0, 1.0, 2.0):
+
+            def there(x: float = x) -> bool:
+                header = {"frame_id": "map", "stamp": Time.now()}
+                place = {"translation": {"x": x}, "rotation": {"w": 1.0}}
+                frame = {"header": header, "child_frame_id": "popup_test", "transform": place}
+                publisher.publish(transforms=[frame])
+                seen = Camera(app.window).project((x, 0, 0))
+                at = popup.content.geometry().center()
+                near = abs(at.x() - seen.x) < 3 and abs(at.y() - seen.y) < 3
+                return near and popup.content.isVisible()
+
+            hand.wait(there)
+            assert popup.problem == ""
+
+
+def test_modal_popup_is_seen_wherever_its_point_is(hand: Any, app: Any) -> None:
+    from rosglass.rviz.camera import Camera
+    from rosglass.rviz.popup import Popup
+
+    popup = app.add(Popup(label(), "Question", modal=True))
+    x, y, z = Camera(app.window).eye
+    popup.follow(app.rviz.trackers, (2 * x, 2 * y, 2 * z))
+    hand.wait(200)
+    assert popup.content.isVisible()
+    assert (popup.content.geometry().center() - popup.root.rect().center()).manhattanLength() < 4
+
+
+def test_popup_may_be_removed_by_its_own_button(hand: Any, app: Any, view: Any) -> None:
+    from rosglass.rviz.popup import Popup
+
+    below = app.add(Popup(label("below"), "Below", modal=True))
+    above = app.add(Popup(label("above"), "Above", modal=True))
+    below.move(200, 200)
+    above.move(240, 230)
+    told: list[str] = []
+    for popup in (below, above):
+        popup.content.clicked.connect(lambda *_, p=popup: (told.append(p.name), remove(p)))
+
+    def remove(popup: Any) -> None:
+        app.overlays.remove(popup)
+
+    hand.wait(200)
+    assert app.overlays.input.focused is above
+    # The lower one is covered, and gets its turn when the upper one has gone.
+    hand.click(170, 180)
+    assert told == []
+    hand.click(240, 230)
+    assert told == ["Above"]
+    assert app.overlays.input.focused is below
+    distance = view("Distance")
+    hand.wheel(500, 400)
+    assert view("Distance") == distance
+    hand.click(240, 225)
+    assert told == ["Above", "Below"]
+    hand.wheel(500, 400)
+    hand.wait(lambda: view("Distance") != distance)
+
+
+def test_qml_popup_that_is_not_seen_takes_no_mouse(hand: Any, app: Any, show: Any) -> None:
+    root = show(
+        """import RosRviz 1.0
+        Item { id: top; property var at: [0, 0, 0]; property int clicks: 0
+            property real seen: popup.opacity
+            AnchoredPopup { id: popup; visible: true; point: top.at; padding: 0
+                contentItem: Button { implicitWidth: 80; implicitHeight: 60
+                    onClicked: top.clicks++ } } }"""
+    )
+    from rosglass.rviz.camera import Camera
+
+    hand.wait(lambda: root.property("seen") == 1)
+    seen = Camera(app.window).project((0, 0, 0))
+    hand.click(seen.x, seen.y)
+    assert root.property("clicks") == 1
+    x, y, z = Camera(app.window).eye
+    root.setProperty("at", [2 * x, 2 * y, 2 * z])
+    hand.wait(lambda: root.property("seen") == 0)
+    hand.click(seen.x, seen.y)
+    assert root.property("clicks") == 1
+    root.setProperty("at", [0, 0, 0])
+    hand.wait(lambda: root.property("seen") == 1)
+    hand.click(seen.x, seen.y)
+    assert root.property("clicks") == 2
+
+
+def test_qml_popup_with_a_wrong_point_names_the_users_file(
+    hand: Any, show: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    root = show(
+        """import RosRviz 1.0
+        Item { property string problem: popup.problem; property real seen: popup.opacity
+            AnchoredPopup { id: popup; visible: true; point: ["a", 2] } }"""
+    )
+    hand.wait(lambda: "expected x, y and z in metres" in root.property("problem"))
+    assert root.property("seen") == 0
+    told = [r for r in caplog.records if "expected x, y and z" in r.getMessage()]
+    assert len(told) == 1
+    assert "AnchoredPopup: " in told[0].getMessage()
+    assert "Test.qml" in caplog.text
+    assert "AnchoredPopup.qml" not in caplog.text

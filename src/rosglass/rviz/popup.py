@@ -35,7 +35,7 @@ class Popup(WidgetOverlay):
     """A widget of its own size above all overlays that are no popups.
 
     It is kept inside the view. What it follows may leave the view, or be behind the camera: it is
-    not seen then.
+    not seen then, or in the middle of the view if it is modal.
 
     Args:
         content: The widget, or what returns it.
@@ -164,6 +164,9 @@ class Popup(WidgetOverlay):
         x, y = self.place
         room = content.parentWidget().size()
         seen = self._tracker is None or (0 <= x <= room.width() and 0 <= y <= room.height())
+        if self.is_modal and not seen:
+            # All else is blocked until it is answered.
+            x, y, seen = room.width() / 2, room.height() / 2, True
         content.setVisible(seen)
         if not seen:
             return

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
+from rosglass.qml.log import Caller, log_from_qml, plain_path
 from rosglass.qml.runtime import runtime_of
 from rosglass.qt import Property, QJSValue, QtCore, QtQml, Signal, Slot
 from rosglass.rviz.access import Access
@@ -399,6 +400,13 @@ class RvizObject(RegisteredProperties):
     def _answer(self, what: str, work: Callable[[], QJSValue]) -> QJSValue:
         answer: QJSValue = self._asked(what, work, QJSValue())
         return answer
+
+    @Slot(QtCore.QObject, str)
+    def refuse(self, item: QtCore.QObject, message: str) -> None:
+        """Log what is wrong with an item, with the file that it is used in, not its own."""
+        context = QtQml.QQmlEngine.contextForObject(item)
+        file = "" if context is None else plain_path(context.baseUrl().toString())
+        log_from_qml("", logging.ERROR, message, Caller(file or self._overlay.name, 0, ""))
 
     # Signals of RViz.
 

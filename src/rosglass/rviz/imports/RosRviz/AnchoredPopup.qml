@@ -14,37 +14,55 @@ Popup {
     // Whether the user may move it; it then follows the point no longer.
     property bool movable: false
     // Why the point cannot be followed; empty where it can.
-    readonly property string problem: tracker ? tracker.problem : ""
+    readonly property string problem: refused || (tracker ? tracker.problem : "")
 
     property var tracker: null
+    property string refused: ""
     readonly property size room: parent ? Qt.size(parent.width, parent.height) : Qt.size(0, 0)
 
     function follow() {
-        if (!point) {
+        var wrong = ""
+        try {
+            if (!point) {
+                tracker = null
+            } else if (tracker) {
+                tracker.point = point
+                tracker.frame = frame
+            } else {
+                tracker = rviz.createPositionTracker(point, frame)
+            }
+        } catch (error) {
             tracker = null
-        } else if (tracker) {
-            tracker.point = point
-            tracker.frame = frame
-        } else {
-            tracker = rviz.createPositionTracker(point, frame)
+            wrong = error.message
         }
+        if (wrong && wrong !== refused)
+            rviz.refuse(popup, "AnchoredPopup: " + wrong)
+        refused = wrong
         place()
     }
 
     function place() {
-        if (!tracker || !parent)
+        if (!parent)
             return
-        var at = tracker.position
-        var seen = at.x >= 0 && at.y >= 0 && at.x <= parent.width && at.y <= parent.height
-        opacity = seen ? 1 : 0
-        if (!seen)
-            return
-        x = Math.max(0, Math.min(at.x - anchor.x * width, parent.width - width))
-        y = Math.max(0, Math.min(at.y - anchor.y * height, parent.height - height))
+        var at = tracker ? tracker.position : null
+        var seen = at !== null && at.x >= 0 && at.y >= 0 && at.x <= parent.width && at.y <= parent.height
+        var hidden = !seen && !modal && (tracker !== null || refused !== "")
+        opacity = hidden ? 0 : 1
+        // What is not seen must not take the mouse either.
+        contentItem.parent.enabled = !hidden
+        if (seen) {
+            x = Math.max(0, Math.min(at.x - anchor.x * width, parent.width - width))
+            y = Math.max(0, Math.min(at.y - anchor.y * height, parent.height - height))
+        } else if (!hidden && (tracker || refused)) {
+            // All else is blocked until it is answered.
+            x = (parent.width - width) / 2
+            y = (parent.height - height) / 2
+        }
     }
 
     function moveBy(dx, dy) {
         tracker = null
+        refused = ""
         x = Math.max(0, Math.min(x + dx, parent.width - width))
         y = Math.max(0, Math.min(y + dy, parent.height - height))
     }
