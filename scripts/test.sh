@@ -17,10 +17,13 @@ scripts/check_wheel.sh
 # Most tests wait for others most of the time: three side by side, each file in one process.
 # Once more what failed: with other programs, machines under load can. Each is listed at the end.
 # A process that crashes fails its test and is not replaced: the others would wait for it for ever.
-side_by_side=(-n 3 --dist loadfile --max-worker-restart=0 --reruns 1 --rerun-show-tracebacks)
+# Files in the order of their folders: by default, those of few tests come last, which here are
+# those that wait longest for others, and the end would be spent on waiting for one of them.
+side_by_side=(-n 3 --dist loadfile --no-loadscope-reorder --max-worker-restart=0 --reruns 1
+  --rerun-show-tracebacks)
 say "tests on Debian's own Python and Qt 5 ($(.venv-system/bin/python -V))"
 scripts/private_network.sh .venv-system/bin/python -m pytest -q "${side_by_side[@]}" \
-  tests/unit tests/gui "$@"
+  tests/gui tests/unit "$@"
 say "tests in RViz ($(.venv-system/bin/python -V))"
 # Apart from tests/gui: a process has one Qt application, and RViz needs one of its own kind.
 scripts/private_network.sh .venv-system/bin/python -m pytest -q "${side_by_side[@]}" tests/rviz "$@"
