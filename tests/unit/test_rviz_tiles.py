@@ -99,6 +99,7 @@ def test_neighbours_are_joined_where_that_is_cheaper_but_never_over_a_third() ->
     assert len(cover(tiles, 320, 320, worth=500)) == 3
 
 
+@settings(deadline=None)
 @given(
     st.lists(st.tuples(*[st.integers(0, 99)] * 4), max_size=5),
     st.lists(st.tuples(*[st.integers(0, 99)] * 4), max_size=5),
