@@ -61,6 +61,8 @@ def main(last: str, folder: str) -> None:
     faulthandler.enable()
     os.chdir(folder)
     app = Application()
+    # All members of an object are driven by one call from JavaScript, which may take a minute.
+    app.session.longest_script = 0
     app.window.widget.show()
     spin(0.5)
     file = Path(folder, "Fuzz.qml")
