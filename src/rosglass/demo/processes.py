@@ -16,9 +16,11 @@ from rosglass.errors import Error
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-__all__ = ["Child", "VirtualScreen", "start_robot"]
+__all__ = ["LEASH", "Child", "VirtualScreen", "start_robot"]
 
 _PATIENCE = 3.0
+#: Before a command: the system ends it when this program ends, even when it is killed.
+LEASH = ("setpriv", "--pdeathsig", "TERM") if shutil.which("setpriv") else ()
 
 
 class Child(Handle):
@@ -98,9 +100,10 @@ class VirtualScreen(Handle):
             )
         read, write = os.pipe()
         try:
-            # -terminate: it ends with its last window, even when we end without closing it.
+            # It ends with us where the system can see to that, otherwise with its last window.
             self._process = subprocess.Popen(
                 [
+                    *LEASH,
                     program,
                     *("-displayfd", str(write)),
                     *("-screen", "0", f"{width}x{height}x24"),

@@ -13,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
-from rosglass.demo.processes import Child, VirtualScreen, start_robot
+from rosglass.demo.processes import LEASH, Child, VirtualScreen, start_robot
 from rosglass.errors import Error
 
 __all__ = ["main"]
@@ -21,8 +21,6 @@ __all__ = ["main"]
 _FOLDER = Path(__file__).parents[3] / "examples/rviz"
 _SIZE = (1280, 800)
 _PATIENCE = 20.0
-# The system ends what is started so when this program ends, even when it is killed.
-_LEASH = ("setpriv", "--pdeathsig", "TERM")
 
 
 def main(seconds: float | None = None, picture: Path | None = None) -> int:
@@ -56,7 +54,7 @@ def main(seconds: float | None = None, picture: Path | None = None) -> int:
         if seconds is not None:
             ending = ["--screenshot", str(picture or "rviz-demo.png"), "--after", str(seconds)]
         command = ["-m", "rosglass", "rviz", *files, "--bare", "--url", url, *ending]
-        rviz = Child([*_LEASH, sys.executable, *command], "RViz")
+        rviz = Child([*LEASH, sys.executable, *command], "RViz")
         # Both at a time: whoever has ended RViz waits.
         stack.callback(_close, rviz, robot)
         code = _wait(rviz)
@@ -77,7 +75,7 @@ def _start_master(stack: ExitStack) -> str:
     environment = {**os.environ, "PATH": "/usr/bin:/bin"}
     environment.pop("PYTHONPATH", None)
     master = subprocess.Popen(
-        [*_LEASH, program, "--core", "-p", str(port)],
+        [*LEASH, program, "--core", "-p", str(port)],
         env=environment,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
