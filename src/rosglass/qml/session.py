@@ -454,7 +454,9 @@ class Session(QtCore.QObject):
             handle.close()
         self._handles = []
         if self._rosout is not None:
+            # QML's elements, which PySide keeps, hold this, and it the whole node.
             self._rosout.close()
+            self._rosout = None
         node, self.node = self.node, None
         self._follow(time.monotonic)
         if node is not None:
