@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error, QmlError
 from rosglass.qml.places import locate
-from rosglass.qt import QtCore, Signal, is_alive
+from rosglass.qt import QtCore, is_alive
 from rosglass.rviz.display_classes import QML_CLASS, REFERENCE_QML_CLASS, maker_of
 from rosglass.rviz.host import pyqt, rviz
 from rosglass.rviz.overlay import SCALES
@@ -19,7 +19,7 @@ from rosglass.rviz.registered_properties import RegisteredProperties
 from rosglass.rviz.saved_values import from_config, plain_config, to_config
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from rosglass.qml.session import Session
@@ -105,15 +105,6 @@ class Entry(QtCore.QObject):
         import_paths: Further folders with QML modules.
     """
 
-    #: Its check box, or that of a group it is in, was clicked; or it is to show something else.
-    touched = Signal()
-    #: It has another name; itself.
-    renamed = Signal(object)
-    #: Something that RViz does not see, and its file would keep, is another now.
-    edited = Signal()
-    #: RViz has deleted it.
-    gone = Signal()
-
     def __init__(
         self,
         class_id: str,
@@ -124,6 +115,14 @@ class Entry(QtCore.QObject):
         super().__init__()
         self.class_id, self._session, self._sources = class_id, session, sources
         self._import_paths = import_paths
+        #: Called when its check box, or that of a group it is in, was clicked, when it is to show
+        #: something else, and when RViz has deleted it. No signal: PySide2 takes entries that have
+        #: gone for ones that it can still tell to disconnect.
+        self.touched: Callable[[], object] = _nothing
+        #: Called when it has another name; with itself.
+        self.renamed: Callable[[Entry], object] = _nothing
+        #: Called when something that RViz does not see, and its file would keep, is another now.
+        self.edited: Callable[[], object] = _nothing
         self.overlay: Overlay | None = None
         self._failed, self._taken_file = "", ""
         self._registered: dict[str, Any] = {}
@@ -143,11 +142,11 @@ class Entry(QtCore.QObject):
         self._fill()
         self._own_tree = PropertyTree(self.own, self.display, sources)
         self._holder: Any = None
-        renamed = quiet()(lambda _name: self.renamed.emit(self))
+        renamed = quiet()(lambda _name: self.renamed(self))
         shown = [
-            (self.display.changed, quiet()(self.touched.emit)),
+            (self.display.changed, quiet()(lambda *_: self.touched())),
             (self.display.objectNameChanged, renamed),
-            (self.display.destroyed, quiet()(lambda *_: self.gone.emit())),
+            (self.display.destroyed, quiet()(lambda *_: self.touched())),
         ]
         for signal, slot in shown:
             signal.connect(slot)
@@ -243,7 +242,7 @@ class Entry(QtCore.QObject):
     def retry(self) -> None:
         """Forget why there was no overlay."""
         self._failed = ""
-        self.touched.emit()
+        self.touched()
 
     def take(self, overlay: Overlay) -> None:
         """Show an overlay as this entry, with what was saved for it.
@@ -269,7 +268,7 @@ class Entry(QtCore.QObject):
         overlay.arranged.connect(self._follow)
         overlay.problem_changed.connect(self._show_problem)
         properties.registered.connect(self._show_registered)
-        properties.configChanged.connect(self.edited)
+        properties.configChanged.connect(self._on_config)
         self._show_registered()
         self._show_problem(overlay.problem)
         if isinstance(overlay, QmlOverlay) and not overlay.loaded:
@@ -291,7 +290,7 @@ class Entry(QtCore.QObject):
         # Those of QML end with their engine.
         if is_alive(properties):
             properties.registered.disconnect(self._show_registered)
-            properties.configChanged.disconnect(self.edited)
+            properties.configChanged.disconnect(self._on_config)
         tree, self._tree = self._tree, None
         if tree is not None:
             tree.close()
@@ -308,6 +307,7 @@ class Entry(QtCore.QObject):
             with suppress(TypeError):
                 signal.disconnect(slot)
         self._watches = ([], [])
+        self.touched = self.renamed = self.edited = _nothing
         if self.alive:
             self.display.entry = None
 
@@ -319,11 +319,14 @@ class Entry(QtCore.QObject):
             if name in self.own.properties and hasattr(overlay, attribute):
                 self.own.properties[name].set(getattr(overlay, attribute))
 
+    def _on_config(self) -> None:
+        self.edited()
+
     def _apply(self, name: str, value: Any) -> None:
         overlay = self.overlay
         if name == "Path":
             self._failed = ""
-            self.touched.emit()
+            self.touched()
         elif overlay is not None:
             attribute = _ATTRIBUTES[name]
             if getattr(overlay, attribute, None) != value:
@@ -389,7 +392,11 @@ class Entry(QtCore.QObject):
         if self.overlay is not None:
             self.overlay.properties.load(self._registered)
             self.overlay.properties.set_config(self._config)
-        self.touched.emit()
+        self.touched()
+
+
+def _nothing(*_: Any) -> None:
+    """Be told what nobody follows."""
 
 
 @cache

@@ -221,10 +221,8 @@ class Entries(QtCore.QObject):
     def _make(self, class_id: str) -> Entry:
         entry = Entry(class_id, self._session, self.sources, self._import_paths)
         self._entries.append(entry)
-        entry.touched.connect(self._schedule)
-        entry.gone.connect(self._schedule)
-        entry.renamed.connect(self._rename)
-        entry.edited.connect(quiet()(self._window.manager.notifyConfigChanged))
+        entry.touched, entry.renamed = self._schedule, self._rename
+        entry.edited = quiet()(self._window.manager.notifyConfigChanged)
         return entry
 
     def _forget(self, entry: Entry) -> None:
