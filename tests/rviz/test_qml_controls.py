@@ -28,7 +28,8 @@ def test_menus_dialogs_drawers_and_tooltips(hand: Any, show: Any, view: Any) -> 
             onClicked: drawer.open() }
         Button { x: 320; width: 100; height: 50; text: "dialog"; onClicked: ask.open() }
         Drawer { id: drawer; width: 150; height: top.height; edge: Qt.LeftEdge }
-        Dialog { id: ask; anchors.centerIn: parent; modal: true; focus: true; closePolicy: Popup.CloseOnEscape
+        Dialog { id: ask; anchors.centerIn: parent; modal: true; focus: true
+            closePolicy: Popup.CloseOnEscape
             title: "Really?"; standardButtons: Dialog.Yes; onAccepted: top.log += "yes" } }"""
     )
     hand.click(40, 40, button=3)
