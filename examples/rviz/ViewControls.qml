@@ -27,7 +27,7 @@ Panel {
     Timer {
         interval: 500; repeat: true; running: true
         onTriggered: {
-            look([-3.4, 0, 2.0])
+            look([-3.0, 0, 2.5])
             running = panel.failure !== ""
         }
     }
@@ -35,7 +35,7 @@ Panel {
         anchors.fill: parent
         columns: 3
         rowSpacing: 5; columnSpacing: 5
-        Push { Layout.fillWidth: true; Layout.fillHeight: true; text: "Behind"; onClicked: look([-3.4, 0, 2.0]) }
+        Push { Layout.fillWidth: true; Layout.fillHeight: true; text: "Behind"; onClicked: look([-3.0, 0, 2.5]) }
         Push { Layout.fillWidth: true; Layout.fillHeight: true; text: "Above"; onClicked: look([-0.4, 0, 7]) }
         Push { Layout.fillWidth: true; Layout.fillHeight: true; text: "Front"; onClicked: look([3.2, 0, 1.4]) }
         Push {

@@ -29,6 +29,8 @@ __all__ = ["Cloud"]
 _SPACING, _GROUND_SPACING = 0.11, 0.12
 #: Bare concrete is left to the map: what is drawn of it would cost the most, and tell the least.
 _COLOURED, _RAISED = 30, 0.02
+#: How much is told of the yard's walls, metres: who looks at the robot from behind sees over them.
+_PARAPET = 0.85
 #: How far the robot can tell colours, metres.
 _REACH = 5.5
 #: sensor_msgs/PointField's number of 32-bit floats.
@@ -56,6 +58,9 @@ class Cloud:
             parts.append((places, colours))
         places = np.concatenate([part[0] for part in parts])
         colours = np.concatenate([part[1] for part in parts])
+        outer = (np.abs(places[:, :2]) > (world.half_length - 0.05, world.half_width - 0.05)).any(1)
+        told = ~outer | (places[:, 2] < _PARAPET)
+        places, colours = places[told], colours[told]
         self._places = places[:, :2]
         self._seen = np.zeros(len(places), bool)
         self._rows = np.empty((len(places), 4), np.float32)
