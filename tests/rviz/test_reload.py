@@ -319,6 +319,7 @@ def test_a_press_ends_without_effect_and_keys_are_rvizs_again(
     assert overlay.root.property("clicks") == 1
 
 
+@pytest.mark.usefixtures("view")
 def test_reloading_from_its_own_click(
     show: Any, app: Any, mouse: Any, wait: Any, grab: Any
 ) -> None:
