@@ -147,6 +147,13 @@ def test_context_menus(panel: Any, act: Any, view: Any) -> None:
     act(at(panel.text), RIGHT, panel._popups, ("key", "Escape"), panel.text.hasFocus)
     act(("key", "End"), ("key", "s"))
     assert panel.text.text() == "hello worlds"
+    # Beside it, the mouse leaves it open until it presses; keys are the field's then as well.
+    beside = ("at", 500, 500)
+    act(at(panel.text), RIGHT, panel._popups, beside, ("at", 520, 500))
+    assert panel._popups()
+    act(LEFT, panel.text.hasFocus, ("key", "End"), ("key", "t"))
+    assert not panel._popups()
+    assert panel.text.text() == "hello worldst"
     # What has no menu leaves the button to RViz, which zooms.
     distance = view("Distance")
     _, x, y = at(panel.plain)

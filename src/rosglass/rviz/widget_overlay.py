@@ -167,7 +167,8 @@ class WidgetOverlay(Overlay):
         if kind in MOUSE:
             self._buttons = event.buttons() if taken or kind not in PRESS else self._buttons
         if kind == _E.MouseMove and event.buttons() == QtCore.Qt.NoButton:
-            taken = _has(self._widget_at(at), _minds_mouse)
+            # Qt closes what has popped up when the mouse leaves the scene.
+            taken = opened or _has(self._widget_at(at), _minds_mouse)
         return taken
 
     def _deliver_key(self, event: Any) -> bool:
