@@ -9,12 +9,14 @@ import subprocess
 import sys
 import time
 import xmlrpc.client
-from contextlib import suppress
+from contextlib import closing, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+
+from rosglass.demo.processes import VirtualScreen
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -455,6 +457,33 @@ def qml(app: Any, wait: Callable[..., None], tmp_path: Path) -> Callable[..., Qm
         return Qml(overlay, wait)
 
     return show
+
+
+@pytest.fixture
+def seen(master: str, tmp_path: Path) -> Callable[..., dict[str, Any]]:
+    """Return what a program of its own tells to have seen, on a screen with pixels for units."""
+
+    def run(program: str, factor: str, renderer: str) -> dict[str, Any]:
+        env = {k: v for k, v in os.environ.items() if k not in ("QT_QPA_PLATFORM", "DISPLAY")}
+        env |= {"HOME": str(tmp_path), "XDG_RUNTIME_DIR": str(tmp_path), "ROS_IP": "127.0.0.1"}
+        env |= {"ROS_MASTER_URI": master, "ROSGLASS_QT": "pyside2", "QT_SCALE_FACTOR": factor}
+        file = Path(__file__).with_name(program)
+        with closing(VirtualScreen(1800, 1400)) as screen:
+            done = subprocess.run(
+                [sys.executable, str(file), str(tmp_path / "Test.qml"), renderer],
+                env=env | {"DISPLAY": screen.display},
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                text=True,
+                timeout=90,
+                check=False,
+            )
+        lines = [line for line in done.stdout.splitlines() if line.startswith("SEEN ")]
+        assert lines, done.stdout[-3000:]
+        told: dict[str, Any] = json.loads(lines[0].removeprefix("SEEN "))
+        return told
+
+    return run
 
 
 @pytest.fixture(autouse=True)

@@ -12,6 +12,7 @@ from rosglass.qml.places import locate
 from rosglass.qt import QtCore, is_alive
 from rosglass.rviz.display_classes import QML_CLASS, REFERENCE_QML_CLASS, maker_of
 from rosglass.rviz.host import pyqt, rviz
+from rosglass.rviz.icons import overlay_icon
 from rosglass.rviz.overlay import SCALES
 from rosglass.rviz.properties import PropertyTree, given_to_rviz, quiet, take_out
 from rosglass.rviz.qml_overlay import QmlOverlay
@@ -133,7 +134,7 @@ class Entry(QtCore.QObject):
         self.display: Any = given_to_rviz(display())
         self.display.entry = self
         self.display.setClassId(class_id)
-        self.display.setIcon(_icon())
+        self.display.setIcon(overlay_icon())
         self.display.setDescription(
             "Drawn over the 3D view by rosglass. "
             + ("A QML file." if self.is_qml else f"Of the class {class_id}.")
@@ -397,20 +398,3 @@ class Entry(QtCore.QObject):
 
 def _nothing(*_: Any) -> None:
     """Be told what nobody follows."""
-
-
-@cache
-def _icon() -> Any:
-    """Return a pane over a view, as RViz's binding has it."""
-    core, gui = pyqt(), pyqt("QtGui")
-    picture = gui.QPixmap(32, 32)
-    picture.fill(core.Qt.transparent)
-    painter = gui.QPainter(picture)
-    painter.setRenderHint(gui.QPainter.Antialiasing)
-    painter.setPen(gui.QPen(gui.QColor("#404850"), 2))
-    painter.setBrush(gui.QColor("#a8b4c0"))
-    painter.drawRoundedRect(core.QRectF(2, 2, 24, 20), 3, 3)
-    painter.setBrush(gui.QColor(33, 150, 243, 200))
-    painter.drawRoundedRect(core.QRectF(9, 11, 21, 19), 3, 3)
-    painter.end()
-    return gui.QIcon(picture)

@@ -10,6 +10,7 @@ from rosglass.errors import Error
 from rosglass.qt import QtCore, Slot
 from rosglass.rviz.display import display_class, tell_status
 from rosglass.rviz.host import pyqt
+from rosglass.rviz.icons import camera_icon
 from rosglass.rviz.properties import PropertyTree, given_to_rviz, quiet, take_out
 from rosglass.rviz.registered_properties import RegisteredProperties
 from rosglass.rviz.saved_values import plain_config
@@ -58,7 +59,7 @@ class _Entry:
         self.display.entry = self
         self.display.setClassId(VIEW_CLASS)
         self.display.setName(_NAME)
-        self.display.setIcon(_icon())
+        self.display.setIcon(camera_icon())
         self.display.setDescription(
             "How the camera is moved by keys, by interfaces and by robots. "
             "Without this entry, it is as at first."
@@ -217,20 +218,3 @@ class ViewEntry(QtCore.QObject):
             ):
                 if entry.alive:
                     tell_status(entry.display, row, _WARN if problem else _OK, problem or fine)
-
-
-@cache
-def _icon() -> Any:
-    """Return a camera, as RViz's binding has it."""
-    core, gui = pyqt(), pyqt("QtGui")
-    picture = gui.QPixmap(32, 32)
-    picture.fill(core.Qt.transparent)
-    painter = gui.QPainter(picture)
-    painter.setRenderHint(gui.QPainter.Antialiasing)
-    painter.setPen(gui.QPen(gui.QColor("#404850"), 2))
-    painter.setBrush(gui.QColor("#a8b4c0"))
-    painter.drawPolygon(*(core.QPointF(x, y) for x, y in ((17, 16), (29, 8), (29, 24))))
-    painter.setBrush(gui.QColor(33, 150, 243, 200))
-    painter.drawRoundedRect(core.QRectF(2, 8, 19, 16), 3, 3)
-    painter.end()
-    return gui.QIcon(picture)
