@@ -176,7 +176,7 @@ def test_a_graphics_card_is_used(monkeypatch: pytest.MonkeyPatch, app: Any) -> N
     ],
 )
 def test_what_may_come_to_need_opengl_is_found_in_the_files(
-    text: str, imports: str, need: str, qml: Any, tmp_path: Path
+    text: str, imports: str, need: str, qml: Any, app: Any, tmp_path: Path
 ) -> None:
     from rosglass.qt import QtQml
     from rosglass.rviz.opengl_needs import need_in_file
@@ -190,3 +190,17 @@ def test_what_may_come_to_need_opengl_is_found_in_the_files(
     found = need_in_file(qml("Main", text, imports), places)
     assert found.endswith(need)
     assert bool(found) == bool(need)
+
+
+def test_folders_that_import_each_other_are_looked_through_once(tmp_path: Path) -> None:
+    from rosglass.rviz.opengl_needs import need_in_file
+
+    places = {"First": "Parts", "Second": "More Pages", "Third": "Looks"}
+    imports = "".join(f'import "../{folder}"\n' for folder in places.values())
+    files = {name: tmp_path / folder / f"{name}.qml" for name, folder in places.items()}
+    for file in files.values():
+        file.parent.mkdir()
+        file.write_text(f"{imports}Item {{ First {{ }} Second {{ }} Third {{ }} }}")
+    assert not need_in_file(files["First"], [])
+    files["Second"].write_text(f"{imports}Item {{ First {{ }} {SHADER} }}")
+    assert need_in_file(files["First"], []) == f"{files['Second']}:4: ShaderEffect"

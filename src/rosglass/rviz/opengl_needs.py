@@ -35,7 +35,7 @@ _WRITTEN = re.compile(
 )
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
 _USED = re.compile(r"\b([A-Z]\w*)\s*\{|[\"']([\w./-]+\.qml)[\"']")
-_FOLDER = re.compile(r"^[ \t]*import\s+[\"']([\w./-]+)[\"']", re.MULTILINE)
+_FOLDER = re.compile(r"^[ \t]*import\s+[\"']([^\"'\n\0]+)[\"']", re.MULTILINE)
 _MODULE = re.compile(r"^[ \t]*import\s+([A-Za-z][\w.]*)\s*([\d.]*)", re.MULTILINE)
 _LISTED = re.compile(r"^[ \t]*(?:singleton\s+)?([A-Z]\w*)\s+[\d.]+\s+(\S+\.qml)\s*$", re.MULTILINE)
 
@@ -83,7 +83,7 @@ def _files(file: Path, import_paths: Sequence[Path]) -> Iterator[tuple[Path, str
         path = waiting.pop()
         text = _read(path)
         yield path, text
-        places = [path.parent, *(path.parent / name for name in _FOLDER.findall(text))]
+        places = [path.parent, *(_plain(path.parent / name) for name in _FOLDER.findall(text))]
         modules = _MODULE.findall(text)
         places += [p for name, version in modules for p in _places(name, version, import_paths)]
         for place in places:
@@ -121,8 +121,13 @@ class _Folder:
             if name in self._names:
                 found.add(self._path / name)
             elif "/" in name and (self._path / name).is_file():
-                found.add((self._path / name).resolve())
+                found.add(_plain(self._path / name))
         return found
+
+
+def _plain(path: Path) -> Path:
+    """Return the one name of a place, as addresses have it: folders may import each other."""
+    return Path(os.path.normpath(path))
 
 
 def _read(path: Path) -> str:
