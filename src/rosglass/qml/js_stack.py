@@ -18,7 +18,7 @@ __all__ = ["JsStack"]
 
 #: Bytes from the start of QJSEngine to its pointer to QV4::ExecutionEngine, whose first member is
 #: the pointer to the innermost QV4::CppStackFrame: Qt's own JIT relies on that.
-_ENGINE = 16
+_ENGINE = 2 * ctypes.sizeof(ctypes.c_void_p)
 #: Bytes from the start of a frame to its caller, its QV4::Function, and its place in the code.
 _CALLER, _FUNCTION, _POSITION = (0, 8, 20) if QT6 else (16, 24, 52)
 #: Bytes from the start of a QV4::Function to its QV4::CompiledData::Function; inside of that.
@@ -55,13 +55,13 @@ class _Memory:
 
     def __init__(self) -> None:
         try:
-            self._file = os.open("/proc/self/mem", os.O_RDONLY | os.O_CLOEXEC)
+            self._file = os.open("/proc/self/mem", os.O_RDONLY)
         except OSError:
             self._file = -1
 
     def read(self, address: int, size: int) -> bytes:
         """Return bytes; raises OSError when they are not there."""
-        if not 0 < address < 1 << 62:
+        if self._file < 0 or not 0 < address < 1 << 62:
             raise OSError(f"no such address: {address:#x}")
         found = os.pread(self._file, size, address)
         if len(found) < size:
