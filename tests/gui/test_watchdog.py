@@ -223,3 +223,13 @@ def test_a_function_that_python_calls_is_ended_and_is_an_error(
     error = runtime.call(failing, [])
     assert error.toString() == "Error: no"
     assert error.property("lineNumber").toInt() == 2
+
+
+def test_whatever_a_function_throws_is_an_error(run: Callable[..., Runner]) -> None:
+    runner = run("", 5.0)
+    runtime = runtime_of(runner.engine)
+    failing: Any = runner.engine.evaluate("(function () { throw 'not now' })", "/f.js")
+    error = runtime.call(failing, [])
+    assert error.isError()
+    assert error.toString() == "Error: not now"
+    assert error.property("fileName").isUndefined()

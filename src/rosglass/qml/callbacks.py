@@ -30,9 +30,9 @@ def call_back(runtime: Runtime, callback: QJSValue, *arguments: QJSValue) -> QJS
     result = runtime.call(callback, arguments)
     if not result.isError():
         return result
-    known = result.hasProperty("fileName")
-    file = plain_path(result.property("fileName").toString()) if known else "<unknown>"
-    line = result.property("lineNumber").toInt()
+    named = result.property("fileName")
+    file = "<unknown>" if named.isUndefined() else plain_path(named.toString())
+    line = 0 if named.isUndefined() else result.property("lineNumber").toInt()
     log_from_qml("", logging.ERROR, result.toString(), Caller(file, max(line, 0), ""))
     return QJSValue()
 

@@ -14,12 +14,15 @@ if TYPE_CHECKING:
 __all__ = ["JsCalls"]
 
 _SCRIPT = """(function (calls, jobs) {
+    function thrown(value) {
+        return Object.assign(new Error(String(value)), { fileName: undefined })
+    }
     calls.asked.connect(function (number) {
         const job = jobs[number]
         try {
             job.result = job.callee.apply(undefined, job.passed)
         } catch (error) {
-            job.result = error
+            job.result = error instanceof Error ? error : thrown(error)
         }
         job.done = true
     })
@@ -47,7 +50,7 @@ class JsCalls(QtCore.QObject):
         script.call([engine.newQObject(self), self._jobs])
 
     def call(self, function: QJSValue, arguments: Sequence[QJSValue]) -> QJSValue:
-        """Return what a function returns, or what it throws; an error when it was ended."""
+        """Return what a function returns, or the error that it throws, or that it was ended."""
         self._number = (self._number + 1) % 2**31
         name = str(self._number)
         job, passed = self._engine.newObject(), self._engine.newArray(len(arguments))
