@@ -231,6 +231,17 @@ def test_topics_and_services_can_be_withdrawn(
     wait(lambda: service in str(names()))
 
 
+def test_changing_ones_mind_while_they_are_made_leaves_them_there(
+    app: Any, robot: Robot, view: Any, wait: Callable[..., None]
+) -> None:
+    for _ in range(3):
+        view.settings.topics = False
+        view.settings.topics = True
+    wait(lambda: app.view_services.is_open or app.view_services.problem)
+    assert not app.view_services.problem
+    assert robot.namespace + "move_eye" in str(app.session.node.services())
+
+
 def test_catkin_makes_the_types_that_we_speak(robot: Robot, view: Any) -> None:
     import rosglass
 

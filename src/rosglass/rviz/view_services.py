@@ -58,6 +58,8 @@ class ViewServices(QtCore.QObject):
         self._node: Node | None = None
         self._generation = 0
         self._handles: list[Handle] = []
+        #: What the worker is making now.
+        self._making: _Made | None = None
         self._publishers: dict[str, Publisher] = {}
         self._closed = False
         session.node_changed.connect(self._node_changed)
@@ -109,8 +111,12 @@ class ViewServices(QtCore.QObject):
     def _shut(self) -> None:
         self._generation += 1
         handles, self._handles, self._publishers = self._handles, [], {}
+        making, self._making = self._making, None
         if handles:
             self._session.background(lambda: _close_all(handles))
+        if making is not None:
+            # Made by then, and closed before others take its names: jobs keep their order.
+            self._session.background(lambda: _close_all(making.handles))
 
     def _open(self) -> None:
         self._shut()
@@ -124,12 +130,13 @@ class ViewServices(QtCore.QObject):
         if node.wire != "ros1":
             self._tell_problem(f"{node.url}: the services of the camera are of ROS 1")
             return
-        made = _Made()
+        made = self._making = _Made()
 
         def done(result: _Made | Error) -> None:
             if generation != self._generation:
-                self._session.background(lambda: _close_all(made.handles))
-            elif isinstance(result, Error):
+                return
+            self._making = None
+            if isinstance(result, Error):
                 self._tell_problem(str(result))
             else:
                 self._handles, self._publishers = made.handles, made.publishers
