@@ -288,12 +288,13 @@ class Input(QtCore.QObject):
 
     def _touch(self, event: Any) -> bool:
         if event.type() == _E.TouchBegin:
-            self._touched, open_to_rviz = self._offer(event)
+            overlay, open_to_rviz = self._offer(event)
+            self._touched = overlay if overlay in self._stack.topmost_first() else None
             if self._touched is not None:
                 self._stack.clicked(self._touched)
                 self.focus(self._touched)
             # What is not taken, Qt offers anew as the mouse.
-            return self._touched is not None or not open_to_rviz
+            return overlay is not None or not open_to_rviz
         touched = self._touched
         if touched is None:
             return False
