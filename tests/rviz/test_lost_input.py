@@ -162,6 +162,30 @@ def test_nothing_stays_pressed(
     assert root.property("log") == "canceledclickedtapped"
 
 
+def test_keys_count_no_longer_while_a_menu_has_them(hand: Any, app: Any, show: Any) -> None:
+    root = show(
+        """Item {
+        property bool driving: false
+        focus: true
+        onActiveFocusChanged: if (!activeFocus) driving = false
+        Keys.onPressed: driving = true
+        Keys.onReleased: driving = false
+        MouseArea { width: 100; height: 100 }
+        }"""
+    )
+    focus(app.window.widget)
+    hand.wait(app.window.widget.isActiveWindow)
+    hand.click(50, 50)
+    hand.do("keydown", "F6")
+    hand.wait(lambda: root.property("driving"))
+    back = by_menu(hand, app)
+    hand.do("keyup", "F6")
+    hand.wait(lambda: not root.property("driving"))
+    back()
+    hand.wait(lambda: root.property("activeFocus"))
+    assert not root.property("driving")
+
+
 def test_widgets_are_let_go_of(hand: Any, app: Any) -> None:
     from rosglass.rviz import WidgetOverlay
     from rosglass.rviz.qt5 import QtWidgets

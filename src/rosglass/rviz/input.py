@@ -335,13 +335,17 @@ class Input(QtCore.QObject):
         return focused.is_modal
 
     def _focus_event(self, event: Any) -> bool:
-        focused = self._focused
-        if event.type() == _E.FocusOut and event.reason() == Qt5Core.Qt.PopupFocusReason:
-            # A menu has all of the mouse while it is open.
-            self._lose()
-        if focused is not None and event.reason() != Qt5Core.Qt.PopupFocusReason:
-            with guarded(focused, "getting or losing the keys"):
-                focused.set_focus(event.type() == _E.FocusIn)
+        told = [event.type() == _E.FocusIn]
+        if event.reason() == Qt5Core.Qt.PopupFocusReason:
+            # A menu has all of the mouse and the keys while it is open: what is held must end, but
+            # Qt Quick could not be given the keys back when it closes.
+            told = [] if told[0] else [False, True]
+            if told:
+                self._lose()
+        for focus in told:
+            if self._focused is not None:
+                with guarded(self._focused, "getting or losing the keys"):
+                    self._focused.set_focus(focus)
         return False
 
     # What happens around
