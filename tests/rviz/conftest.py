@@ -117,6 +117,26 @@ def app(
     app.close()
 
 
+@pytest.fixture(scope="module")
+def as_found(
+    app: Application, master: str, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[None]:
+    """Leave displays, panels and the robot's description as they were to the tests that follow."""
+    file = tmp_path_factory.mktemp("found") / "found.rviz"
+    app.save_config(file)
+    yield
+    app.overlays.close()
+    with xmlrpc.client.ServerProxy(master) as proxy:
+        proxy.deleteParam("/test", "/robot_description")
+    app.load_config(file)
+    # RViz makes some of it by later events.
+    from rosglass.qt import QtCore, run_event_loop
+
+    loop = QtCore.QEventLoop()
+    QtCore.QTimer.singleShot(1000, loop.quit)
+    run_event_loop(loop)
+
+
 @pytest.fixture
 def wait(app: Application) -> Callable[..., None]:
     """Run the event loop until a condition holds; without one, for some milliseconds."""

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 FOLDER = Path(__file__).parents[2] / "examples/rviz"
+pytestmark = pytest.mark.usefixtures("as_found")
 
 
 class Dashboard:
@@ -89,14 +90,14 @@ def test_everything_says_that_the_robot_is_silent(
     wait(lambda: not dashboard.find("emergency stop").property("known"))
     wait(lambda: any(text.startswith("ROBOT SILENT") for text in dashboard.seen()))
     wait(lambda: "STATE UNKNOWN" in dashboard.seen())
-    assert "following" not in dashboard.seen()
-    assert dashboard.seen().count("NO PICTURE") == 2
+    wait(lambda: "following" not in dashboard.seen())
+    wait(lambda: dashboard.seen().count("NO PICTURE") == 2)
     dashboard.click("tab Behaviours")
     wait(lambda: "ROBOT SILENT" in dashboard.seen())
     assert not dashboard.find("behaviour Look around").isEnabled()
     dashboard.click("tab Settings")
     wait(lambda: "Highest speed   unknown" in dashboard.seen())
-    assert "Flashlight: unknown" in dashboard.seen()
+    wait(lambda: "Flashlight: unknown" in dashboard.seen())
     assert not dashboard.find("speed").isEnabled()
     # What is asked for all the same says that nobody answers.
     dashboard.click("flashlight")

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+pytestmark = pytest.mark.usefixtures("as_found")
 TOOLS = ["rviz/Interact", "rviz/MoveCamera", "rviz/Select"]
 
 

@@ -158,6 +158,7 @@ def test_context_menus(panel: Any, act: Any, view: Any) -> None:
     distance = view("Distance")
     _, x, y = at(panel.plain)
     act(("at", x, y), ("mousedown", 3), ("at", x, y + 40), ("at", x, y + 80), ("mouseup", 3))
+    act(lambda: view("Distance") != distance)
     assert view("Distance") != distance
 
 
