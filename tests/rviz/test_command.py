@@ -144,7 +144,7 @@ def test_waits_for_a_master_and_says_so(start: Callable[..., Program]) -> None:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     program = start("--url", f"ros1://127.0.0.1:{port}")
-    program.wait_for("start one: roscore")
+    program.wait_for(f"start one: roscore -p {port}")
     assert program.end() == 130
     program = start("--url", f"ros1://127.0.0.1:{port}", "--timeout", "0.5")
     assert program.process.wait(PATIENCE) == 1
@@ -181,7 +181,7 @@ def test_tells_when_the_master_is_gone_and_when_another_one_came(
     # It waits for the master, and starts as soon as there is one.
     overlay = interface(tmp_path, "console.warn('up')")
     program = start("--overlay", overlay, ROS_MASTER_URI=f"http://127.0.0.1:{port}")
-    program.wait_for("start one: roscore")
+    program.wait_for(f"start one: roscore -p {port}")
     for message in ("up", "started anew"):
         server = roscore()
         try:

@@ -9,6 +9,7 @@ from collections import deque
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
+from rosglass.comm.terminal import warn_on_terminal
 from rosglass.comm.worker import Worker
 from rosglass.errors import Error
 
@@ -160,6 +161,7 @@ class LibraryLog(logging.Handler):
         super().__init__(logging.WARNING)
         self._handler, self._runs_here = handler, runs_here
         logging.getLogger("rosglass").addHandler(self)
+        warn_on_terminal()
 
     def emit(self, record: logging.LogRecord) -> None:
         """Hand on a record."""

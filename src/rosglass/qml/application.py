@@ -7,9 +7,11 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import Handle
+from rosglass.comm.terminal import warn_on_terminal
 from rosglass.errors import Error
 from rosglass.qml.display import require_display
 from rosglass.qml.interrupt import QuitOnSignal, end_process_within
+from rosglass.qml.log import LocationFormatter
 from rosglass.qml.places import interface_file
 from rosglass.qml.runner import Runner, needs_widgets
 from rosglass.qml.session import Session
@@ -81,6 +83,7 @@ class Application(Handle):
             if not word.isidentifier() or word[0].isupper():
                 raise Error(f"context: QML cannot use the name {word!r}: expected e.g. {'arm'!r}")
         path = interface_file(file)
+        warn_on_terminal(LocationFormatter())
         #: The Qt application.
         self.qt: Any = QtCore.QCoreApplication.instance() or _qt_application(path, arguments)
         if not isinstance(self.qt, QtGui.QGuiApplication):

@@ -9,9 +9,11 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import Handle
+from rosglass.comm.terminal import warn_on_terminal
 from rosglass.errors import ConnectionLostError, Error, UnsupportedError
 from rosglass.qml.display import require_display
 from rosglass.qml.interrupt import QuitOnSignal, end_process_within
+from rosglass.qml.log import LocationFormatter
 from rosglass.qml.places import import_folder
 from rosglass.qml.session import Session
 from rosglass.qt import QtCore, run_event_loop
@@ -133,6 +135,7 @@ class Application(Handle):
             config_file(config)
         #: The Qt application.
         self.qt: Any = _qt_application(arguments)
+        warn_on_terminal(LocationFormatter())
         self._unhook = log_what_is_raised()
         self._closed = self._running = self._fullscreen = False
         self._fullscreen = fullscreen

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import logging
+import socket
 import threading
 import time
 from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
 
 from rosglass.errors import ConnectionLostError, Error
 from rosglass.qml.executor import GuiExecutor
@@ -23,6 +25,8 @@ _log = logging.getLogger("rosglass.rviz")
 _WAITING, _WATCHING, _TIMEOUT = 0.25, 2.0, 2.0
 #: Milliseconds after which a window says what is waited for.
 _PATIENCE = 700
+#: Where roscore is found unless it is told otherwise.
+_PORT = 11311
 
 
 class _Asker:
@@ -90,7 +94,7 @@ def wait_for_master(uri: str, timeout: float | None, ended: Callable[[], bool]) 
         if not isinstance(answer, Error):
             finish(True)
             return
-        problem = f"{answer}; start one: roscore"
+        problem = f"{answer}; {_advice(uri)}"
         if timeout is not None and time.monotonic() - started >= timeout:
             finish(ConnectionLostError(problem))
         elif problem not in problems:
@@ -101,7 +105,7 @@ def wait_for_master(uri: str, timeout: float | None, ended: Callable[[], bool]) 
         if ended():
             finish(False)
         elif problems and not window and time.monotonic() - started > _PATIENCE / 1000:
-            window.append(_waiting_window(uri, lambda: finish(False)))
+            window.append(_waiting_window(uri, problems[-1], lambda: finish(False)))
 
     asker = _Asker(uri, _WAITING, on_answer)
     timer = QtCore.QTimer()
@@ -118,11 +122,21 @@ def wait_for_master(uri: str, timeout: float | None, ended: Callable[[], bool]) 
     return bool(outcome[0])
 
 
-def _waiting_window(uri: str, cancel: Callable[[], None]) -> Any:
+def _advice(uri: str) -> str:
+    """Return what to do where a master does not answer."""
+    address = urlsplit(uri)
+    port = "" if address.port in (None, _PORT) else f" -p {address.port}"
+    host = address.hostname or ""
+    if host in ("localhost", "::1", socket.gethostname()) or host.startswith("127."):
+        return f"start one: roscore{port}"
+    return f"check the address, or start one on {host}: roscore{port}"
+
+
+def _waiting_window(uri: str, problem: str, cancel: Callable[[], None]) -> Any:
     box = QtWidgets.QMessageBox()
     box.setWindowTitle("RViz")
     box.setText(f"Waiting for the ROS master at {uri}")
-    box.setInformativeText("RViz starts as soon as it answers. To start one: roscore")
+    box.setInformativeText(f"RViz starts as soon as it answers. {problem}")
     box.setStandardButtons(QtWidgets.QMessageBox.Cancel)
     box.rejected.connect(cancel)
     box.finished.connect(lambda _: cancel())
