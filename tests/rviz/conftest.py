@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 HAVE_RVIZ = find_spec("PySide6") is None and find_spec("rviz") is not None
 if HAVE_RVIZ:
     os.environ.setdefault("ROSGLASS_QT", "pyside2")
+#: RViz, its master, and the config that it has begun with.
+FOUND: list[tuple[Application, str, Path]] = []
 IMPORTS = "import QtQuick 2.15\nimport QtQuick.Controls 2.15\n"
 SCREEN = (1280, 800)
 
@@ -113,28 +115,29 @@ def app(
     app = Application(renderer=os.environ.get("TEST_RENDERER", "auto"))
     app.window.widget.setGeometry(0, 0, *SCREEN)
     app.window.widget.show()
+    found = home / "found.rviz"
+    app.save_config(found)
+    FOUND.append((app, master, found))
     yield app
+    FOUND.clear()
     app.close()
 
 
-@pytest.fixture(scope="module")
-def as_found(
-    app: Application, master: str, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[None]:
-    """Leave displays, panels and the robot's description as they were to the tests that follow."""
-    file = tmp_path_factory.mktemp("found") / "found.rviz"
-    app.save_config(file)
+@pytest.fixture(scope="module", autouse=True)
+def as_found() -> Iterator[None]:
+    """Leave displays, tools, panels and the robot's description as they were to the next tests."""
     yield
-    app.overlays.close()
-    with xmlrpc.client.ServerProxy(master) as proxy:
-        proxy.deleteParam("/test", "/robot_description")
-    app.load_config(file)
-    # RViz makes some of it by later events.
-    from rosglass.qt import QtCore, run_event_loop
+    for app, master, file in FOUND:
+        app.overlays.close()
+        with xmlrpc.client.ServerProxy(master) as proxy:
+            proxy.deleteParam("/test", "/robot_description")
+        app.load_config(file)
+        # RViz makes some of it by later events.
+        from rosglass.qt import QtCore, run_event_loop
 
-    loop = QtCore.QEventLoop()
-    QtCore.QTimer.singleShot(1000, loop.quit)
-    run_event_loop(loop)
+        loop = QtCore.QEventLoop()
+        QtCore.QTimer.singleShot(1000, loop.quit)
+        run_event_loop(loop)
 
 
 @pytest.fixture

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 FOLDER = Path(__file__).parents[2] / "examples/rviz"
-pytestmark = pytest.mark.usefixtures("as_found")
 
 
 class Dashboard:

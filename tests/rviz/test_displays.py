@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
-pytestmark = pytest.mark.usefixtures("as_found")
 QML = """import QtQuick 2.15
 Item {
     property var speed: rviz.registerFloatProperty("Speed", 1, "m/s", {min: 0, max: 2})

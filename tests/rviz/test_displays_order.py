@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
-pytestmark = pytest.mark.usefixtures("as_found")
 SQUARE = 'import QtQuick 2.15\nItem {{ Rectangle {{ width: 200; height: 200; color: "{0}" }} }}\n'
 RED, BLUE, LIME, GREY = (255, 0, 0), (0, 0, 255), (0, 255, 0), (48, 48, 48)
 

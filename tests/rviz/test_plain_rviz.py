@@ -15,7 +15,6 @@ from rosglass.demo.processes import VirtualScreen
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-pytestmark = pytest.mark.usefixtures("as_found")
 RVIZ = Path("/usr/bin/rviz")
 QML = """import QtQuick 2.15
 Item {

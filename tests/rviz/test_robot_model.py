@@ -6,8 +6,6 @@ from contextlib import closing
 from typing import Any
 from xml.etree import ElementTree
 
-import pytest
-
 import rosglass
 from rosglass.comm import QoS, Time
 from rosglass.demo import telemetry
@@ -16,7 +14,6 @@ from rosglass.demo.model import urdf
 from rosglass.demo.simulation import RobotState
 
 
-@pytest.mark.usefixtures("as_found")
 def test_its_description_and_frames_are_complete(app: Any, master: str, wait: Any) -> None:
     url = master.replace("http:", "ros1:")
     with closing(rosglass.connect(url, name="robot")) as node:

@@ -12,7 +12,6 @@ from typing import Any
 
 import pytest
 
-pytestmark = pytest.mark.usefixtures("as_found")
 TOOLS = ["rviz/Interact", "rviz/MoveCamera", "rviz/Select"]
 
 

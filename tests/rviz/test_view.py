@@ -12,9 +12,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-pytestmark = pytest.mark.usefixtures("as_found")
-
-
 def near(found: Any, wanted: Any, within: float = 0.01) -> bool:
     return all(abs(a - b) < within for a, b in zip(found, wanted, strict=True))
 

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
-pytestmark = pytest.mark.usefixtures("as_found")
 #: A plain RViz: loads a file, saves it as another one, and tells its displays.
 PLAIN = """
 import os, sys

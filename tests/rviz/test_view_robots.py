@@ -16,7 +16,6 @@ import pytest
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-pytestmark = pytest.mark.usefixtures("as_found")
 HERE = Path(__file__).parent
 CATKIN, MESSAGES = Path("/usr/bin/catkin_make"), Path("/usr/share/std_msgs/msg")
 PACKAGES = (
