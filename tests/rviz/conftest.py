@@ -129,6 +129,8 @@ def as_found() -> Iterator[None]:
     yield
     for app, master, file in FOUND:
         app.overlays.close()
+        # Another file may start an RViz whose interface gives its node the same name.
+        app.session.shutdown()
         with xmlrpc.client.ServerProxy(master) as proxy:
             proxy.deleteParam("/test", "/robot_description")
         app.load_config(file)

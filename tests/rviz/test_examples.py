@@ -130,6 +130,15 @@ class Rviz:
         subprocess.run([sys.executable, "-c", GRAB, file], env=self._env, check=True, timeout=60)
         return QtGui.QImage(file)
 
+    def evidence(self, robot: Robot) -> Callable[[], str]:
+        """Return what tells of a failure: what the robot has told, and where the picture lies."""
+
+        def tell() -> str:
+            self.picture()
+            return f"{robot.told}; see {self._folder / 'picture.png'}; {self.output}"
+
+        return tell
+
     def press(self, place: tuple[int, int]) -> None:
         self._do("mousemove", *place, "mousedown", 1)
 
@@ -154,7 +163,11 @@ def rviz(env: dict[str, str], robot: Robot, tmp_path: Path) -> Iterator[Rviz]:
             stdout=log,
             stderr=log,
         )
-    yield Rviz(process, env, tmp_path)
+    rviz = Rviz(process, env, tmp_path)
+    # A button that a test has left pressed would not be pressed again.
+    rviz.release()
+    yield rviz
+    rviz.release()
     if process.poll() is None:
         process.kill()
         process.wait(PATIENCE)
@@ -185,25 +198,22 @@ def test_an_operator_sees_stops_and_commands_the_robot(robot: Robot, rviz: Rviz)
     wait_until(look, lambda: f"live: {live}; {rviz.output}")
     wait_until(lambda: robot.stopped is False and robot.speed > 0.1, lambda: robot.told)
 
-    def press_until(done: Callable[[], bool], seconds: float) -> None:
-        """Press for some seconds, and again, as an operator does."""
-
-        def tried() -> bool:
-            rviz.press(STOP)
-            time.sleep(seconds)
-            rviz.release()
-            time.sleep(2.0)
-            return done()
-
-        wait_until(tried, lambda: robot.told)
-
-    press_until(lambda: robot.stopped is True, 0.1)
-    wait_until(lambda: robot.stopped and robot.speed < 0.01, lambda: robot.told)
+    rviz.click(STOP)
+    wait_until(lambda: robot.stopped and robot.speed < 0.01, rviz.evidence(robot))
     # A click does not release it, a long press does.
     rviz.click(STOP)
     time.sleep(1.0)
     assert robot.stopped
-    press_until(lambda: robot.stopped is False, 1.5)
+
+    def released() -> bool:
+        """Press long, and again: a press stops when the robot has just not been heard of."""
+        rviz.press(STOP)
+        time.sleep(1.5)
+        rviz.release()
+        time.sleep(2.0)
+        return robot.stopped is False
+
+    wait_until(released, rviz.evidence(robot))
 
     rviz.click(BEHAVIOURS)
     rviz.click(FLIPPERS_UP)
