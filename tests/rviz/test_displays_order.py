@@ -73,6 +73,26 @@ def test_dragging_an_entry_changes_which_is_above(
     assert seen() == BLUE
 
 
+def test_a_number_set_and_set_back_leaves_the_order(app: Any, squares: Any, seen: Any) -> None:
+    red, blue = squares
+    for other in (1, -1):
+        red.z = other
+        assert order(app)[max(other, 0)] == "Red"
+        red.z = 0
+        assert order(app) == ["Red", "Blue"]
+        blue.z = other
+        blue.z = 0
+        assert order(app) == ["Red", "Blue"]
+    assert seen() == BLUE
+    # Who is raised stays so among its equals, even if it was above all by its number alone.
+    red.z = 1
+    app.overlays.to_front(red)
+    red.z = 0
+    assert order(app) == ["Blue", "Red"]
+    app.overlays.to_back(red)
+    assert (order(app), red.z) == (["Red", "Blue"], 0)
+
+
 def test_a_file_keeps_the_order(
     app: Any, squares: Any, panel: Any, wait: Any, seen: Any, tmp_path: Path
 ) -> None:

@@ -35,7 +35,10 @@ class Stack(QtCore.QObject):
     def __init__(self, window: Window) -> None:
         super().__init__()
         self._window = window
+        #: As they were added, or last raised or lowered: what counts among those of equal `z`.
         self._entries: list[Drawing] = []
+        #: As they lie above each other, the lowest first.
+        self._arranged: list[Drawing] = []
         self._drawing = False
         self._later: list[Callable[[], None]] = []
         window.before_frame.connect(self._before_frame)
@@ -65,6 +68,7 @@ class Stack(QtCore.QObject):
         for entry in self._entries:
             if entry.overlay is overlay:
                 self._entries.remove(entry)
+                self._arranged.remove(entry)
                 overlay.changed.disconnect(entry.mark)
                 overlay.arranged.disconnect(self._arrange)
                 overlay.renewed.disconnect(self.input.forget)
@@ -84,7 +88,7 @@ class Stack(QtCore.QObject):
 
     def __iter__(self) -> Iterator[Overlay]:
         """Iterate over the overlays, the lowest first."""
-        return iter([entry.overlay for entry in self._entries])
+        return iter([entry.overlay for entry in self._arranged])
 
     def topmost_first(self) -> list[Overlay]:
         """Return the overlays that are shown, in the order in which they get input."""
@@ -117,14 +121,16 @@ class Stack(QtCore.QObject):
         self._arrange()
 
     def _to_end(self, overlay: Overlay, end: int, outermost: Callable[..., int]) -> None:
-        alike = [e for e in self._entries if e.overlay.is_popup == overlay.is_popup]
+        alike = [e for e in self._arranged if e.overlay.is_popup == overlay.is_popup]
         entry = next((e for e in alike if e.overlay is overlay), None)
-        if entry is None or alike[end] is entry:
+        if entry is None:
             return
+        # Where it stays when `z` is set to what others have.
         self._entries.remove(entry)
         self._entries.insert(0 if end == 0 else len(self._entries), entry)
-        # Setting it puts all in order, equal ones as they stand now.
-        overlay.z = outermost(e.overlay.z for e in alike)
+        if alike[end] is not entry:
+            # Setting it puts all in order.
+            overlay.z = outermost(e.overlay.z for e in alike)
 
     @property
     def covered(self) -> float:
@@ -140,9 +146,9 @@ class Stack(QtCore.QObject):
             send_deferred_deletes()
 
     def _arrange(self) -> None:
-        self._entries.sort(key=lambda entry: (entry.overlay.is_popup, entry.overlay.z))
-        for number, entry in enumerate(self._entries):
-            entry.layer.set_z(max(HIGHEST_Z - len(self._entries) + number, 0))
+        self._arranged = sorted(self._entries, key=lambda e: (e.overlay.is_popup, e.overlay.z))
+        for number, entry in enumerate(self._arranged):
+            entry.layer.set_z(max(HIGHEST_Z - len(self._arranged) + number, 0))
         self.changed.emit()
 
     def _before_frame(self) -> None:
@@ -156,7 +162,7 @@ class Stack(QtCore.QObject):
         # What is drawn may have overlays come and go, itself included.
         self._drawing = True
         try:
-            works = [entry.before_frame(width, height, ratio) for entry in list(self._entries)]
+            works = [entry.before_frame(width, height, ratio) for entry in list(self._arranged)]
         finally:
             self._drawing = False
         later, self._later = self._later, []
