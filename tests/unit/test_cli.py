@@ -42,6 +42,27 @@ def test_wrong_usage_exits_with_2(arguments: list[str], capsys: pytest.CaptureFi
     assert "usage: rosglass" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("line", "usage", "told"),
+    [
+        ("rviz --overly x", "rosglass rviz", "--overly; did you mean --overlay?"),
+        ("run a.qml --wach=yes", "rosglass run", "--wach=yes; did you mean --watch?"),
+        ("topic echo /x --fields y", "rosglass topic echo", "--fields y; did you mean --field?"),
+        ("topic --zzz list", "rosglass topic", "--zzz\n"),
+        ("--zzz topic list", "rosglass", "--zzz\n"),
+        ("robot red", "rosglass robot", "red\n"),
+    ],
+)
+def test_misspelt_options_are_explained_by_their_command(
+    line: str, usage: str, told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(line.split())
+    said = capsys.readouterr().err
+    assert said.startswith(f"usage: {usage} ")
+    assert f"{usage}: error: unrecognized arguments: {told}" in said
+
+
 def test_missing_extra_names_the_fix(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from rosglass.cli.completion import is_completing
 
@@ -24,13 +24,27 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """See argparse."""
         has_commands = any(action.nargs == argparse.PARSER for action in self._actions)
-        if has_commands or self._mixing or is_completing():
+        if self._mixing or is_completing():
             return super().parse_known_args(args, namespace)
-        self._mixing = True
-        try:
-            return self.parse_known_intermixed_args(args, namespace)
-        finally:
-            self._mixing = False
+        if has_commands:
+            found, unknown = super().parse_known_args(args, namespace)
+        else:
+            self._mixing = True
+            try:
+                found, unknown = self.parse_known_intermixed_args(args, namespace)
+            finally:
+                self._mixing = False
+        if unknown:
+            self._refuse(unknown)
+        return found, unknown
+
+    def _refuse(self, unknown: list[str]) -> NoReturn:
+        """End with this command's own usage; argparse alone shows that of ``rosglass``."""
+        from rosglass.comm.similar import similar
+
+        options = [one for action in self._actions for one in action.option_strings]
+        hints = (similar(one.partition("=")[0], options) for one in unknown if one[:1] == "-")
+        self.error(f"unrecognized arguments: {' '.join(unknown)}{next(filter(None, hints), '')}")
 
 
 class Subcommands:
