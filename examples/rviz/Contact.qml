@@ -8,7 +8,9 @@ Item {
     readonly property bool live: !place.stale
     readonly property var problems: {
         var found = []
-        if (Ros.connectionState !== "connected" && Ros.connectionState !== "uninitialized")
+        if (Ros.connectionState === "failed")
+            found.push("NO CONNECTION, start again: " + Ros.connectionDetail)
+        else if (Ros.connectionState !== "connected" && Ros.connectionState !== "uninitialized")
             found.push("NO ROS MASTER: nothing new is found")
         if (place.stale)
             found.push(place.age < 0 ? "NO ROBOT: nothing was heard of it yet"

@@ -8,6 +8,7 @@ import queue
 import shutil
 import subprocess
 import threading
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -377,3 +378,20 @@ def test_another_node_offers_the_same(
     wait(lambda: app.view_services.is_open)
     assert robot.call("set_view_mode", "SetViewMode", mode={"mode": 0}) == "done"
     wait(lambda: robot.ask("heard", topic=mode)[-1] == 0)
+
+
+def test_a_second_node_of_the_name_ends_ours(
+    app: Any, steered: Any, master: str, wait: Callable[..., None]
+) -> None:
+    import rosglass
+
+    session = app.session
+    with closing(rosglass.connect(master.replace("http", "ros1"), name=session.name)):
+        wait(lambda: session.state == "failed")
+        assert "new node registered with same name" in session.detail
+        wait(lambda: not app.view_services.is_open)
+        assert app.view_services.problem == session.detail
+    # It does not come back by itself, but when it is told to.
+    session.shutdown()
+    app.connect()
+    wait(lambda: session.state == "connected" and app.view_services.is_open)

@@ -162,10 +162,9 @@ class Session(QtCore.QObject):
         """``uninitialized``, ``connecting``, ``connected``, ``lost`` or ``failed``."""
         if not self.is_initialized:
             return "uninitialized"
-        if self._failed:
+        # A node that others have ended, as by one of its name in ROS 1, does not come back.
+        if self._failed or self._status.state is ConnectionState.CLOSED:
             return "failed"
-        if self._status.state is ConnectionState.CLOSED:
-            return "connecting"
         return str(self._status.state.value)
 
     @property

@@ -63,6 +63,7 @@ class ViewServices(QtCore.QObject):
         self._publishers: dict[str, Publisher] = {}
         self._closed = False
         session.node_changed.connect(self._node_changed)
+        session.connection_changed.connect(self._connection_changed)
         view.mode_changed.connect(self._tell_mode)
         view.tracked_frame_changed.connect(self._tell_frame)
         self._settings.properties.edited.connect(self._on_edited)
@@ -107,6 +108,12 @@ class ViewServices(QtCore.QObject):
         if self._session.node is not self._node and not self._closed:
             self._node = self._session.node
             self._open()
+
+    def _connection_changed(self) -> None:
+        """Tell that others have ended the node, and what was made from it with it."""
+        if self._node is not None and self._session.state == "failed" and not self._closed:
+            self._shut()
+            self._tell_problem(self._session.detail)
 
     def _shut(self) -> None:
         self._generation += 1
