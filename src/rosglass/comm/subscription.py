@@ -92,7 +92,7 @@ class Subscription(Handle):
         self._watchers = threading.Lock()
         self._waiting, self._watched_at = 0, -math.inf
         self._patient = False
-        self._problem = ""
+        self._problem = self._logged = ""
         call = raw_callback
         if call is None and callback is not None:
             call = _decoding(callback)
@@ -172,14 +172,24 @@ class Subscription(Handle):
         """Take the profile that was decided on; for worlds."""
         self._qos = qos
 
-    def set_problem(self, problem: str, level: int = logging.WARNING) -> None:
-        """Say why nothing can be received; for worlds. Logged once for each new problem."""
-        if problem == self._problem:
-            return
-        self._problem = problem
-        if problem:
-            _log.log(level, "%s: %s", self.topic, problem)
-        self.events.problem.notify(problem)
+    def set_problem(
+        self, problem: str, level: int = logging.WARNING, logged: str | None = None
+    ) -> None:
+        """Say why nothing can be received; for worlds. Logged once for each new problem.
+
+        Args:
+            problem: Why, in words; empty when all is well.
+            level: Of what is logged.
+            logged: What of it is logged, where others log the rest; None for all.
+        """
+        logged = problem if logged is None else logged
+        if logged != self._logged:
+            self._logged = logged
+            if logged:
+                _log.log(level, "%s: %s", self.topic, logged)
+        if problem != self._problem:
+            self._problem = problem
+            self.events.problem.notify(problem)
 
     # -- taking ----------------------------------------------------------------------------------
 

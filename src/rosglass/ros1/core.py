@@ -21,6 +21,7 @@ from rosglass.ros1.names import expand
 from rosglass.ros1.registrations import Registrations
 from rosglass.ros1.slave import Slave
 from rosglass.ros1.types import Types
+from rosglass.ros1.unreachable import Unreachable
 
 if TYPE_CHECKING:
     import socket
@@ -85,6 +86,7 @@ class Core(NodeCore[Member]):
         types: Finds types.
         loop: Waits for all sockets.
         errands: Runs what waits for others.
+        unreachable: Told of publishers that cannot be reached.
         lookups: Runs what calls of services wait for: they must not queue behind what topics wait
             for.
         uri: The node's own API.
@@ -124,6 +126,7 @@ class Core(NodeCore[Member]):
         self.uris: set[str] = set()
         self.move(options.address or own_address())
         self.loop = IoLoop(f"{name.name} connections")
+        self.unreachable = Unreachable(self.loop, self.errands)
         self._registrations = Registrations(self)
         self._worker = self._start_following()
 

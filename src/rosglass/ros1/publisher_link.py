@@ -48,6 +48,7 @@ class PublisherLink:
         epoch: Which master named it.
 
     Attributes:
+        topic: Which it is.
         header: What the publisher said of itself; empty before it is connected.
         name: The publishing node's full name, or its URI as long as that is not known.
         problem: Why it is not connected; empty when it is, or about to be.
@@ -60,6 +61,7 @@ class PublisherLink:
 
     def __init__(self, intake: Intake, uri: str, epoch: int) -> None:
         self.intake, self.uri, self.name, self.epoch = intake, uri, uri, epoch
+        self.topic = intake.topic
         self.header: dict[str, str] = {}
         self.problem, self.lost = "", False
         self.latched: Received | None = None
@@ -137,7 +139,7 @@ class PublisherLink:
 
     def _ask(self) -> None:
         """Ask the publisher where to connect; on a thread that may wait."""
-        topic = self.intake.topic
+        topic = self.topic
         reason, found = "", list[tuple[str, int]]()
         try:
             found = publisher_addresses(self._core.name.full, self.uri, topic)
@@ -154,7 +156,7 @@ class PublisherLink:
             self._fail(reason)
             return
         self._addresses = addresses[1:]
-        header = subscriber_header(self._core.name.full, self.intake.topic)
+        header = subscriber_header(self._core.name.full, self.topic)
         try:
             self._connection = Connection.dial(
                 self._core.loop, addresses[0], header, self._on_header, _ignore, self._fail
@@ -172,6 +174,7 @@ class PublisherLink:
         self._latches = header.get("latching") == "1"
         self._silence, self._count = Silence(), 0
         self._measured_at, self._measured, self._rate = time.monotonic(), 0, 0.0
+        self._core.unreachable.greet(self)
         self.intake.greet(self)
 
     def _on_frames(self, frames: list[Received], _: int) -> None:
@@ -211,6 +214,8 @@ class PublisherLink:
             return
         what = "was lost" if was_connected else "cannot be received from"
         self.problem, self.lost = f"{self.name} {what}: {reason}; trying again", was_connected
+        if not was_connected:
+            self._core.unreachable.fail(self)
         self.intake.part(self)
         if not self.ended:
             self._core.loop.after(self._delay, self._begin)

@@ -245,16 +245,20 @@ class Reading(Source):
             return
         links = self.intake.links()
         matching = self._matching()
-        problems = [*self._refused.copy().values(), *self._remarks.copy().values()]
-        grave = bool(problems) or any(link.problem and not link.lost for link in links)
-        problems = [link.problem for link in links if link.problem] + problems
-        problems += [link.silence for link in links if link.silence and link in self._accepted]
+        faults = [*self._refused.copy().values(), *self._remarks.copy().values()]
+        silence = [link.silence for link in links if link.silence and link in self._accepted]
+        problems = [link.problem for link in links if link.problem] + faults + silence
+        # Those that cannot be reached are logged once for all that they publish.
+        logged = [link.problem for link in links if link.problem and link.lost] + faults + silence
         there = matching or self._core.graph.endpoints(_PUBLISHER, self.intake.topic)
         absence = self._absence.follow(there)
         # What comes needs no master, and who leaves is no mistake of anybody's.
-        told = problems if matching else problems + absence
-        level = logging.WARNING if grave else logging.INFO
-        self.subscription.set_problem("; ".join(dict.fromkeys(told)), level)
+        absence = [] if matching else absence
+        self.subscription.set_problem(
+            "; ".join(dict.fromkeys(problems + absence)),
+            logging.WARNING if faults else logging.INFO,
+            "; ".join(dict.fromkeys(logged + absence)),
+        )
         self.subscription.events.matched.update(matching, Matched)
         self._watch_deadline(bool(matching))
         self.intake.attend()

@@ -375,4 +375,41 @@ def test_who_leaves_in_good_order_is_no_warning_and_who_dies_is(
     master.answers["unregisterPublisher"] = lambda *_: [1, "", 0]
     other.close()
     wait_for(lambda: "cannot be received from" in word.problem, lambda: word.problem)
-    assert any(r.levelno == logging.WARNING and "/word" in r.getMessage() for r in caplog.records)
+    wait_for(
+        lambda: any(
+            r.levelno == logging.WARNING and "/word" in r.getMessage() for r in caplog.records
+        ),
+        lambda: caplog.text,
+    )
+
+
+def test_a_publisher_out_of_reach_is_told_once_for_all_its_topics_and_when_it_is_back(
+    master: FakeMaster, node: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    topics = ["/a", "/b", "/c"]
+    heard = [node.create_subscription(topic, "std_msgs/String") for topic in topics]
+    robot = connected(master, "robot")
+    for topic in topics:
+        robot.create_publisher(topic, "std_msgs/String")
+    wait_for(lambda: all(one.publisher_count() for one in heard))
+
+    def told(what: str) -> list[str]:
+        return [r.getMessage() for r in caplog.records if what in r.getMessage()]
+
+    master.answers["unregisterPublisher"] = lambda *_: [1, "", 0]
+    robot.close()
+    wait_for(lambda: told("cannot be received"), lambda: caplog.text)
+    wait_for(lambda: all("refused; trying again" in one.problem.lower() for one in heard))
+    del master.answers["unregisterPublisher"]
+    for topic in topics:
+        del master.publishers[topic]["/robot"]  # as a real one does for a new node of that name
+    robot = connected(master, "robot")
+    for topic in topics:
+        robot.create_publisher(topic, "std_msgs/String")
+    wait_for(lambda: told("is back"), lambda: caplog.text)
+    (lost,) = told("cannot be received")
+    assert lost.startswith("/a, /b, /c: /robot cannot be received from: http://")
+    assert told("is back") == ["/a, /b, /c: /robot is back"]
+    assert {r.levelno for r in caplog.records if "/robot" in r.getMessage()} == {logging.WARNING}
+    wait_for(lambda: not any(one.problem for one in heard), lambda: [h.problem for h in heard])
+    robot.close()
