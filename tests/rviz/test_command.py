@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from rosglass.demo.processes import VirtualScreen
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
@@ -244,3 +246,70 @@ def test_without_a_display(start: Callable[..., Program]) -> None:
     program = start(QT_QPA_PLATFORM="offscreen")
     assert program.process.wait(PATIENCE) == 1
     assert "RViz draws on X11 only" in program.output
+
+
+def nodes(master: str) -> set[str]:
+    """Return what the master knows of."""
+    from rosglass.ros1.master import call_node
+
+    state = call_node(master, "getSystemState", "/test")
+    return {node for kind in state for _, found in kind for node in found}
+
+
+def kill_screen(screen: VirtualScreen) -> None:
+    screen._process.kill()
+
+
+def close_screen(screen: VirtualScreen) -> None:
+    screen._process.terminate()
+
+
+def on_window(command: str) -> Callable[[VirtualScreen], None]:
+    """Return what does something to RViz's window from outside."""
+
+    def do(screen: VirtualScreen) -> None:
+        found = ["search", "--onlyvisible", "--name", "RViz"]
+        env = {**os.environ, "DISPLAY": screen.display}
+        subprocess.run(["xdotool", *found, command], env=env, timeout=PATIENCE, check=True)
+
+    return do
+
+
+BROKEN_SCREEN = "the connection to the X server (DISPLAY {display}) is broken: RViz ends"
+NO_WINDOW = "another program has destroyed RViz's window (xdotool windowclose, xkill): RViz ends"
+
+
+@pytest.mark.parametrize(
+    ("happens", "messages"),
+    [
+        (kill_screen, {BROKEN_SCREEN}),
+        (close_screen, {BROKEN_SCREEN}),
+        (on_window("windowclose"), {NO_WINDOW}),
+        # The server breaks the connection, and destroys the window.
+        (on_window("windowkill"), {BROKEN_SCREEN, NO_WINDOW}),
+    ],
+    ids=["killed screen", "closed screen", "destroyed window", "killed client"],
+)
+def test_ends_when_its_screen_or_window_is_gone(
+    start: Callable[..., Program],
+    tmp_path: Path,
+    master: str,
+    happens: Callable[[VirtualScreen], None],
+    messages: set[str],
+) -> None:
+    file = interface(tmp_path, "console.warn('up')")
+    text = 'import Ros 1.0\nItem { Component.onCompleted: Ros.init("its_overlay")\n'
+    file.write_text(file.read_text().replace("Item {", text, 1))
+    with VirtualScreen() as screen:
+        program = start("--name", "rviz_lost", "--overlay", file, DISPLAY=screen.display)
+        program.wait_for("up")
+        until = time.monotonic() + PATIENCE
+        while not nodes(master) >= {"/rviz_lost", "/its_overlay"}:
+            assert time.monotonic() < until
+            time.sleep(0.05)
+        happens(screen)
+        # A crash would be told as a negative number.
+        assert program.process.wait(PATIENCE) == 1, program.output
+        told = {message.format(display=screen.display) for message in messages}
+    assert any(message in program.output for message in told), program.output
+    assert not nodes(master) & {"/rviz_lost", "/its_overlay"}

@@ -25,6 +25,7 @@ from rosglass.rviz.access import Access
 from rosglass.rviz.entries import Entries
 from rosglass.rviz.guard import log_what_is_raised
 from rosglass.rviz.host import require_rviz
+from rosglass.rviz.lost_screen import LostScreen
 from rosglass.rviz.master import MasterWatch, wait_for_master
 from rosglass.rviz.nodes import connect_beside_rviz, name_node, shared_arguments
 from rosglass.rviz.overlay_menu import OverlayMenu
@@ -159,6 +160,8 @@ class Application(Handle):
             connect=connect_beside_rviz,
             arguments=shared_arguments(options),
         )
+        self._screen = LostScreen(self.window.ids, [roscpp.shut_down, self._close_node])
+        self.window.before_frame.connect(self._screen.look)
         #: RViz's tools, displays, views and camera.
         self.rviz = Access(self.window, self.session)
         self.session.shared[Access] = self.rviz
@@ -316,11 +319,17 @@ class Application(Handle):
             self.rviz.close,
             *([self.session.close] if self._owns_session else []),
             roscpp.shut_down,
+            self._screen.close,
             self.window.destroy,
         ]
         for step in steps:
             _attempt(step)
         self._unhook()
+
+    def _close_node(self) -> None:
+        node = self.session.node
+        if node is not None:
+            node.close()
 
     def _on_closing(self) -> None:
         if self._running:

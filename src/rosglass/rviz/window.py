@@ -97,6 +97,11 @@ class Window(QtCore.QObject):
         found = self.widget.findChildren(kind)
         return next(w for w in found if w.metaObject().className() == "rviz::RenderPanel")
 
+    @property
+    def ids(self) -> list[int]:
+        """The X server's numbers of the window and of the 3D view in it."""
+        return [int(widget.winId()) for widget in (self.widget, self.panel)]
+
     def view_size(self) -> tuple[int, int, float]:
         """Return width and height of the 3D view in pixels of the screen, and its pixel ratio."""
         ratio = self.panel.devicePixelRatioF()

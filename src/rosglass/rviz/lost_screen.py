@@ -1,0 +1,186 @@
+"""An X server that ends, and windows that others destroy: the program says so, and ends.
+
+Qt and Xlib call ``exit()`` where the connection to the X server breaks, which destroys what other
+threads still use; Ogre crashes where its window is gone. Neither can go on without, so the program
+ends before they do.
+"""
+
+from __future__ import annotations
+
+import atexit
+import ctypes
+import logging
+import os
+import select
+import sys
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+from rosglass.comm import Handle
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+__all__ = ["LostScreen"]
+
+_log = logging.getLogger("rosglass.rviz")
+#: Seconds that saying goodbye may take, and how long the thread waits that has called ``exit()``.
+_PATIENCE, _PAUSE = 1.5, 4
+#: Seconds that an X server which ends may take from the first window to the last connection.
+_LAST_BREATH = 0.3
+_EXIT_CODE = 1
+#: xproto.h: XCB_CW_EVENT_MASK, XCB_EVENT_MASK_STRUCTURE_NOTIFY, XCB_DESTROY_NOTIFY.
+_EVENT_MASK, _STRUCTURE, _DESTROYED = 1 << 11, 1 << 17, 17
+_IoErrorHandler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
+_BROKEN = "the connection to the X server (DISPLAY {display}) is broken: RViz ends"
+_WINDOW = "another program has destroyed RViz's window (xdotool windowclose, xkill): RViz ends"
+
+
+class _Time(ctypes.Structure):
+    """A ``struct timespec``."""
+
+    _fields_ = (("seconds", ctypes.c_long), ("nanoseconds", ctypes.c_long))
+
+
+class _Connection:
+    """A connection of its own to the X server, which tells of destroyed windows."""
+
+    def __init__(self) -> None:
+        xcb = ctypes.CDLL("libxcb.so.1")
+        xcb.xcb_connect.restype = xcb.xcb_poll_for_event.restype = ctypes.c_void_p
+        self._xcb, self._libc = xcb, ctypes.CDLL(None)
+        self._given = ctypes.c_void_p(xcb.xcb_connect(None, None))
+        self.file = int(xcb.xcb_get_file_descriptor(self._given))
+
+    @property
+    def is_broken(self) -> bool:
+        """Whether the X server is gone."""
+        return bool(self._xcb.xcb_connection_has_error(self._given))
+
+    def watch(self, window: int) -> None:
+        """Have a window's end told."""
+        mask = ctypes.c_uint32(_STRUCTURE)
+        self._xcb.xcb_change_window_attributes(
+            self._given, ctypes.c_uint32(window), ctypes.c_uint32(_EVENT_MASK), ctypes.byref(mask)
+        )
+        self._xcb.xcb_flush(self._given)
+
+    def destroyed(self) -> set[int]:
+        """Return the windows that were destroyed since; does not wait."""
+        found = set()
+        while event := self._xcb.xcb_poll_for_event(self._given):
+            if ctypes.c_uint8.from_address(event).value & 0x7F == _DESTROYED:
+                found.add(ctypes.c_uint32.from_address(event + 8).value)
+            self._libc.free(ctypes.c_void_p(event))
+        return found
+
+    def close(self) -> None:
+        self._xcb.xcb_disconnect(self._given)
+
+
+class LostScreen(Handle):
+    """Ends the process, with exit code 1, once its screen or its window is gone.
+
+    Args:
+        windows: The X server's numbers of the windows that RViz cannot do without.
+        goodbyes: What is to be done before, in threads of their own; not waited for any longer
+            than a second and a half.
+    """
+
+    def __init__(self, windows: Sequence[int], goodbyes: Sequence[Callable[[], object]]) -> None:
+        self._windows, self._goodbyes = set(windows), list(goodbyes)
+        self._connection = _Connection()
+        for window in windows:
+            self._connection.watch(window)
+        self._lock = threading.Lock()
+        self._closed = self._ending = False
+        self._reader, self._writer = os.pipe()
+        # The thread that calls exit() may be any, and in the midst of anything: it wakes ours by
+        # closing the pipe, and waits for the end. All of that is C's: Python may be gone by then.
+        self._pause = _Time(_PAUSE, 0)
+        libc = ctypes.CDLL(None)
+        before_exit = libc["__cxa_atexit"]
+        before_exit(libc.nanosleep, ctypes.byref(self._pause), None)
+        before_exit(libc.close, ctypes.c_void_p(self._writer), None)
+        _KEPT.append(self._pause)
+        self._io_error_handler = _IoErrorHandler(self._on_io_error)
+        self._set_io_error = ctypes.CDLL("libX11.so.6").XSetIOErrorHandler
+        self._set_io_error.restype = ctypes.c_void_p
+        self._io_error_before = self._set_io_error(self._io_error_handler)
+        self._thread = threading.Thread(target=self._run, name="screen", daemon=True)
+        self._thread.start()
+        atexit.register(self.close)
+
+    def look(self) -> None:
+        """Look whether all is there; does not return if not. To be called before drawing."""
+        with self._lock:
+            gone = not self._closed and self._windows & self._connection.destroyed()
+        if gone:
+            self._end()
+        if self._ending:
+            time.sleep(_PAUSE)
+
+    def close(self) -> None:
+        """Watch no more; safe to call twice. RViz's windows may go from now on."""
+        with self._lock:
+            closed, self._closed = self._closed, True
+        if closed:
+            return
+        atexit.unregister(self.close)
+        self._set_io_error(ctypes.c_void_p(self._io_error_before))
+        self._pause.seconds = 0
+        os.write(self._writer, b".")
+        self._thread.join(_PATIENCE)
+        self._connection.close()
+
+    def _run(self) -> None:
+        poll = select.poll()
+        poll.register(self._reader, select.POLLIN)
+        poll.register(self._connection.file, select.POLLIN)
+        while not self._closed:
+            woken = dict(poll.poll())
+            exiting = self._reader in woken and not os.read(self._reader, 1)
+            self.look()
+            with self._lock:
+                broken = not self._closed and self._connection.is_broken
+            if broken or exiting:
+                self._end(broken=True)
+
+    def _on_io_error(self, *_: Any) -> int:
+        self._end(broken=True)
+        return 0
+
+    def _end(self, *, broken: bool = False) -> None:
+        """End the process; a second thread that asks for it waits."""
+        with self._lock:
+            ending, self._ending = self._ending, True
+        if ending:
+            time.sleep(_PAUSE)
+        text = _BROKEN if broken or self._breaks() else _WINDOW
+        text = text.format(display=os.environ.get("DISPLAY", ""))
+        until = time.monotonic() + _PATIENCE
+        steps = [lambda: _log.error("%s", text), *self._goodbyes]
+        threads = [threading.Thread(target=step, daemon=True) for step in steps]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(max(0.0, until - time.monotonic()))
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(_EXIT_CODE)
+
+    def _breaks(self) -> bool:
+        """Return whether a window is gone because the X server ends."""
+        until = time.monotonic() + _LAST_BREATH
+        while time.monotonic() < until:
+            with self._lock:
+                self._connection.destroyed()
+                if self._connection.is_broken:
+                    return True
+            time.sleep(0.01)
+        return False
+
+
+#: What C still reads after Python has ended.
+_KEPT: list[_Time] = []
