@@ -27,11 +27,11 @@ def file(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("text", "place", "message"),
     [
-        ("import QtQuick 2.15\nItem {\n  widht: 5\n}", "3:3", 'non-existent property "widht"'),
-        ("import QtQuick 2.15\nItem {\n  width: 5 5\n}", "3:12", "Expected token"),
-        ("import QtQuick 2.15\nimport No.Such.Module 1.0\nItem {}", "2:1", "No.Such.Module"),
-        ("import QtQuick 2.15\nMissing {}", "2:1", "Missing is not a type"),
-        ("", "0:0", "File is empty"),
+        ("import QtQuick 2.15\nItem {\n  widht: 5\n}", ":3:3", 'non-existent property "widht"'),
+        ("import QtQuick 2.15\nItem {\n  width: 5 5\n}", ":3:12", "Expected token"),
+        ("import QtQuick 2.15\nimport No.Such.Module 1.0\nItem {}", ":2:1", "No.Such.Module"),
+        ("import QtQuick 2.15\nMissing {}", ":2:1", "Missing is not a type"),
+        ("", "", "File is empty"),
     ],
 )
 def test_errors_are_listed_with_file_line_and_column(
@@ -40,7 +40,7 @@ def test_errors_are_listed_with_file_line_and_column(
     file.write_text(text)
     program = start("run", file)
     assert program.end() == 1
-    assert f"{file}:{place}: " in program.text
+    assert f"{file}{place}: " in program.text
     assert message in program.text
 
 
@@ -67,7 +67,7 @@ def test_errors_in_other_files_name_them(start: Any, file: Path) -> None:
 def test_a_missing_file(start: Any, tmp_path: Path) -> None:
     program = start("run", tmp_path / "none.qml")
     assert program.end() == 1
-    assert program.text == f"{tmp_path / 'none.qml'}:0:0: there is no such file"
+    assert program.text == f"{tmp_path / 'none.qml'}: there is no such file"
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -205,7 +205,7 @@ def test_other_files_than_qml_are_refused(start: Any, tmp_path: Path) -> None:
     (tmp_path / "Main.qml").write_text(GOOD)
     program = start("run", tmp_path)
     assert program.end() == 1
-    assert program.text == f"{tmp_path}:0:0: this is a folder; name a file in it: Main.qml"
+    assert program.text == f"{tmp_path}: this is a folder; name a file in it: Main.qml"
     program = start("run", "package://nowhere/Main.qml")
     assert program.end() == 1
     assert "there is no package 'nowhere'" in program.text

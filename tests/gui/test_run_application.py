@@ -115,7 +115,7 @@ thread.join()
     assert program.end(40) == 0, program.text
     for expected in (
         f"QmlError {tmp_path / 'Main.qml'}:2:8: ",
-        "QmlError none.qml:0:0: there is no such file",
+        "QmlError none.qml: there is no such file",
         "Error context: QML cannot use the name 'Big'",
         "Error give either a session, or url, name and ros_arguments",
         "QmlError nowhere: there is no such folder to import QML modules from",

@@ -217,7 +217,7 @@ BROKEN = "a: [1,\n b: }"
         (["{folder}/Bad.qml"], "not a config file of RViz: rosglass rviz --overlay"),
         (["a.rviz", "b.rviz"], "one file, got a.rviz, b.rviz"),
         (["{folder}/brokn.rviz"], "(.rviz); did you mean broken.rviz?"),
-        (["--overlay", "{folder}/None.qml"], "None.qml:0:0: there is no such file"),
+        (["--overlay", "{folder}/None.qml"], "None.qml: there is no such file"),
         (["--overlay", "{folder}/Bat.qml"], "there is no such file; did you mean Bad.qml?"),
         (["--overlay", "{folder}/broken.rviz"], "a config file of RViz, no QML file"),
         (["--overlay", "{folder}/Bad.qml"], "Bad.qml:2:"),

@@ -264,10 +264,14 @@ def test_errors_from_the_start_are_shown_until_they_are_mended(
     assert (seen(picture), seen(picture, 20, 24), overlay.problem) == (BLUE, GREY, "")
 
 
-def test_watched_files_may_come_later(show: Any, file: Path, wait: Any, grab: Any) -> None:
+def test_watched_files_may_come_later(
+    show: Any, file: Path, wait: Any, grab: Any, caplog: Any
+) -> None:
     overlay = show("Item {", watch=True)
     assert not overlay.loaded
     assert overlay.problem
+    wait(300)
+    assert caplog.text.count(overlay.problem) == 1
     file.unlink()
     wait(lambda: "there is no such file" in overlay.problem)
     file.write_text(IMPORTS + BLUE_UI)

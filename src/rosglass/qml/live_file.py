@@ -107,7 +107,7 @@ class LiveFile(QtCore.QObject):
             QmlError: It has errors; the message lists them as ``file:line:column: text``.
         """
         if not os.path.isfile(self.path):  # noqa: PTH113 - pathlib's may raise
-            raise QmlError(f"{self.path}:0:0: there is no such file")
+            raise QmlError(f"{self.path}: there is no such file")
         self.engine.clearComponentCache()
         component = QtQml.QQmlComponent(self.engine, QtCore.QUrl.fromLocalFile(str(self.path)))
         root: QtCore.QObject | None = None if component.isError() else component.create()

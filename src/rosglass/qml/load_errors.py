@@ -59,7 +59,7 @@ _GONE = {
 
 
 def error_list(errors: Sequence[QtQml.QQmlError], file: Path) -> str:
-    """Return errors as ``file:line:column: message``, one per line.
+    """Return errors as ``file:line:column: message``, or ``file: message``, one per line.
 
     Args:
         errors: What Qt says.
@@ -73,8 +73,9 @@ def error_list(errors: Sequence[QtQml.QQmlError], file: Path) -> str:
         line, column = max(error.line(), 0), max(error.column(), 0)
         if not line and "requires a version" in text:
             line, column = _unversioned(place), 1
-        lines.append(f"{place}:{line}:{column}: {text}{f'; {hint}' if hint else ''}")
-    return "\n".join(lines) or f"{file}:0:0: it could not be created"
+        where = f"{place}:{line}:{column}" if line else place
+        lines.append(f"{where}: {text}{f'; {hint}' if hint else ''}")
+    return "\n".join(lines) or f"{file}: it could not be created"
 
 
 def _unversioned(place: str) -> int:

@@ -58,13 +58,13 @@ def interface_file(place: str | os.PathLike[str]) -> Path:
     if os.path.isdir(path):
         inside = sorted(file.name for file in path.glob("*.qml"))
         hint = f"name a file in it: {', '.join(inside[:5])}" if inside else "it has no QML files"
-        raise QmlError(f"{shown}:0:0: this is a folder; {hint}")
+        raise QmlError(f"{shown}: this is a folder; {hint}")
     if not os.path.isfile(path):
-        raise QmlError(f"{shown}:0:0: there is no such file{near(path)}")
+        raise QmlError(f"{shown}: there is no such file{near(path)}")
     if path.suffix == ".rviz":
-        raise QmlError(f"{shown}:0:0: a config file of RViz, no QML file: rosglass rviz {shown}")
+        raise QmlError(f"{shown}: a config file of RViz, no QML file: rosglass rviz {shown}")
     if path.suffix != ".qml":
-        raise QmlError(f"{shown}:0:0: not a QML file, whose name would end in .qml")
+        raise QmlError(f"{shown}: not a QML file, whose name would end in .qml")
     return path
 
 

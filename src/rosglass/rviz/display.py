@@ -272,7 +272,8 @@ class Entry(QtCore.QObject):
         properties.configChanged.connect(self._on_config)
         self._show_registered()
         self._show_problem(overlay.problem)
-        if isinstance(overlay, QmlOverlay) and not overlay.loaded:
+        # One whose file has errors has told them.
+        if isinstance(overlay, QmlOverlay) and not overlay.loaded and not overlay.problem:
             try:
                 overlay.load()
             except Error as error:

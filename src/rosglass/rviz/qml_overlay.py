@@ -180,7 +180,7 @@ class QmlOverlay(QmlInput, Overlay):
         else:
             what = f"a {_kind(root)}: put what it holds into an Item {{ }}"
         self._live.drop(made)
-        raise QmlError(f"{self.file}:0:0: the root of an overlay must be an Item, and is {what}")
+        raise QmlError(f"{self.file}: the root of an overlay must be an Item, and is {what}")
 
     def _show(self, root: Any) -> None:
         # What was pressed, and had the keys, is about to go.
