@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from memory_world import MemoryWorld
 
+from rosglass.errors import Error
 from rosglass.qml import Session
 from rosglass.qml.runner import Runner
 from rosglass.qml.runtime import runtime_of
@@ -233,3 +234,14 @@ def test_whatever_a_function_throws_is_an_error(run: Callable[..., Runner]) -> N
     assert error.isError()
     assert error.toString() == "Error: not now"
     assert error.property("fileName").isUndefined()
+
+
+@pytest.mark.parametrize("limit", [-1, float("nan"), float("inf"), True, "5", None])
+def test_limits_that_are_no_seconds_are_refused(app: Any, limit: Any) -> None:
+    session = Session(connect=MemoryWorld().connect)
+    with pytest.raises(Error, match=r"Session\.longest_script: .* 0 for no limit"):
+        session.longest_script = limit
+    assert session.longest_script == 5.0
+    session.longest_script = 2
+    assert session.longest_script == 2.0
+    session.close()

@@ -16,6 +16,7 @@ from rosglass.errors import ConnectionLostError, Error, InvalidNameError
 from rosglass.qml.executor import GuiExecutor
 from rosglass.qml.load_balancer import LoadBalancer
 from rosglass.qml.rosout import QmlRosout
+from rosglass.qml.script_limit import ScriptLimit
 from rosglass.qt import QtCore, Signal, is_alive
 
 if TYPE_CHECKING:
@@ -92,6 +93,10 @@ class Session(QtCore.QObject):
     #: A call from QML that waited has ended, and returns to QML.
     call_ended = Signal()
 
+    #: Seconds that JavaScript may compute at a time before it is ended; 0 for no limit. What is no
+    #: such number raises Error.
+    longest_script = ScriptLimit(5.0)
+
     _default: ClassVar[Session | None] = None
 
     def __init__(
@@ -112,8 +117,6 @@ class Session(QtCore.QObject):
         self.streams: dict[Any, Any] = {}
         #: What elements share, other than pictures, by what it is.
         self.shared: dict[Any, Any] = {}
-        #: Seconds that JavaScript may compute at a time before it is ended; 0 for no limit.
-        self.longest_script = 5.0
         #: When throttled streams fetch their pictures.
         self.balancer = LoadBalancer()
         #: While any, QML's wish to shut down is ignored: its successor, or others, need the node.
