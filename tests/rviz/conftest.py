@@ -492,6 +492,7 @@ def seen(master: str, tmp_path: Path) -> Callable[..., dict[str, Any]]:
         env = {k: v for k, v in os.environ.items() if k not in ("QT_QPA_PLATFORM", "DISPLAY")}
         env |= {"HOME": str(tmp_path), "XDG_RUNTIME_DIR": str(tmp_path), "ROS_IP": "127.0.0.1"}
         env |= {"ROS_MASTER_URI": master, "ROSGLASS_QT": "pyside2", "QT_SCALE_FACTOR": factor}
+        env |= {"PYTHONFAULTHANDLER": "1"}
         file = Path(__file__).with_name(program)
         with closing(VirtualScreen(1800, 1400)) as screen:
             done = subprocess.run(
@@ -504,7 +505,7 @@ def seen(master: str, tmp_path: Path) -> Callable[..., dict[str, Any]]:
                 check=False,
             )
         lines = [line for line in done.stdout.splitlines() if line.startswith("SEEN ")]
-        assert lines, done.stdout[-3000:]
+        assert lines, f"it ended with {done.returncode}: {done.stdout[-3000:]}"
         told: dict[str, Any] = json.loads(lines[0].removeprefix("SEEN "))
         return told
 
