@@ -236,3 +236,21 @@ def test_the_environment(ros1: Bench, monkeypatch: Any) -> None:
     monkeypatch.setenv("ROBOT_NAME", "Hector")
     script = 'return [Ros.getEnvironmentVariable("ROBOT_NAME"), Ros.getEnvironmentVariable("NO")]'
     assert ros1.run(script) == ["Hector", ""]
+
+
+def test_types_are_told_as_ros1_writes_them(running: Any, wait: Any, caplog: Any) -> None:
+    running.module = "Ros 1.0"
+    root = running.load(
+        """QtObject {
+            property var word: Ros.advertise("std_msgs/String", "/word", 1)
+            property var odd: Ros.advertise("std_msgs/Strin", "/odd", 1)
+            function ready() { return word.isAdvertised }
+            function send() { try { word.publish({data: 5}) } catch (e) { return String(e) } }
+        }"""
+    )
+    wait(lambda: root.ready())
+    told = "nothing was published on /word: std_msgs/String: data: expected a string, got 5"
+    assert told in root.send()
+    wait(lambda: "/odd: " in caplog.text)
+    assert "Did you mean std_msgs/String? " in caplog.text
+    assert "/msg/" not in caplog.text

@@ -14,7 +14,8 @@ import rosglass
 from rosglass.cli import is_interrupt
 from rosglass.cli.completion import is_completing, offer
 from rosglass.cli.subcommands import Parser, add_verbose
-from rosglass.cli.worlds import names_ros1, spelled_ros1
+from rosglass.cli.worlds import names_ros1
+from rosglass.interfaces.names import spelled_ros1
 
 if TYPE_CHECKING:
     import argparse

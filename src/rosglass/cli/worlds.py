@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
+
+from rosglass.interfaces.names import spelled_ros1
 
 if TYPE_CHECKING:
     import argparse
@@ -12,12 +13,7 @@ if TYPE_CHECKING:
     from rosglass.comm import Node
     from rosglass.ros1.node import Ros1Node
 
-__all__ = ["as_ros1", "is_hidden", "is_ros1", "names_ros1", "spelled", "spelled_ros1"]
-
-#: Names of types, but no parts of paths.
-_TYPE = re.compile(
-    r"(?<![\w./-])([A-Za-z]\w*)/(?:msg|srv|action)/([A-Za-z]\w*)(?![\w/]|\.(?:msg|srv|action)\b)"
-)
+__all__ = ["as_ros1", "is_hidden", "is_ros1", "names_ros1", "spelled"]
 
 
 def is_ros1(node: Node) -> bool:
@@ -54,8 +50,3 @@ def is_hidden(node: Node, name: str) -> bool:
 def spelled(node: Node, text: str) -> str:
     """Return a type's name, or a text that has some, as the node's world spells them."""
     return spelled_ros1(text) if is_ros1(node) else text
-
-
-def spelled_ros1(text: str) -> str:
-    """Return a text with all names of types as ROS 1 spells them: ``pkg/Type``."""
-    return _TYPE.sub(r"\1/\2", text)

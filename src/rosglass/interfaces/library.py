@@ -445,6 +445,9 @@ class Library:
         short = {f"{n.split('/')[0]}/{n.split('/')[2]}".lower(): n for n in reversed(names)}
         wanted = "/".join(part for part in name.split("/") if part not in KINDS)
         near = difflib.get_close_matches(wanted.lower(), short, 3, 0.75)
+        # A long package in common makes no names of types alike.
+        base = wanted.rpartition("/")[2].lower()
+        near = [m for m in near if difflib.get_close_matches(base, [m.rpartition("/")[2]])]
         if near[:1] == [wanted.lower()]:
             del near[1:]  # only the case is wrong
         close = [short[match] for match in near]

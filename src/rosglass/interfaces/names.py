@@ -14,12 +14,17 @@ __all__ = [
     "check_type_name",
     "join_name",
     "ros1_name",
+    "spelled_ros1",
     "split_name",
 ]
 
 #: The kinds of interfaces; also the folders their files lie in and the file extensions.
 KINDS = ("msg", "srv", "action")
 
+#: Names of types in a text, but no parts of paths.
+_IN_TEXT = re.compile(
+    r"(?<![\w./-])([A-Za-z]\w*)/(?:msg|srv|action)/([A-Za-z]\w*)(?![\w/]|\.(?:msg|srv|action)\b)"
+)
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _ROS1_CONSTANT = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _ROS2_LOWER = re.compile(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)*")
@@ -84,6 +89,11 @@ def ros1_name(name: str) -> str:
     """
     package, _, base = split_name(name)
     return f"{package}/{base}"
+
+
+def spelled_ros1(text: str) -> str:
+    """Return a text with all names of types as ROS 1 spells them: ``pkg/Type``."""
+    return _IN_TEXT.sub(r"\1/\2", text)
 
 
 def check_package_name(name: str, ros: int) -> str:

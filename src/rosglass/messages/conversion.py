@@ -123,7 +123,7 @@ def _check_float32(made: float, value: Any, path: str) -> None:
 def _text(member: Member, value: Any, path: str) -> str:
     if not isinstance(value, str):
         hint = " (decode the bytes first)" if isinstance(value, (bytes, bytearray)) else ""
-        raise ConversionError(path, value, f"a str{hint}")
+        raise ConversionError(path, value, f"a string{hint}")
     try:
         if member.wide:
             units = len(value.encode("utf-16-le", "surrogatepass")) // 2

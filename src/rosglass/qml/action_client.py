@@ -163,7 +163,7 @@ class GoalSender(ClientElement):
 
     def _throw(self, error: Error) -> None:
         if self._runtime is not None:
-            self._runtime.throw(f"action {self._name}: {error}")
+            self._runtime.throw(self._dialect.spelled(f"action {self._name}: {error}"))
 
     def _check_functions(self, functions: dict[str, QJSValue | None]) -> bool:
         """Return whether these are functions, or left out; throws into JavaScript otherwise."""

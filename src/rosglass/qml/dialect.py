@@ -5,6 +5,8 @@ from __future__ import annotations
 from enum import Enum
 from typing import TYPE_CHECKING
 
+from rosglass.interfaces.names import spelled_ros1
+
 if TYPE_CHECKING:
     from rosglass.messages.schema import Schema
 
@@ -48,6 +50,10 @@ class Dialect(Enum):
             return name
         package, _, rest = name.partition("/")
         return f"{package}/{rest.rpartition('/')[2]}"
+
+    def spelled(self, text: str) -> str:
+        """Return a text with the names of types in it as the module writes them."""
+        return spelled_ros1(text) if self is Dialect.ROS1 else text
 
     def names(self, schema: Schema) -> dict[str, str]:
         """Return the fields that the module's ROS calls otherwise than the robot's.

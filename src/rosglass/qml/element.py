@@ -187,6 +187,7 @@ class Element(QtCore.QObject):
 
     def _say(self, problem: str, level: int = logging.WARNING) -> None:
         """Set the problem; a new one is logged, the same one not more often than every 5 s."""
+        problem = self.DIALECT.spelled(problem)
         if problem == self._problem:
             return
         self._problem = problem

@@ -94,7 +94,8 @@ class Publisher(Element):
         except ConversionError as error:
             # Logged by Qt, with the place, unless somebody catches it.
             if self._runtime is not None:
-                self._runtime.throw(f"nothing was published on {self._resolved}: {error}")
+                text = f"nothing was published on {self._resolved}: {error}"
+                self._runtime.throw(self.DIALECT.spelled(text))
             return False
         except Error as error:
             self._complain(f"nothing was published on {self._resolved}: {error}", logging.ERROR)
@@ -116,7 +117,7 @@ class Publisher(Element):
         """Log with the QML place, but not for every message of a stream."""
         if self._runtime is None:
             return
-        caller = self._runtime.caller()
+        text, caller = self.DIALECT.spelled(text), self._runtime.caller()
         if self._limit.allows((caller, text)):
             log_from_qml("", level, text, caller)
 

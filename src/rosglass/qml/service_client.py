@@ -181,7 +181,7 @@ class ServiceClient(ClientElement):
         except Error as error:
             self._end(request, error, tell=not running)
             if running and self._runtime is not None:
-                self._runtime.throw(f"service {self._name}: {error}")
+                self._runtime.throw(self._dialect.spelled(f"service {self._name}: {error}"))
             return
         request.call = call
         call.on_done(lambda ended: self._answered(request, ended), session.executor)
