@@ -287,6 +287,7 @@ def test_an_address_that_nobody_listens_on_is_shown(start: Any, file: Path) -> N
     assert line.endswith("mine")
     program.kill(signal.SIGINT)
     assert program.end() == 130
+    assert "rosglass.qml: uninitialized" not in program.text, "who ends it knows"
 
 
 def test_bad_urls_are_shown(start: Any, file: Path) -> None:

@@ -476,9 +476,9 @@ class Session(QtCore.QObject):
         self._status = status
         if (self.state, self.detail) != before or not self.is_initialized:
             told = (self.state, self.detail)
-            _log.info(
-                "%s", told[1] if told[1].startswith(told[0]) else ": ".join(filter(None, told))
-            )
+            text = told[1] if told[1].startswith(told[0]) else ": ".join(filter(None, told))
+            # Whoever has ended it knows.
+            _log.log(logging.INFO if self.is_initialized else logging.DEBUG, "%s", text)
             self.connection_changed.emit()
 
 
