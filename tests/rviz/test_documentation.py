@@ -47,7 +47,16 @@ def tables() -> dict[str, dict[str, str]]:
 TABLES = tables()
 BLOCKS = re.findall(r"```qml\n(.*?)```", PAGE, re.DOTALL)
 #: What tells that several properties have changed, is Python's, or is for RosRviz's own QML.
-NOT_TOLD = {"objectName", "changed", "moved", "registered", "unregistered", "edited", "refuse"}
+NOT_TOLD = {
+    "objectName",
+    "changed",
+    "moved",
+    "registered",
+    "unregistered",
+    "edited",
+    "refuse",
+    "warn",
+}
 
 
 @pytest.fixture

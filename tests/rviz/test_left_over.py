@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from rosglass.errors import Error, UnsupportedError
+
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
@@ -55,6 +57,30 @@ def add_widget(app: Any, file: Path, wait: Callable[..., None]) -> None:
     wait(lambda: not list(app.entries))
 
 
+def refuse_qml(app: Any, file: Path, wait: Callable[..., None]) -> None:
+    from rosglass.rviz import QmlOverlay
+
+    del wait
+    with pytest.raises(Error, match="z must be a whole number"):
+        QmlOverlay(file, app.session, z="high")
+
+
+def fail_to_draw(app: Any, file: Path, wait: Callable[..., None]) -> None:
+    from rosglass.rviz import QmlOverlay
+    from rosglass.rviz.renderer_choice import choice
+
+    del wait
+    with pytest.MonkeyPatch.context() as patch:
+        # As on a screen without OpenGL.
+        patch.setattr(choice, "make", _draw_nothing)
+        with pytest.raises(UnsupportedError, match="cannot draw"):
+            QmlOverlay(file, app.session, watch=True)
+
+
+def _draw_nothing(import_paths: object) -> None:
+    raise UnsupportedError(f"cannot draw what is in {import_paths}")
+
+
 def left(wait: Callable[..., None], before: Counter[str]) -> dict[str, int]:
     """Return what has come since and stays; timers that have fired are collected later."""
     until = time.monotonic() + 20
@@ -72,7 +98,7 @@ def counted(wait: Callable[..., None]) -> Counter[str]:
     return Counter(name for name in names if name.startswith(("rosglass.", "PySide2.")))
 
 
-@pytest.mark.parametrize("step", [add_qml, add_entry, add_widget])
+@pytest.mark.parametrize("step", [add_qml, add_entry, add_widget, refuse_qml, fail_to_draw])
 def test_overlays_that_go_leave_no_object(
     app: Any, file: Path, wait: Callable[..., None], step: Callable[..., None]
 ) -> None:

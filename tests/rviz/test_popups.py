@@ -16,6 +16,14 @@ def label(text: str = "popup") -> Any:
     return made
 
 
+def there_is_grey(popup: Any) -> bool:
+    """Return whether a popup is covered as those are whose place is old."""
+    picture = popup.root.grab().toImage()
+    at = popup.content.geometry().topLeft()
+    here = picture.pixelColor(at.x() + 10, at.y() + 10)
+    return bool(max(here.red(), here.green(), here.blue()) < 200)
+
+
 def test_popups_are_above_and_the_pressed_one_above_the_others(hand: Any, app: Any) -> None:
     from rosglass.rviz.popup import Popup
 
@@ -223,7 +231,7 @@ def test_labels_that_pop_up_later_hide_no_question(hand: Any, show: Any, grab: A
     assert picture.pixelColor(picture.width() // 2, picture.height() // 2).name() == "#00ff00"
 
 
-def test_popup_follows_a_moving_frame(hand: Any, app: Any, master: str) -> None:
+def test_popup_follows_a_moving_frame(hand: Any, app: Any, master: str, caplog: Any) -> None:
     import rosglass
     from rosglass.comm import Time
     from rosglass.rviz.camera import Camera
@@ -249,6 +257,21 @@ def test_popup_follows_a_moving_frame(hand: Any, app: Any, master: str) -> None:
 
             hand.wait(there)
             assert popup.problem == ""
+        live = there_is_grey(popup)
+    # The robot is gone, and its transforms stay as they were.
+    hand.wait(lambda: popup.problem == "where the frame 'popup_test' is was not told for 3 s")
+    assert popup.content.isVisible()
+    assert (live, there_is_grey(popup)) == (False, True)
+    hand.wait(200)
+    assert caplog.text.count("popup Robot: where the frame 'popup_test' is") == 1
+    # It can be operated all the same.
+    clicked: list[str] = []
+    popup.content.clicked.connect(lambda *_: clicked.append(popup.name))
+    at = popup.content.geometry().center()
+    hand.click(at.x(), at.y())
+    assert clicked == ["Robot"]
+    popup.move(50, 50)
+    assert (popup.problem, there_is_grey(popup)) == ("", False)
 
 
 def test_modal_popup_is_seen_wherever_its_point_is(hand: Any, app: Any) -> None:
@@ -318,6 +341,45 @@ def test_qml_popup_that_is_not_seen_takes_no_mouse(hand: Any, app: Any, show: An
     hand.wait(lambda: root.property("seen") == 1)
     hand.click(seen.x, seen.y)
     assert root.property("clicks") == 2
+
+
+def test_qml_popup_is_half_seen_while_its_place_is_old(
+    hand: Any, app: Any, show: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    from rosglass.comm import Time
+    from rosglass.tf import Transform
+
+    app.fixed_frame = "map"
+    app.connect()
+    hand.wait(lambda: app.rviz.frames.buffer is not None)
+
+    def tell() -> None:
+        app.rviz.frames.buffer.set_transform(
+            Transform(stamp=Time.now(), frame_id="map", child_frame_id="old_link")
+        )
+
+    tell()
+    root = show(
+        """import RosRviz 1.0
+        Item { id: top; property int clicks: 0
+            property real seen: popup.opacity; property string problem: popup.problem
+            AnchoredPopup { id: popup; visible: true; point: [0, 0, 0]; frame: "old_link"
+                contentItem: Button { implicitWidth: 80; implicitHeight: 60
+                    onClicked: top.clicks++ } } }"""
+    )
+    from rosglass.rviz.camera import Camera
+
+    hand.wait(lambda: root.property("seen") == 1)
+    hand.wait(lambda: root.property("seen") == 0.5)
+    assert root.property("problem") == "where the frame 'old_link' is was not told for 3 s"
+    assert caplog.text.count("AnchoredPopup: where the frame 'old_link' is") == 1
+    # It can be operated all the same.
+    seen = Camera(app.window).project((0, 0, 0))
+    hand.click(seen.x, seen.y)
+    assert root.property("clicks") == 1
+    tell()
+    hand.wait(lambda: root.property("seen") == 1)
+    assert root.property("problem") == ""
 
 
 def test_qml_popup_with_a_wrong_point_names_the_users_file(

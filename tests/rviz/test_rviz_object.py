@@ -7,6 +7,7 @@ import math
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -303,6 +304,19 @@ def test_trackers_end_with_their_objects(app: Any, qml: Any, wait: Any) -> None:
     wait(lambda: len(app.rviz.trackers) <= before + 1)
 
 
+def test_trackers_end_with_their_overlay(app: Any, qml: Any) -> None:
+    here = qml()
+    before = len(app.rviz.trackers)
+    here.run("rviz.createPositionTracker(1, 0, 0)")
+    assert len(app.rviz.trackers) == before + 1
+    app.overlays.remove(here.overlay)
+    # Programs that have no event loop of their own: the engine lives on until they have.
+    until = time.monotonic() + 30
+    while len(app.rviz.trackers) > before and time.monotonic() < until:
+        app.qt.processEvents()
+    assert len(app.rviz.trackers) == before
+
+
 def test_picking(app: Any, displays: Any, qml: Any, wait: Any) -> None:
     here = qml(scale=2.0)
     displays.find("Grid").enabled = False
@@ -488,3 +502,5 @@ def test_trackers_of_frames(app: Any, qml: Any, wait: Any) -> None:
     wait(lambda: run(same.replace("{0}", "3")))
     place(1.0)
     wait(lambda: run(same.replace("{0}", "2")))
+    # What is static does not get old.
+    assert run("return root.t.stale") is False

@@ -59,6 +59,10 @@ class Frames(QtCore.QObject):
         """RViz's fixed frame."""
         return str(self._window.manager.getFixedFrame())
 
+    def steady(self) -> float:
+        """Return seconds by which ages are told; see :meth:`Session.steady`."""
+        return self._session.steady()
+
     def locate(self, frame: str, time: Time | None = None) -> Transform:
         """Return where a frame is, in RViz's fixed frame.
 

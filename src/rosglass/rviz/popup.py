@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import logging
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     from rosglass.rviz.trackers import Tracker, Trackers
 
 __all__ = ["Anchor", "MoveBar", "Popup"]
+
+_log = logging.getLogger("rosglass.rviz")
 
 
 class Anchor(enum.Enum):
@@ -66,6 +69,7 @@ class Popup(WidgetOverlay):
     ) -> None:
         made = make_widget(content, name)
         base = _Base(made, self._put, self._pressed_beside)
+        self._veil = _Veil(base)
         #: The widget.
         self.content: Any = made
         self._anchor, self._place = anchor, (math.nan, math.nan)
@@ -131,6 +135,7 @@ class Popup(WidgetOverlay):
         self._tracker, self._trackers = tracker, trackers
         tracker.positionChanged.connect(lambda at: self._go(at.x(), at.y()))
         tracker.problemChanged.connect(self._tell_lost)
+        tracker.staleChanged.connect(self._look_whether_old)
         self._tell_lost()
         at: Any = tracker.position
         self._go(at.x(), at.y())
@@ -152,6 +157,12 @@ class Popup(WidgetOverlay):
         if self.problem in ("", before):
             self.tell_problem(self._lost)
 
+    def _look_whether_old(self) -> None:
+        if self._tracker is not None and self._tracker.stale:
+            # Popups have no entry in the panel that would tell it.
+            _log.warning("popup %s: %s", self.name, self._tracker.problem)
+        self._put()
+
     def _go(self, x: float, y: float) -> None:
         self._place, self._free = (x, y), False
         self._put()
@@ -168,6 +179,7 @@ class Popup(WidgetOverlay):
             # All else is blocked until it is answered.
             x, y, seen = room.width() / 2, room.height() / 2, True
         content.setVisible(seen)
+        self._veil.setVisible(seen and self._tracker is not None and bool(self._tracker.stale))
         if not seen:
             return
         size = content.sizeHint().expandedTo(content.minimumSize()).boundedTo(content.maximumSize())
@@ -177,7 +189,8 @@ class Popup(WidgetOverlay):
             down = float(y + size.height() > room.height())
         left = _inside(x - across * size.width(), room.width() - size.width())
         top = _inside(y - down * size.height(), room.height() - size.height())
-        content.setGeometry(left, top, size.width(), size.height())
+        for part in (content, self._veil):
+            part.setGeometry(left, top, size.width(), size.height())
 
     def _pressed_beside(self) -> None:
         if self._light_dismiss:
@@ -212,6 +225,19 @@ class _Base(QtWidgets.QWidget):  # type: ignore[misc]
         """Cover what is below a modal popup."""
         if self.color is not None:
             QtGui.QPainter(self).fillRect(event.rect(), self.color)
+
+
+class _Veil(QtWidgets.QWidget):  # type: ignore[misc]
+    """Greys out a popup whose place is old; it can be operated all the same."""
+
+    def __init__(self, base: Any) -> None:
+        super().__init__(base)
+        self.setAttribute(QtCore.Qt.WA_TransparentForMouseEvents)
+        self.hide()
+
+    def paintEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
+        """Cover it halfway."""
+        QtGui.QPainter(self).fillRect(event.rect(), QtGui.QColor(128, 128, 128, 150))
 
 
 class MoveBar(QtWidgets.QLabel):  # type: ignore[misc]

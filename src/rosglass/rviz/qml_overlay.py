@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.errors import QmlError
 from rosglass.qml.error_view import ERRORS, ERRORS_BELOW, PANEL, SCRIPT_ENDED, ErrorView
 from rosglass.qml.live_file import LiveFile
+from rosglass.qml.places import interface_file
 from rosglass.qt import is_alive
 from rosglass.rviz.opengl_needs import need_in_items
 from rosglass.rviz.overlay import Overlay
@@ -68,19 +69,23 @@ class QmlOverlay(QmlInput, Overlay):
         import_paths: Sequence[str | os.PathLike[str]] = (),
         **options: Any,
     ) -> None:
-        self._live = LiveFile(file, session, watch=watch, import_paths=import_paths)
-        self.file = self._live.path
+        self.file = interface_file(file)
         super().__init__(name or self.file.stem, **options)
         self.session = session
+        self._live = LiveFile(file, session, watch=watch, import_paths=import_paths)
         self.engine = self._live.engine
         self.engine.addImportPath(str(_IMPORTS))
         self.engine.quit.connect(self._quit)
         self.engine.exit.connect(self._exit)
+        choice.expect(self.file)
+        try:
+            self._scene = Scene(choice.make(self.engine.importPathList()))
+        except Exception:
+            self._live.close()
+            raise
         #: What QML finds as ``rviz``.
         self.properties = RvizObject(self, self.engine)
         self.engine.rootContext().setContextProperty("rviz", self.properties)
-        choice.expect(self.file)
-        self._scene = Scene(choice.make(self.engine.importPathList()))
         self._window = self._scene.window
         self._scene.changed.connect(self.changed)
         self._shown_over: Window | None = None

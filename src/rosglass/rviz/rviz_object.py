@@ -89,6 +89,10 @@ class RvizObject(RegisteredProperties):
         leaving, self._leaving = self._leaving, []
         for leave in leaving:
             leave()
+        access = self.__dict__.get("_access")
+        if access is not None and self.runtime is not None:
+            # Without an event loop of its own, a program may keep the engine for long.
+            access.trackers.let_go(self.runtime)
 
     @cached_property
     def _access(self) -> Access:
@@ -404,9 +408,17 @@ class RvizObject(RegisteredProperties):
     @Slot(QtCore.QObject, str)
     def refuse(self, item: QtCore.QObject, message: str) -> None:
         """Log what is wrong with an item, with the file that it is used in, not its own."""
+        self._log_for(item, logging.ERROR, message)
+
+    @Slot(QtCore.QObject, str)
+    def warn(self, item: QtCore.QObject, message: str) -> None:
+        """Log what has become of an item, with the file that it is used in."""
+        self._log_for(item, logging.WARNING, message)
+
+    def _log_for(self, item: QtCore.QObject, level: int, message: str) -> None:
         context = QtQml.QQmlEngine.contextForObject(item)
         file = "" if context is None else plain_path(context.baseUrl().toString())
-        log_from_qml("", logging.ERROR, message, Caller(file or self._overlay.name, 0, ""))
+        log_from_qml("", level, message, Caller(file or self._overlay.name, 0, ""))
 
     # Signals of RViz.
 

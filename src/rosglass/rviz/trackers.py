@@ -8,6 +8,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
+from rosglass.qml.element import DEFAULT_TIMEOUT
 from rosglass.qt import Property, QJSValue, QtCore, QtGui, Signal, is_alive
 from rosglass.rviz.camera import Camera
 from rosglass.rviz.face import VARIANT, given, place
@@ -24,6 +25,8 @@ __all__ = ["Tracker", "Trackers"]
 
 #: Units and metres below which a change is none.
 _THRESHOLD = 0.01
+#: Seconds without a newer transform after which a frame that has moved is told to be old.
+_OLD = DEFAULT_TIMEOUT / 1000
 _NAN = (math.nan, math.nan, math.nan)
 
 
@@ -45,8 +48,9 @@ class Tracker(QtCore.QObject):
     positionChanged = Signal(QtGui.QVector3D, arguments=["position"])
     pointChanged = Signal()
     frameChanged = Signal()
-    #: Why there is no place for it; empty where there is one.
+    #: Why there is no place for it, or an old one; empty where there is one.
     problemChanged = Signal()
+    staleChanged = Signal()
 
     def __init__(
         self,
@@ -59,7 +63,9 @@ class Tracker(QtCore.QObject):
         super().__init__()
         self._owner, self._point, self._frame = owner, point, frame
         self._scale, self._runtime = scale, runtime
-        self._position, self._problem = _NAN, ""
+        self._position, self._problem, self._stale = _NAN, "", False
+        #: The newest transform of its frame, and when it came.
+        self._newest: tuple[int, float] | None = None
 
     @property
     def follows_frame(self) -> bool:
@@ -69,16 +75,33 @@ class Tracker(QtCore.QObject):
     def look(self) -> None:
         """Find out where it is seen now."""
         at, problem = _NAN, ""
+        stale = bool(self._frame)
         try:
-            at = self._owner.seen(self._point, self._frame, self._scale())
+            at, stamp = self._owner.seen(self._point, self._frame, self._scale())
+            stale = self._is_old(stamp)
+            if stale:
+                problem = f"where the frame {self._frame!r} is was not told for {_OLD:g} s"
         except Error as error:
             problem = str(error)
+        told = self._stale
+        self._stale = stale
         if _differ(at, self._position):
             self._position = at
             self.positionChanged.emit(QtGui.QVector3D(*at))
         if problem != self._problem:
             self._problem = problem
             self.problemChanged.emit()
+        if stale != told:
+            self.staleChanged.emit()
+
+    def _is_old(self, stamp: int) -> bool:
+        # What stands still for ever has no time.
+        if not stamp:
+            return False
+        now = self._owner.steady()
+        if self._newest is None or self._newest[0] != stamp:
+            self._newest = stamp, now
+        return now - self._newest[1] > _OLD
 
     def move(self, point: Sequence[float] | dict[str, float]) -> None:
         """Follow another point, in the same frame.
@@ -101,7 +124,7 @@ class Tracker(QtCore.QObject):
         if not isinstance(frame, str) or len(frame) > 1000:
             raise Error(f"expected the name of a frame, e.g. 'base_link', got {shown(frame)}")
         if frame != self._frame:
-            self._frame = frame
+            self._frame, self._newest = frame, None
             self.frameChanged.emit()
             self.look()
 
@@ -128,6 +151,8 @@ class Tracker(QtCore.QObject):
         QtGui.QVector3D, lambda self: QtGui.QVector3D(*self._position), notify=positionChanged
     )
     problem = Property(str, lambda self: self._problem, notify=problemChanged)
+    #: Whether nothing came of its frame for 3 s; `position` is where it was last then.
+    stale = Property(bool, lambda self: self._stale, notify=staleChanged)
 
 
 class Trackers:
@@ -171,25 +196,38 @@ class Trackers:
         if tracker in self._trackers:
             self._trackers.remove(tracker)
 
+    def let_go(self, runtime: Runtime) -> None:
+        """Follow nothing any longer for a QML engine that is about to go."""
+        self._trackers = [t for t in self._trackers if is_alive(t) and t._runtime is not runtime]
+
     def __len__(self) -> int:
         """Return how many are followed."""
         return len(self._trackers)
 
     def seen(
         self, point: tuple[float, float, float], frame: str, scale: float
-    ) -> tuple[float, float, float]:
-        """Return where a point is seen, and how far away.
+    ) -> tuple[tuple[float, float, float], int]:
+        """Return where a point is seen and how far away, and the time of that in nanoseconds.
+
+        The time is 0 for what does not move.
 
         Raises:
             Error: Nobody knows where the frame is.
         """
         if self._camera is None:
             self._camera = Camera(self._window)
+        stamp = 0
         if frame:
-            x, y, z = self._frames().locate(frame).apply_point(point)
+            there = self._frames().locate(frame)
+            stamp = there.stamp.nanoseconds
+            x, y, z = there.apply_point(point)
             point = (float(x), float(y), float(z))
         found = self._camera.project(point)
-        return found.x / scale, found.y / scale, found.depth
+        return (found.x / scale, found.y / scale, found.depth), stamp
+
+    def steady(self) -> float:
+        """Return seconds by which ages are told; see :meth:`Session.steady`."""
+        return self._frames().steady()
 
     def _before_frame(self) -> None:
         self._trackers = [tracker for tracker in self._trackers if is_alive(tracker)]

@@ -13,8 +13,10 @@ Popup {
     property point anchor: Qt.point(0.5, 0.5)
     // Whether the user may move it; it then follows the point no longer.
     property bool movable: false
-    // Why the point cannot be followed; empty where it can.
+    // Why the point cannot be followed, or is old; empty where it can.
     readonly property string problem: refused || (tracker ? tracker.problem : "")
+    // Whether nothing came of its frame for 3 s: it is half transparent then.
+    readonly property bool stale: tracker !== null && tracker.stale
 
     property var tracker: null
     property string refused: ""
@@ -47,9 +49,10 @@ Popup {
         var at = tracker ? tracker.position : null
         var seen = at !== null && at.x >= 0 && at.y >= 0 && at.x <= parent.width && at.y <= parent.height
         var hidden = !seen && !modal && (tracker !== null || refused !== "")
-        opacity = hidden ? 0 : 1
+        opacity = hidden ? 0 : stale ? 0.5 : 1
         // What is not seen must not take the mouse either.
-        contentItem.parent.enabled = !hidden
+        if (contentItem && contentItem.parent)
+            contentItem.parent.enabled = !hidden
         if (seen) {
             x = Math.max(0, Math.min(at.x - anchor.x * width, parent.width - width))
             y = Math.max(0, Math.min(at.y - anchor.y * height, parent.height - height))
@@ -74,6 +77,11 @@ Popup {
     onPointChanged: follow()
     onFrameChanged: follow()
     onAnchorChanged: place()
+    onStaleChanged: {
+        if (stale && !isNaN(tracker.position.x))
+            rviz.warn(popup, "AnchoredPopup: " + problem)
+        place()
+    }
     onRoomChanged: place()
     onWidthChanged: place()
     onHeightChanged: place()
