@@ -78,6 +78,27 @@ def test_opacity_is_blended_without_drawing_anew(
     assert len(drawn) == count
 
 
+def test_overlays_look_the_same_where_there_are_no_shaders(
+    app: Any, show: Any, grab: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.rviz import layer
+
+    text = """Item { Repeater { model: 8; Rectangle { x: 40 * index; width: 90; height: 200; y: 9
+        color: Qt.hsva(index / 8, 0.8, 0.9, (index + 1) / 8); radius: 20 } } }"""
+    assert layer._program() != ""
+    overlay = show(text)
+    picture = grab()
+    overlay.opacity = 0.999
+    assert close_to(colour(grab(), 200, 50), colour(picture, 200, 50))
+    overlay.opacity = 1
+    assert grab() == picture
+    app.overlays.remove(overlay)
+    assert grab() != picture
+    monkeypatch.setattr(layer, "_program", lambda: "")
+    show(text, "Plain")
+    assert grab() == picture
+
+
 def test_hidden_overlays_are_not_drawn_and_show_the_newest_when_shown_again(
     show: Any, grab: Any, drawn: list[Any], frames: Any
 ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import time
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,6 +29,11 @@ _GROUP = "General"
 _PANEL = 2000
 #: Tiles that panels may cover without need before they are placed anew.
 _SLACK = 128
+#: Shows a texture as it is. OpenGL's own way adds a second colour, for Ogre asks for that always.
+_SHADER = """#version 120
+uniform sampler2D picture;
+void main() { gl_FragColor = texture2D(picture, gl_TexCoord[0].st); }
+"""
 
 
 class Layer:
@@ -46,6 +52,7 @@ class Layer:
         self._overlay = self._manager.create(self._name)
         self._texture: Any = None
         self._material: Any = None
+        self._pass: Any = None
         self._unit: Any = None
         self._panels: list[Any] = []
         self._before: NDArray[np.uint32] | None = None
@@ -149,6 +156,7 @@ class Layer:
         render.setDepthWriteEnabled(False)
         # Qt gives colours that are multiplied with their alpha already.
         render.setSceneBlending(o.SBF_ONE, o.SBF_ONE_MINUS_SOURCE_ALPHA)
+        self._pass = render
         self._unit = render.createTextureUnitState(name)
         self._unit.setTextureFiltering(o.TFO_NONE)
         self._unit.setTextureAddressingMode(o.TextureUnitState.TAM_CLAMP)
@@ -164,6 +172,7 @@ class Layer:
         one, faint = o.ColourValue(1, 1, 1, 1), o.ColourValue(part, part, part, part)
         self._unit.setColourOperationEx(how, o.LBS_TEXTURE, o.LBS_MANUAL, one, faint)
         self._unit.setAlphaOperation(how, o.LBS_TEXTURE, o.LBS_MANUAL, 1.0, part)
+        self._pass.setFragmentProgram(_program() if part == 1 else "")
 
     def _upload(self, pixels: NDArray[np.uint32], rect: Rect) -> None:
         o = ogre()
@@ -224,7 +233,20 @@ class Layer:
             o = ogre()
             o.MaterialManager.getSingleton().remove(self._material.getName(), _GROUP)
             o.TextureManager.getSingleton().remove(self._texture.getName(), _GROUP)
-            self._texture = self._material = self._unit = None
+            self._texture = self._material = self._pass = self._unit = None
+
+
+@cache
+def _program() -> str:
+    """Return the name of Ogre's program for all layers; empty where there are no shaders."""
+    o = ogre()
+    name = "rosglass/picture"
+    program = o.HighLevelGpuProgramManager.getSingleton().createProgram(
+        name, _GROUP, "glsl", o.GPT_FRAGMENT_PROGRAM
+    )
+    program.setSource(_SHADER)
+    program.load()
+    return name if program.isSupported() else ""
 
 
 def _use_own_context() -> None:
