@@ -5,15 +5,27 @@ cd "$(dirname "$0")/.."
 say() { printf '==> %s\n' "$*"; }
 export QT_LOGGING_RULES=${QT_LOGGING_RULES:-qt.multimedia.*=false}
 
+# Types take longest, on one core: everything else that needs no test runs beside them.
+types=$(mktemp)
+trap 'kill $(jobs -p) 2>/dev/null || true; rm -f "$types"' EXIT
+.venv/bin/mypy >"$types" 2>&1 &
+checked=$!
 say "lint and format (ruff)"
 .venv/bin/ruff check .
 .venv/bin/ruff format --check .
-say "types (mypy --strict)"
-.venv/bin/mypy
 say "documentation (mkdocs --strict)"
 NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict --quiet
 say "wheel"
 scripts/check_wheel.sh
+if [[ -e /usr/include/ros/ros.h ]]; then
+  say "a node of roscpp to test against"
+  .venv/bin/python tests/interop/ros1/peers/build_roscpp.py .pytest_cache/d/roscpp
+fi
+say "types (mypy --strict)"
+failed=0
+wait "$checked" || failed=$?
+cat "$types"
+((failed == 0)) || exit "$failed"
 # Most tests wait for others most of the time: three side by side, each file in one process.
 # Once more what failed: with other programs, machines under load can. Each is listed at the end.
 # A process that crashes fails its test and is not replaced: the others would wait for it for ever.

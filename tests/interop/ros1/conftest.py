@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import itertools
-import os
 import shutil
 import signal
 import socket
 import subprocess
+import sys
 import xmlrpc.client
 from contextlib import suppress
 from pathlib import Path
@@ -219,43 +218,15 @@ def roscpp_program(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Path:
     """Build the roscpp peer of all peers/roscpp_*.cpp; what was built before is kept."""
-    compiler, pkg_config = shutil.which("g++"), shutil.which("pkg-config")
-    if compiler is None or pkg_config is None or not Path("/usr/include/ros/ros.h").exists():
+    tools = all(map(shutil.which, ("g++", "pkg-config")))
+    if not tools or not Path("/usr/include/ros/ros.h").exists():
         pytest.skip(INSTALL_CPP)
     cache = getattr(request.config, "cache", None)  # -p no:cacheprovider leaves none
     folder = tmp_path_factory.mktemp("roscpp") if cache is None else cache.mkdir("roscpp")
-    shared = b"".join(path.read_bytes() for path in sorted(PEERS.glob("roscpp_*.hpp")))
-    objects = []
-    for source in sorted(PEERS.glob("roscpp_*.cpp")):
-        version = hashlib.sha256(source.read_bytes() + shared).hexdigest()[:16]
-        built = folder / f"{source.stem}_{version}.o"
-        if not built.exists():
-            made = built.with_name(f"{os.getpid()}_{built.name}")
-            flags = [
-                "-std=c++17",
-                "-O1",
-                "-DBOOST_BIND_GLOBAL_PLACEHOLDERS",
-                "-I",
-                str(PEERS),
-                "-c",
-                str(source),
-                "-o",
-                str(made),
-            ]
-            subprocess.run([compiler, *flags], check=True)
-            made.rename(built)
-        objects.append(built)
-    names = hashlib.sha256("".join(path.name for path in objects).encode()).hexdigest()[:16]
-    program = folder / f"roscpp_peer_{names}"
-    if not program.exists():
-        made = program.with_name(f"{os.getpid()}_{program.name}")
-        asked = [pkg_config, "--libs", "roscpp"]
-        libraries = subprocess.run(asked, check=True, capture_output=True, text=True).stdout
-        rest = ["-lactionlib", "-lboost_thread", "-lboost_system", "-lpthread"]
-        command = [compiler, *map(str, objects), "-o", str(made), *libraries.split(), *rest]
-        subprocess.run(command, check=True)
-        made.rename(program)
-    return program
+    command = [sys.executable, str(PEERS / "build_roscpp.py"), str(folder)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return Path(done.stdout.strip())
 
 
 @pytest.fixture(scope="module")
