@@ -147,6 +147,33 @@ def test_nothing_is_drawn_when_nothing_changes_and_little_uploaded_when_little_d
     assert app.overlays.covered == pytest.approx((400 * 400 + 16 * 16) / (width * height), rel=0.02)
 
 
+def test_panels_grow_and_shrink_by_pixels_with_what_is_on_them(
+    app: Any, show: Any, grab: Any
+) -> None:
+    overlay = show(f"Item {{ {square(43, 43, '#0080ff', 8)} }}")
+    item = overlay._root.childItems()[0]
+    width, height, _ = app.window.view_size()
+    grab()
+    assert app.overlays.covered * width * height == pytest.approx(8 * 8)
+    for x, y, across, down in (
+        (43, 43, 8, 8),
+        (42, 41, 10, 13),
+        (41, 40, 14, 15),
+        (44, 46, 3, 5),
+        (60, 46, 3, 5),
+        (43, 43, 8, 8),
+    ):
+        for name, value in (("x", x), ("y", y), ("width", across), ("height", down)):
+            item.setProperty(name, value)
+        picture = grab()
+        right, bottom = x + across, y + down
+        assert colour(picture, x, y) == colour(picture, right - 1, bottom - 1) == BLUE
+        for outside in ((x - 1, y), (x, y - 1), (right, y), (x, bottom)):
+            assert colour(picture, *outside) == GREY
+        covered = app.overlays.covered * width * height
+        assert across * down - 0.1 <= covered <= (across + 8) * (down + 8)
+
+
 def test_scaled_overlays_have_as_many_units_less(show: Any, grab: Any, app: Any) -> None:
     width, height, _ = app.window.view_size()
     overlay = show(

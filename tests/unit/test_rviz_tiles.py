@@ -10,7 +10,15 @@ import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rosglass.rviz.tiles import Rect, changed_tiles, cover, covered_tiles, uncovered, update_covered
+from rosglass.rviz.tiles import (
+    Rect,
+    changed_tiles,
+    cover,
+    covered_tiles,
+    trimmed,
+    uncovered,
+    update_covered,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -119,6 +127,31 @@ def test_uncovered_tells_waste_and_what_is_left_out() -> None:
     assert uncovered(tiles, [Rect(16, 0, 32, 32)]) is None
     assert uncovered(tiles, []) is None
     assert uncovered(tiles & False, []) == 0
+
+
+def test_empty_edges_are_trimmed() -> None:
+    pixels = picture(64, 64, (17, 10, 42, 31))
+    assert trimmed(pixels, Rect(16, 8, 48, 32)) == (17, 10, 42, 31)
+    assert trimmed(pixels, Rect(16, 8, 40, 24)) == (17, 10, 40, 24)
+    # A tile at most, for more is not looked at.
+    assert trimmed(pixels, Rect(0, 0, 64, 64)) == (8, 8, 56, 56)
+    assert trimmed(pixels, Rect(48, 48, 64, 64)) == (48, 48, 64, 64)
+
+
+@settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
+@given(
+    st.integers(1, 60),
+    st.integers(1, 60),
+    st.lists(st.tuples(*[st.integers(0, 59)] * 4), max_size=4),
+)
+def test_nothing_that_is_seen_is_trimmed(
+    width: int, height: int, places: list[tuple[int, int, int, int]]
+) -> None:
+    pixels = picture(width, height, *places)
+    rects = cover(covered_tiles(pixels), width, height)
+    inner = [trimmed(pixels, rect) for rect in rects]
+    assert (painted(inner, width, height)[pixels != 0] == 1).all()
+    assert sum(rect.area for rect in inner) <= sum(rect.area for rect in rects)
 
 
 def test_it_needs_neither_qt_nor_rviz() -> None:

@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rosglass.rviz.host import ogre, ogre_overlay
-from rosglass.rviz.tiles import TILE, Rect, changed_tiles, cover, uncovered, update_covered
+from rosglass.rviz.tiles import (
+    TILE,
+    Rect,
+    changed_tiles,
+    cover,
+    trimmed,
+    uncovered,
+    update_covered,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -57,7 +65,9 @@ class Layer:
         self._panels: list[Any] = []
         self._before: NDArray[np.uint32] | None = None
         self._covered = np.zeros((0, 0), np.bool_)
+        #: Tiles, each with a panel; and what is shown of each, without its empty edges.
         self._rects: list[Rect] = []
+        self._shown: list[Rect | None] = []
         self._waste = 0
         self._opacity = 1.0
         self._visible = True
@@ -91,7 +101,7 @@ class Layer:
     def covered(self) -> float:
         """Share of the view that panels cover, and RViz has to blend."""
         whole = 1 if self._before is None else self._before.size
-        return sum(rect.area for rect in self._rects) / max(whole, 1)
+        return sum(rect.area for rect in self._shown if rect) / max(whole, 1)
 
     def update(
         self, pixels: NDArray[np.uint32], within: Iterable[Rect] | None = None
@@ -124,7 +134,7 @@ class Layer:
         uploaded = time.perf_counter()
         if rects:
             update_covered(self._covered, self._before, rects)
-            self._place(width, height)
+            self._place(rects, width, height)
         self.compared = compared - started + time.perf_counter() - uploaded
         self.uploaded = uploaded - compared
         return rects
@@ -187,15 +197,21 @@ class Layer:
             source, o.Box(rect.left, rect.top, rect.right, rect.bottom)
         )
 
-    def _place(self, width: int, height: int) -> None:
-        """Put panels where there is something, unless those that stand fit well enough."""
-        covered = self._covered
-        waste = uncovered(covered, self._rects)
-        if waste is not None and waste - self._waste <= _SLACK:
-            return
+    def _place(self, changed: list[Rect], width: int, height: int) -> None:
+        """Put panels where there is something, but keep those that stand well enough."""
+        waste = uncovered(self._covered, self._rects)
+        if waste is None or waste - self._waste > _SLACK:
+            changed = self._rects = cover(self._covered, width, height, worth=_PANEL)
+            self._waste = uncovered(self._covered, self._rects) or 0
+            self._make_panels()
+        for number, rect in enumerate(self._rects):
+            if any(rect.meets(other) for other in changed):
+                self._fit(number, width, height)
+
+    def _make_panels(self) -> None:
+        """Show as many panels as there are rectangles."""
         o = ogre_overlay()
-        self._rects = cover(covered, width, height, worth=_PANEL)
-        self._waste = uncovered(covered, self._rects) or 0
+        self._shown = [None] * len(self._rects)
         while len(self._panels) < len(self._rects):
             name = f"{self._name}/panel{len(self._panels)}"
             panel = self._manager.createOverlayElement("Panel", name).castPanelOverlayElement()
@@ -203,16 +219,25 @@ class Layer:
             panel.setMaterialName(self._material.getName(), _GROUP)
             self._overlay.add2D(panel)
             self._panels.append(panel)
-        for panel, rect in zip(self._panels, self._rects, strict=False):
-            left, right = rect.left / width, rect.right / width
-            top, bottom = rect.top / height, rect.bottom / height
-            panel.setPosition(left, top)
-            panel.setDimensions(right - left, bottom - top)
-            panel.setUV(left, top, right, bottom)
-            panel.show()
-        for panel in self._panels[len(self._rects) :]:
-            panel.hide()
+        for number, panel in enumerate(self._panels):
+            if number < len(self._rects):
+                panel.show()
+            else:
+                panel.hide()
         self._show()
+
+    def _fit(self, number: int, width: int, height: int) -> None:
+        """Have a panel no larger than what is on it."""
+        assert self._before is not None
+        rect, panel = trimmed(self._before, self._rects[number]), self._panels[number]
+        if rect == self._shown[number]:
+            return
+        self._shown[number] = rect
+        left, right = rect.left / width, rect.right / width
+        top, bottom = rect.top / height, rect.bottom / height
+        panel.setPosition(left, top)
+        panel.setDimensions(right - left, bottom - top)
+        panel.setUV(left, top, right, bottom)
 
     def _show(self) -> None:
         if self._visible and self._rects:
@@ -225,7 +250,7 @@ class Layer:
             self._overlay.remove2D(panel)
             self._manager.destroyOverlayElement(panel)
         self._panels.clear()
-        self._rects = []
+        self._rects, self._shown = [], []
         self._waste = 0
 
     def _drop_texture(self) -> None:

@@ -11,7 +11,16 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["TILE", "Rect", "changed_tiles", "cover", "covered_tiles", "uncovered", "update_covered"]
+__all__ = [
+    "TILE",
+    "Rect",
+    "changed_tiles",
+    "cover",
+    "covered_tiles",
+    "trimmed",
+    "uncovered",
+    "update_covered",
+]
 
 #: Pixels of a tile's edge.
 TILE = 8
@@ -142,6 +151,23 @@ def uncovered(tiles: NDArray[np.bool_], rects: list[Rect]) -> int | None:
     if (tiles & ~inside).any():
         return None
     return int(inside.sum()) - int(tiles.sum())
+
+
+def trimmed(pixels: NDArray[np.uint32], rect: Rect) -> Rect:
+    """Return a rectangle without what is empty at its edges, as far as a tile from each."""
+    part = pixels[rect.top : rect.bottom, rect.left : rect.right]
+    left, right = (
+        _leading(part[:, :TILE].any(axis=0)),
+        _leading(part[:, : -TILE - 1 : -1].any(axis=0)),
+    )
+    top, bottom = _leading(part[:TILE].any(axis=1)), _leading(part[: -TILE - 1 : -1].any(axis=1))
+    inner = Rect(rect.left + left, rect.top + top, rect.right - right, rect.bottom - bottom)
+    return inner if inner.left < inner.right and inner.top < inner.bottom else rect
+
+
+def _leading(filled: NDArray[np.bool_]) -> int:
+    """Return how many come before the first that is filled."""
+    return int(filled.argmax()) if filled.any() else len(filled)
 
 
 def _halved(tiles: NDArray[np.bool_]) -> NDArray[np.bool_]:
