@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import socket
@@ -129,6 +130,7 @@ def as_found() -> Iterator[None]:
     yield
     for app, master, file in FOUND:
         app.overlays.close()
+        app.window.fullscreen = app.window.bare.on = False
         # Another file may start an RViz whose interface gives its node the same name.
         app.session.shutdown()
         with xmlrpc.client.ServerProxy(master) as proxy:
@@ -205,10 +207,21 @@ class Hand:
 
     def __init__(self, app: Any, wait: Callable[..., None]) -> None:
         self.app, self.wait, self.panel = app, wait, app.window.panel
+        self._held: dict[tuple[str, str], None] = {}
 
     def do(self, *words: object) -> None:
-        subprocess.run(["xdotool", *map(str, words)], check=True, capture_output=True)
+        told = [str(word) for word in words]
+        for act, what in itertools.pairwise(told):
+            if act in ("mousedown", "keydown"):
+                self._held[act.replace("down", "up"), what] = None
+            self._held.pop((act, what), None)
+        subprocess.run(["xdotool", *told], check=True, capture_output=True)
         self.wait(60)
+
+    def let_go(self) -> None:
+        """Release what is held, which later tests would meet."""
+        for act, what in list(self._held):
+            self.do(act, what)
 
     def move(self, x: float, y: float) -> None:
         from rosglass.rviz.qt5 import QtCore
@@ -245,13 +258,14 @@ class Hand:
 
 
 @pytest.fixture
-def hand(app: Any, wait: Callable[..., None]) -> Any:
+def hand(app: Any, wait: Callable[..., None]) -> Iterator[Hand]:
     hand = Hand(app, wait)
     app.window.widget.activateWindow()
     for button in (1, 2, 3):
         hand.do("mouseup", button)
     hand.move(5, 5)
-    return hand
+    yield hand
+    hand.let_go()
 
 
 @pytest.fixture
