@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["connect", "default_url"]
 
 _EXAMPLE = "zenoh://127.0.0.1:7447"
-_EXAMPLES = "zenoh://127.0.0.1:7447 or dds://?domain=0"
+_EXAMPLES = "zenoh://127.0.0.1:7447, dds://?domain=0 or ros1://robot:11311"
 _KNOWN = (
     "dds:// (ROS 2 with any DDS), zenoh:// (ROS 2 with rmw_zenoh), ros1:// (ROS 1, its master), "
     "replay:FILE (a recording)"
@@ -205,7 +205,8 @@ def _zenoh(url: str) -> Middleware:
     if find_spec("zenoh") is None or find_spec("xxhash") is None:
         raise UnsupportedError(
             f"cannot connect to {url!r}: Zenoh is not installed; "
-            'install it with: pip install "rosglass[zenoh]"'
+            'install it with: pip install "rosglass[zenoh]"; '
+            "without it, there are dds:// (other ROS 2 robots) and ros1://host:11311 (ROS 1)"
         )
     from rosglass.ros2.zenoh.options import ZenohOptions  # noqa: PLC0415
 
@@ -219,7 +220,8 @@ def _dds(url: str) -> Middleware:
     if find_spec("cyclonedds") is None:
         raise UnsupportedError(
             f"cannot connect to {url!r}: Cyclone DDS is not installed; "
-            'install it with: pip install "rosglass[dds]"'
+            'install it with: pip install "rosglass[dds]"; '
+            "without it, there are zenoh:// (ROS 2 with rmw_zenoh) and ros1://host:11311 (ROS 1)"
         )
     from rosglass.ros2.dds.options import DdsOptions  # noqa: PLC0415
 

@@ -240,3 +240,25 @@ def test_definitions_from_a_folder(tmp_path: Path) -> None:
     assert show("list", "my_msgs").returncode == 1
     wrong = show("list", "--definitions", str(tmp_path / "none"))
     assert (wrong.returncode, "is not a folder" in wrong.stderr) == (1, True)
+
+
+@pytest.mark.parametrize(
+    ("said", "url"),
+    [
+        ({}, "zenoh://127.0.0.1:7447"),
+        ({"ROS_MASTER_URI": "http://robot:5"}, "ros1://robot:5"),
+        ({"ROS_MASTER_URI": "http://robot:5", "ROS_DISTRO": "humble"}, "zenoh://127.0.0.1:7447"),
+        ({"ROS_MASTER_URI": "http://robot:5", "ROSGLASS_URL": "dds://"}, "dds://"),
+        ({"ROS_MASTER_URI": "robot"}, "ros1://"),
+    ],
+)
+def test_where_the_simulated_robot_is(
+    said: dict[str, str], url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("ROSGLASS_URL", "ROS_DISTRO", "ROS_DOMAIN_ID", "ROS_MASTER_URI"):
+        monkeypatch.delenv(name, raising=False)
+    for name in ("RMW_IMPLEMENTATION", "ZENOH_SESSION_CONFIG_URI", "CYCLONEDDS_URI"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in said.items():
+        monkeypatch.setenv(name, value)
+    assert build_parser("robot").parse_args(["robot"]).url == url

@@ -6,12 +6,14 @@ import os
 import signal
 import sys
 import threading
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rosglass.comm import ConnectionState
 
 if TYPE_CHECKING:
     import argparse
+    from collections.abc import Mapping
 
     from rosglass.comm import Status
 
@@ -22,8 +24,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Declare the command's options."""
     parser.add_argument(
         "--url",
-        default=os.environ.get("ROSGLASS_URL") or "zenoh://127.0.0.1:7447",
-        help="where to find the other nodes (default: %(default)s)",
+        default=_default_url(os.environ),
+        help="where to find the other nodes (default: ROSGLASS_URL, or the ROS 1 master that "
+        "ROS_MASTER_URI names, or zenoh://127.0.0.1:7447; here: %(default)s)",
     )
     parser.add_argument("--name", default="robot", help="name of the node (default: %(default)s)")
     parser.add_argument(
@@ -93,6 +96,22 @@ def run(args: argparse.Namespace) -> int:
     finally:
         node.close()
     return 1 if failed else 0
+
+
+def _default_url(env: Mapping[str, str]) -> str:
+    """Return where the robot is to be, so that whoever starts it sees where."""
+    from rosglass.connection import default_url
+    from rosglass.errors import Error
+    from rosglass.ros1.options import Ros1Options
+
+    url = env.get("ROSGLASS_URL", "")
+    with suppress(Error):
+        url = default_url(env)
+    if url != "ros1://":
+        return env.get("ROSGLASS_URL") or "zenoh://127.0.0.1:7447"
+    with suppress(Error):  # connecting to it tells what is wrong
+        url += Ros1Options.parse(url, env).master.removeprefix("http://")
+    return url
 
 
 def _tell(status: Status) -> None:
