@@ -115,7 +115,7 @@ def test_without_a_choice_the_user_is_told_the_choices(env, told):
     with pytest.raises(rosglass.UnsupportedError) as error:
         default_url(env)
     assert told in str(error.value)
-    assert "zenoh://127.0.0.1:7447 or dds://?domain=0" in str(error.value)
+    assert "zenoh://127.0.0.1:7447, dds://?domain=0 or ros1://robot:11311" in str(error.value)
 
 
 @pytest.mark.parametrize(
