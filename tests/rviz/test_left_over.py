@@ -6,6 +6,7 @@ import gc
 import subprocess
 import sys
 import time
+import weakref
 from collections import Counter
 from typing import TYPE_CHECKING, Any
 
@@ -108,6 +109,22 @@ def test_overlays_that_go_leave_no_object(
     for _ in range(10):
         step(app, file, wait)
     assert left(wait, before) == {}
+
+
+def test_what_is_left_of_an_overlay_does_not_wait_for_hundreds_of_others(
+    app: Any, file: Path, wait: Callable[..., None]
+) -> None:
+    overlay = app.add_qml(file)
+    wait(lambda: list(app.entries))
+    left = weakref.ref(overlay)
+    # Python itself looks now and then, at what it finds worth it.
+    gc.disable()
+    try:
+        app.overlays.remove(overlay)
+        del overlay
+        wait(lambda: left() is None)
+    finally:
+        gc.enable()
 
 
 def test_reloads_leave_no_object(app: Any, file: Path, wait: Callable[..., None]) -> None:

@@ -11,6 +11,7 @@ from rosglass.rviz.guard import guarded
 from rosglass.rviz.input import Input
 from rosglass.rviz.layer import HIGHEST_Z
 from rosglass.rviz.overlay import Overlay
+from rosglass.rviz.tidying import Tidying
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -41,6 +42,7 @@ class Stack(QtCore.QObject):
         self._arranged: list[Drawing] = []
         self._drawing = False
         self._later: list[Callable[[], None]] = []
+        self._tidying = Tidying()
         window.before_frame.connect(self._before_frame)
         #: Who gets the mouse and the keys.
         self.input = Input(window, self)
@@ -62,6 +64,7 @@ class Stack(QtCore.QObject):
         overlay.arranged.connect(self._arrange)
         overlay.renewed.connect(self.input.forget)
         self._arrange()
+        self._tidying.came()
 
     def remove(self, overlay: Overlay) -> None:
         """Take an overlay away and close it; does nothing when it is not there."""
@@ -79,6 +82,7 @@ class Stack(QtCore.QObject):
                 else:
                     # It may be handling the very event that had it removed.
                     self.input.after_event(lambda: _close(overlay))
+                self._tidying.went()
                 self.changed.emit()
                 return
 
