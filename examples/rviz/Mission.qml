@@ -5,6 +5,7 @@ import Ros 1.0
 Column {
     id: mission
     spacing: 8
+    property bool live
     readonly property int count: path.message ? path.message.poses.length - 1 : 0
     readonly property int next: waypoint.message ? waypoint.message.data : 0
 
@@ -47,8 +48,9 @@ Column {
     }
     Row {
         spacing: 5
+        enabled: mission.live && !state_.stale
         Push { text: "Go on"; onClicked: request.ask("Go on", "/mission/pause", "std_srvs/SetBool", {data: false}) }
-        Push { text: "Pause"; onClicked: request.ask("Pause", "/mission/pause", "std_srvs/SetBool", {data: true}) }
+        Push { objectName: "pause"; text: "Pause"; onClicked: request.ask("Pause", "/mission/pause", "std_srvs/SetBool", {data: true}) }
         Push { text: "Restart"; onClicked: request.ask("Restart", "/mission/restart", "std_srvs/Trigger", {}) }
     }
     Text {

@@ -24,7 +24,7 @@ Panel {
     }
     Item {
         anchors { fill: parent; topMargin: 14 }
-        Mission { anchors.fill: parent; visible: panel.current === 0 }
+        Mission { live: panel.live; anchors.fill: parent; visible: panel.current === 0 }
         Behaviours { live: panel.live; anchors.fill: parent; visible: panel.current === 1 }
         Settings { live: panel.live; anchors.fill: parent; visible: panel.current === 2 }
     }

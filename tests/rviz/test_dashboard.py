@@ -84,11 +84,13 @@ def live(dashboard: Dashboard) -> bool:
 def test_everything_says_that_the_robot_is_silent(
     dashboard: Dashboard, robot: subprocess.Popen[bytes], wait: Any, end: signal.Signals
 ) -> None:
+    wait(dashboard.find("pause").isEnabled)
     robot.send_signal(end)
     wait(lambda: all(dashboard.stale.values()))
     wait(lambda: not dashboard.find("emergency stop").property("known"))
     wait(lambda: any(text.startswith("ROBOT SILENT") for text in dashboard.seen()))
     wait(lambda: "STATE UNKNOWN" in dashboard.seen())
+    wait(lambda: not dashboard.find("pause").isEnabled())
     wait(lambda: "following" not in dashboard.seen())
     wait(lambda: dashboard.seen().count("NO PICTURE") == 2)
     dashboard.click("tab Behaviours")
