@@ -117,10 +117,9 @@ def medians(works: list[Any]) -> dict[str, float]:
 
 
 def measure(order: dict[str, Any]) -> dict[str, Any]:
-    """Measure RViz without overlay, with a static or with an animated one."""
+    """Measure start and memory of RViz without overlay, with a static or with an animated one."""
     from rosglass.qt import QtCore
     from rosglass.rviz import Application
-    from rosglass.rviz.renderer_choice import choice
 
     app = Application(renderer=order["renderer"])
     app.window.widget.setGeometry(0, 0, *VIEW)
@@ -141,20 +140,50 @@ def measure(order: dict[str, Any]) -> dict[str, Any]:
     run_for(2.0, app)
     if order["what"] == "animated":
         overlay._root.setProperty("animated", True)
-        run_for(0.5, app)
-    seconds = order["seconds"]
+    uncapped(app, order["seconds"])
     figures: dict[str, Any] = {"start": 1000 * (first[0] - order["started"])}
-    figures["view"] = app.window.view_size()[:2]
-    figures["cpu"] = processor(seconds, lambda s: run_for(s, app))
-    done: list[tuple[float, float]] = []
-    figures["work"] = medians(works_during(app, lambda: done.append(uncapped(app, seconds))))
-    figures["fps"], figures["frame"] = done[0]
-    figures["covered"] = app.overlays.covered
-    figures["renderer"] = choice.renderer
     gc.collect()
     figures["memory"], figures["own"] = memory(), memory(own=True)
     app.close()
     return figures
+
+
+def turns(order: dict[str, Any]) -> dict[str, Any]:
+    """Measure one RViz without overlay, with a static and an animated one by turns.
+
+    Returns:
+        By contender, what was measured in each turn but for the first, which warms up.
+    """
+    from rosglass.rviz import Application
+    from rosglass.rviz.renderer_choice import choice
+
+    app = Application(renderer=order["renderer"])
+    app.window.widget.setGeometry(0, 0, *VIEW)
+    app.window.widget.show()
+    fit_view(app)
+    run_for(2.0, app)
+    seconds, contenders = order["seconds"], list(order["contenders"])
+    found: dict[str, list[dict[str, Any]]] = {what: [] for what in contenders}
+    for number in range(order["turns"] + 1):
+        for what in contenders:
+            overlay = app.add_qml(QML) if what != "without" else None
+            run_for(0.7, app)
+            if what == "animated":
+                overlay._root.setProperty("animated", True)
+                run_for(0.3, app)
+            figures: dict[str, Any] = {"cpu": processor(seconds, lambda s: run_for(s, app))}
+            done: list[tuple[float, float]] = []
+            works = works_during(app, lambda done=done: done.append(uncapped(app, seconds)))
+            figures["fps"], figures["frame"] = done[0]
+            figures |= {"work": medians(works), "covered": app.overlays.covered}
+            figures["renderer"] = choice.renderer if overlay else None
+            if overlay:
+                app.overlays.remove(overlay)
+            if number:
+                found[what].append(figures)
+        # Whatever follows another is measured after it as often as before it.
+        contenders.reverse()
+    return found
 
 
 def save_bare(order: dict[str, Any]) -> dict[str, Any]:
@@ -329,7 +358,7 @@ def main() -> None:
     sys.argv[1:] = []
     with tempfile.TemporaryDirectory() as home:
         os.environ.update(HOME=home, XDG_RUNTIME_DIR=home)
-        others = {"cycles": cycles, "dashboard": dashboard, "bare": save_bare}
+        others = {"turns": turns, "cycles": cycles, "dashboard": dashboard, "bare": save_bare}
         figures = others.get(order["what"], measure)(order)
         Path(order["into"]).write_text(json.dumps(figures), encoding="utf-8")
     # What is measured is over; how a process ends is for others to test.

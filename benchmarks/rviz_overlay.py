@@ -1,21 +1,25 @@
 """Measure what an interface over RViz's 3D view costs, and whether it leaves anything behind.
 
-    .venv-system/bin/python benchmarks/rviz_overlay.py [--seconds N] [--rounds N] [--cycles N]
-        [--renderer auto|opengl|software]
+    .venv-system/bin/python benchmarks/rviz_overlay.py [--seconds N] [--turns N] [--rounds N]
+        [--cycles N] [--renderer auto|opengl|software]
 
-RViz without overlay, with a static and with an animated one take turns in processes of their own,
-each on a virtual screen (Xvfb) with software OpenGL, Debian's rosmaster beside them. RViz shows
-its grid in a 3D view of 1280x800 pixels, and nothing else. The overlay (`rviz_overlay.qml`) is a
-clock, tool buttons and a legend at the top and a dashboard at the bottom; animated, a needle, four
-bars and four numbers move all the time. `alone` is RViz's own program, /usr/bin/rviz, without
-Python, with a 3D view of the same size: with software OpenGL, its pixels are memory of the process.
-Memory is what is resident; `own` is what the process alone has written, so without the code of
-libraries.
+RViz shows its grid in a 3D view of 1280x800 pixels, and nothing else, on a virtual screen (Xvfb)
+with software OpenGL, Debian's rosmaster beside it. The overlay (`rviz_overlay.qml`) is a clock,
+tool buttons and a legend at the top and a dashboard at the bottom; animated, a needle, four bars
+and four numbers move all the time.
 
-CPU is that of the process at RViz's 30 frames per second, of one core. Uncapped frame rates are
-those of RViz drawing as fast as it can. The C++ reference's figures were measured on the same kind
-of machine (hector_rviz_overlay, QML, 1280x800, llvmpipe), and hold as ratios only. Figures are
-medians of the rounds.
+Frame rates and CPU: one RViz has no overlay, a static and an animated one by turns, forwards and
+backwards, for processes that start one after the other differ by more than an overlay costs. Each
+figure is set against that without overlay of the same turn; told is the median of these ratios,
+and how far its middle half reaches. CPU is that of the process at RViz's 30 frames per second, of
+one core. Uncapped frame rates are those of RViz drawing as fast as it can. The C++ reference's
+figures were measured on the same kind of machine (hector_rviz_overlay, QML, 1280x800, llvmpipe),
+and hold as ratios only.
+
+Start and memory: medians of processes of their own. `alone` is RViz's own program, /usr/bin/rviz,
+without Python, with a 3D view of the same size: with software OpenGL, its pixels are memory of the
+process. Memory is what is resident; `own` is what the process alone has written, so without the
+code of libraries.
 
 At last, in one RViz, overlays come, change and go again and again, 1000 times in each of the ways
 that there are (`rviz_cycles.qml` uses everything that an interface can have of RViz). What is told
@@ -148,46 +152,58 @@ class Verdicts:
         print(f"{name:52} {figure:>24}  {ratio:8.2f}  {sign} {target:<6g} {verdict}")
 
 
-def report(rounds: dict[str, list[dict[str, Any]]], rviz: list[tuple[float, float]]) -> Verdicts:
+def report(
+    turns: dict[str, list[dict[str, Any]]],
+    rounds: dict[str, list[dict[str, Any]]],
+    rviz: list[tuple[float, float]],
+) -> Verdicts:
     """Print all figures."""
 
-    def median(what: str, figure: str) -> float:
-        return statistics.median(r[figure] for r in rounds[what])
+    def median(measured: dict[str, list[dict[str, Any]]], what: str, figure: str) -> float:
+        return statistics.median(r[figure] for r in measured[what])
 
     for what in CONTENDERS:
         print(
-            f"{what:9} start {median(what, 'start'):5.0f} ms   CPU {median(what, 'cpu'):4.0f} %   "
-            f"uncapped {median(what, 'fps'):5.1f} frames/s, median {median(what, 'frame'):5.2f} ms"
-            f"   memory {median(what, 'memory'):4.0f} MiB, own {median(what, 'own'):.0f}   "
-            f"blended {100 * median(what, 'covered'):.0f} % of the view   "
-            f"renderer {rounds[what][-1]['renderer'] or 'none'}"
+            f"{what:9} start {median(rounds, what, 'start'):5.0f} ms   "
+            f"CPU {median(turns, what, 'cpu'):4.0f} %   "
+            f"uncapped {median(turns, what, 'fps'):5.1f} frames/s, "
+            f"median {median(turns, what, 'frame'):5.2f} ms   "
+            f"memory {median(rounds, what, 'memory'):4.0f} MiB, "
+            f"own {median(rounds, what, 'own'):.0f}   "
+            f"blended {100 * median(turns, what, 'covered'):.0f} % of the view   "
+            f"renderer {turns[what][-1]['renderer'] or 'none'}"
         )
     alone_all, alone_own = (statistics.median(used) for used in zip(*rviz, strict=True))
     print(f"{'alone':9} memory {alone_all:4.0f} MiB, of its own {alone_own:.0f}")
     for what in CONTENDERS:
-        works = [r["work"] for r in rounds[what] if r["work"]]
+        works = [r["work"] for r in turns[what] if r["work"]]
         if works:
             parts = {n: statistics.median(w[n] for w in works) for n in works[0]}
             listed = "   ".join(f"{name} {value:.2f}" for name, value in parts.items())
             print(f"{what:9} ms per drawn frame: {listed}")
     print(f"\n{'':52} {'figures':>24}  {'ratio':>8}  target")
     told = Verdicts()
-    fps = {what: median(what, "fps") for what in CONTENDERS}
-    for what, target in (("static", 0.88), ("animated", 0.55)):
-        figure = f"{fps[what]:.1f} of {fps['without']:.1f}"
-        told.line(f"{what}: uncapped frame rate", figure, fps[what] / fps["without"], target, True)
-    cpu = median("static", "cpu"), median("without", "cpu")
-    told.line(
-        "static: CPU at 30 Hz", f"{cpu[0]:.0f} % of {cpu[1]:.0f} %", cpu[0] / cpu[1], 1.1, False
-    )
-    later = (median("static", "start") - median("without", "start")) / 1000
+    for name, what, figure, unit, target, least in (
+        ("uncapped frame rate", "static", "fps", "", 0.88, True),
+        ("uncapped frame rate", "animated", "fps", "", 0.55, True),
+        ("CPU at 30 Hz", "static", "cpu", " %", 1.1, False),
+    ):
+        pairs = zip(turns[what], turns["without"], strict=True)
+        ratios = [one[figure] / other[figure] for one, other in pairs]
+        low, _, high = (
+            statistics.quantiles(ratios, method="inclusive") if len(ratios) > 1 else ratios * 3
+        )
+        used, without = median(turns, what, figure), median(turns, "without", figure)
+        figures = f"{used:.0f} of {without:.0f}{unit}, {low:.2f}..{high:.2f}"
+        told.line(f"{what}: {name}", figures, statistics.median(ratios), target, least)
+    later = (median(rounds, "static", "start") - median(rounds, "without", "start")) / 1000
     told.line("visible after RViz's first frame", "seconds", later, 0.2, False)
     for kind, figure, rviz_alone in (
         ("MiB", "memory", alone_all),
         ("own MiB", "own", alone_own),
     ):
-        used = median("static", figure)
-        for name, than in (("RViz here", median("without", figure)), ("RViz alone", rviz_alone)):
+        used, without = median(rounds, "static", figure), median(rounds, "without", figure)
+        for name, than in (("RViz here", without), ("RViz alone", rviz_alone)):
             more = f"{used:.0f} - {than:.0f}"
             told.line(f"{kind} more than {name}", more, used - than, 60, False)
     print(
@@ -215,8 +231,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--seconds", type=float, default=5, help="of each figure (5)")
-    parser.add_argument("--rounds", type=int, default=5, help="of all contenders (5)")
+    parser.add_argument("--seconds", type=float, default=3, help="of each figure (3)")
+    parser.add_argument("--turns", type=int, default=8, help="for frame rates and CPU (8)")
+    parser.add_argument("--rounds", type=int, default=5, help="for start and memory (5)")
     parser.add_argument("--cycles", type=int, default=1000, help="of each kind of change (1000)")
     parser.add_argument(
         "--renderer", default="auto", help="of overlays: auto (default), opengl or software"
@@ -231,13 +248,16 @@ def main() -> int:
         for number in range(args.rounds + 1):
             for what in CONTENDERS:
                 order = {"what": what, "seconds": args.seconds, "renderer": args.renderer}
-                figures = ask(env, 120 + 3 * args.seconds, **order)
+                figures = ask(env, 120 + args.seconds, **order)
                 # The first round warms caches up.
                 if number:
                     rounds[what].append(figures)
             if number:
                 rviz.append(alone(env, config, 3))
-        told = report(rounds, rviz)
+        order = {"what": "turns", "seconds": args.seconds, "renderer": args.renderer}
+        order |= {"turns": args.turns, "contenders": CONTENDERS}
+        turns = ask(env, 120 + 10 * (args.turns + 1) * (args.seconds + 1), **order)
+        told = report(turns, rounds, rviz)
         if args.cycles:
             order = {"what": "cycles", "cycles": args.cycles, "warm_up": min(args.cycles, 100)}
             endurance(ask(env, 300 + 3 * args.cycles, **order), args.cycles, told)
