@@ -4,6 +4,8 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 say() { printf '==> %s\n' "$*"; }
 export QT_LOGGING_RULES=${QT_LOGGING_RULES:-qt.multimedia.*=false}
+# Hundreds of processes load the same modules: what one has compiled need not be by all others.
+unset PYTHONDONTWRITEBYTECODE
 
 # Types take longest, on one core: everything else that needs no test runs beside them.
 types=$(mktemp)

@@ -248,7 +248,7 @@ def test_types_are_told_as_ros1_writes_them(running: Any, wait: Any, caplog: Any
             function send() { try { word.publish({data: 5}) } catch (e) { return String(e) } }
         }"""
     )
-    wait(lambda: root.ready())
+    wait(root.ready)
     told = "nothing was published on /word: std_msgs/String: data: expected a string, got 5"
     assert told in root.send()
     wait(lambda: "/odd: " in caplog.text)
