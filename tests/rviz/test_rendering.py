@@ -196,6 +196,17 @@ def test_scaled_overlays_have_as_many_units_less(show: Any, grab: Any, app: Any)
     assert (root.width(), root.height()) == (width * 2, height * 2)
 
 
+def test_picture_of_what_stands_still_is_let_go(show: Any, grab: Any, wait: Any) -> None:
+    from rosglass.rviz.qt5 import QtGui
+
+    overlay = show(f"Item {{ {square(40, 40, '#0080ff')} }}")
+    kept = vars(overlay._scene.renderer)
+    assert colour(grab(), 70, 70) == BLUE
+    wait(lambda: not any(isinstance(v, (np.ndarray, QtGui.QImage)) for v in kept.values()))
+    overlay.root.childItems()[0].setProperty("color", "red")
+    assert colour(grab(), 70, 70) == (255, 0, 0)
+
+
 @pytest.mark.parametrize("scale", [4.0, 0.4])
 def test_text_is_as_sharp_as_text_of_the_size_that_it_is_seen_in(
     app: Any, show: Any, frames: Any, scale: float

@@ -94,7 +94,7 @@ class QmlOverlay(QmlInput, Overlay):
         self._look = QtCore.QTimer()
         self._look.setSingleShot(True)
         self._look.setInterval(_LOOK)
-        self._look.timeout.connect(self._look_for_needs)
+        self._look.timeout.connect(self._rest)
         self._errors = ErrorView(self.engine, PANEL)
         self.arranged.connect(self._fit_errors)
         self._closed = self._loading = False
@@ -196,8 +196,9 @@ class QmlOverlay(QmlInput, Overlay):
         self.tell_problem("")
         self._tell_not_drawn(root)
 
-    def _look_for_needs(self) -> None:
-        """Tell of what is not drawn that has been made since; popups are not in the root."""
+    def _rest(self) -> None:
+        """Hold no picture, and tell of what is not drawn that was made since; popups, too."""
+        self._scene.rest()
         if not self._not_drawn and is_alive(self._window):
             self._tell_not_drawn(self._window.contentItem())
 

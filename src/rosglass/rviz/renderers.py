@@ -53,6 +53,9 @@ class Renderer(Protocol):
     def draw(self) -> NDArray[np.uint32]:
         """Return how the window looks; see :meth:`Scene.draw`."""
 
+    def rest(self) -> None:
+        """Let the last picture go: it may be long until the next one."""
+
     def stop(self) -> None:
         """Let everything go."""
 
@@ -70,7 +73,8 @@ class OpenGLRenderer:
         self._control: Any = None
         self._window: Any = None
         self._buffer: Any = None
-        self._pixels = np.zeros((0, 0), np.uint32)
+        self._shape = (0, 0)
+        self._pixels: NDArray[np.uint32] | None = None
 
     def start(self, control: Any, window: Any) -> None:
         """Begin to draw a window."""
@@ -97,23 +101,30 @@ class OpenGLRenderer:
             if not self._buffer.isValid():
                 raise UnsupportedError(f"OpenGL makes no buffer of {width}x{height} pixels here")
             self._window.setRenderTarget(self._buffer)
-        self._pixels = np.zeros((height, width), np.uint32)
+        self._shape, self._pixels = (height, width), None
         return ratio
 
     def draw(self) -> NDArray[np.uint32]:
         """Render into a buffer, and read all of it: Qt Quick does not tell what has changed."""
-        height, width = self._pixels.shape
+        height, width = self._shape
         with self._gl.current():
             self._control.polishItems()
             self._control.sync()
             with self._control.apart():
                 self._control.render()
             started = time.perf_counter()
+            # Not before: QML that waits for an answer may have it let go meanwhile.
+            if self._pixels is None:
+                self._pixels = np.empty(self._shape, np.uint32)
             self._buffer.bind()
             read_pixels(width, height, self._pixels)
             self._buffer.release()
             self.read_back = time.perf_counter() - started
         return self._pixels[::-1]
+
+    def rest(self) -> None:
+        """Let the last picture go."""
+        self._pixels = None
 
     def stop(self) -> None:
         """Let the buffer and what the scene has in OpenGL go."""
@@ -177,6 +188,10 @@ class SoftwareRenderer:
         finally:
             self._window.resize(self._units)
             self._window.blockSignals(blocked)
+
+    def rest(self) -> None:
+        """Let the last picture go."""
+        self._image = None
 
     def stop(self) -> None:
         """Let what the scene has in memory go."""

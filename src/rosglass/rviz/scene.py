@@ -116,9 +116,13 @@ class Scene(QtCore.QObject):
 
         Returns:
             Shape (height, width), each pixel 0xAARRGGBB with premultiplied colours; valid until
-            the next call.
+            the next call, or event.
         """
         return self.renderer.draw()
+
+    def rest(self) -> None:
+        """Let the last picture go: it may be long until the next one."""
+        self.renderer.rest()
 
     def close(self) -> None:
         """Let the window go as soon as no event is handled any more; safe to call twice."""
