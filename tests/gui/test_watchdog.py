@@ -245,3 +245,59 @@ def test_limits_that_are_no_seconds_are_refused(app: Any, limit: Any) -> None:
     session.longest_script = 2
     assert session.longest_script == 2.0
     session.close()
+
+
+LOADING = """import QtQuick 2.15
+Item {
+    property var done: []
+    property int first: { %s; return 1 }
+    Component.onCompleted: {
+        done = ["begun"]
+        %s
+        done = done.concat("went on")
+    }
+    Timer { interval: 50; running: true; onTriggered: done = done.concat("after") }
+}"""
+
+
+@pytest.mark.parametrize(
+    ("line", "binding", "completed"), [(4, "while (true) {}", ""), (6, "", "while (true) {}")]
+)
+def test_a_loop_without_end_while_the_file_is_loaded_is_ended(
+    run: Callable[..., Runner],
+    wait: Callable[..., None],
+    line: int,
+    binding: str,
+    completed: str,
+) -> None:
+    runner = run("", 0.5)
+    runner.file.write_text(LOADING % (binding, completed))
+    assert runner.reload()
+    runner.root = runner._live.made.root
+    wait(lambda: panel(runner))
+    assert f"{runner.file}:{line}" in panel(runner)
+    wait(lambda: "after" in done(runner))
+    lived_on = ["begun", "after"] if completed else ["begun", "went on", "after"]
+    assert done(runner) == lived_on or "the machine is busy" in panel(runner)
+
+
+def test_a_file_whose_required_properties_nobody_sets_is_refused(
+    run: Callable[..., Runner],
+) -> None:
+    runner = run("", 0.5)
+    before = runner.root
+    runner.file.write_text("import QtQuick 2.15\nItem { required property int number }")
+    assert not runner.reload()
+    assert "number was not initialized" in runner._errors.items[0].property("text")
+    assert runner._live.made.root is before
+
+
+def test_that_more_may_have_ended_is_told(
+    run: Callable[..., Runner], wait: Callable[..., None], monkeypatch: Any
+) -> None:
+    # As if this thread had been kept from its processor.
+    monkeypatch.setattr("rosglass.qml.watchdog._LATE", -1.0)
+    runner = run("while (true) {}", 0.5)
+    QtCore.QMetaObject.invokeMethod(runner.root, "begin")
+    wait(lambda: panel(runner))
+    assert "what came right after it may have ended early, too" in panel(runner)

@@ -44,3 +44,24 @@ def test_a_loop_without_end_is_ended_and_told_in_the_overlay(
     assert overlay.reload()
     assert not overlay.problem
     assert not overlay._errors.items
+
+
+LOADED = """Item {
+    property int ticks: 0
+    Component.onCompleted: { while (true) {} }
+    Timer { interval: 20; running: true; repeat: true; onTriggered: ticks++ }
+}"""
+
+
+def test_a_loop_without_end_while_an_overlay_is_loaded_is_ended(
+    app: Any, wait: Callable[..., None], show_file: Any, monkeypatch: Any
+) -> None:
+    monkeypatch.setattr(app.session, "longest_script", 0.5)
+    overlay = show_file(LOADED)
+    wait(lambda: overlay.problem)
+    assert f"{overlay.file}:5" in overlay.problem
+    wait(lambda: overlay.root.property("ticks") > 3)
+    # It is no worse when it is shown anew.
+    assert overlay.reload()
+    wait(lambda: overlay.problem)
+    wait(lambda: overlay.root.property("ticks") > 3)

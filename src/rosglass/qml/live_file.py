@@ -6,6 +6,7 @@ import os
 from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.errors import QmlError
+from rosglass.qml.creation import create
 from rosglass.qml.load_errors import error_list
 from rosglass.qml.modules import install
 from rosglass.qml.places import import_folder, interface_file
@@ -110,7 +111,7 @@ class LiveFile(QtCore.QObject):
             raise QmlError(f"{self.path}: there is no such file")
         self.engine.clearComponentCache()
         component = QtQml.QQmlComponent(self.engine, QtCore.QUrl.fromLocalFile(str(self.path)))
-        root: QtCore.QObject | None = None if component.isError() else component.create()
+        root = create(component, self.engine)
         if root is None:
             raise QmlError(error_list(component.errors(), self.path))
         return Made(root, component)

@@ -47,9 +47,12 @@ _GAP = 1.0
 _BUSY = 0.05
 #: On a machine with too much to do, JavaScript is given up to so many times as long.
 _PATIENCE = 4
+#: Seconds within which the next function of JavaScript does not begin.
+_LATE = 30e-6
 _OURS = str(Path(__file__).parents[1])
 _LIBRARIES = (sysconfig.get_paths()["stdlib"], *{sysconfig.get_paths()[p] for p in ("purelib",)})
 _ADVICE = "let it end, or do its work in pieces by a Timer"
+_AND_OTHERS = "; the machine is busy, so what came right after it may have ended early, too"
 
 
 class _Watched(NamedTuple):
@@ -73,23 +76,34 @@ class _Watched(NamedTuple):
         """Whether JavaScript runs, or something in C++ or Python that it has called."""
         return self.stack.is_known and self.stack.frame != self.waiting[0]
 
-    def hold(self, seconds: float) -> None:
-        """Tell JavaScript to end, until it has, or until some seconds have passed."""
-        outermost, handler = self.handler
-        if not handler:
-            return
+    def hold(self, wanted: tuple[int, int], seconds: float) -> float:
+        """Tell JavaScript to end, until it has, or until some seconds have passed.
+
+        Args:
+            wanted: The :attr:`handler` to end.
+            seconds: How long.
+
+        Returns:
+            For how many seconds at most it was told on after it had ended: what came next was told
+            so, too.
+        """
+        outermost, handler = wanted
+        if self.handler != wanted:
+            return 0.0
         frame, waiting = self.stack.pointer, self.waiting[0] or None
         # The next one may have begun already when it is looked whether any runs.
         function = self.stack.function_of(outermost)
         tell, clock = self.engine.setInterrupted, time.perf_counter
-        until = clock() + seconds
+        seen = now = clock()
+        until = now + seconds
         tell(True)
         try:
             # Each part of a microsecond that this takes counts.
-            while frame.value != waiting and function.value == handler and clock() < until:
-                pass
+            while frame.value != waiting and function.value == handler and now < until:
+                seen, now = now, clock()
         finally:
             tell(False)
+        return clock() - seen
 
     @property
     def handler(self) -> tuple[int, int]:
@@ -120,8 +134,9 @@ class Watchdog(QtCore.QObject):
     only told.
 
     JavaScript that runs while a function of Qt keeps Python's lock cannot be ended, for no thread
-    of Python runs then: QQmlComponent.create, QObject.setProperty, QJSValue.call (for which there
-    is :class:`JsCalls`). The event loop, signals and QMetaObject.invokeMethod give it back.
+    of Python runs then: QObject.setProperty, QQmlComponent.create (for which there is
+    ``creation.py``), QJSValue.call (for which there is :class:`JsCalls`). The event loop, signals
+    and QMetaObject.invokeMethod give it back.
 
     Args:
         session: Whose interfaces it watches.
@@ -282,27 +297,29 @@ class Watchdog(QtCore.QObject):
     def _end_script(self, watched: _Watched, seconds: float) -> bool:
         """Have JavaScript end that runs now; returns whether it did."""
         callers, handler = watched.stack.callers(), watched.handler
-        ended, alone, shared = False, list(_HOLDS), list(_SHARED_HOLDS)
+        ended, late, alone, shared = False, 0.0, list(_HOLDS), list(_SHARED_HOLDS)
         for _ in range(_TRIES):
             time.sleep(_REST)
             ended = watched.handler != handler
             if ended:
                 break
             # Told while it waits for this thread's processor, it would not be seen to end.
-            if not self._computes() and self._use().runs:
+            computes = self._computes()
+            if not computes and self._use().runs:
                 continue
             if not shared:
                 break
-            interval = _NEVER if alone and self._computes() else _AT_ONCE
+            interval = _NEVER if alone and computes else _AT_ONCE
             before = sys.getswitchinterval()
             sys.setswitchinterval(interval)
             try:
-                watched.hold((alone if interval == _NEVER else shared).pop(0))
+                longest = (alone if interval == _NEVER else shared).pop(0)
+                late = watched.hold(handler, longest) or late
             finally:
                 sys.setswitchinterval(before)
         if ended:
             self._told = ""
-            self._tell_ended(watched, callers, seconds)
+            self._tell_ended(watched, callers, seconds, late)
         return ended
 
     def _computes(self) -> bool:
@@ -314,13 +331,16 @@ class Watchdog(QtCore.QObject):
             pass
         return self._clock() - before > _GLANCE / 5
 
-    def _tell_ended(self, watched: _Watched, callers: list[Caller], seconds: float) -> None:
+    def _tell_ended(
+        self, watched: _Watched, callers: list[Caller], seconds: float, late: float
+    ) -> None:
         where = callers[0] if callers else Caller("<unknown>", 0, "")
         shown = dict.fromkeys(map(_told, [*callers[:3], *callers[-1:]]))
         chain = ", called at ".join(shown)
         text = (
             f"JavaScript computed for {seconds:.1f} s and kept the screen from living; it was "
             f"ended{f' in {chain}' if chain else ''}: {_ADVICE}"
+            f"{_AND_OTHERS if late > _LATE else ''}"
         )
         log_from_qml("", logging.ERROR, text, where)
         self._show(watched, text)
