@@ -156,17 +156,15 @@ def uncovered(tiles: NDArray[np.bool_], rects: list[Rect]) -> int | None:
 def trimmed(pixels: NDArray[np.uint32], rect: Rect) -> Rect:
     """Return a rectangle without what is empty at its edges, as far as a tile from each."""
     part = pixels[rect.top : rect.bottom, rect.left : rect.right]
-    left, right = (
-        _leading(part[:, :TILE].any(axis=0)),
-        _leading(part[:, : -TILE - 1 : -1].any(axis=0)),
-    )
-    top, bottom = _leading(part[:TILE].any(axis=1)), _leading(part[: -TILE - 1 : -1].any(axis=1))
+    left, right = _leading(part[:, :TILE], 0), _leading(part[:, : -TILE - 1 : -1], 0)
+    top, bottom = _leading(part[:TILE], 1), _leading(part[: -TILE - 1 : -1], 1)
     inner = Rect(rect.left + left, rect.top + top, rect.right - right, rect.bottom - bottom)
     return inner if inner.left < inner.right and inner.top < inner.bottom else rect
 
 
-def _leading(filled: NDArray[np.bool_]) -> int:
-    """Return how many come before the first that is filled."""
+def _leading(part: NDArray[np.uint32], axis: int) -> int:
+    """Return how many columns (axis 0) or rows (axis 1) are empty before the first that is not."""
+    filled = np.asarray(part.any(axis=axis))
     return int(filled.argmax()) if filled.any() else len(filled)
 
 
