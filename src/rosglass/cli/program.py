@@ -15,7 +15,6 @@ from rosglass.cli import is_interrupt
 from rosglass.cli.completion import is_completing, offer
 from rosglass.cli.subcommands import Parser, add_verbose
 from rosglass.cli.worlds import names_ros1
-from rosglass.interfaces.names import spelled_ros1
 
 if TYPE_CHECKING:
     import argparse
@@ -158,6 +157,8 @@ def _run(arguments: list[str]) -> int:
         return int(import_module(COMMANDS[args.command][0]).run(args))
     except rosglass.Error as error:
         if getattr(args, "ros1", hasattr(args, "url") and names_ros1(args)):
+            from rosglass.interfaces.names import spelled_ros1
+
             return _fail(spelled_ros1(str(error)))
         raise
 

@@ -100,17 +100,19 @@ def run(args: argparse.Namespace) -> int:
 
 def _default_url(env: Mapping[str, str]) -> str:
     """Return where the robot is to be, so that whoever starts it sees where."""
+    url = env.get("ROSGLASS_URL") or "zenoh://127.0.0.1:7447"
+    # Help and completion do without these.
+    if env.get("ROSGLASS_URL") or not env.get("ROS_MASTER_URI"):
+        return url
     from rosglass.connection import default_url
     from rosglass.errors import Error
     from rosglass.ros1.options import Ros1Options
 
-    url = env.get("ROSGLASS_URL", "")
     with suppress(Error):
-        url = default_url(env)
-    if url != "ros1://":
-        return env.get("ROSGLASS_URL") or "zenoh://127.0.0.1:7447"
-    with suppress(Error):  # connecting to it tells what is wrong
-        url += Ros1Options.parse(url, env).master.removeprefix("http://")
+        if default_url(env) == "ros1://":
+            url = "ros1://"
+            # Connecting to it tells what is wrong with it.
+            url += Ros1Options.parse(url, env).master.removeprefix("http://")
     return url
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from rosglass.interfaces.names import spelled_ros1
-
 if TYPE_CHECKING:
     import argparse
 
@@ -49,4 +47,6 @@ def is_hidden(node: Node, name: str) -> bool:
 
 def spelled(node: Node, text: str) -> str:
     """Return a type's name, or a text that has some, as the node's world spells them."""
+    from rosglass.interfaces.names import spelled_ros1
+
     return spelled_ros1(text) if is_ros1(node) else text

@@ -5,8 +5,6 @@ from __future__ import annotations
 from enum import Enum
 from typing import TYPE_CHECKING
 
-from rosglass.interfaces.names import spelled_ros1
-
 if TYPE_CHECKING:
     from rosglass.messages.schema import Schema
 
@@ -53,7 +51,11 @@ class Dialect(Enum):
 
     def spelled(self, text: str) -> str:
         """Return a text with the names of types in it as the module writes them."""
-        return spelled_ros1(text) if self is Dialect.ROS1 else text
+        if self is Dialect.ROS2 or not text:
+            return text
+        from rosglass.interfaces.names import spelled_ros1  # noqa: PLC0415 - not at start-up
+
+        return spelled_ros1(text)
 
     def names(self, schema: Schema) -> dict[str, str]:
         """Return the fields that the module's ROS calls otherwise than the robot's.
