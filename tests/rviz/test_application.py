@@ -110,6 +110,10 @@ def test_menus_in_the_menu_bar(app: Any) -> None:
     assert "Quit" in [a.text().replace("&", "") for a in app.window.menu("File").actions()]
 
 
+def test_the_master_is_told_by_name(app: Any, master: str) -> None:
+    assert app.session.url == master.replace("http:", "ros1:").rstrip("/")
+
+
 def test_overlays_get_names_of_their_own(app: Any, tmp_path: Path) -> None:
     file = tmp_path / "Panel.qml"
     file.write_text(CONTENT)

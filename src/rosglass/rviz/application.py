@@ -156,7 +156,7 @@ class Application(Handle):
         self._owns_session = session is None
         #: The node that QML talks through.
         self.session = session or Session(
-            url or "ros1://",
+            url or _master_url(options),
             connect=connect_beside_rviz,
             arguments=shared_arguments(options),
         )
@@ -383,6 +383,12 @@ def _qt_application(arguments: Sequence[str]) -> Any:
     made = QtWidgets.QApplication(["rosglass", *arguments])
     connected()
     return made
+
+
+def _master_url(options: Ros1Options) -> str:
+    """Return a URL of the master that says, where one can, which it is."""
+    master = options.master.removeprefix("http://")
+    return "ros1://" if "/" in master else f"ros1://{master}"
 
 
 def _check_frame(frame: str) -> None:
