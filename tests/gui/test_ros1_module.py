@@ -246,6 +246,7 @@ def test_types_are_told_as_ros1_writes_them(running: Any, wait: Any, caplog: Any
             property var odd: Ros.advertise("std_msgs/Strin", "/odd", 1)
             function ready() { return word.isAdvertised }
             function send() { try { word.publish({data: 5}) } catch (e) { return String(e) } }
+            function shout() { odd.publish({}) }
         }"""
     )
     wait(root.ready)
@@ -253,4 +254,6 @@ def test_types_are_told_as_ros1_writes_them(running: Any, wait: Any, caplog: Any
     assert told in root.send()
     wait(lambda: "/odd: " in caplog.text)
     assert "Did you mean std_msgs/String? " in caplog.text
+    root.shout()
+    assert "nothing was published on /odd: no definition of std_msgs/Strin" in caplog.text
     assert "/msg/" not in caplog.text

@@ -78,7 +78,8 @@ class Publisher(Element):
         """
         sender, schema = self._sender, self._schema
         if sender is None or schema is None:
-            reason = self._problem or "it is not advertised yet"
+            told = self._problem.removeprefix(f"{self._topic}: ")
+            reason = told or "it is not advertised yet"
             if self._session is not None and not self._session.is_initialized:
                 reason += f"; {NOT_INITIALIZED}"
             self._complain(f"nothing was published on {self._topic}: {reason}", logging.WARNING)
