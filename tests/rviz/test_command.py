@@ -276,7 +276,10 @@ def on_window(command: str) -> Callable[[VirtualScreen], None]:
 
 
 BROKEN_SCREEN = "the connection to the X server (DISPLAY {display}) is broken: RViz ends"
-NO_WINDOW = "another program has destroyed RViz's window (xdotool windowclose, xkill): RViz ends"
+NO_WINDOW = (
+    "RViz's window was destroyed by another program (xdotool windowclose, xkill), or by this one, as "
+    "setWindowFlags() does: RViz ends"
+)
 
 
 @pytest.mark.parametrize(
