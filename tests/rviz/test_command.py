@@ -277,8 +277,8 @@ def on_window(command: str) -> Callable[[VirtualScreen], None]:
 
 BROKEN_SCREEN = "the connection to the X server (DISPLAY {display}) is broken: RViz ends"
 NO_WINDOW = (
-    "RViz's window was destroyed by another program (xdotool windowclose, xkill), or by this one, as "
-    "setWindowFlags() does: RViz ends"
+    "RViz's window was destroyed by another program (xdotool windowclose, xkill), or by this one, "
+    "as setWindowFlags() does: RViz ends"
 )
 
 

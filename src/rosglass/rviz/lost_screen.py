@@ -35,8 +35,8 @@ _EVENT_MASK, _STRUCTURE, _DESTROYED = 1 << 11, 1 << 17, 17
 _IoErrorHandler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
 _BROKEN = "the connection to the X server (DISPLAY {display}) is broken: RViz ends"
 _WINDOW = (
-    "RViz's window was destroyed by another program (xdotool windowclose, xkill), or by this one, as "
-    "setWindowFlags() does: RViz ends"
+    "RViz's window was destroyed by another program (xdotool windowclose, xkill), or by this one, "
+    "as setWindowFlags() does: RViz ends"
 )
 
 
