@@ -16,10 +16,11 @@ one core. Uncapped frame rates are those of RViz drawing as fast as it can. The 
 figures were measured on the same kind of machine (hector_rviz_overlay, QML, 1280x800, llvmpipe),
 and hold as ratios only.
 
-Start and memory: medians of processes of their own. `alone` is RViz's own program, /usr/bin/rviz,
-without Python, with a 3D view of the same size: with software OpenGL, its pixels are memory of the
-process. Memory is what is resident; `own` is what the process alone has written, so without the
-code of libraries.
+Start and memory: medians of processes of their own. `start` is until RViz shows something, with an
+overlay until it shows that; the target is for how long RViz is seen without. `alone` is RViz's own
+program, /usr/bin/rviz, without Python, with a 3D view of the same size: with software OpenGL, its
+pixels are memory of the process. Memory is what is resident; `own` is what the process alone has
+written, so without the code of libraries.
 
 At last, in one RViz, overlays come, change and go again and again, 1000 times in each of the ways
 that there are (`rviz_cycles.qml` uses everything that an interface can have of RViz). What is told
@@ -196,8 +197,9 @@ def report(
         used, without = median(turns, what, figure), median(turns, "without", figure)
         figures = f"{used:.0f} of {without:.0f}{unit}, {low:.2f}..{high:.2f}"
         told.line(f"{what}: {name}", figures, statistics.median(ratios), target, least)
-    later = (median(rounds, "static", "start") - median(rounds, "without", "start")) / 1000
-    told.line("visible after RViz's first frame", "seconds", later, 0.2, False)
+    later = [r["later"] for r in rounds["static"]]
+    figures = f"{min(later):.2f}..{max(later):.2f} s"
+    told.line("visible after RViz's first frame", figures, statistics.median(later), 0.2, False)
     for kind, figure, rviz_alone in (
         ("MiB", "memory", alone_all),
         ("own MiB", "own", alone_own),
