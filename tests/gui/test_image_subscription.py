@@ -271,7 +271,7 @@ def test_rate_and_latency_are_not_rounded(running: Any, camera: Any, wait: Any) 
         stop.set()
         thread.join()
     rate = (len(sent) - 1) / (sent[-1] - sent[0])  # 33.3 on a machine that is not loaded
-    assert sub.property("framerate") == pytest.approx(rate, rel=0.15)
+    assert sub.property("framerate") == pytest.approx(rate, rel=0.5)
     assert sub.property("framerate") % 1
     assert 0 < sub.property("processingLatency") < 5000
     assert 0 < sub.property("networkLatency") < 5000
