@@ -172,7 +172,8 @@ def turns(order: dict[str, Any]) -> dict[str, Any]:
     for number in range(order["turns"] + 1):
         for what in contenders:
             overlay = app.add_qml(QML) if what != "without" else None
-            run_for(0.7, app)
+            # Memory of overlays that went is given back in the first three seconds.
+            run_for(3.5, app)
             if what == "animated":
                 overlay._root.setProperty("animated", True)
                 run_for(0.3, app)

@@ -112,6 +112,15 @@ def test_shows_overlays_over_rviz_and_takes_a_picture(
     assert "#303030" in colours
 
 
+def test_edges_are_hard_if_asked_for(start: Callable[..., Program], tmp_path: Path) -> None:
+    picture = tmp_path / "rviz.png"
+    for options in ((), ("--disable-anti-aliasing",)):
+        program = start("-v", *options, "--screenshot", picture, "--after", "0.5")
+        assert program.process.wait(PATIENCE) == 0, program.output
+        # RViz's own words.
+        assert ("Disabling Anti-Aliasing" in program.output) is bool(options)
+
+
 def test_qml_ends_it_with_an_exit_code(start: Callable[..., Program], tmp_path: Path) -> None:
     program = start("--overlay", interface(tmp_path, "Qt.exit(7)"))
     assert program.process.wait(PATIENCE) == 7, program.output

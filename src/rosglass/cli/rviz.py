@@ -82,6 +82,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--splash", action="store_true", help="show RViz's splash screen")
     parser.add_argument(
+        "--disable-anti-aliasing",
+        action="store_true",
+        help="draw the 3D view with hard edges: without a graphics card several times as fast",
+    )
+    parser.add_argument(
         "--renderer",
         choices=("auto", "opengl", "software"),
         default="auto",
@@ -159,6 +164,7 @@ def _show(args: argparse.Namespace, config: str, remappings: list[str], received
         fullscreen=args.fullscreen,
         bare=args.bare,
         splash=args.splash,
+        anti_aliasing=not args.disable_anti_aliasing,
         renderer=args.renderer,
         timeout=args.timeout,
         import_paths=args.import_paths,

@@ -22,6 +22,7 @@ from rosglass.ros1.options import Ros1Options
 from rosglass.ros2.names import validate_node_name
 from rosglass.rviz import roscpp
 from rosglass.rviz.access import Access
+from rosglass.rviz.cpp import cpp_function
 from rosglass.rviz.entries import Entries
 from rosglass.rviz.guard import log_what_is_raised
 from rosglass.rviz.host import require_rviz
@@ -46,6 +47,8 @@ if TYPE_CHECKING:
 __all__ = ["Application"]
 
 _log = logging.getLogger("rosglass.rviz")
+#: rviz::RenderSystem::disableAntiAliasing(), before the first window.
+_NO_ANTI_ALIASING = "_ZN4rviz12RenderSystem19disableAntiAliasingEv"
 #: Seconds after which a program ends that was told to, whatever RViz is doing.
 _PATIENCE = 1.7
 #: Milliseconds that overlays have to ask for a node of a name of their own.
@@ -79,6 +82,8 @@ class Application(Handle):
         fullscreen: Fill the screen.
         bare: Show the 3D view alone, without menu, tool bar, docked panels and status bar.
         splash: Show RViz's splash screen.
+        anti_aliasing: Smooth edges in the 3D view, where RViz can. Without a graphics card, RViz
+            takes several times as long for each frame with it.
         renderer: What draws overlays in QML: ``opengl``, ``software`` (Qt's own renderer, without
             shaders, particles and VideoOutput), or ``auto`` for the one that is faster here.
         timeout: Seconds to wait for the master; None for as long as it takes.
@@ -110,6 +115,7 @@ class Application(Handle):
         fullscreen: bool = False,
         bare: bool = False,
         splash: bool = False,
+        anti_aliasing: bool = True,
         renderer: str = "auto",
         timeout: float | None = None,
         import_paths: Sequence[str | os.PathLike[str]] = (),
@@ -146,6 +152,8 @@ class Application(Handle):
             if answers:
                 name_node(name or told.name, options)
                 Application._made = True
+                if not anti_aliasing:
+                    cpp_function("librviz", _NO_ANTI_ALIASING)()
                 #: RViz.
                 self.window = Window(config, splash=splash)
         if received:

@@ -10,11 +10,9 @@ from __future__ import annotations
 
 import ctypes
 import logging
-from functools import cache
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from rosglass.errors import UnsupportedError
+from rosglass.rviz.cpp import cpp_function
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,39 +44,14 @@ def _string(text: str) -> _String:
     return _String(data, len(data))
 
 
-@cache
-def _library(name: str) -> ctypes.CDLL:
-    """Return a library that RViz has loaded.
-
-    Raises:
-        UnsupportedError: It has not.
-    """
-    for line in Path("/proc/self/maps").read_text().splitlines():
-        file = line.split(maxsplit=5)[-1]
-        if Path(file).name.startswith(f"{name}.so"):
-            return ctypes.CDLL(file)
-    raise UnsupportedError(f"RViz's bindings come without {name}: they are none of RViz 1")
-
-
-def _function(library: str, symbol: str, result: Any = None) -> Any:
-    try:
-        found = _library(library)[symbol]
-    except AttributeError:
-        raise UnsupportedError(
-            f"{library} has no {symbol}: it was built for another C++ library than GNU's"
-        ) from None
-    found.restype = result
-    return found
-
-
 def is_initialized() -> bool:
     """Return whether this process has a node of roscpp already."""
-    return bool(_function("libroscpp", "_ZN3ros13isInitializedEv", ctypes.c_bool)())
+    return bool(cpp_function("libroscpp", "_ZN3ros13isInitializedEv", ctypes.c_bool)())
 
 
 def is_running() -> bool:
     """Return whether nobody has shut the node down, as another one of its name does."""
-    return bool(_function("libroscpp", "_ZN3ros2okEv", ctypes.c_bool)())
+    return bool(cpp_function("libroscpp", "_ZN3ros2okEv", ctypes.c_bool)())
 
 
 def initialize(name: str, arguments: Sequence[str]) -> None:
@@ -91,25 +64,25 @@ def initialize(name: str, arguments: Sequence[str]) -> None:
     words = [b"rviz", *(argument.encode() for argument in arguments)]
     argv = (ctypes.c_char_p * (len(words) + 1))(*words)
     count = ctypes.c_int(len(words))
-    init = _function("libroscpp", _INIT)
+    init = cpp_function("libroscpp", _INIT)
     init(ctypes.byref(count), argv, ctypes.byref(_string(name)), _NO_SIGINT_HANDLER)
 
 
 def node_name() -> str:
     """Return the full name of RViz's node."""
-    get = _function("libroscpp", "_ZN3ros9this_node7getNameB5cxx11Ev", ctypes.POINTER(_String))
+    get = cpp_function("libroscpp", "_ZN3ros9this_node7getNameB5cxx11Ev", ctypes.POINTER(_String))
     return str(get().contents.data.decode())
 
 
 def set_log_level(level: int) -> None:
     """Let RViz write what it logs from a level of Python's logging on."""
-    _function("librosconsole", "_ZN3ros7console10initializeEv")()
-    set_level = _function("librosconsole", _SET_LEVEL)
+    cpp_function("librosconsole", "_ZN3ros7console10initializeEv")()
+    set_level = cpp_function("librosconsole", _SET_LEVEL)
     cpp_level = next((ours for theirs, ours in _LEVELS if level <= theirs), _FATAL)
     set_level(ctypes.byref(_string("ros")), cpp_level)
-    _function("librosconsole", "_ZN3ros7console25notifyLoggerLevelsChangedEv")()
+    cpp_function("librosconsole", "_ZN3ros7console25notifyLoggerLevelsChangedEv")()
 
 
 def shut_down() -> None:
     """End RViz's node: it says goodbye to the master."""
-    _function("libroscpp", "_ZN3ros8shutdownEv")()
+    cpp_function("libroscpp", "_ZN3ros8shutdownEv")()
