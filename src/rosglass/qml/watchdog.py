@@ -304,12 +304,12 @@ class Watchdog(QtCore.QObject):
             if ended:
                 break
             # Told while it waits for this thread's processor, it would not be seen to end.
-            computes = self._computes()
-            if not computes and self._use().runs:
+            if not self._computes() and self._use().runs:
                 continue
             if not shared:
                 break
-            interval = _NEVER if alone and computes else _AT_ONCE
+            # Asked again: what calls Python all the time computes only now and then.
+            interval = _NEVER if alone and self._computes() else _AT_ONCE
             before = sys.getswitchinterval()
             sys.setswitchinterval(interval)
             try:
