@@ -121,7 +121,7 @@ def measure(order: dict[str, Any]) -> dict[str, Any]:
     from rosglass.qt import QtCore
     from rosglass.rviz import Application
 
-    app = Application(renderer=order["renderer"])
+    app = Application(renderer=order["renderer"], anti_aliasing=order["anti_aliasing"])
     app.window.widget.setGeometry(0, 0, *VIEW)
     overlay = app.add_qml(QML) if order["what"] != "without" else None
     frames: list[float] = []
@@ -162,7 +162,7 @@ def turns(order: dict[str, Any]) -> dict[str, Any]:
     from rosglass.rviz import Application
     from rosglass.rviz.renderer_choice import choice
 
-    app = Application(renderer=order["renderer"])
+    app = Application(renderer=order["renderer"], anti_aliasing=order["anti_aliasing"])
     app.window.widget.setGeometry(0, 0, *VIEW)
     app.window.widget.show()
     fit_view(app)
