@@ -41,4 +41,4 @@ bench: ## run every benchmark (an hour, half of it watching memory)
 	@scripts/bench.sh
 
 clean: ## remove everything that set-up and builds made
-	@rm -rf .venv .venv-system .stamps site dist build demo.png rviz-demo.png htmlcov .coverage* coverage.xml
+	@rm -rf .venv .venv-system .venv-rclpy .stamps site dist build demo.png rviz-demo.png htmlcov .coverage* coverage.xml

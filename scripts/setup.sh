@@ -2,7 +2,8 @@
 # Prepares a clean checkout: scripts/setup.sh demo | rviz-demo | test
 #   demo  what `make demo` needs: .venv with rosglass and its cockpit
 #   rviz-demo  what `make rviz-demo` needs: RViz and ROS's master, .venv-system on Debian's own Python
-#   test  what `make test` needs: .venv with everything, .venv-system on Debian's own Python
+#   test  what `make test` needs: .venv with everything, .venv-system on Debian's own Python,
+#         .venv-rclpy with real ROS 2 nodes to talk to
 # Repeatable: what is already there is left alone, so a second run needs no network and no root.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -92,6 +93,24 @@ make_venv() {
   printf '%s\n' "$wanted" >"$dir/.rosglass"
 }
 
+# Real ROS 2 Jazzy nodes (rclpy over Fast DDS), in an environment of their own: they bring ROS's message
+# packages, which rosglass must do without. Wheels of PyPI, for Debian's Python.
+rclpy_packages=("ros-jazzy-rclpy[fastrtps]==7.1.6" ros-jazzy-test-msgs==2.0.3 ros-jazzy-std-srvs==5.3.6
+                ros-jazzy-sensor-msgs==5.3.6 ros-jazzy-nav-msgs==5.3.6 ros-jazzy-diagnostic-msgs==5.3.6)
+make_rclpy_venv() {
+  local dir=.venv-rclpy wanted="${rclpy_packages[*]}"
+  [ "$(cat "$dir/.rosglass" 2>/dev/null)" = "$wanted" ] && return
+  say "making $dir: real ROS 2 Jazzy nodes to test against"
+  /usr/bin/python3 -m venv --clear "$dir" >.stamps/rclpy.log 2>&1 &&
+    "$dir/bin/python" -m pip install --disable-pip-version-check --quiet "${rclpy_packages[@]}" >>.stamps/rclpy.log 2>&1 || {
+      tail -5 .stamps/rclpy.log >&2
+      fail "ROS 2's nodes (rclpy) could not be installed from PyPI" "the whole output is in .stamps/rclpy.log;" \
+        "their wheels need x86_64 Linux and $(/usr/bin/python3 -V 2>&1) must be one they are built for (3.11)."; }
+  "$dir/bin/python" -c 'import rclpy, test_msgs.srv, sensor_msgs.msg' ||
+    fail "$dir was made, but rclpy cannot be imported" "remove $dir and run this again"
+  printf '%s\n' "$wanted" >"$dir/.rosglass"
+}
+
 python=${PYTHON:-python3}
 system_extras=zenoh,dds,bags,completion,images,test,peers
 case $purpose in
@@ -116,6 +135,7 @@ case $purpose in
     make_venv .venv "$python" dev
     touch .venv/.rosglass-dev
     [ -x /usr/bin/python3 ] || fail "/usr/bin/python3 is missing" "the RViz environment needs Debian's own Python 3"
-    make_venv .venv-system /usr/bin/python3 "$system_extras" --system-site-packages ;;
+    make_venv .venv-system /usr/bin/python3 "$system_extras" --system-site-packages
+    make_rclpy_venv ;;
 esac
 say "set-up complete"
