@@ -28,14 +28,14 @@ class Wire:
     Attributes:
         name: ``cdr`` or ``ros1``.
         big: Whether numbers are big endian.
-        wide: Bytes for each character of a ``wstring``: 2 (Fast CDR 2 and later) or 4 (before).
+        wide: Bytes for each UTF-16 unit of a ``wstring``: 4, as ROS 2's nodes have it, or 2.
         view: Whether the bytes are in a memoryview, whose slices cannot be decoded as those of
             bytes can, and more quickly.
     """
 
     name: str
     big: bool = False
-    wide: int = 2
+    wide: int = 4
     view: bool = False
 
     @property

@@ -162,7 +162,7 @@ class Message:
 
 
 def _restore(kind: MessageType, data: bytes) -> Message:
-    return kind.decode(data, wstring_width=2) if kind.wire == "cdr" else kind.decode(data)
+    return kind.decode(data, wstring_width=4) if kind.wire == "cdr" else kind.decode(data)
 
 
 def _no_field(schema: Schema, name: str) -> str:

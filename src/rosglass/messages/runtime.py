@@ -64,7 +64,7 @@ def hint(name: Any, known: Sequence[str]) -> str:
 
 
 def read_wide(buffer: bytes | memoryview, start: int, end: int, width: int, big: bool) -> str:
-    """Decode the code units of a ``wstring``: UTF-16, or one unit in 4 bytes (Fast CDR 1)."""
+    """Decode the code units of a ``wstring``: UTF-16, or one unit in 4 bytes (ROS 2's nodes)."""
     raw = buffer[start:end]
     if len(raw) < end - start:
         too_short()

@@ -186,7 +186,7 @@ class MessageType:
                 and must stay unchanged, as long as the message or an array out of it is used.
                 Anything else with bytes in it is copied first.
             wire: ``cdr`` or ``ros1``; None for the type's own.
-            wstring_width: Bytes for each character of wstrings, 2 or 4; None finds out.
+            wstring_width: Bytes for each UTF-16 unit of wstrings, 2 or 4; None finds out.
 
         Raises:
             DecodeError: The buffer is no bytes, or its header announces another representation.
@@ -250,10 +250,11 @@ class MessageType:
     def _plausible_width(self, data: bytes | memoryview, name: str, big: bool) -> int:
         """Return the wstring width that makes the message end where its bytes end.
 
-        If both do, the padding that the encapsulation header announces decides, then the newer.
+        If both do, the padding that the encapsulation header announces decides; otherwise 4,
+        which is what ROS 2's nodes write.
         """
         fitting = []
-        for wide in (2, 4):
+        for wide in (4, 2):
             try:
                 left = len(data) - self._codec(name, big, wide).end(data)
             except DecodeError:
@@ -261,7 +262,7 @@ class MessageType:
             if left <= (_PADDING if name == "cdr" else 0):
                 announced = data[3] & _PADDING if name == "cdr" else 0
                 fitting.append((left != announced, wide))
-        return min(fitting)[1] if fitting else 2
+        return min(fitting, key=lambda found: found[0])[1] if fitting else 4
 
     def decode_small(self, buffers: Sequence[bytes | memoryview]) -> list[Message] | None:
         """Return many small messages of ROS 1 at once, decoded: that takes less than leaving it.
@@ -330,7 +331,7 @@ class MessageType:
         name = self._wire_name(wire)
         if self._schema.has_wide and wstring_width is None:
             # Only the bytes tell the width.
-            self._path(name, 2, False, (path, *more), not more)
+            self._path(name, 4, False, (path, *more), not more)
             return partial(self._path_by_bytes, name, (path, *more), not more)
         return self._path(name, _width(wstring_width), False, (path, *more), not more)
 
@@ -396,7 +397,8 @@ class MessageType:
             value: A message of this type, or a dict of fields; missing fields get the defaults.
             wire: ``cdr`` or ``ros1``; None for the type's own.
             byteorder: ``little`` or ``big``; ROS 1 knows only little.
-            wstring_width: Bytes for each character of wstrings: 2 (default) or 4.
+            wstring_width: Bytes for each UTF-16 unit of wstrings: 4 (default), as ROS 2's nodes
+                write and read them, or 2.
             fields: The fields as keyword arguments, instead of or on top of `value`.
 
         Raises:
@@ -480,7 +482,7 @@ def _encapsulation(type_name: str, data: bytes | memoryview) -> bool:
 def _width(wide: int | None) -> int:
     if wide not in (None, 2, 4):
         raise UnsupportedError(f"a wstring's character takes 2 or 4 bytes, not {wide!r}")
-    return wide or 2
+    return wide or 4
 
 
 def portable(definition: Definition) -> Definition:

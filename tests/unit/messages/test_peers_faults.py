@@ -222,8 +222,8 @@ def test_invalid_utf8_survives(wire: str) -> None:
 @pytest.mark.parametrize("text", ["", "a", "Grüße", "日本語", "🤖 drives"])
 @pytest.mark.parametrize("byteorder", ["little", "big"])
 def test_wstring_in_both_widths(text: str, width: int, byteorder: str) -> None:
-    # No peer knows wstring. Fast CDR 1 (Humble) writes the count of UTF-16 units and 4 bytes for
-    # each, Fast CDR 2 (Jazzy) the same count and 2 bytes for each; no terminator.
+    # No peer of Python knows wstring. ROS 2's nodes write the count of UTF-16 units and 4 bytes for
+    # each, OMG's CDR for UTF-16 the same count and 2 bytes for each; no terminator.
     order = "<" if byteorder == "little" else ">"
     native = text.encode("utf-16-le")
     units = struct.unpack(f"<{len(native) // 2}H", native)
