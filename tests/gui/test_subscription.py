@@ -346,7 +346,8 @@ def test_frequency_and_bandwidth_follow_the_topic(running: Any, wait: Any) -> No
     finally:
         stop.set()
         thread.join()
-    wait(lambda: sub.property("frequency") < 10)
+    wait(lambda: sub.property("frequency") == 0)
+    assert sub.property("bandwidth") == 0, "a rate that stays is old data dressed as live"
 
 
 def test_malformed_messages_are_refused_and_the_good_one_stays(

@@ -264,6 +264,26 @@ def test_the_tree(live: Bench, robot: Robot, wait: Any) -> None:
     assert 0 <= age < 20
 
 
+@pytest.mark.parametrize("module", ["Ros2 1.0", "Ros 1.0"])
+def test_the_frequency_of_a_frame_falls_to_zero(live: Bench, module: str, wait: Any) -> None:
+    live.module = module
+    root: Any = live.load("""
+        QtObject {
+            property TfBuffer b: TfBuffer {}
+            function frequency(frame) {
+                const f = b.getFrame(frame)
+                return f === undefined ? -1 : f.frequency
+            }
+        }
+    """)
+    robot = Robot(live.robot)
+    try:
+        wait(lambda: root.frequency("base") > 10)
+    finally:
+        robot.close()
+    wait(lambda: root.frequency("base") == 0)
+
+
 def test_namespaces_are_apart(live: Bench, robot: Robot, wait: Any) -> None:
     other = StaticTransformBroadcaster(live.robot, "/arm")
     other.send_transform(Transform((3.0, 0.0, 0.0), frame_id="root", child_frame_id="tip"))

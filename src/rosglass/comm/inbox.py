@@ -107,7 +107,7 @@ class Inbox:
                 return
             if now >= self._next_mark:
                 self._next_mark = now + MARK_PERIOD
-                self._meter.mark(self._last, self._received, self._bytes, sample)
+                self._meter.mark(now, self._last, self._received, self._bytes, sample)
             self._last = now
             self._received += 1
             self._bytes += len(sample[0])
@@ -142,7 +142,7 @@ class Inbox:
                 return
             if now >= self._next_mark:
                 self._next_mark = now + MARK_PERIOD
-                self._meter.mark(self._last, self._received, self._bytes, given[0])
+                self._meter.mark(now, self._last, self._received, self._bytes, given[0])
             self._last = now
             self._received += len(given)
             self._bytes += size
@@ -379,7 +379,7 @@ class ImmediateInbox(Inbox):
         now = time.monotonic()
         if now >= self._next_mark:
             self._next_mark = now + MARK_PERIOD
-            self._meter.mark(self._last, self._received, self._bytes, given[0])
+            self._meter.mark(now, self._last, self._received, self._bytes, given[0])
         self._last = now
         waiting = self._samples
         call, ready = self._prepare(given)
@@ -402,7 +402,7 @@ class ImmediateInbox(Inbox):
         now = time.monotonic()
         if now >= self._next_mark:
             self._next_mark = now + MARK_PERIOD
-            self._meter.mark(self._last, self._received, self._bytes, sample)
+            self._meter.mark(now, self._last, self._received, self._bytes, sample)
         self._last = now
         self._received += 1
         self._bytes += len(sample[0])

@@ -11,14 +11,45 @@ from rosglass.comm.lateness import Lateness
 from rosglass.comm.time import Duration
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rosglass.comm.sample import Sample
 
-__all__ = ["MARK_PERIOD", "Meter", "Statistics"]
+__all__ = ["MARK_PERIOD", "Meter", "Statistics", "fading_rate", "note_time", "rate_of"]
 
 #: Rates are taken over so many marks ...
 _MARKS = 30
 #: ... which are at least so many seconds apart.
 MARK_PERIOD = 1 / 30
+#: A rate begins to fall when the next is so many periods late, ...
+_LATE_PERIODS = 1.5
+#: ... and is 0 so many periods or seconds after that, whichever is longer.
+_FADE_PERIODS, _FADE_S = 2.0, 2.0
+
+
+def fading_rate(period: float, age: float) -> float:
+    """Return how often something comes a second; 0 once it has stopped.
+
+    Args:
+        period: Seconds from one to the next, on average.
+        age: Seconds since the last one.
+    """
+    overdue = max(0.0, age - _LATE_PERIODS * period)
+    return max(0.0, 1 - overdue / max(_FADE_S, _FADE_PERIODS * period)) / period
+
+
+def rate_of(times: Sequence[float], now: float) -> float:
+    """Return how often something comes a second, given when it came last; see `fading_rate`."""
+    if len(times) < 2 or times[-1] <= times[0]:
+        return 0.0
+    return fading_rate((times[-1] - times[0]) / (len(times) - 1), now - times[-1])
+
+
+def note_time(times: deque[float], now: float) -> None:
+    """Append a time for `rate_of`; after a silence the rate is taken anew."""
+    if len(times) > 1 and rate_of(times, now) == 0:
+        times.clear()
+    times.append(now)
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +60,7 @@ class Statistics:
         received: Samples received since creation.
         dropped: Samples thrown out of a full inbox before anyone took them.
         frequency: Samples per second over the last 30, or the last second where there are more;
-            falls to 0 when they stop.
+            0 from 3.5 s without any, or 3.5 periods where they come more rarely than once a second.
         bandwidth: Bytes per second over the same samples.
         age: Time since the last sample, None before the first.
         lost: Samples that were sent, by the publishers' running numbers, and have not arrived.
@@ -61,9 +92,12 @@ class Meter:
         self._took: deque[tuple[int, int]] = deque(maxlen=_MARKS)
         self._lateness = Lateness()
 
-    def mark(self, last: float, count: int, size: int, sample: Sample) -> None:
-        """Note where the counts stood when the last sample before `sample` had come."""
-        if count:
+    def mark(self, now: float, last: float, count: int, size: int, sample: Sample) -> None:
+        """Note where the counts stood when the last sample before `sample`, of `now`, had come."""
+        if self._marks and self._rate(now, last, count) == 0:
+            # After a silence the rates are taken anew.
+            self._marks.clear()
+        elif count:
             self._marks.append((last, count, size))
         sent = sample.sent_ns
         if sent is not None:
@@ -80,16 +114,12 @@ class Meter:
         self, now: float, last: float, received: int, size: int, dropped: int, lost: int
     ) -> Statistics:
         """Return the figures as of `now`, given the counts and the time of the last sample."""
-        start, count, before = self._marks[0] if self._marks else (last, received, size)
-        frequency = bandwidth = 0.0
-        age = now - last
-        if received > count and last > start:
-            period = (last - start) / (received - count)
-            # Once the next sample is overdue, let the figures fall instead of showing a dead rate:
-            # as if there had been no more than the last 30.
-            recent = min(received - count, _MARKS - 1)
-            frequency = recent / (recent * period + max(0.0, age - 1.5 * period))
+        frequency = self._rate(now, last, received)
+        bandwidth = 0.0
+        if frequency:
+            _, count, before = self._marks[0]
             bandwidth = (size - before) / (received - count) * frequency
+        age = now - last
         ways = sorted(way for way, _ in self._took)
         return Statistics(
             received,
@@ -101,3 +131,11 @@ class Meter:
             Duration(ways[len(ways) // 2]) if ways else None,
             Duration(self._took[-1][1]) if ways else None,
         )
+
+    def _rate(self, now: float, last: float, received: int) -> float:
+        if not self._marks:
+            return 0.0
+        start, count, _ = self._marks[0]
+        if received <= count or last <= start:
+            return 0.0
+        return fading_rate((last - start) / (received - count), now - last)

@@ -10,6 +10,7 @@ from collections import deque
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.executor import Dispatcher
+from rosglass.comm.statistics import note_time, rate_of
 from rosglass.errors import Error
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.element import Element, changed_enough
@@ -393,7 +394,7 @@ class ImagePublisher(Element):
             return
         self._say(f"ImagePublisher: {problem}" if problem else "")
         if not problem:
-            self._sent.append(time.monotonic())
+            note_time(self._sent, time.monotonic())
             self._measure()
         again, self._again = self._again, False
         if again and self._senders:
@@ -411,13 +412,7 @@ class ImagePublisher(Element):
     def _measure(self) -> None:
         """Find out how often pictures go out, and whether one is overdue."""
         now, sent = time.monotonic(), self._sent
-        frequency, age = 0.0, now - sent[-1] if sent else math.inf
-        if len(sent) > 1 and sent[-1] > sent[0]:
-            period = (sent[-1] - sent[0]) / (len(sent) - 1)
-            frequency = 1 / (period + max(0.0, age - 1.5 * period))
-            if age > max(_PATIENCE, 5 * period):
-                sent.clear()
-                frequency = 0.0
+        frequency, age = rate_of(sent, now), now - sent[-1] if sent else math.inf
         if changed_enough(self._frequency, frequency):
             self._frequency = frequency
             self.frequencyChanged.emit()

@@ -8,6 +8,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
+from rosglass.comm.statistics import note_time, rate_of
 from rosglass.comm.time import Time
 from rosglass.images import ImageStream
 from rosglass.qml.image_rendering import Look, Picture, Renderer
@@ -70,20 +71,14 @@ class Channel:
     def show(self, picture: Picture) -> None:
         """Show a picture to all viewers."""
         self.last = picture
-        self._arrivals.append(time.monotonic())
+        note_time(self._arrivals, time.monotonic())
         for viewer in list(self.viewers):
             viewer.show_picture(picture)
 
     @property
     def frame_rate(self) -> float:
-        """Pictures shown per second, falling when they stop."""
-        arrivals = self._arrivals
-        if len(arrivals) < 2:
-            return 0.0
-        span = arrivals[-1] - arrivals[0]
-        period = span / (len(arrivals) - 1)
-        span += max(0.0, time.monotonic() - arrivals[-1] - 1.5 * period)
-        return (len(arrivals) - 1) / span if span > 0 else 0.0
+        """Pictures shown per second; 0 when they have stopped."""
+        return rate_of(self._arrivals, time.monotonic())
 
 
 @dataclass(slots=True)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.approximate_time import ApproximateTime
 from rosglass.comm.executor import Dispatcher
+from rosglass.comm.statistics import note_time, rate_of
 from rosglass.errors import ConversionError, DecodeError, Error, TypeNotFoundError
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.element import DEFAULT_TIMEOUT, RETRY, Element, changed_enough
@@ -353,7 +354,7 @@ class SynchronizedSubscription(Element):
     def _deliver(self, matcher: _Matcher, sets: list[list[Sample]]) -> None:
         for samples in sets:
             self._samples, self._value = samples, None
-            self._times.append(time.monotonic())
+            note_time(self._times, time.monotonic())
             self._shown_at = self._steady()
             self._late, self._suspect = matcher.lateness(samples), False
             was_stale, self._stale = self._stale, self._is_old()
@@ -388,11 +389,8 @@ class SynchronizedSubscription(Element):
             # Their topics, types and profiles may have changed.
             self._update()
         self._judge()
-        matcher, times = self._matcher, self._times
-        frequency = 0.0
-        if len(times) > 1 and times[-1] > times[0]:
-            period = (times[-1] - times[0]) / (len(times) - 1)
-            frequency = 1 / (period + max(0.0, time.monotonic() - times[-1] - 1.5 * period))
+        matcher = self._matcher
+        frequency = rate_of(self._times, time.monotonic())
         if changed_enough(self._frequency, frequency):
             self._frequency = frequency
             self.frequencyChanged.emit()

@@ -9,6 +9,7 @@ import logging
 import threading
 from collections import Counter
 from dataclasses import dataclass, replace
+from time import monotonic
 from typing import TYPE_CHECKING
 
 from rosglass.comm.complaints import Complaints
@@ -157,6 +158,7 @@ class TransformBuffer(Handle):
                     refused.append((kind, name, store.told(kind, name, stamp, entry)))
                 else:
                     changed.add(name)
+            store.arrivals.update(dict.fromkeys(changed, monotonic()))
             self.ignored.update(kind for kind, _, _ in refused)
             moved = store.version != tree
             disagreements, store.disagreements = store.disagreements, []

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from rosglass.comm.statistics import fading_rate
 from rosglass.errors import ConnectivityException, LookupException
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ class FrameInfo:
             a parent.
         oldest: Time of the oldest transform kept.
         count: How many transforms are kept.
+        silence: Seconds since the last one came, by this machine's clock.
     """
 
     name: str
@@ -41,13 +43,15 @@ class FrameInfo:
     latest: Time | None = None
     oldest: Time | None = None
     count: int = 0
+    silence: float = field(default=0.0, compare=False)
 
     @property
     def rate(self) -> float:
-        """Average number of transforms a second, by their stamps; 0 for static frames."""
+        """Transforms a second, by their stamps; 0 for static frames, and once none come."""
         if self.static or self.latest is None or self.oldest is None or self.count < 2:
             return 0.0
-        return (self.count - 1) / (self.latest - self.oldest).seconds
+        period = (self.latest - self.oldest).seconds / (self.count - 1)
+        return fading_rate(period, self.silence)
 
     def age(self, now: Time) -> Duration | None:
         """Return how old the newest transform is at a time; None without a parent."""

@@ -55,6 +55,7 @@ class FrameStore:
         caches: What is known of each frame that has a parent.
         names: Every frame there is, parents included, in the order of their appearance.
         authorities: Who placed each frame last.
+        arrivals: When something was last taken in for each frame, by :func:`time.monotonic`.
         version: Changes when frames come, go, or get another parent.
         disagreements: Frames that changed between static and moving, and by whom they were
             published before and now; for the buffer to tell people.
@@ -67,6 +68,7 @@ class FrameStore:
         self.caches: dict[str, DynamicCache | StaticCache] = {}
         self.names: dict[str, None] = {}
         self.authorities: dict[str, object] = {}
+        self.arrivals: dict[str, float] = {}
         self.version = 0
         self.disagreements: list[tuple[str, object, object]] = []
         self.jumps: list[tuple[str, int, object]] = []
@@ -142,7 +144,8 @@ class FrameStore:
             return FrameInfo(name)
         latest = Time(cache.stamp)
         oldest = latest if cache.static else Time(cache.oldest)
-        return FrameInfo(name, cache.parent, "", cache.static, latest, oldest, cache.count)
+        silence = monotonic() - self.arrivals.get(name, -math.inf)
+        return FrameInfo(name, cache.parent, "", cache.static, latest, oldest, cache.count, silence)
 
     def _place(self, child: str, stamp: int, entry: Entry, static: bool, authority: object) -> str:
         """Take a transform in that is new in some way; returns why not."""
@@ -191,6 +194,7 @@ class FrameStore:
     def _remove(self, name: str) -> None:
         del self.caches[name]
         self.authorities.pop(name, None)
+        self.arrivals.pop(name, None)
         self.version += 1
 
 

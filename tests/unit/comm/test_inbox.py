@@ -311,7 +311,25 @@ def test_rates_fall_at_once_when_samples_stop(monkeypatch, rate):
         clock[0] += 1 / rate
         sub.deliver(sample(bytes(10)))
     assert sub.statistics().frequency == pytest.approx(rate, rel=0.01)
-    clock[0] += 10
+    clock[0] += max(0.04, 1 / rate)
+    assert sub.statistics().frequency > rate / 2, "one that is a little late is no silence"
+    clock[0] += 1.5
+    falling = sub.statistics()
+    assert 0 < falling.frequency < rate
+    assert falling.bandwidth == pytest.approx(10 * falling.frequency)
+    clock[0] += 2.4
     stopped = sub.statistics()
-    assert stopped.frequency < 3
-    assert stopped.bandwidth == pytest.approx(10 * stopped.frequency)
+    assert (stopped.frequency, stopped.bandwidth) == (0, 0)
+
+
+def test_rates_are_taken_anew_after_a_silence(monkeypatch):
+    clock = [100.0]
+    monkeypatch.setattr("rosglass.comm.inbox.time.monotonic", lambda: clock[0])
+    sub = subscription(QoS(depth=1))
+    for silence in (0, 600):
+        clock[0] += silence
+        for _ in range(5):
+            clock[0] += 0.1
+            sub.deliver(sample(bytes(10)))
+        assert sub.statistics().frequency == pytest.approx(10)
+        assert sub.statistics().bandwidth == pytest.approx(100)

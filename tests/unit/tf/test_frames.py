@@ -43,6 +43,29 @@ def test_a_frame(buffer: TransformBuffer) -> None:
     assert not buffer.has_frame("never")
 
 
+def test_the_rate_falls_to_zero_when_nothing_comes(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = [100.0]
+    for module in ("buffer", "store"):
+        monkeypatch.setattr(f"rosglass.tf.{module}.monotonic", lambda: clock[0])
+    buffer = TransformBuffer()
+    for n in range(50):
+        stamp = Time.from_parts(1, n * 20_000_000)
+        buffer.set_transform(Transform(stamp=stamp, frame_id="map", child_frame_id="base"), "/b")
+        clock[0] += 0.02
+
+    def rate() -> float:
+        frame = buffer.frame("base")
+        assert frame is not None
+        return frame.rate
+
+    assert rate() == pytest.approx(50)
+    clock[0] += 1.0
+    assert 0 < rate() < 50
+    clock[0] += 3.0
+    assert rate() == 0, "a rate that stays is old data dressed as live"
+    assert buffer.tree()["base"].rate == 0
+
+
 def test_the_tree(buffer: TransformBuffer) -> None:
     tree = buffer.tree()
     assert sorted(tree) == ["arm", "base", "camera", "far", "map", "odom", "other"]
