@@ -86,6 +86,51 @@ def test_a_hundred_nodes_leave_nothing_behind(dds_domain):
     assert after[2] - memory < 2_000
 
 
+def test_hundreds_of_services_in_one_process_take_little_memory(dds_domain, dds_connect):
+    text = """
+import gc, resource
+resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
+trigger, fibonacci = 'std_srvs/srv/Trigger', 'example_interfaces/action/Fibonacci'
+for _ in range(4):
+    ends = []
+    for number in range(200):
+        answer = lambda request, number=number: dict(success=True, message=str(number))
+        ends.append(node.create_service_server(f'/s{number}', trigger, answer))
+    for number in range(20):
+        ends.append(node.create_action_server(f'/a{number}', fibonacci, lambda goal: dict()))
+    clients = [node.create_service_client(f'/s{number}', trigger) for number in range(100)]
+    texts = [client.call(timeout=60).message for client in clients]
+    assert texts == [str(number) for number in range(100)], texts
+    gc.collect()
+    print(int(open('/proc/self/statm').read().split()[1]) * 4096, flush=True)
+    sys.stdin.readline()
+    for end in (*clients, *ends):
+        end.close()
+"""
+    process = program(text, dds_domain)
+    assert process.stdout is not None
+    assert process.stdin is not None
+    used = []
+    try:
+        node = dds_connect("caller")
+        for _ in range(4):
+            line = process.stdout.readline()
+            assert line.strip().isdecimal(), line + process.stdout.read()
+            used.append(int(line))
+            for number in range(40):
+                client = node.create_service_client(f"/s{number}", "std_srvs/srv/Trigger")
+                assert client.call(timeout=60).message == str(number)
+                client.close()
+            print(file=process.stdin, flush=True)
+        rest, _ = process.communicate(timeout=60)
+        assert process.returncode == 0, rest
+    finally:
+        process.kill()
+        process.communicate()
+    assert used[0] < 150_000_000
+    assert used[-1] - used[1] < 5_000_000, used
+
+
 def test_closing_while_samples_arrive(dds_connect, wait_for):
     talker, stop = dds_connect("talker"), threading.Event()
     publisher = talker.create_publisher("/flood", STRING)

@@ -12,6 +12,7 @@ Beside it, samples are in ``cyclone_samples``, profiles in ``cyclone_qos``, even
 from __future__ import annotations
 
 import ctypes
+import itertools
 import logging
 import sys
 from ctypes import POINTER, c_bool, c_char_p, c_int32, c_int64, c_size_t, c_uint32, c_uint64
@@ -229,7 +230,7 @@ def create_participant(domain: int, qos: Qos | None) -> int:
     return check(result, "dds_create_participant", f"domain {domain}")
 
 
-def create_topic(participant: int, name: str, type_name: str) -> int:
+def create_topic(participant: int, name: str, type_name: str, *, own_type: bool = False) -> int:
     """Create a topic whose payloads nobody looks into and whose type matches by its name alone.
 
     It announces no type information, so endpoints that do so match it, too.
@@ -238,9 +239,12 @@ def create_topic(participant: int, name: str, type_name: str) -> int:
         participant: The participant it belongs to.
         name: Its DDS name, e.g. ``rt/chatter``.
         type_name: The type's DDS name, e.g. ``std_msgs::msg::dds_::String_``.
+        own_type: Whether the library gives the topic a type object (:func:`sertype`) of its own
+            instead of the one that all topics with this type share.
     """
-    descriptor = ctypes.addressof(_descriptor(type_name))
-    result = library().dds_create_topic(participant, descriptor, name.encode(), None, None)
+    descriptor = _descriptor(type_name, next(_own_sizes)) if own_type else _shared(type_name)
+    address = ctypes.addressof(descriptor)
+    result = library().dds_create_topic(participant, address, name.encode(), None, None)
     return check(result, "dds_create_topic", f"topic {name} of type {type_name}")
 
 
@@ -328,18 +332,25 @@ class _Descriptor(ctypes.Structure):
 #: One octet at offset 0, then the end (``dds/ddsc/dds_opcodes.h``): the library checks that a
 #: payload has it, and takes the rest of the payload as it is.
 _OPS = (c_uint32 * 3)(0x01010000, 0, 0)
+#: Sizes of native samples, by which the library tells types of one name apart. They say nothing
+#: about payloads, and no native sample is ever made.
+_own_sizes = itertools.count(2)
 
 
-@cache
-def _descriptor(type_name: str) -> _Descriptor:
+def _descriptor(type_name: str, size: int) -> _Descriptor:
     return _Descriptor(
-        size=1,
+        size=size,
         align=1,
         type_name=type_name.encode(),
         op_count=len(_OPS),
         ops=ctypes.addressof(_OPS),
         meta=b"",
     )
+
+
+@cache
+def _shared(type_name: str) -> _Descriptor:
+    return _descriptor(type_name, 1)
 
 
 def _of(qos: Qos | None) -> int | None:

@@ -1,11 +1,15 @@
 """Replacing functions that Cyclone DDS makes and reads samples with.
 
 Each topic's type points to a table of functions (``ddsi_serdata_ops``, meant for other languages'
-type support); a topic made here gets a table of its own with some of them replaced. That takes
-private layouts, those of Cyclone DDS 11.0.1 on 64-bit Linux. They are tested once, on memory of our
-own, before anything relies on them.
+type support); a topic made here gets a type of its own, which points to a copy of that table with
+some functions replaced. That takes private layouts, those of Cyclone DDS 11.0.1 on 64-bit Linux.
+They are tested once, on memory of our own, before anything relies on them.
 
-What the library was given is never freed, as samples outlive readers, writers and topics.
+All types share one copy of each table. The library finds instances by the hash of a sample and by
+its table, and all samples without key have one hash: with a table for each type, the 33rd instance
+of that hash makes its hash table (hopscotch hashing with 32 slots) double until memory ends.
+
+A copy is never freed, as samples outlive readers, writers and topics.
 """
 
 from __future__ import annotations
@@ -32,8 +36,6 @@ _OPS_OF_TYPE = 8
 _OPS = 17
 
 _lock = threading.Lock()
-#: By the address of the type that points to them; the address may be another type's later.
-_tables: dict[int, Any] = {}
 
 
 class Hook(ABC):
@@ -42,13 +44,13 @@ class Hook(ABC):
     def __init__(self) -> None:
         self.problem = ""
         self._tested = False
-        self._replaced: dict[int, dict[int, Any]] = {}
+        #: Our tables and the functions in them, by the address of the library's table.
+        self._tables: dict[int, tuple[Any, dict[int, Any]]] = {}
 
     def create_topic(self, participant: int, name: str, type_name: str) -> int:
         """Create a topic whose type has functions replaced; see `cyclone.create_topic`."""
-        # Topics whose types look the same to the library share one: nobody may get in between.
         with _lock:
-            topic = cyclone.create_topic(participant, name, type_name)
+            topic = cyclone.create_topic(participant, name, type_name, own_type=True)
             try:
                 sertype = cyclone.sertype(topic)
                 if not self._tested:
@@ -71,7 +73,7 @@ class Hook(ABC):
 
     def function(self, sertype: int, place: int) -> Any:
         """Return what the library calls for a type, by the place in the table."""
-        return _tables[sertype][place]
+        return _table_of(sertype)[place]
 
     @abstractmethod
     def replace(self, originals: Any) -> dict[int, Any]:
@@ -101,21 +103,24 @@ class Hook(ABC):
 
     def _install(self, sertype: int) -> None:
         pointer = c_void_p.from_address(sertype + _OPS_OF_TYPE)
-        table = _tables.get(sertype)
-        if table is not None and pointer.value == ctypes.addressof(table):
-            return
         originals = pointer.value
         assert originals is not None
-        if originals not in self._replaced:
-            self._replaced[originals] = self.replace((c_void_p * _OPS).from_address(originals))
-        # One for each type: otherwise the library would take types for the same that it knows as
-        # two, and remove the wrong one when a topic is deleted.
-        if table is None:
-            table = _tables[sertype] = (c_void_p * _OPS)()
-        ctypes.memmove(table, originals, ctypes.sizeof(table))
-        for place, function in self._replaced[originals].items():
-            table[place] = ctypes.cast(function, c_void_p)
-        pointer.value = ctypes.addressof(table)
+        if any(originals == ctypes.addressof(table) for table, _ in self._tables.values()):
+            return
+        if originals not in self._tables:
+            table = (c_void_p * _OPS).from_buffer_copy(_table_of(sertype))
+            replaced = self.replace(_table_of(sertype))
+            for place, function in replaced.items():
+                table[place] = ctypes.cast(function, c_void_p)
+            self._tables[originals] = table, replaced
+        pointer.value = ctypes.addressof(self._tables[originals][0])
+
+
+def _table_of(sertype: int) -> Any:
+    """Return the table of functions that a type points to."""
+    address = c_void_p.from_address(sertype + _OPS_OF_TYPE).value
+    assert address is not None
+    return (c_void_p * _OPS).from_address(address)
 
 
 def make_sample(sertype: int, data: bytes) -> int:
