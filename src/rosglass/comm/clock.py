@@ -9,13 +9,14 @@ from __future__ import annotations
 import heapq
 import itertools
 import logging
-import math
 import threading
 import time
 from contextlib import suppress
 from enum import Enum
 from typing import TYPE_CHECKING, NamedTuple
 
+from rosglass.comm.complaints import FailureLog
+from rosglass.comm.executor import RetryingExecutor
 from rosglass.comm.listeners import Listeners
 from rosglass.comm.loop import check_plain
 from rosglass.comm.node import Executor, Handle
@@ -31,8 +32,6 @@ __all__ = ["Clock", "ClockChange", "Jump", "Timer"]
 _log = logging.getLogger("rosglass.comm")
 #: Longest pause of the timers' thread in seconds.
 _IDLE = 3600.0
-#: Seconds between two log lines about a callback that fails.
-_LOG_EVERY = 10.0
 
 
 class ClockChange(Enum):
@@ -162,7 +161,7 @@ class Clock(Unique):
             self._put(timer, self._tick() + length.nanoseconds)
             if self._thread is None:
                 self._thread = threading.Thread(
-                    target=self._work, name=f"{self._name} timers", daemon=True
+                    target=self._work, name=f"{self._name} clock", daemon=True
                 )
                 self._thread.start()
             self._changed.notify_all()
@@ -258,7 +257,10 @@ class Clock(Unique):
                 period = timer.period.nanoseconds
                 # Turns that were missed are not made up for.
                 self._put(timer, due + period * max(1, (self._tick() - due) // period + 1))
-            timer.fire()
+            try:
+                timer.fire()
+            except BaseException:  # sys.exit() in one timer's callback must not end all others
+                _log.exception("%s asked to end its thread, which goes on", timer)
 
     def _pause(self) -> float | None:
         if self._simulated or not self._heap:
@@ -295,23 +297,26 @@ class Timer(Handle):
         self, clock: Clock, period: Duration, callback: Callable[[], None], executor: Executor
     ) -> None:
         self.period = period
-        self._clock, self._callback, self._executor = clock, callback, executor
-        self._waiting = threading.Lock()
         self._closed = False
-        self._failed, self._next_failure = 0, -math.inf
+        self._clock, self._callback = clock, callback
+        self._executor = RetryingExecutor(executor, repr(self))
+        self._waiting = False
+        self._failures = FailureLog(_log)
 
     def __repr__(self) -> str:
         return f"<Timer every {self.period.seconds} s{' closed' * self._closed}>"
 
     def fire(self) -> None:
         """Post the callback, unless it is still waiting or running from the last time."""
-        if self._waiting.acquire(blocking=False):
+        if not self._waiting:
+            self._waiting = True
             self._executor.post(self._run)
 
     def close(self) -> None:
         """Call back no more; safe to call twice, from any thread and from the callback."""
         if not self._closed:
             self._closed = True
+            self._executor.close()
             self._clock.forget(self)
 
     def _run(self) -> None:
@@ -319,18 +324,9 @@ class Timer(Handle):
             if not self._closed:
                 self._callback()
         except Exception:
-            self._log_failure()
+            self._failures.exception("the callback of %s failed", self)
         finally:
-            self._waiting.release()
-
-    def _log_failure(self) -> None:
-        """Log what was just caught: a fast timer must not fill the log with it."""
-        self._failed += 1
-        now = time.monotonic()
-        if now >= self._next_failure:
-            self._next_failure = now + _LOG_EVERY
-            often = f", {self._failed} times so far" if self._failed > 1 else ""
-            _log.exception("the callback of %s failed%s", self, often)
+            self._waiting = False
 
 
 def _seconds(what: str, value: object) -> Duration:

@@ -4,22 +4,30 @@ from __future__ import annotations
 
 import logging
 import threading
+from collections import deque
 from queue import SimpleQueue
 from typing import TYPE_CHECKING
 
+from rosglass.comm.complaints import FailureLog
 from rosglass.comm.node import Executor
+from rosglass.comm.timers import Timers
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-__all__ = ["IMMEDIATE", "Dispatcher", "ImmediateExecutor"]
+__all__ = ["IMMEDIATE", "Dispatcher", "ImmediateExecutor", "RetryingExecutor", "run_job"]
 
 _log = logging.getLogger("rosglass.comm")
 #: Seconds that closing waits for a callback that is still running.
 _PATIENCE = 2.0
+#: Seconds until an executor that raised is given its jobs again: the first, and the longest.
+_FIRST_RETRY_S, _LONGEST_RETRY_S = 0.05, 1.0
+#: Gives executors that raised their jobs again; its thread starts with the first of them.
+_retries = Timers("rosglass executor retries")
 
 
-def _run(job: Callable[[], None]) -> None:
+def run_job(job: Callable[[], None]) -> None:
+    """Run `job`, and log an exception that it raises."""
     try:
         job()
     except Exception:
@@ -35,7 +43,7 @@ class ImmediateExecutor(Executor):
 
     def post(self, job: Callable[[], None]) -> None:
         """Run `job` now; an exception it raises is logged."""
-        _run(job)
+        run_job(job)
 
 
 #: The one immediate executor; it has no state.
@@ -95,4 +103,69 @@ class Dispatcher(Executor):
             job = self._jobs.get()
             if job is None or self._closed:
                 return
-            _run(job)
+            try:
+                run_job(job)
+            except BaseException:  # sys.exit() in one callback must not end all others
+                _log.exception("%s: a callback asked to end its thread, which goes on", self._name)
+
+
+class RetryingExecutor(Executor):
+    """Posts jobs to an executor that may raise, as a full queue or a pool that was shut down does.
+
+    What it did not take is posted again, in order, until it takes it: a job may carry a stop
+    command, and must neither be lost nor end the thread that posts it. Jobs must not raise: an
+    executor may run them at once.
+
+    Args:
+        executor: The executor, often the user's own.
+        name: What posts, for the log.
+    """
+
+    def __init__(self, executor: Executor, name: str) -> None:
+        self._executor, self._name = executor, name
+        self._lock = threading.Lock()
+        self._refused: deque[Callable[[], None]] = deque()
+        self._closed = False
+        self._failures = FailureLog(_log)
+
+    def post(self, job: Callable[[], None]) -> None:
+        """Run `job` on the executor soon; logs, and never raises."""
+        if not self._refused:
+            try:
+                self._executor.post(job)
+            except Exception:
+                self._log_failure()
+            else:
+                return
+        with self._lock:
+            self._refused.append(job)
+            first = len(self._refused) == 1
+        if first:
+            self._retry_after(_FIRST_RETRY_S)
+
+    def close(self) -> None:
+        """Forget the jobs that were not taken; safe to call twice."""
+        self._closed = True
+
+    def _retry_after(self, delay_s: float) -> None:
+        _retries.after(delay_s, lambda: self._retry(delay_s))
+
+    def _retry(self, delay_s: float) -> None:
+        while not self._closed:
+            try:
+                self._executor.post(self._refused[0])
+            except Exception:
+                self._log_failure()
+                self._retry_after(min(2 * delay_s, _LONGEST_RETRY_S))
+                return
+            with self._lock:
+                del self._refused[0]
+                if not self._refused:
+                    return
+
+    def _log_failure(self) -> None:
+        self._failures.exception(
+            "%s: the executor %r raised instead of taking a callback, which it is given again",
+            self._name,
+            self._executor,
+        )

@@ -73,7 +73,10 @@ class GoalRunner:
     def start(self, goal: Runnable) -> None:
         """Execute a goal, soon."""
         if self._executor is not None:
-            self._executor.post(lambda: self._run(goal))
+            try:
+                self._executor.post(lambda: self._run(goal))
+            except Exception as error:
+                self._not_started(goal, error)
             return
         thread = threading.Thread(
             target=self._run_in_thread,
@@ -86,9 +89,7 @@ class GoalRunner:
                 thread.start()
                 self._threads.add(thread)
         except RuntimeError as error:
-            self._log.error("%s: aborting goal %s: %s", self._name, goal.id_text, error)
-            goal.fail(error)
-            self._ended()
+            self._not_started(goal, error)
 
     def close(self) -> None:
         """Take note that goals end because their server closes."""
@@ -103,6 +104,13 @@ class GoalRunner:
             thread.join(max(0.0, until - time.monotonic()))
             if thread.is_alive():
                 self._log.warning("%s still runs %.0f s after closing", thread.name, _PATIENCE)
+
+    def _not_started(self, goal: Runnable, error: Exception) -> None:
+        self._log.error(
+            "%s: aborting goal %s, which cannot be executed: %r", self._name, goal.id_text, error
+        )
+        goal.fail(error)
+        self._ended()
 
     def _run_in_thread(self, goal: Runnable) -> None:
         try:

@@ -71,6 +71,18 @@ class GoalServer(ActionServer):
         """Whether :meth:`close` was called."""
         return self._closed
 
+    def _decide_later(self, decide: Callable[[], None]) -> bool:
+        """Have a callback of the user's decide; returns whether its executor takes that."""
+        try:
+            self._decider.post(decide)
+        except Exception:
+            self._log.exception(
+                "%s: the executor of accept and cancel raised: goals are rejected, and cancelled",
+                self.name,
+            )
+            return False
+        return True
+
     def _accepts(self, goal: Message, id_text: str) -> bool:
         """Return whether a goal is accepted, which is asked for on the decider."""
         assert self._accept is not None

@@ -14,7 +14,8 @@ from contextlib import suppress
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm.executor import IMMEDIATE
+from rosglass.comm.complaints import FailureLog
+from rosglass.comm.executor import IMMEDIATE, RetryingExecutor
 from rosglass.comm.qos import History
 from rosglass.comm.statistics import MARK_PERIOD, Meter
 from rosglass.errors import ConversionError
@@ -36,7 +37,7 @@ _log = logging.getLogger("rosglass.comm")
 INBOX_LIMIT = 256 * 1024 * 1024
 #: Bytes that a waiting sample takes up besides its data, about.
 _SAMPLE_SIZE = 500
-#: Seconds between two log lines about a consumer that is too slow, or one that fails.
+#: Seconds between two log lines about a consumer that is too slow.
 _LOG_EVERY = 10.0
 _data, _kind = itemgetter(0), itemgetter(2)
 #: Samples that are made ready for a callback at once.
@@ -70,7 +71,8 @@ class Inbox:
     ) -> None:
         keep_all = qos.history is History.KEEP_ALL
         self._topic = topic
-        self._executor, self._call, self._call_decoded = executor, call, call_decoded
+        self._executor = RetryingExecutor(executor, topic)
+        self._call, self._call_decoded = call, call_decoded
         self._depth = -1 if keep_all else qos.depth
         self._limit: int | None = INBOX_LIMIT if keep_all else None
         self._samples: deque[Sample] = deque(maxlen=None if keep_all else qos.depth)
@@ -80,7 +82,7 @@ class Inbox:
         self._at_once = 1
         self._held = self._received = self._bytes = self._dropped = 0
         self._last = self._next_mark = self._next_log = -math.inf
-        self._failed, self._next_failure = 0, -math.inf
+        self._failures = FailureLog(_log)
         self._meter = Meter()
 
     @property
@@ -228,6 +230,7 @@ class Inbox:
             self._closed = True
             self._samples.clear()
             waiters, self._waiters = self._waiters, []
+        self._executor.close()
         for wake in waiters:
             wake()
         return True
@@ -265,27 +268,29 @@ class Inbox:
     def _call_soon(self) -> None:
         """Call back for what waits now; others have their turn before what comes meanwhile."""
         left, end = len(self._samples), time.monotonic() + _TURN
-        while left > 0 and (part := self._take(min(left, self._at_once))):
-            left -= len(part)
-            begun = time.monotonic()
-            call, given = self._prepare(part)
-            for one in given:
-                if self._closed:
+        try:
+            while left > 0 and (part := self._take(min(left, self._at_once))):
+                left -= len(part)
+                begun = time.monotonic()
+                call, given = self._prepare(part)
+                for one in given:
+                    if self._closed:
+                        break
+                    try:
+                        call(one)
+                    except Exception:
+                        self._log_failure()
+                now = time.monotonic()
+                # What a slow callback has not begun with stays where newer samples take its place.
+                slow = (now - begun) * _BATCH > len(part) * _TURN
+                self._at_once = 1 if slow else _BATCH
+                if now >= end:
                     break
-                try:
-                    call(one)
-                except Exception:
-                    self._log_failure()
-            now = time.monotonic()
-            # What a slow callback has not begun with stays where newer samples take its place.
-            slow = (now - begun) * _BATCH > len(part) * _TURN
-            self._at_once = 1 if slow else _BATCH
-            if now >= end:
-                break
-        with self._lock:
-            self._calling = again = bool(self._samples)
-        if again:
-            self._executor.post(self._call_soon)
+        finally:  # what a callback that calls sys.exit() leaves is called back with, too
+            with self._lock:
+                self._calling = again = bool(self._samples)
+            if again:
+                self._executor.post(self._call_soon)
 
     def _take(self, most: int) -> list[Sample]:
         """Take some of the oldest samples out."""
@@ -309,13 +314,7 @@ class Inbox:
         return self._call, samples
 
     def _log_failure(self) -> None:
-        """Log what was just caught: a peer that sends rubbish must not fill the log with it."""
-        self._failed += 1
-        now = time.monotonic()
-        if now >= self._next_failure:
-            self._next_failure = now + _LOG_EVERY
-            often = f", {self._failed} times so far" if self._failed > 1 else ""
-            _log.exception("callback of subscription %s failed%s", self._topic, often)
+        self._failures.exception("callback of subscription %s failed", self._topic)
 
 
 class ImmediateInbox(Inbox):

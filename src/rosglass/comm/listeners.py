@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING, Generic, TypeVar
 
+from rosglass.comm.executor import RetryingExecutor, run_job
 from rosglass.comm.loop import check_plain
 from rosglass.comm.node import Executor, Handle
 from rosglass.errors import ConversionError
@@ -44,7 +45,7 @@ class Listeners(Generic[_T]):
         check_plain(callback, self._where)
         if not isinstance(executor, Executor):
             raise ConversionError("executor", executor, "a rosglass.comm.Executor", self._where)
-        listener = Listener(self, callback, executor, self._depth)
+        listener = Listener(self, callback, executor, self._depth, self._where)
         with self._lock:
             self._listeners.append(listener)
         return listener
@@ -65,7 +66,7 @@ class Listeners(Generic[_T]):
         with self._lock:
             told, self._listeners = self._listeners, []
         for listener in told:
-            listener.closed = True
+            listener.close()
 
     def remove(self, listener: Listener[_T]) -> None:
         """Forget a listener; for listeners that are closed."""
@@ -87,8 +88,10 @@ class Listener(Handle, Generic[_T]):
         callback: Callable[[_T], None],
         executor: Executor,
         depth: int | None,
+        where: str,
     ) -> None:
-        self._owner, self._callback, self._executor = owner, callback, executor
+        self._owner, self._callback = owner, callback
+        self._executor = RetryingExecutor(executor, where or getattr(callback, "__qualname__", ""))
         self._depth = depth
         self._lock = threading.Lock()
         self._waiting: list[_T] = []
@@ -109,9 +112,10 @@ class Listener(Handle, Generic[_T]):
         with self._lock:
             value = self._waiting.pop(0)
         if not self.closed:
-            self._callback(value)
+            run_job(lambda: self._callback(value))
 
     def close(self) -> None:
         """Call back no more; safe to call twice."""
         self.closed = True
+        self._executor.close()
         self._owner.remove(self)

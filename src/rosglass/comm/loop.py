@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import logging
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.node import Executor
@@ -16,19 +15,16 @@ if TYPE_CHECKING:
 
 __all__ = ["LoopExecutor", "check_plain", "executor_for", "is_coroutine_function"]
 
-_log = logging.getLogger("rosglass.comm")
-
 
 class LoopExecutor(Executor):
     """Runs callbacks in an asyncio event loop, and coroutines.
 
     Args:
-        loop: The loop; callbacks that come after its end are dropped, with one warning.
+        loop: The loop.
     """
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self._loop = loop
-        self._told = False
 
     @classmethod
     def running(cls, callback: object, where: str) -> LoopExecutor:
@@ -61,13 +57,8 @@ class LoopExecutor(Executor):
             return False
 
     def post(self, job: Callable[[], None]) -> None:
-        """Run `job` in the loop soon."""
-        try:
-            self._loop.call_soon_threadsafe(job)
-        except RuntimeError:
-            if not self._told:
-                self._told = True
-                _log.warning("the event loop of callbacks is closed: they are not called any more")
+        """Run `job` in the loop soon; raises RuntimeError when the loop is closed."""
+        self._loop.call_soon_threadsafe(job)
 
     def run(self, coroutine: Coroutine[Any, Any, Any]) -> Future[Any]:
         """Run a coroutine in the loop; the future has what it returns."""

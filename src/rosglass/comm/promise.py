@@ -8,6 +8,7 @@ from concurrent.futures import CancelledError, Future, InvalidStateError
 from concurrent.futures import TimeoutError as _NotYet
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from rosglass.comm.executor import RetryingExecutor, run_job
 from rosglass.comm.receiving import check_may_wait
 from rosglass.errors import ConversionError, TimeoutError  # noqa: A004 - the field's own word
 
@@ -97,7 +98,8 @@ class Promise(Future[_T]):
         if chosen is None:
             self.add_done_callback(callback)
         else:
-            self.add_done_callback(lambda _: chosen.post(lambda: callback(self)))
+            poster = RetryingExecutor(chosen, "on_done")
+            self.add_done_callback(lambda _: poster.post(lambda: run_job(lambda: callback(self))))
 
     def fulfil(self, value: _T) -> bool:
         """Let it come, unless it is done already; returns whether. For worlds."""

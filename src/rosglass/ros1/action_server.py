@@ -265,7 +265,8 @@ class Ros1ActionServer(GoalServer, Member):
             self._take(entry, True)
         else:
             self.publish_status()
-            self._decider.post(lambda: self._decide(entry))
+            if not self._decide_later(lambda: self._decide(entry)):
+                self._refuse(entry, "It cannot be decided on")
 
     def _decide(self, entry: GoalEntry) -> None:
         self._take(entry, self._accepts(entry.asked, entry.id))
@@ -360,7 +361,9 @@ class Ros1ActionServer(GoalServer, Member):
             allowed = [one for one in chosen if one.goal is None or self._allows(one.goal)]
             self._cancel_all(allowed)
 
-        self._decider.post(decide)
+        # What cannot be asked must not hold up a stop.
+        if not self._decide_later(decide):
+            self._cancel_all(chosen)
 
     def _cancel_all(self, entries: Sequence[GoalEntry]) -> None:
         waiting = []

@@ -207,8 +207,8 @@ class Ros2ActionServer(GoalServer, Member):
         if self._accept is None:
             # Once the answer is waited for: it must be on its way before the goal starts.
             self._desk.post(lambda: self._take(goal_id, request.goal, answer, True))
-        else:
-            self._decider.post(lambda: self._decide(goal_id, request.goal, answer))
+        elif not self._decide_later(lambda: self._decide(goal_id, request.goal, answer)):
+            self._take(goal_id, request.goal, answer, False)
         return answer
 
     def _decide(self, goal_id: bytes, goal: Message, answer: Future[Any]) -> None:
@@ -247,8 +247,8 @@ class Ros2ActionServer(GoalServer, Member):
             rejected = _REJECTED if not allowed else code
             self._desk.post(lambda: answer.set_result(self._cancel_all(allowed, rejected)))
 
-        self._decider.post(decide)
-        return answer
+        # What cannot be asked must not hold up a stop.
+        return answer if self._decide_later(decide) else self._cancel_all(chosen, code)
 
     def _cancel_all(self, goals: Sequence[Ros2ServerGoal], code: int) -> dict[str, Any]:
         """Cancel goals; returns the answer to the request."""

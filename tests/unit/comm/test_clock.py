@@ -211,11 +211,11 @@ def test_other_bad_arguments_are_refused(clock: Clock) -> None:
 def test_closing_ends_timers_and_their_thread() -> None:
     clock = Clock("closed", IMMEDIATE)
     clock.create_timer(100, lambda: None)
-    before = [t.name for t in threading.enumerate() if t.name == "closed timers"]
+    before = [t.name for t in threading.enumerate() if t.name == "closed clock"]
     clock.close()
     clock.close()
     assert before
-    assert not [t for t in threading.enumerate() if t.name == "closed timers"]
+    assert not [t for t in threading.enumerate() if t.name == "closed clock"]
     with pytest.raises(NodeClosedError):
         clock.create_timer(1, lambda: None)
     with pytest.raises(NodeClosedError):

@@ -10,7 +10,7 @@ import threading
 import pytest
 
 import rosglass
-from rosglass.comm import IMMEDIATE, Dispatcher, GoalStatus, QoS, Time
+from rosglass.comm import IMMEDIATE, Dispatcher, Executor, GoalStatus, QoS, Time
 from rosglass.errors import (
     ConnectionLostError,
     ConversionError,
@@ -602,6 +602,49 @@ def test_who_decides_on_cancelling(answer, allowed, offer, eventually):
     eventually(lambda: "marker" in hand.listed)
     assert hand.listed["a"] == "ACTIVE"
     assert not goal.is_cancel_requested
+
+
+class Failing(Executor):
+    """Runs each job on a thread of its own, until it fails."""
+
+    failing = False
+
+    def post(self, job):
+        if self.failing:
+            raise RuntimeError("cannot schedule new futures after shutdown")
+        threading.Thread(target=job, daemon=True).start()
+
+
+def test_a_stop_is_taken_although_the_executor_raises(offer, eventually, caplog):
+    executor = Failing()
+    server, hand = offer(
+        until_stopped, accept=lambda _: True, cancel=lambda _: False, executor=executor
+    )
+    hand.send("a")
+    eventually(lambda: server.goals)
+    executor.failing = True
+    hand.stop("a")
+    eventually(lambda: "a" in hand.results)
+    assert hand.results["a"] == [("PREEMPTED", "", 3)]
+    hand.send("b")
+    eventually(lambda: "b" in hand.results)
+    assert hand.results["b"][0][:2] == ("REJECTED", "It cannot be decided on")
+    assert "the executor of accept and cancel raised" in caplog.text
+
+
+@pytest.mark.parametrize("simple", [False, True])
+def test_goals_that_the_executor_does_not_take_end_at_once(simple, offer, eventually):
+    executor = Failing()
+    executor.failing = True
+    _, hand = offer(lambda _: {"result": 3}, executor=executor, simple=simple)
+    hand.send("a")
+    eventually(lambda: "a" in hand.results)
+    executor.failing = False
+    hand.send("b")
+    eventually(lambda: "b" in hand.results)
+    # With `simple`, it is pending until it is executed, and actionlib rejects what is.
+    ended = ["REJECTED" if simple else "ABORTED", "SUCCEEDED"]
+    assert [hand.results[one][0][0] for one in "ab"] == ended
 
 
 @pytest.mark.parametrize(

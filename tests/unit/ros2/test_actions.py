@@ -16,6 +16,7 @@ from rosglass.comm import (
     ConnectionState,
     Dispatcher,
     EndpointKind,
+    Executor,
     GoalStatus,
     Time,
 )
@@ -986,6 +987,49 @@ def test_a_goal_is_accepted_by_true_alone(client, robot, decision, told, caplog)
     with pytest.raises(rosglass.GoalRejectedError):
         client.send_goal().result(30)
     assert told in caplog.text
+
+
+class Failing(Executor):
+    """Runs each job on a thread of its own, until it fails."""
+
+    failing = False
+
+    def post(self, job):
+        if self.failing:
+            raise RuntimeError("cannot schedule new futures after shutdown")
+        threading.Thread(target=job, daemon=True).start()
+
+
+def test_a_stop_is_taken_although_the_executor_raises(client, robot, caplog):
+    executor = Failing()
+    robot.create_action_server(
+        "/fib",
+        FIB,
+        fibonacci,
+        accept=lambda _: True,
+        cancel=lambda _: False,
+        executor=executor,
+    )
+    goal = client.send_goal({"order": 99})
+    assert goal.acceptance.result(30)
+    executor.failing = True
+    assert goal.cancel().result(30).accepted == (goal.id,)
+    assert goal.result(30).status is CANCELED
+    with pytest.raises(rosglass.GoalRejectedError):
+        client.send_goal({"order": 3}).result(30)
+    executor.failing = False
+    assert client.send_goal({"order": 3}).result(30).status is SUCCEEDED
+    assert "the executor of accept and cancel raised" in caplog.text
+
+
+def test_a_goal_that_the_executor_does_not_take_is_aborted(client, robot, caplog):
+    executor = Failing()
+    executor.failing = True
+    robot.create_action_server("/fib", FIB, fibonacci, executor=executor)
+    assert client.send_goal({"order": 3}).result(30).status is ABORTED
+    executor.failing = False
+    assert client.send_goal({"order": 3}).result(30).status is SUCCEEDED
+    assert "which cannot be executed: RuntimeError" in caplog.text
 
 
 def test_a_stop_is_taken_although_callbacks_hold_up_the_dispatcher(client, robot, server):

@@ -1,0 +1,212 @@
+"""Executors whose post() raises: what they are given is not lost, and nobody else suffers."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import queue
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from rosglass import QoS
+from rosglass.comm import IMMEDIATE, Clock, Dispatcher, History, Sample, Subscription
+from rosglass.comm.executor import RetryingExecutor
+from rosglass.comm.goal_runner import GoalRunner
+from rosglass.comm.listeners import Listeners
+from rosglass.comm.loop import LoopExecutor
+from rosglass.comm.node import Executor
+from rosglass.comm.promise import Promise
+
+LIMIT = 60
+
+
+class Refusing(Executor):
+    """Raises the first `times` times, as a full queue does; runs the others at once."""
+
+    def __init__(self, times):
+        self.left = times
+
+    def post(self, job):
+        if self.left > 0:
+            self.left -= 1
+            raise queue.Full
+        job()
+
+
+def sample(number):
+    return Sample(b"x", "cdr", None, 1, 1, b"p", number)
+
+
+def receive(executor, qos):
+    """Return a subscription, the numbers of what its callback received, and their semaphore."""
+    seen, came = [], threading.Semaphore(0)
+
+    def callback(given):
+        seen.append(given.sequence)
+        came.release()
+
+    return Subscription("/cmd_vel", None, qos, executor, raw_callback=callback), seen, came
+
+
+@pytest.mark.parametrize("many", [False, True])
+@pytest.mark.parametrize("times", [1, 3])
+def test_a_subscription_goes_on_and_the_message_that_was_refused_comes(times, many, caplog):
+    keep_all = QoS(history=History.KEEP_ALL)
+    sub, seen, came = receive(Refusing(times), keep_all)
+    if many:
+        sub.deliver_many([sample(1), sample(2)])
+    else:
+        sub.deliver(sample(1))  # a stop command after which nothing else comes
+    assert came.acquire(timeout=LIMIT)
+    for number in (3, 4):
+        sub.deliver(sample(number))
+    for _ in range(2 + many):
+        assert came.acquire(timeout=LIMIT)
+    assert seen == ([1, 2, 3, 4] if many else [1, 3, 4])
+    assert "/cmd_vel: the executor" in caplog.text
+    assert "queue.Full" in caplog.text
+
+
+def test_a_pool_that_was_shut_down_fills_neither_the_log_nor_memory(caplog):
+    class Pool(Executor):
+        def __init__(self):
+            self.pool = ThreadPoolExecutor()
+
+        def post(self, job):
+            self.pool.submit(job)
+
+    executor = Pool()
+    sub, _, _ = receive(executor, QoS(depth=5))
+    executor.pool.shutdown()
+    for number in range(1000):
+        sub.deliver(sample(number))
+    assert (sub.waiting, sub.statistics().dropped) == (5, 995)
+    assert len([one for one in caplog.records if one.levelno >= logging.ERROR]) == 1
+    executor.pool = ThreadPoolExecutor()
+    sub.close()
+
+
+def test_sys_exit_in_a_callback_ends_neither_its_subscription_nor_the_dispatcher(caplog):
+    dispatcher, came = Dispatcher("test"), threading.Semaphore(0)
+
+    def callback(given):
+        came.release()
+        if given.sequence == 1:
+            raise SystemExit
+
+    sub = Subscription("/t", None, QoS(), dispatcher, raw_callback=callback)
+    for number in (1, 2, 3):
+        sub.deliver(sample(number))
+        assert came.acquire(timeout=LIMIT)
+    dispatcher.close()
+    assert "SystemExit" in caplog.text
+
+
+@pytest.mark.parametrize("kind", ["refuses", "exits"])
+def test_one_timer_that_fails_stops_neither_itself_nor_the_others(kind, caplog):
+    clock = Clock("tester", IMMEDIATE)
+    calls = {"good": threading.Semaphore(0), "bad": threading.Semaphore(0)}
+
+    def bad():
+        calls["bad"].release()
+        if kind == "exits":
+            raise SystemExit
+
+    clock.create_timer(0.01, bad, Refusing(3) if kind == "refuses" else IMMEDIATE)
+    clock.create_timer(0.01, calls["good"].release)
+    for _ in range(10):
+        assert calls["good"].acquire(timeout=LIMIT)
+        assert calls["bad"].acquire(timeout=LIMIT)
+    clock.close()
+    assert "Timer every 0.01 s" in caplog.text
+
+
+@pytest.mark.parametrize("merge", [False, True])
+def test_every_listener_is_told_although_one_executor_raises(merge, caplog):
+    listeners, seen, other, came = Listeners(merge=merge, where="/t"), [], [], threading.Event()
+
+    def last(value):
+        seen.append(value)
+        if value == "lost":
+            came.set()
+
+    listeners.add(last, Refusing(2))
+    listeners.add(other.append, IMMEDIATE)
+    for value in ("connecting", "connected", "lost"):
+        listeners.notify(value)
+    assert other == ["connecting", "connected", "lost"]
+    assert came.wait(LIMIT)
+    assert seen == (["lost"] if merge else ["connecting", "connected", "lost"])
+    assert "/t: the executor" in caplog.text
+
+
+def test_a_listener_whose_callback_fails_is_called_once(caplog):
+    class Bare(Executor):
+        def post(self, job):
+            job()
+
+    listeners, calls = Listeners(), []
+
+    def fail(value):
+        calls.append(value)
+        raise ValueError("mine")
+
+    listeners.add(fail, Bare())
+    listeners.notify(1)
+    listeners.notify(2)
+    assert calls == [1, 2]
+    assert "mine" in caplog.text
+
+
+def test_a_promise_calls_back_although_its_executor_raised_at_first():
+    promise, came = Promise(cancellable=True), threading.Event()
+    promise.on_done(lambda _: came.set(), Refusing(2))
+    promise.fulfil(1)
+    assert came.wait(LIMIT)
+
+
+class Goal:
+    """What a GoalRunner asks of a goal."""
+
+    id_text = "7"
+
+    def __init__(self):
+        self.error = None
+
+    def fail(self, error):
+        self.error = error
+
+
+@pytest.mark.parametrize("kind", ["refuses", "closed loop"])
+def test_a_goal_that_no_executor_takes_is_aborted_and_the_next_one_has_its_turn(kind, caplog):
+    loop = asyncio.new_event_loop()
+    loop.close()
+    executor = Refusing(1) if kind == "refuses" else LoopExecutor(loop)
+    goal, over = Goal(), []
+    log = logging.getLogger("rosglass")
+    GoalRunner("/dock", print, executor, log, lambda: over.append(1)).start(goal)
+    assert isinstance(goal.error, queue.Full if kind == "refuses" else RuntimeError)
+    assert over == [1]
+    assert "aborting goal 7" in caplog.text
+
+
+def test_jobs_that_were_refused_keep_their_order_and_are_forgotten_at_the_end():
+    seen, came = [], threading.Event()
+    executor = RetryingExecutor(Refusing(4), "test")
+    for number in range(5):
+        executor.post(lambda number=number: seen.append(number))
+    executor.post(came.set)
+    assert came.wait(LIMIT)
+    assert seen == [0, 1, 2, 3, 4]
+    never = Refusing(10**9)
+    executor = RetryingExecutor(never, "test")
+    executor.post(seen.clear)
+    executor.close()
+    asked = threading.Event()  # behind it, on the same thread
+    other = RetryingExecutor(Refusing(6), "test")
+    other.post(asked.set)
+    assert asked.wait(LIMIT)
+    assert 10**9 - never.left <= 2
+    assert seen
