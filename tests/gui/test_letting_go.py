@@ -127,9 +127,8 @@ def test_a_question_on_its_way_holds_nothing_up(bench: Bench, wait: Any) -> None
     """The client is closed, and not by the GUI thread, which would wait for the question."""
     client = SlowClient()
     node: Any = Node(client)
-    link = ParameterLink.join(bench.session, node, "/arm", "it", lambda *_: None)
-    link.read("speed", lambda _: None)
-    wait(client.asked.is_set)
+    link = ParameterLink.join(bench.session, node, "/arm", "it", "speed", print)
+    wait(lambda: link.on_tick() or client.asked.is_set())
     link.leave("it")
     assert client.closed_in is None
     client.go.set()

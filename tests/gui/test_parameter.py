@@ -24,6 +24,7 @@ QML = """
                     p.maximum, p.problem].join()
         }
         function set(value) { p.value = value }
+        function ask(node) { p.nodeName = node }
     }
 """
 
@@ -89,14 +90,39 @@ def test_setting_too_early_is_told(bench: Any, caplog: Any) -> None:
     assert "nothing was set" in caplog.text
 
 
+def test_it_is_ready_only_with_a_value(live: Bench, wait: Any) -> None:
+    # ROS 1's parameters outlive their node, and with it the test.
+    root: Any = live.load(QML.replace('"speed"', '"gain"'))
+    wait(lambda: "/robot has no parameter 'gain'" in root.info())
+    assert root.info().startswith("false,false")
+    live.robot.parameters.declare("gain", 1.5)
+    wait(lambda: root.info().startswith("true,false") and root.shown() == "1.5")
+    live.robot.parameters.undeclare("gain")
+    wait(lambda: root.info().startswith("false,false"))
+    assert root.shown() in {None, "", "undefined"}
+    wait(lambda: "/robot has no parameter 'gain'" in root.info())
+
+
+def test_a_wrong_name_of_the_node_is_named(live: Bench, wait: Any) -> None:
+    live.robot.parameters.declare("speed", 1.5)
+    # In ROS 1, a node that neither publishes nor serves anything is not in the graph.
+    live.robot.create_publisher("/scan", "sensor_msgs/LaserScan")
+    root: Any = live.load(QML.replace("/robot", "/robto"))
+    wait(lambda: "/robto" in root.info() and "did you mean /robot?" in root.info())
+    assert root.info().startswith("false,false")
+    root.ask("/robot")
+    wait(lambda: root.info().startswith("true") and root.info().endswith(","))
+
+
 @ROS2
 def test_what_is_wrong_stays_said(ros2: Bench, wait: Any) -> None:
     root: Any = ros2.load(QML.replace('"speed"', '"sped"'))
-    wait(lambda: "has no 'sped'" in root.info())
+    wait(lambda: "/robot has no parameter 'sped'; did you mean speed?" in root.info())
     ticks: list[None] = []
     ros2.session.tick.connect(lambda: ticks.append(None))
     wait(lambda: len(ticks) > 3)
-    assert "has no 'sped'" in root.info()
+    assert "has no parameter 'sped'" in root.info()
+    assert root.info().startswith("false,false")
     ros2.robot.parameters.declare("sped", 2)
     wait(lambda: root.info().endswith(","))
     assert root.shown() == "2"
@@ -137,9 +163,7 @@ def test_a_change_that_went_unheard_is_found(ros2: Bench, wait: Any, monkeypatch
     """The first moments after a node appears, its changes may be heard of by nobody."""
     from rosglass.qml.parameter_link import ParameterLink
 
-    monkeypatch.setattr(ParameterLink, "_changed", lambda link, event: None)
-    # The change comes before it is asked again, however slow this machine is.
-    monkeypatch.setattr("rosglass.qml.parameter.RETRY", 3000)
+    monkeypatch.setattr(ParameterLink, "_on_event", lambda link, event: None)
     root: Any = ros2.load(QML)
     wait(lambda: root.shown() == "1.5")
     ros2.robot.parameters.set({"speed": 0.25})

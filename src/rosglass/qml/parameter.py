@@ -4,12 +4,10 @@
 from __future__ import annotations
 
 import logging
-import math
-import time
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import ConversionError, Error
-from rosglass.qml.element import RETRY, Element
+from rosglass.qml.element import Element
 from rosglass.qml.log import log_from_qml
 from rosglass.qml.plain import plain_from_js
 from rosglass.qml.to_js import exact
@@ -18,7 +16,7 @@ from rosglass.qt import Property, QJSValue, Signal, Slot, is_alive
 if TYPE_CHECKING:
     from rosglass.comm.node import Node
     from rosglass.comm.parameters import ParameterDescriptor
-    from rosglass.qml.parameter_link import ParameterLink
+    from rosglass.qml.parameter_link import ParameterLink, Reading
     from rosglass.qml.runtime import Runtime
     from rosglass.qt import QtCore
 
@@ -46,12 +44,8 @@ class Parameter(Element):
         self._value: Any = None
         self._descriptor: ParameterDescriptor | None = None
         self._ready, self._writes = False, 0
-        #: Why there is no value although the node is there.
+        #: Why the node gives no value.
         self._missing = ""
-        #: When the node may be asked, monotonic; infinite while it is.
-        self._ask_at = 0.0
-        #: Whether it was asked again: changes of the first moments may have gone unheard.
-        self._checked = False
         self._link: ParameterLink | None = None
         self._have: tuple[Node, str, str] | None = None
 
@@ -101,7 +95,9 @@ class Parameter(Element):
                 # Whoever showed the wish already has to show the truth again.
                 self.valueChanged.emit()
             elif link is self._link:
-                self._take(self._name, wanted)
+                self._set_shown(wanted)
+                # The node may have made something else of it.
+                link.read_soon()
 
         link.write(have[2], wanted, done)
 
@@ -155,7 +151,9 @@ class Parameter(Element):
             return
         from rosglass.qml.parameter_link import ParameterLink as Link  # noqa: PLC0415 - few need it
 
-        link = self._link = Link.join(self._session, want[0], want[1], self, self._take)
+        link = self._link = Link.join(
+            self._session, want[0], want[1], self, self._name, self._on_reading
+        )
         self._at_end["link"] = lambda: link.leave(self)
         self._on_tick()
 
@@ -164,57 +162,56 @@ class Parameter(Element):
         self._at_end.pop("link", None)
         if link is not None:
             link.leave(self)
-        self._missing, self._ask_at = "", 0.0
+        self._missing = ""
         self._set_ready(False)
         if self._writes:
-            # Nobody will say what became of them.
+            # Their replies will never arrive.
             self._writes = 0
             self.pendingChanged.emit()
-        if self._value is not None:
-            self._value = None
-            self.valueChanged.emit()
+        self._set_shown(None)
+
+    @Slot()
+    def _on_graph(self) -> None:
+        if self._link is not None:
+            self._link.on_graph()
 
     @Slot()
     def _on_tick(self) -> None:
         link = self._link
         if link is None:
             return
+        link.on_tick()
         self._say(link.problem or self._missing)
-        if not link.ready:
+        if link.problem or not link.ready:
             self._set_ready(False)
-        elif not (self._ready and self._checked) and time.monotonic() >= self._ask_at:
-            # A node that came back may have other values than before.
-            self._read(link)
 
     def _set_ready(self, ready: bool) -> None:
         if ready != self._ready:
-            self._ready, self._checked = ready, False
+            self._ready = ready
             self.readyChanged.emit()
 
-    def _read(self, link: ParameterLink) -> None:
-        def done(result: tuple[Any, ParameterDescriptor] | Error) -> None:
-            if not is_alive(self) or link is not self._link:
-                return
-            self._ask_at = time.monotonic() + RETRY / 1000
-            if isinstance(result, Error):
-                self._missing = f"Parameter {self._name!r}: {result}"
-                self._say(self._missing)
-                return
-            self._checked = self._ready
-            value, self._descriptor = result
-            self._missing = "" if value is not None else f"{self._node_name} has no {self._name!r}"
-            self._say(self._missing)
+    def _on_reading(self, reading: Reading) -> None:
+        link = self._link
+        if not is_alive(self) or link is None:
+            return
+        self._missing = reading.problem and f"Parameter {self._name!r}: {reading.problem}"
+        self._say(link.problem or self._missing)
+        described = reading.descriptor != self._descriptor
+        if described:
+            # The range comes before the value: a slider would clamp it to the old one.
+            self._descriptor = reading.descriptor
             self.descriptionChanged.emit()
-            self._take(self._name, value)
-            if is_alive(self) and link is self._link:
-                self._set_ready(link.ready)
+        self._set_shown(reading.value, again=described)
+        # Handlers may have changed which parameter this is.
+        if is_alive(self) and link is self._link:
+            self._set_ready(reading.value is not None and link.ready)
 
-        self._ask_at = math.inf
-        link.read(self._name, done)
-
-    def _take(self, name: str, value: Any) -> None:
-        if is_alive(self) and name == self._name and value != self._value:
-            self._value, self._missing = value, ""
+    def _set_shown(self, value: Any, again: bool = False) -> None:
+        """Show a value; announce it even if it is the same `again`."""
+        if is_alive(self) and (
+            again or value != self._value or type(value) is not type(self._value)
+        ):
+            self._value = value
             self.valueChanged.emit()
 
     def _problem_changed(self) -> None:
