@@ -27,6 +27,8 @@ _log = logging.getLogger("rosglass.bags")
 _NS = 1_000_000_000
 #: Longest sleep in seconds.
 _NAP = 0.5
+#: Seconds that a lap of a loop lasts at least, however short the recording is.
+_SHORTEST_LAP_S = 0.1
 #: Seconds that closing waits for the player's thread.
 _PATIENCE = 5.0
 #: Undecodable messages that are logged for each topic.
@@ -75,7 +77,8 @@ class Player(Handle):
         exclude: Regular expression; topics whose whole name matches are left out.
         remap: New names of topics.
         rate: How fast time passes: 2 is twice as fast.
-        loop: Whether to begin again at the end.
+        loop: Whether to begin again at the end. A lap lasts as long as what was selected, whenever
+            its last message comes, and 0.1 s at least.
         clock: Publish ``/clock`` so many times a second, so that nodes with ``use_sim_time``
             follow the recording; 0 for not at all. A recorded ``/clock`` is left out then.
         start: Seconds into the recording at which to begin.
@@ -124,6 +127,8 @@ class Player(Handle):
         self._rate, self._loop = float(rate), loop
         self._begin = bag.start + int(start * _NS)
         self._end = None if duration is None else self._begin + int(duration * _NS)
+        #: Where what was selected ends.
+        self._last = bag.end if self._end is None else min(self._end, bag.end)
         self._delay, self._hold, self._context = delay, hold, int(context * _NS)
         self.problems: dict[str, str] = {}
         self.played = PlayedTime()
@@ -353,15 +358,18 @@ class Player(Handle):
 
     def _pass(self, start: int) -> int | None:
         """Play from a place to the end; returns where to go on if there was a seek."""
+        again_at = time.monotonic() + _SHORTEST_LAP_S
         for message in self._bag.messages(self.channels, start, self._end):
             if not self._wait_for(message.time):
                 return self._take_target()
             self._publish(message)
+        if self._loop and not self._wait_for_lap(again_at):
+            return self._take_target()
         with self._lock:
             holds = self._hold and not self._loop
             if holds and self._target is None and not self._closed:
                 self._paused = True
-                self._position = self._bag.end if self._end is None else self._end
+                self._position = self._last
                 self._set_anchor(self._position)
         if holds and self._clock:
             self._tell_time()
@@ -374,7 +382,15 @@ class Player(Handle):
                 self._target = self._begin
         return self._take_target()
 
-    def _wait_for(self, moment: int) -> bool:
+    def _wait_for_lap(self, again_at: float) -> bool:
+        """Wait until the next lap is due; returns False when something else is to be done."""
+        if not self._wait_for(self._last, is_message=False):
+            return False
+        with self._lock:
+            left = again_at - time.monotonic()
+            return not self._lock.wait_for(lambda: self._closed or self._target is not None, left)
+
+    def _wait_for(self, moment: int, *, is_message: bool = True) -> bool:
         """Wait until a message is due; returns False when something else is to be done."""
         while True:
             with self._lock:
@@ -383,7 +399,7 @@ class Player(Handle):
                 now = time.monotonic()
                 if self._paused:
                     if self._steps:
-                        self._steps -= 1
+                        self._steps -= is_message
                         self._jump(moment)
                         return True
                     self._lock.wait(_NAP)

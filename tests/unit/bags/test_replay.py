@@ -13,7 +13,7 @@ from rosbags.typesys import Stores, get_typestore
 
 import rosglass
 from rosglass import load
-from rosglass.bags import ReplayNode
+from rosglass.bags import Player, ReplayNode, open_bag
 from rosglass.comm import ConnectionState, QoS, Time
 from rosglass.errors import BagError, ConversionError, NodeClosedError, UnsupportedError
 from rosglass.interfaces import full_text
@@ -170,6 +170,29 @@ def test_playing_again_from_the_end_and_looping(drive, play):
         node.playback.set_rate(0)
     with pytest.raises(BagError, match="position"):
         node.playback.seek(3)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "topics", "options", "lap"),
+    [
+        (0.0, ["/chatter"], {}, 0.1),
+        (1.0, ["/plan"], {}, 1.0),
+        (1.0, ["/plan"], {"rate": 2.0}, 0.5),
+        (1.0, ["/plan"], {"start": 0.05, "duration": 0.02, "clock": 1.0}, 0.1),
+        (1.0, ["/plan"], {"duration": 0.5}, 0.5),
+    ],
+    ids=["one message", "one early", "faster", "none but a latched one", "part"],
+)
+def test_a_lap_lasts_as_long_as_what_was_selected(tmp_path, play, seconds, topics, options, lap):
+    path = write(tmp_path / "short.mcap", seconds)
+    node, begun = play(path, "?paused=true"), time.monotonic()
+    with (
+        open_bag(path) as bag,
+        Player(node, bag, topics=topics, loop=True, delay=0.0, **options) as player,
+    ):
+        until(lambda: player.status().sent >= 4)  # one in each lap
+        sent, took = player.status().sent, time.monotonic() - begun
+    assert took >= 0.99 * lap * (sent - 1)
 
 
 def test_what_is_published_reaches_nobody_and_says_so(drive, play):
