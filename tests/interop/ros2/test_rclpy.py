@@ -1,0 +1,338 @@
+"""Real ROS 2 nodes: rclpy of Jazzy over Fast DDS, each way; docs/peers.md names these tests."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import threading
+import zlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+import rosglass
+from rosglass.comm import GoalStatus, QoS, Reliability
+from rosglass.interfaces import Library, rihs01
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from rosglass.comm import Node
+
+NUMBERS = itertools.count(1)
+PEER = Path(__file__).parent / "peers/rclpy_peer.py"
+NAME = "/robot/real"
+STRING, TWIST, IMAGE = "std_msgs/msg/String", "geometry_msgs/msg/Twist", "sensor_msgs/msg/Image"
+SWITCH = "std_srvs/srv/SetBool"
+#: Types that only the peer knows.
+BASIC, ECHO = "test_msgs/msg/BasicTypes", "test_msgs/srv/BasicTypes"
+#: Of goals (action_msgs/msg/GoalStatus).
+SUCCEEDED, CANCELED = 4, 5
+FIBONACCI = "test_msgs/action/Fibonacci"
+
+pytestmark = pytest.mark.peers
+pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
+
+
+@pytest.fixture(scope="module")
+def start_rclpy_peer(start_program, rclpy_python, dds_domain) -> Callable[..., Any]:
+    def start(name: str) -> Any:
+        env = os.environ | {"ROS_DOMAIN_ID": str(dds_domain)}
+        process = start_program(str(rclpy_python), "-u", str(PEER), name, env=env)
+        process.event("ready")
+        return process
+
+    return start
+
+
+@pytest.fixture(scope="module")
+def peer(start_rclpy_peer) -> Iterator[Any]:
+    process = start_rclpy_peer("real")
+    yield process
+    process.end()
+
+
+@pytest.fixture(scope="module")
+def node(dds_domain) -> Iterator[Node]:
+    """Our node, without any definition of test_msgs."""
+    made = rosglass.connect(f"dds://?domain={dds_domain}", "cockpit", "/own")
+    yield made
+    made.close()
+
+
+@pytest.fixture(scope="module")
+def informed(dds_domain, rclpy_python) -> Iterator[Node]:
+    """Our node, with the peer's definitions."""
+    library = Library()
+    library.add_path(rclpy_python.parents[1] / "share")
+    made = rosglass.connect(f"dds://?domain={dds_domain}", "informed", "/own", library=library)
+    yield made
+    made.close()
+
+
+def do(peer: Any, task: str, **arguments: Any) -> Any:
+    """Have the peer run a task; return its result."""
+    number = next(NUMBERS)
+    peer.ask(do=task, number=number, **arguments)
+    return peer.event(f"done {number}", 90)
+
+
+# -- topics ----------------------------------------------------------------------------------------
+
+
+def test_we_receive_what_rclpy_publishes(peer, node, wait_for):
+    do(peer, "advertise", topic="/chatter", type=STRING, depth=50)
+    got: list[Any] = []
+    with node.create_subscription("/chatter", STRING, got.append, QoS(50)) as subscription:
+        wait_for(subscription.publisher_count)
+        values = [{"data": f"Grüße {n}"} for n in range(20)]
+        do(peer, "publish", topic="/chatter", values=values)
+        wait_for(lambda: len(got) >= 20, 30, lambda: got)
+    assert [message.data for message in got] == [value["data"] for value in values]
+
+
+def test_rclpy_receives_what_we_publish(peer, node, wait_for):
+    do(peer, "subscribe", topic="/cmd_vel", type=TWIST, depth=50)
+    with node.create_publisher("/cmd_vel", TWIST, QoS(50)) as publisher:
+        wait_for(publisher.subscription_count)
+        for n in range(20):
+            publisher.publish({"linear": {"x": n / 2}, "angular": {"z": -n}})
+        got = [peer.event("received /cmd_vel") for _ in range(20)]
+    assert [value["linear"]["x"] for value in got] == [n / 2 for n in range(20)]
+    assert [value["angular"]["z"] for value in got] == [-n for n in range(20)]
+
+
+def test_what_rclpy_latched_comes_late_but_comes(peer, node, wait_for):
+    do(peer, "advertise", topic="/map_name", type=STRING, latched=True, depth=1)
+    do(peer, "publish", topic="/map_name", values=[{"data": "a"}, {"data": "b"}], matched=0)
+    got: list[Any] = []
+    with node.create_subscription("/map_name", STRING, got.append, QoS.latched()):
+        wait_for(lambda: got)
+    assert [message.data for message in got] == ["b"]
+
+
+def test_what_we_latched_reaches_rclpy_late(peer, node):
+    with node.create_publisher("/our_map", STRING, QoS.latched()) as publisher:
+        for text in "ab":
+            publisher.publish(data=text)
+        do(peer, "subscribe", topic="/our_map", type=STRING, latched=True)
+        assert peer.event("received /our_map") == {"data": "b"}
+
+
+def test_best_effort_both_ways(peer, node, wait_for):
+    do(peer, "advertise", topic="/scan_name", type=STRING, best_effort=True)
+    do(peer, "subscribe", topic="/our_scan", type=STRING, best_effort=True)
+    got: list[Any] = []
+    qos = QoS.sensor_data()
+    with (
+        node.create_subscription("/scan_name", STRING, got.append, qos) as subscription,
+        node.create_publisher("/our_scan", STRING, qos) as publisher,
+    ):
+        wait_for(lambda: subscription.publisher_count() and publisher.subscription_count())
+        do(peer, "publish", topic="/scan_name", values=[{"data": "theirs"}] * 3, period=0.1)
+        wait_for(lambda: got)
+        publisher.publish(data="ours")
+        assert peer.event("received /our_scan") == {"data": "ours"}
+    assert got[0].data == "theirs"
+
+
+def test_profiles_that_do_not_match_are_named_here(peer, node, wait_for):
+    do(peer, "advertise", topic="/volatile", type=STRING, best_effort=True)
+    with node.create_subscription("/volatile", STRING, print, QoS.latched()) as subscription:
+        problem = wait_for(lambda: subscription.problem)
+    assert NAME in problem
+    assert "reliab" in problem
+
+
+@pytest.mark.parametrize("size", [100_000, 6_220_800])
+def test_big_messages_both_ways(peer, node, wait_for, size):
+    picture = {"height": 1, "width": size // 3, "step": size, "encoding": "rgb8"}
+    data = (bytes(range(251)) * (size // 251 + 1))[:size]
+    got: list[Any] = []
+    do(peer, "advertise", topic=f"/theirs{size}", type=IMAGE)
+    do(peer, "subscribe", topic=f"/ours{size}", type=IMAGE)
+    with (
+        node.create_subscription(f"/theirs{size}", IMAGE, got.append) as subscription,
+        node.create_publisher(f"/ours{size}", IMAGE) as publisher,
+    ):
+        wait_for(lambda: subscription.publisher_count() and publisher.subscription_count())
+        value = picture | {"data": {"fill": size}}
+        do(peer, "publish", topic=f"/theirs{size}", values=[value])
+        wait_for(lambda: got)
+        publisher.publish(picture | {"data": data})
+        assert peer.event(f"received /ours{size}")["data"] == [size, zlib.crc32(data)]
+    assert bytes(got[0].data) == data
+
+
+# -- services --------------------------------------------------------------------------------------
+
+
+def test_we_call_rclpy(peer, node):
+    do(peer, "serve", service="/real/enable", type=SWITCH)
+    with node.create_service_client("/real/enable", SWITCH) as client:
+        assert client.wait_for_server(30), client.problem
+        client.call({"data": True}, timeout=30)
+        assert client.problem == ""
+    assert peer.event("served /real/enable") == {"data": True}
+
+
+def test_rclpy_calls_us(peer, node):
+    got: list[bool] = []
+
+    def switch(request: Any) -> dict[str, Any]:
+        got.append(request.data)
+        return {"success": request.data, "message": "done"}
+
+    with node.create_service_server("/own/enable", SWITCH, switch) as server:
+        requests = [{"data": n % 2 == 0} for n in range(10)]
+        answers = do(peer, "call", service="/own/enable", type=SWITCH, requests=requests)
+        assert server.problem == ""
+    assert got == [n % 2 == 0 for n in range(10)]
+    assert answers == [{"success": n % 2 == 0, "message": "done"} for n in range(10)]
+
+
+def test_every_basic_type_both_ways(peer, informed):
+    do(peer, "serve", service="/real/echo", type=ECHO)
+    client = informed.create_service_client("/real/echo", ECHO)
+    assert client.wait_for_server(30), client.problem
+    values = {
+        "bool_value": True, "byte_value": 255, "char_value": 97, "float32_value": 0.5,
+        "float64_value": -1e300, "int8_value": -128, "uint8_value": 255, "int16_value": -32768,
+        "uint16_value": 65535, "int32_value": -(2**31), "uint32_value": 2**32 - 1,
+        "int64_value": -(2**63), "uint64_value": 2**64 - 1, "string_value": "Größe",
+    }  # fmt: skip
+    assert client.call(values, timeout=30).to_dict() == values
+
+    with informed.create_service_server("/own/echo", ECHO, lambda request: request.to_dict()):
+        request = values | {"byte_value": {"octet": 255}}
+        assert do(peer, "call", service="/own/echo", type=ECHO, requests=[request]) == [values]
+
+
+# -- actions ---------------------------------------------------------------------------------------
+
+
+def test_we_send_goals_to_rclpy(peer, informed):
+    do(peer, "act", action="/real/count")
+    feedback: list[int] = []
+    with informed.create_action_client("/real/count") as client:
+        assert client.wait_for_server(30), client.problem
+        goal = client.send_goal(
+            {"order": 6}, on_feedback=lambda m: feedback.append(len(m.sequence))
+        )
+        status, result = goal.result(30)
+        assert (status, list(result.sequence)) == (GoalStatus.SUCCEEDED, [0, 1, 1, 2, 3, 5])
+        assert feedback == [3, 4, 5, 6]
+        running = threading.Event()
+        endless = client.send_goal({"order": 100_000}, on_feedback=lambda _: running.set())
+        assert running.wait(30)
+        endless.cancel()
+        assert endless.result(30)[0] is GoalStatus.CANCELED
+        assert client.problem == ""
+
+
+def test_rclpy_sends_us_goals(peer, informed):
+    def count(goal: Any) -> dict[str, Any]:
+        sequence = [0, 1]
+        while len(sequence) < goal.goal.order and not goal.wait_for_cancel(0.02):
+            sequence.append(min(sequence[-1] + sequence[-2], 1000))
+            goal.publish_feedback(sequence=sequence)
+        return {"sequence": sequence}
+
+    with informed.create_action_server("/own/count", FIBONACCI, count):
+        ended = do(peer, "send_goal", action="/own/count", order=6)
+        assert ended == {
+            "status": SUCCEEDED, "result": [0, 1, 1, 2, 3, 5], "feedback": [3, 4, 5, 6]
+        }  # fmt: skip
+        ended = do(peer, "send_goal", action="/own/count", order=100_000, cancel_after=3)
+        assert ended["status"] == CANCELED
+
+
+# -- parameters ------------------------------------------------------------------------------------
+
+
+def test_we_set_parameters_of_rclpy(peer, node, wait_for):
+    with node.create_parameter_client(NAME) as client:
+        changes: list[Any] = []
+        client.watch(changes.append)
+        assert client.wait_for_server(30)
+        assert {"name", "speed"} <= set(client.names())
+        assert client.get(["speed", "name"]) == {"speed": 0.5, "name": "rover"}
+        results = client.set({"speed": 0.75, "name": 3})
+        assert [result.successful for result in results.values()] == [True, False]
+        assert "type" in results["name"].reason
+        wait_for(lambda: [change for change in changes if change.changed == {"speed": 0.75}])
+    assert do(peer, "own_parameter", name="speed") == 0.75
+
+
+def test_rclpy_sets_our_parameters(peer, node):
+    node.parameters.declare("gain", 1.5)
+    told = do(peer, "parameters", of="/own/cockpit", set={"gain": 2.5, "nix": 1})
+    assert node.parameters.get("gain") == 2.5
+    assert told["values"][0] == 2.5
+    assert told["successful"] == [True, False]
+    assert "gain" in told["names"]
+
+
+# -- graph -----------------------------------------------------------------------------------------
+
+
+def test_we_see_the_nodes_and_topics_of_rclpy(peer, node, wait_for):
+    do(peer, "advertise", topic="/seen", type=TWIST, best_effort=True)
+    wait_for(lambda: node.publishers("/seen"))
+    wait_for(lambda: NAME in [name.full for name in node.nodes()])
+    (end,) = wait_for(lambda: [e for e in node.publishers("/seen") if e.node.full == NAME])
+    assert end.type == TWIST
+    assert end.type_hash == rihs01(Library().definition(TWIST))
+    assert end.qos.reliability is Reliability.BEST_EFFORT
+    assert node.services()[f"{NAME}/get_parameters"] == ["rcl_interfaces/srv/GetParameters"]
+
+
+def test_rclpy_sees_our_nodes_and_topics(peer, node, wait_for):
+    def seen() -> Any:
+        found = do(peer, "graph")
+        return found if "/shown" in found["topics"] and "/own/cockpit" in found["nodes"] else None
+
+    def shown() -> Any:
+        ends = do(peer, "endpoints", topic="/shown")  # it may not know yet whose they are
+        return ends if ends and "UNKNOWN" not in ends[0]["node"] else None
+
+    with (
+        node.create_publisher("/shown", TWIST, QoS.latched()),
+        node.create_service_server("/shown_service", SWITCH, lambda _: {}),
+    ):
+        found = wait_for(seen)
+        assert found["topics"]["/shown"] == [TWIST]
+        assert found["services"]["/shown_service"] == [SWITCH]
+        ends = wait_for(shown)
+        assert ends == [
+            {
+                "node": "/own/cockpit", "type": TWIST, "kind": "PUBLISHER",
+                "reliability": "RELIABLE", "durability": "TRANSIENT_LOCAL",
+                "hash": rihs01(Library().definition(TWIST)),
+            }
+        ]  # fmt: skip
+
+
+# -- types that only the peer knows ----------------------------------------------------------------
+
+
+def test_a_message_that_only_rclpy_knows(peer, node, wait_for):
+    do(peer, "advertise", topic="/basic", type=BASIC)
+    got: list[Any] = []
+    with node.create_subscription("/basic", None, got.append) as subscription:
+        wait_for(subscription.publisher_count)
+        wait_for(lambda: subscription.type, 30, lambda: subscription.problem)
+        do(peer, "publish", topic="/basic", values=[{"int32_value": 7, "float64_value": 0.1}])
+        wait_for(lambda: got)
+    assert (got[0].int32_value, got[0].float64_value) == (7, 0.1)
+
+
+def test_services_and_actions_that_only_rclpy_knows_are_refused_with_the_reason(
+    peer, node, wait_for
+):
+    do(peer, "serve", service="/real/unknown", type=ECHO)
+    with node.create_service_client("/real/unknown") as client:
+        problem = wait_for(lambda: "Over DDS" in client.problem and client.problem)
+    assert ECHO in problem
+    assert "--definitions FOLDER" in problem
