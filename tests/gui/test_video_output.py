@@ -1,4 +1,4 @@
-"""Pictures reach the pixels of a VideoOutput, on a virtual screen with software OpenGL."""
+"""Pictures reach the pixels of a VideoOutput, on a virtual screen, drawn by each renderer."""
 
 from __future__ import annotations
 
@@ -61,9 +61,10 @@ def interface(folder: Path, form: str, module: str = "Ros2") -> Path:
     return file
 
 
-def show(file: Path, screen: str, encodings: list[str]) -> dict[str, list]:
-    gone = {"QT_QPA_PLATFORM", "WAYLAND_DISPLAY", "QT_QUICK_BACKEND"}
+def show(file: Path, screen: str, encodings: list[str], renderer: str = "") -> dict[str, list]:
+    gone = {"QT_QPA_PLATFORM", "WAYLAND_DISPLAY"}
     environment = {k: v for k, v in os.environ.items() if k not in gone} | {"DISPLAY": screen}
+    environment["QT_QUICK_BACKEND"] = renderer
     done = subprocess.run(
         [sys.executable, str(Path(__file__).with_name("video_app.py")), str(file), *encodings],
         env=environment,
@@ -80,15 +81,16 @@ def show(file: Path, screen: str, encodings: list[str]) -> dict[str, list]:
 SHOWN = [("Ros2", "native"), ("Ros2", "painted"), ("Ros2", "source"), ("Ros", "source")]
 
 
+@pytest.mark.parametrize("renderer", ["", "software"])
 @pytest.mark.parametrize(("module", "form"), SHOWN)
 def test_every_encoding_shows_the_right_colours(
-    tmp_path: Path, screen: str, module: str, form: str
+    tmp_path: Path, screen: str, module: str, form: str, renderer: str
 ) -> None:
     from rosglass.qt import QT6
 
     if form == "native" and not QT6:
         pytest.skip("Qt 5 has no video sinks; its VideoOutput takes a source")
-    seen = show(interface(tmp_path, form, module), screen, COLOURS + GREYS)
+    seen = show(interface(tmp_path, form, module), screen, COLOURS + GREYS, renderer)
     for encoding in COLOURS:
         exact = encoding in {"rgb8", "bgr8", "rgba8", "bgra8"}
         np.testing.assert_allclose(
@@ -98,6 +100,21 @@ def test_every_encoding_shows_the_right_colours(
         greys = [[colour[0]] * 3 for colour in QUARTERS]
         np.testing.assert_allclose(seen[encoding], greys, atol=1, err_msg=encoding)
     assert seen["timeout"] == [[0, 0, 0]] * 4
+    if form != "painted":
+        assert seen["size with a picture"] == [64, 48]
+        # What stands beside it stays where it is when the signal is lost.
+        assert seen["size without"] == [64, 48]
+
+
+@pytest.mark.parametrize("turn", [0, 90, 180, 270])
+def test_a_turned_output_looks_the_same_with_every_renderer(
+    tmp_path: Path, screen: str, turn: int
+) -> None:
+    form = FORMS["source"].replace("source: sub", f"source: sub; orientation: {turn}")
+    file = interface(tmp_path, "source")
+    file.write_text(file.read_text().replace(FORMS["source"], form))
+    by_opengl, painted = (show(file, screen, ["rgb8"], renderer) for renderer in ("", "software"))
+    np.testing.assert_allclose(painted["rgb8"], by_opengl["rgb8"], atol=1)
 
 
 def test_a_stream_shown_in_both_ways_at_once(tmp_path: Path, screen: str) -> None:

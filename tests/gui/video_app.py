@@ -1,7 +1,8 @@
 """Run by test_video_output.py on a virtual screen: shows pictures and prints what pixels became.
 
 Arguments: a QML file with an object called "camera", and names of encodings. Prints a JSON object
-per encoding: the colours in the middle of the picture's four quarters.
+per encoding: the colours in the middle of the picture's four quarters; and the implicit size of the
+VideoOutput, with a picture and after the signal was lost.
 """
 
 from __future__ import annotations
@@ -100,6 +101,12 @@ def main() -> None:
             turn(0.05)
         turn(0.2)
 
+    def tell_size(when: str) -> None:
+        for item in view.rootObject().childItems():
+            if item.inherits("QQuickVideoOutput") or item.inherits("QDeclarativeVideoOutput"):
+                size = [round(item.implicitWidth()), round(item.implicitHeight())]
+                print(json.dumps({"encoding": when, "seen": size}), flush=True)
+
     until(lambda: sub.property("subscribed"))
     for encoding in encodings:
         camera.publish(message(encoding))
@@ -108,9 +115,11 @@ def main() -> None:
         places = [(80, 60), (240, 60), (80, 180), (240, 180)]
         seen = [shot.pixelColor(x, y).getRgb()[:3] for x, y in places]
         print(json.dumps({"encoding": encoding, "seen": seen}), flush=True)
+    tell_size("size with a picture")
     until(lambda: sub.property("stale"))
     blank = view.grabWindow().pixelColor(80, 60).getRgb()[:3]
     print(json.dumps({"encoding": "timeout", "seen": [blank] * 4}), flush=True)
+    tell_size("size without")
     view.close()
     session.close()
 

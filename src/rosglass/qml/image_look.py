@@ -43,12 +43,13 @@ class LookElement(TopicElement):
         self._rate = 0.0
         self._full = False
 
-    def _look(self, video: bool, room: tuple[int, int] | None) -> Look:
+    def _look(self, video: bool, room: tuple[int, int] | None, painted: bool) -> Look:
         """Return what the properties ask for.
 
         Args:
             video: Whether video frames are wanted; otherwise images.
             room: Width and height on the screen, as far as known.
+            painted: Whether images are wanted besides video frames.
 
         Raises:
             UnsupportedError: The colour map is unknown, or the depths are no range.
@@ -69,7 +70,7 @@ class LookElement(TopicElement):
             DepthColors(*colors)
         if room is not None and self._rotation % 180:
             room = (room[1], room[0])
-        return Look(video, view, colors, self._interval, None if self._full else room)
+        return Look(video, view, colors, self._interval, None if self._full else room, painted)
 
     @property
     def _interval(self) -> float:

@@ -36,6 +36,7 @@ class Look:
         interval: Seconds between two pictures, 0 for all of them.
         room: Width and height that the picture has on the screen, before it is turned; larger
             ones are reduced to about that. None leaves them as they are.
+        painted: Whether it takes an image besides each video frame, which nothing else draws.
     """
 
     video: bool = True
@@ -43,6 +44,12 @@ class Look:
     colors: tuple[str, float | None, float | None] | None = None
     interval: float = 0.0
     room: tuple[int, int] | None = None
+    painted: bool = False
+
+    @property
+    def kinds(self) -> set[bool]:
+        """What is taken: true for video frames, false for images."""
+        return {self.video, self.video and not self.painted}
 
     def factor(self, image: RawImage) -> int:
         """Return by which factor a picture can be made smaller without being seen to be."""
@@ -120,7 +127,7 @@ class Renderer:
         failed: dict[Look, str] = {}
         for (colors, factor), views in groups.items():
             small = reduce(image, factor)
-            kinds = {look.video for members in views.values() for look in members}
+            kinds = {kind for members in views.values() for look in members for kind in look.kinds}
             # What is shown as it is can be converted where the display wants it.
             straight = VideoFrame() if kinds == {True} and [*views] == [_WHOLE] else None
             frame = self._convert(small, received, colors, kinds, straight)
@@ -130,7 +137,7 @@ class Renderer:
                 except Error as error:
                     failed |= dict.fromkeys(members, str(error))
                     continue
-                wanted = {look.video for look in members}
+                wanted = {kind for look in members for kind in look.kinds}
                 video = (straight or VideoFrame()).finish(seen) if True in wanted else None
                 painted = to_image(seen) if False in wanted else None
                 whole = image if small is not image else None

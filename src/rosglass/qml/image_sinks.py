@@ -2,36 +2,45 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import UnsupportedError
 from rosglass.qml.image_item import ImageItem
-from rosglass.qml.item_window import window_of
-from rosglass.qt import QT6, QtCore, QtQuick, is_alive, optional
+from rosglass.qml.item_window import all_items, is_painted, window_of
+from rosglass.qt import QT6, QtCore, QtQml, QtQuick, is_alive, optional
 
 if TYPE_CHECKING:
     from rosglass.qml.image_rendering import Picture
 
 __all__ = ["Sink"]
 
+#: The QML file of what paints a VideoOutput's pictures.
+_PAINTED_VIDEO = Path(__file__).with_name("PaintedVideo.qml")
 #: Pixels to which the size of an item is rounded up: resizing it changes little.
 _STEP = 8
+_NOT_DRAWN = "Qt's software renderer draws no VideoOutput, and its pictures cannot be painted"
 
 
 class Sink:
     """Shows the pictures of one viewer; used on the GUI thread.
 
+    A VideoOutput draws with the graphics card only. In a window that Qt's software renderer draws,
+    an :class:`ImageItem` inside it paints the pictures that its video sink gets.
+
     Args:
         item: What QML gave.
+        source: The element whose pictures it shows, by which Qt 5's VideoOutput is found.
 
     Raises:
         UnsupportedError: It shows no pictures.
     """
 
-    def __init__(self, item: QtCore.QObject) -> None:
+    def __init__(self, item: QtCore.QObject, source: QtCore.QObject | None = None) -> None:
         multimedia: Any = optional("QtMultimedia")
         self._multimedia = multimedia
         self.item: Any = item
+        self._source = source
         #: Whether it takes video frames; otherwise it takes images.
         self.takes_video = not isinstance(item, ImageItem)
         kind = "QVideoSink" if QT6 else "QAbstractVideoSurface"
@@ -42,6 +51,9 @@ class Sink:
                 f"videoSink must be {owner} or an ImageItem, got {item.metaObject().className()}"
             )
         self._layout: Any = None
+        self._output: Any = None
+        self._painter: Any = None
+        self._component: Any = None
 
     @property
     def is_alive(self) -> bool:
@@ -67,15 +79,26 @@ class Sink:
         turned = (item.property("orientation") or 0) % 180
         return (sides[1], sides[0]) if turned else (sides[0], sides[1])
 
+    def is_painted(self) -> bool:
+        """Return whether a video sink's pictures have to be painted to be seen."""
+        output = self._find_output() if self.takes_video else None
+        window = window_of(output) if output is not None else None
+        return window is not None and is_painted(window)
+
     def show(self, picture: Picture) -> bool:
         """Show a picture; return false when it was made for another kind of sink.
 
         Raises:
             UnsupportedError: The surface takes no such pictures.
         """
+        painted = self.is_painted()
         made = picture.video if self.takes_video else picture.image
-        if made is None:
+        if made is None or (painted and picture.image is None):
             return False
+        if painted:
+            self._find_painter().present(picture.image)
+        elif is_alive(self._painter):
+            self._painter.present(None)
         if not self.takes_video:
             self.item.present(made)
         elif QT6:
@@ -85,15 +108,65 @@ class Sink:
         return True
 
     def clear(self) -> None:
-        """Take the picture off the screen."""
+        """Take the picture off the screen; what shows it keeps its implicit size."""
+        if is_alive(self._painter):
+            self._painter.present(None)
         if not self.is_alive:
             return
         if not self.takes_video:
             self.item.present(None)
-        elif QT6:
+            return
+        output = self._find_output()
+        size = None if output is None else (output.implicitWidth(), output.implicitHeight())
+        if QT6:
             self.item.setVideoFrame(self._multimedia.QVideoFrame())
         else:
             self.item.stop()
+        if size is not None and all(size):
+            output.setImplicitWidth(size[0])
+            output.setImplicitHeight(size[1])
+
+    def _find_output(self) -> Any:
+        """Return the VideoOutput that a video sink belongs to; None as long as none is found."""
+        if not is_alive(self._output):
+            self._output = None
+            if QT6:
+                owner = self.item.parent()
+                self._output = owner if isinstance(owner, QtQuick.QQuickItem) else None
+            elif self._source is not None:
+                # Qt 5's surface does not say whose it is.
+                self._output = next(
+                    (
+                        item
+                        for item in all_items()
+                        if item.inherits("QDeclarativeVideoOutput")
+                        and item.property("source") is self._source
+                    ),
+                    None,
+                )
+        return self._output
+
+    def _find_painter(self) -> Any:
+        """Return what paints in a VideoOutput, made at the first picture.
+
+        Raises:
+            UnsupportedError: The VideoOutput belongs to no engine that has our types.
+        """
+        if not is_alive(self._painter):
+            context = QtQml.QQmlEngine.contextForObject(self._output)
+            engine = None if context is None else context.engine()
+            if engine is None:
+                raise UnsupportedError(f"{_NOT_DRAWN}: it is in no QML engine; use an ImageItem")
+            url = QtCore.QUrl.fromLocalFile(str(_PAINTED_VIDEO))
+            # As long as its item: dropping it destroys that.
+            self._component = QtQml.QQmlComponent(engine, url)
+            painter: Any = self._component.create()
+            if painter is None:
+                raise UnsupportedError(f"{_NOT_DRAWN}: {self._component.errorString().strip()}")
+            painter.setProperty("clockwise", QT6)
+            painter.setParentItem(self._output)
+            self._painter = painter
+        return self._painter
 
     def _present(self, video: Any) -> None:
         layout = (video.size(), video.pixelFormat())

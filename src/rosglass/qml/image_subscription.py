@@ -135,7 +135,7 @@ class ImageTransportSubscription(LookElement):
         if item is self._get_sink():
             return
         try:
-            sink = None if item is None else Sink(item)
+            sink = None if item is None else Sink(item, self)
         except Error as error:
             self._refuse(f"{self._who}: {error}")
             return
@@ -328,13 +328,14 @@ class ImageTransportSubscription(LookElement):
         from rosglass.qml.image_rendering import Look  # noqa: PLC0415 - brings numpy
 
         assert self._sink is not None
-        video = self._sink.takes_video
+        video, painted = self._sink.takes_video, self._sink.is_painted()
         try:
-            look = self._look(video, self._sink.room())
+            look = self._look(video, self._sink.room(), painted)
         except Error as error:
             self._say(f"{self._who}: {error}")
             before = self._has_look
-            return before if before is not None and before.video == video else Look(video)
+            fits = before is not None and (before.video, before.painted) == (video, painted)
+            return before if before is not None and fits else Look(video, painted=painted)
         self._say("")
         return look
 

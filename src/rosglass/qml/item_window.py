@@ -1,10 +1,15 @@
-"""The window that an item is in."""
+"""The window that an item is in, and what draws it."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from rosglass.qt import QtGui, QtQuick
 
-__all__ = ["window_of"]
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+__all__ = ["all_items", "is_painted", "window_of"]
 
 
 def window_of(item: QtQuick.QQuickItem) -> QtQuick.QQuickWindow | None:
@@ -19,3 +24,19 @@ def window_of(item: QtQuick.QQuickItem) -> QtQuick.QQuickWindow | None:
             if content is item or content.isAncestorOf(item):
                 return window
     return None
+
+
+def all_items() -> Iterator[QtQuick.QQuickItem]:
+    """Iterate over the items of all windows."""
+    for window in QtGui.QGuiApplication.allWindows():
+        items = [window.contentItem()] if isinstance(window, QtQuick.QQuickWindow) else []
+        while items:
+            item = items.pop()
+            yield item
+            items += item.childItems()
+
+
+def is_painted(window: QtQuick.QQuickWindow) -> bool:
+    """Return whether Qt's software renderer draws a window, which draws no video and no shaders."""
+    kinds = QtQuick.QSGRendererInterface.GraphicsApi
+    return window.rendererInterface().graphicsApi() in (kinds.Software, kinds.OpenVG)
