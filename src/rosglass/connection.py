@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rosglass.comm import Node
     from rosglass.ros2 import Middleware
 
-__all__ = ["connect", "default_url"]
+__all__ = ["connect", "default_url", "explain_missing"]
 
 _EXAMPLE = "zenoh://127.0.0.1:7447"
 _EXAMPLES = "zenoh://127.0.0.1:7447, dds://?domain=0 or ros1://robot:11311"
@@ -33,6 +33,18 @@ _MIDDLEWARES = {
     "rmw_fastrtps_dynamic_cpp": "dds://",
     "rmw_connextdds": "dds://",
     "rmw_gurumdds_cpp": "dds://",
+}
+#: Packages that are not always installed, and the extra that installs them.
+_EXTRA_OF = {
+    "PySide6": "qml",
+    "zenoh": "zenoh",
+    "xxhash": "zenoh",
+    "cyclonedds": "dds",
+    "cv2": "images",
+    "av": "video",
+    "mcap": "bags",
+    "rosbags": "bags",
+    "argcomplete": "completion",
 }
 _anonymous = itertools.count(1)
 
@@ -229,3 +241,11 @@ def _dds(url: str) -> Middleware:
     from rosglass.ros2.dds.middleware import DdsMiddleware  # noqa: PLC0415
 
     return DdsMiddleware(options)
+
+
+def explain_missing(error: ModuleNotFoundError) -> str:
+    """Return which package is missing, and how to install it; empty where no extra installs it."""
+    extra = _EXTRA_OF.get((error.name or "").partition(".")[0])
+    if extra is None:
+        return ""
+    return f'{error.name} is not installed; install it with: pip install "rosglass[{extra}]"'

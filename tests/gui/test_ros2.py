@@ -115,6 +115,50 @@ def test_domain_goes_into_the_address(bench: Any, wait: Any) -> None:
 
 
 @pytest.mark.parametrize(
+    ("url", "env", "told"),
+    [
+        ("", {}, "dds://?domain=7"),
+        ("", {"RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}, "dds://?domain=7"),
+        ("", {"RMW_IMPLEMENTATION": "rmw_zenoh_cpp"}, "zenoh://?domain=7"),
+        ("", {"ROS_DISTRO": "jazzy", "ROS_DOMAIN_ID": "3"}, "dds://?domain=7"),
+        ("", {"ROS_MASTER_URI": "http://robot:11311"}, "dds://?domain=7"),
+        ("", {"ROSGLASS_URL": "zenoh://robot?domain=3"}, "zenoh://robot?domain=7"),
+        ("replay:drive.mcap", {}, "replay:drive.mcap"),
+        ("ros1://robot", {}, "ros1://robot"),
+    ],
+)
+def test_the_environment_says_which_middleware_a_domain_is_of(
+    url: str, env: dict, told: str, bench: Any, wait: Any, monkeypatch: Any, caplog: Any
+) -> None:
+    for name in ("ROSGLASS_URL", "RMW_IMPLEMENTATION", "ZENOH_SESSION_CONFIG_URI", "ROS_DISTRO",
+                 "ROS_DOMAIN_ID", "CYCLONEDDS_URI", "ROS_MASTER_URI"):  # fmt: skip
+        monkeypatch.delenv(name, raising=False)
+    for name, value in env.items():
+        monkeypatch.setenv(name, value)
+    bench.session.url = url
+    bench.run("Ros2.init('a', Ros2.createInitOptions().setDomainId(7))")
+    wait(lambda: bench.session.node is not None)
+    assert bench.session.node.url == told
+    assert ("has no domains" in caplog.text) == ("domain" not in told)
+
+
+def test_a_package_that_is_missing_is_named_with_what_installs_it(
+    bench: Any, wait: Any, monkeypatch: Any
+) -> None:
+    def connect(*_: Any, **__: Any) -> Any:
+        raise ModuleNotFoundError("No module named 'mcap'", name="mcap.reader")
+
+    monkeypatch.setattr("rosglass.connection.connect", connect)
+    session = type(bench.session)("replay:drive.mcap")
+    session.init("a")
+    wait(lambda: session.state == "failed")
+    assert 'mcap.reader is not installed; install it with: pip install "rosglass[bags]"' in (
+        session.detail
+    )
+    session.close()
+
+
+@pytest.mark.parametrize(
     ("arguments", "reason"),
     [
         ("'bad name'", "bad name"),

@@ -216,6 +216,7 @@ def _urls(args: argparse.Namespace) -> tuple[list[str], bool]:
 def _robot(url: str, timeout: float) -> Iterator[Finding]:
     import rosglass
     from rosglass.comm import ConnectionState
+    from rosglass.connection import explain_missing
 
     if url.lower().startswith("ros1:"):
         from rosglass.cli import doctor_ros1
@@ -225,9 +226,8 @@ def _robot(url: str, timeout: float) -> Iterator[Finding]:
     try:
         node = rosglass.connect(url, name=f"rosglass_doctor_{os.getpid()}", own_services=False)
     except ModuleNotFoundError as error:
-        extra = url.partition(":")[0]
-        fix = f'pip install "rosglass[{extra}]"'
-        yield Finding("error", url, f"this needs the package {error.name}, which is missing", fix)
+        told, _, fix = explain_missing(error).partition("; ")
+        yield Finding("error", url, told or str(error), fix)
         return
     except Error as error:
         no_network = url.startswith("dds:") and interfaces() == []

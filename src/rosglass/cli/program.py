@@ -122,12 +122,11 @@ def _explain(error: Exception) -> int:
     if isinstance(error, rosglass.Error):
         return _fail(str(error))
     if isinstance(error, ModuleNotFoundError):
-        extra = _EXTRA_OF.get((error.name or "").partition(".")[0])
-        if extra is not None:
-            return _fail(
-                f"this command needs the package {error.name}, which is not installed; "
-                f'install it with: pip install "rosglass[{extra}]"'
-            )
+        from rosglass.connection import explain_missing
+
+        told = explain_missing(error)
+        if told:
+            return _fail(f"this command needs a package: {told}")
     if isinstance(error, BrokenPipeError):
         _drop_output()
         return 141  # as programs end that SIGPIPE ends
@@ -184,16 +183,3 @@ def _drop_output() -> None:
 def _fail(reason: str) -> int:
     print(f"rosglass: {reason}", file=sys.stderr)
     return 1
-
-
-_EXTRA_OF = {
-    "PySide6": "qml",
-    "zenoh": "zenoh",
-    "xxhash": "zenoh",
-    "cyclonedds": "dds",
-    "cv2": "images",
-    "av": "video",
-    "mcap": "bags",
-    "rosbags": "bags",
-    "argcomplete": "completion",
-}

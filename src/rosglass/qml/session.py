@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import logging
+import os
 import re
 import threading
 import time
@@ -218,7 +219,8 @@ class Session(QtCore.QObject):
         Args:
             name: Its base name.
             namespace: Its absolute namespace.
-            domain: ROS domain, -1 for what the URL or the environment says.
+            domain: ROS domain, -1 for what the URL or the environment says. Where neither names a
+                middleware, it means DDS, as ROS_DOMAIN_ID does.
             arguments: What the node is told besides what the session was.
 
         Returns:
@@ -227,6 +229,8 @@ class Session(QtCore.QObject):
         Raises:
             InvalidNameError: The name or namespace breaks ROS's rules.
             RosArgumentError: One of `arguments` is not valid.
+            UnsupportedError: A domain is chosen, and the environment names a middleware that is
+                not known.
         """
         from rosglass.ros2.names import validate_namespace, validate_node_name  # noqa: PLC0415
 
@@ -242,8 +246,10 @@ class Session(QtCore.QObject):
                 _log.warning("init(%r) ignored: the node is already called %r", name, self.name)
             return False
         if domain >= 0:
-            self._url = _with_domain(self._url, domain)
-            self.url_changed.emit()
+            url = _with_domain(self._url, domain)
+            if url != self._url:
+                self._url = url
+                self.url_changed.emit()
         self.name, self.namespace, self._asked = name, namespace, tuple(arguments)
         self._start()
         self.initialized.emit()
@@ -405,12 +411,15 @@ class Session(QtCore.QObject):
             return
 
         def work() -> Node:
+            from rosglass.connection import explain_missing  # noqa: PLC0415 - as in _connect()
+
             try:
                 return connect(url, name, namespace)
             except ModuleNotFoundError as error:
-                raise Error(
-                    f'{error.name} is not installed; install it with: pip install "rosglass[zenoh]"'
-                ) from None
+                told = explain_missing(error)
+                if not told:
+                    raise
+                raise Error(told) from None
 
         def done(result: Node | Error) -> None:
             if generation != self._generation:
@@ -493,7 +502,14 @@ def _call_all(handlers: dict[int, tuple[QtCore.QObject, Callable[[], None]]]) ->
 
 
 def _with_domain(url: str, domain: int) -> str:
-    """Return `url` with another ``domain`` option; an empty one becomes the default robot's."""
-    base, _, query = (url or "zenoh://").partition("?")
+    """Return `url` with another ``domain`` option; for an empty one, what the environment says."""
+    if not url:
+        from rosglass.connection import default_url  # noqa: PLC0415 - not before someone connects
+
+        url = default_url({**os.environ, "ROS_DOMAIN_ID": str(domain)})
+    base, _, query = url.partition("?")
+    if base.partition(":")[0].lower() not in ("dds", "zenoh"):
+        _log.warning("setDomainId(%d) is ignored: %s has no domains", domain, url)
+        return url
     others = [part for part in query.split("&") if part and not re.match(r"domain=", part)]
     return f"{base}?{'&'.join([*others, f'domain={domain}'])}"
