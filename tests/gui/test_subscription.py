@@ -47,6 +47,31 @@ def chat(running: Any) -> Any:
     return running.robot.create_publisher("/chat", TEXT, QoS(depth=10))
 
 
+@pytest.mark.parametrize("element", ["Subscription", "ImageTransportSubscription"])
+def test_a_topic_set_to_its_absolute_name_stays_there(
+    element: str, bench: Any, wait: Any, caplog: Any
+) -> None:
+    shown = "videoSink: shown" if element != "Subscription" else ""
+    root = bench.load(
+        """Item {
+            property QtObject sub: ELEMENT { topic: "chat"; SHOWN }
+            ImageItem { id: shown }
+        }""".replace("ELEMENT", element).replace("SHOWN", shown),
+        "import QtQuick 2.15",
+    )
+    sub = root.property("sub")
+    bench.session.init("ui", "/left")
+    wait(lambda: sub.property("topic") == "/left/chat")
+    bench.run("Ros2.shutdown()")
+    bench.session.init("ui", "/right")
+    wait(lambda: sub.property("topic") == "/right/chat")
+    sub.setProperty("topic", "/right/chat")
+    bench.run("Ros2.shutdown()")
+    bench.session.init("ui", "/left")
+    wait(lambda: "chat: nobody publishes this topic" in caplog.text)
+    assert sub.property("topic") == "/right/chat"
+
+
 @pytest.mark.parametrize("extension", ["property int mine: 7", "function mine() { return 7 }"])
 def test_interfaces_may_extend_it(running: Any, chat: Any, wait: Any, extension: str) -> None:
     # PySide loses the undecorated methods of an object that QML gives properties of its own.

@@ -99,9 +99,12 @@ class ImageTransportSubscription(LookElement):
         return self._resolved or self._topic
 
     def _set_topic(self, topic: str) -> None:
-        if topic in {self._topic, self._resolved}:
+        if topic == self._topic:
             return
-        self._topic, self._resolved = topic, ""
+        self._topic = topic
+        if topic == self._resolved:
+            return  # the same topic, now whatever the node's namespace becomes
+        self._resolved = ""
         # What is paused would stay on the screen under another name.
         self._clear_sink()
         self.topicChanged.emit()

@@ -131,9 +131,12 @@ class Subscription(TopicElement):
         return self._resolved or self._topic
 
     def _set_topic(self, topic: str) -> None:
-        if topic in {self._topic, self._resolved}:
+        if topic == self._topic:
             return
-        self._topic, self._resolved = topic, ""
+        self._topic = topic
+        if topic == self._resolved:
+            return  # the same topic, now whatever the node's namespace becomes
+        self._resolved = ""
         self._forget()
         self.topicChanged.emit()
         self._schedule()
