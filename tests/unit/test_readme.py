@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+
+import rosglass
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -48,3 +52,12 @@ def test_every_cell_of_the_table_of_peers_names_a_test_or_a_reason() -> None:
     headings = [cell for row in rows if row.startswith("| | ") for cell in row.split(" | ")]
     for cell in cells:
         assert any(word in cell for word in named) or cell in " ".join(headings), cell
+
+
+def test_every_name_of_rosglass_in_the_documentation_is_there_after_importing_it() -> None:
+    pages = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs").rglob("*.md"))
+    named = set(re.findall(r"(?<!-m )\brosglass\.([A-Za-z]\w*)\b", pages + README))
+    errors = {f"rosglass.{name}" for name in rosglass.errors.__all__}
+    program = "import rosglass\n" + "\n".join(sorted(errors | {f"rosglass.{n}" for n in named}))
+    subprocess.run([sys.executable, "-c", program], check=True)
+    assert set(rosglass.errors.__all__) <= set(rosglass.__all__)

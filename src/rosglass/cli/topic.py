@@ -167,7 +167,10 @@ def _list(args: argparse.Namespace) -> int:
         found = {t: k for t, k in node.topics().items() if args.hidden or not is_hidden(node, t)}
         counts = {t: (len(node.publishers(t)), len(node.subscriptions(t))) for t in found}
     if args.count_topics:
-        print(len(found))
+        if args.json:
+            print_json({"count": len(found)})
+        else:
+            print(len(found))
         return 0
     if args.json:
         print_json(
@@ -295,9 +298,5 @@ def _announced(node: Node, topic: str, timeout: float) -> str:
 
 
 def _unknown(node: Node, topic: str) -> int:
-    import difflib
-
-    close = difflib.get_close_matches(topic, node.topics(), 3, 0.6)
-    hint = f" Did you mean {' or '.join(close)}?" if close else ""
-    note(f"nobody publishes or subscribes to {topic}.{hint}")
+    note(f"nobody publishes or subscribes to {topic}{similar(topic, node.topics())}")
     return 1

@@ -32,6 +32,10 @@ __all__ = ["Clock", "ClockChange", "Jump", "Timer"]
 _log = logging.getLogger("rosglass.comm")
 #: Longest pause of the timers' thread in seconds.
 _IDLE = 3600.0
+#: Longest uninterrupted wait in seconds: on Windows a lock that is waited for holds up Ctrl-C.
+_SLICE_S = 0.2
+#: Seconds that simulated time may stand still before those who sleep by it are warned.
+_STILL_S = 5.0
 
 
 class ClockChange(Enum):
@@ -221,7 +225,8 @@ class Clock(Unique):
         return self._time if self._simulated else time.monotonic_ns()
 
     def _sleep(self, end: int, read: Callable[[], int]) -> bool:
-        switches = self._switches
+        switches, shown, warned = self._switches, self._time, False
+        still_at = time.monotonic() + _STILL_S
         while True:
             if self._closed:
                 raise NodeClosedError(
@@ -232,7 +237,16 @@ class Clock(Unique):
             rest = end - read()
             if rest <= 0:
                 return True
-            self._changed.wait(None if self._simulated else min(rest / 1e9, _IDLE))
+            if self._time != shown:
+                shown, still_at = self._time, time.monotonic() + _STILL_S
+            elif self._simulated and not warned and time.monotonic() > still_at:
+                warned = True
+                _log.warning(
+                    "%s sleeps by simulated time, which stands at %.3f s: is /clock published?",
+                    self._name,
+                    shown / 1e9,
+                )
+            self._changed.wait(_SLICE_S if self._simulated else min(rest / 1e9, _SLICE_S))
 
     def _restart(self) -> None:
         """Count the timers' periods from now on: the old times mean nothing any more."""

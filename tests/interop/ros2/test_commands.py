@@ -117,7 +117,7 @@ def test_what_does_not_match_is_shown(run: Any) -> None:
     assert found["endpoints"][0]["qos"]["durability"] == "transient_local"
     code, _, err = run("topic", "info", "/lab/mapp", "--timeout", "0.5")
     assert code == 1
-    assert "Did you mean /lab/map" in err
+    assert "; did you mean /lab/map?" in err
 
 
 @BOTH
@@ -311,5 +311,7 @@ def test_as_users_of_ros2_write_it(run: Any) -> None:
     assert out == ""  # what was latched goes to those only who ask for it
     _, out, _ = run("topic", "echo", "/lab/map", "--once", "--csv", "-l", "2")
     assert out.endswith(",7,7,... 1000 in all\n")
-    assert int(run("topic", "list", "--count-topics")[1]) > 5
+    count = int(run("topic", "list", "--count-topics")[1])
+    assert count > 5
+    assert json.loads(run("topic", "list", "--count-topics", "--json")[1]) == {"count": count}
     assert run("param", "set", "/lab/robot", "speed", "-2.5")[0] == 0

@@ -73,6 +73,18 @@ def in_background(job: object) -> tuple[threading.Thread, list[object]]:
     return thread, results
 
 
+def test_sleeping_while_simulated_time_stands_still_says_so_once(clock: Clock, caplog) -> None:
+    clock.simulate(True)
+    clock.advance(seconds(10))
+    thread, results = in_background(lambda: clock.sleep(2.0))
+    eventually(lambda: caplog.messages)
+    (told,) = caplog.messages
+    assert told == "tester sleeps by simulated time, which stands at 10.000 s: is /clock published?"
+    clock.advance(seconds(12))
+    thread.join(10)
+    assert results == [True]
+
+
 def test_sleeping_in_simulated_time_waits_for_the_simulation(clock: Clock) -> None:
     clock.simulate(True)
     clock.advance(seconds(10))
