@@ -48,6 +48,20 @@ _LONG_WORD = re.compile(rf"\S{{{_MOST_IN_WORD + 1},}}")
 _LONG_LINE = re.compile(rf".{{{_MOST_IN_LINE + 1},}}")
 
 
+#: What moves a terminal's cursor, changes its state or reorders its text: C0 but tab and line feed,
+#: DEL, C1, line and paragraph separators, directional controls of Unicode.
+_CONTROLS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+
+
+def escape_controls(text: str) -> str:
+    r"""Return a text with its control characters as ``\uXXXX``, tabs and line feeds kept.
+
+    Names and texts of other nodes go through this on their way to terminals and logs. The escapes
+    are those of JSON, so that JSON stays JSON.
+    """
+    return _CONTROLS.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+
+
 def _shortened(text: str) -> str:
     """Return a message with the beginnings only of words and lines that are very long."""
     if len(text) <= _MOST_IN_WORD:
@@ -64,12 +78,14 @@ class Error(Exception):
     """Base of every error raised by rosglass.
 
     Args:
-        args: The message; of words and lines that no person would read, it keeps the beginning and
-            tells the length.
+        args: The message; control characters are escaped, and of words and lines that no person
+            would read, it keeps the beginning and tells the length.
     """
 
     def __init__(self, *args: object) -> None:
-        super().__init__(*(_shortened(arg) if isinstance(arg, str) else arg for arg in args))
+        super().__init__(
+            *(_shortened(escape_controls(arg)) if isinstance(arg, str) else arg for arg in args)
+        )
 
 
 class DefinitionError(Error):

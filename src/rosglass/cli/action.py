@@ -11,6 +11,7 @@ from rosglass.cli.connecting import (
     add_connection_options,
     connect,
     find,
+    note_invalid_names,
     settle,
     telling,
     wait,
@@ -79,6 +80,7 @@ def _list(args: argparse.Namespace) -> int:
     style = Style(args)
     with connect(args) as node:
         settle(node)
+        note_invalid_names(node)
         found = node.actions()
     if args.json:
         print_json([{"action": name, "types": [spelled(node, t) for t in types]}

@@ -13,7 +13,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rosglass.cli.connecting import TIMEOUT, End, add_definitions_option, join, seconds, settle
-from rosglass.cli.output import Style, add_output_options, note, print_json, table
+from rosglass.cli.output import CLEAR_LINE, Style, add_output_options, note, print_json, table
 from rosglass.cli.worlds import spelled
 from rosglass.errors import Error
 
@@ -258,7 +258,7 @@ def _watch(args: argparse.Namespace, bridge: Bridge, end: End, nodes: tuple[Node
             news.tell(status)
             if shown:
                 width = shutil.get_terminal_size().columns - 1
-                print(f"\r\033[K{status.line()[:width]}", end="", file=sys.stderr, flush=True)
+                print(f"{CLEAR_LINE}{status.line()[:width]}", end="", file=sys.stderr, flush=True)
             elif now >= due:
                 due = now + period
                 print(status.line(), flush=True)
@@ -280,7 +280,7 @@ class _News:
     """Tells what is wrong, or gets lost, when it begins; and when it is over."""
 
     def __init__(self, on_terminal: bool) -> None:
-        self._before = "\r\033[K" if on_terminal else ""
+        self._before = CLEAR_LINE if on_terminal else ""
         self._since: dict[str, tuple[str, float]] = {}
         self._told: dict[str, str] = {}
         self._noted: set[tuple[str, str]] = set()

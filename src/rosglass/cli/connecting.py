@@ -28,13 +28,17 @@ __all__ = [
     "connect",
     "find",
     "join",
+    "left_out",
     "natural",
+    "note_invalid_names",
     "seconds",
     "settle",
     "telling",
     "wait",
 ]
 
+#: Names that a hint shows.
+_EXAMPLES = 3
 _T = TypeVar("_T")
 #: Seconds to wait for the robot, unless told otherwise.
 TIMEOUT = 10.0
@@ -214,6 +218,23 @@ def telling(reason: Callable[[], str]) -> Iterator[None]:
     finally:
         done.set()
         thread.join()
+
+
+def note_invalid_names(node: Node) -> None:
+    """Say how many names lists leave out because ROS's rules forbid them, and some of them."""
+    text = left_out(node)
+    if text:
+        note(text)
+
+
+def left_out(node: Node) -> str:
+    """Return how many names ROS's rules forbid, and some of them; empty when there are none."""
+    names = node.invalid_names()
+    if not names:
+        return ""
+    shown = ", ".join(f"{name!r:.80}" for name in names[:_EXAMPLES])
+    more = ", ..." if len(names) > _EXAMPLES else ""
+    return f"left out, for ROS's rules forbid such names: {len(names)}: {shown}{more}"
 
 
 def await_types(node: Node, look: Callable[[], Iterable[object]], timeout: float) -> None:

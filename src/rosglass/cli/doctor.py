@@ -12,7 +12,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rosglass.cli.connecting import add_connection_options, settle, wait
+from rosglass.cli.connecting import add_connection_options, left_out, settle, wait
 from rosglass.cli.endpoints import problems
 from rosglass.cli.finding import Finding
 from rosglass.cli.network import ask, interfaces, is_loopback
@@ -58,6 +58,8 @@ _VARIABLES = (
 #: Receive buffer in bytes that a camera picture needs.
 _BUFFER = 4 * 2**20
 _NO_NETWORK = "connect a network, or for this machine alone: sudo ip link set lo up multicast on"
+#: What helps against names that ROS's rules forbid.
+_RENAME = "rename them where they are made: letters, digits, '_' and '/', no digit first"
 #: Seconds to look around in a graph.
 _LOOK = 3.0
 
@@ -283,6 +285,8 @@ def _graph(node: Node) -> Iterator[Finding]:
         f"{len(others)} nodes, {len(topics)} topics, {len(node.services())} services, "
         f"{len(node.actions())} actions",
     )
+    if text := left_out(node):
+        yield Finding("warning", node.url, text, _RENAME)
     for name, count in Counter(others).items():
         if count > 1:
             fix = "give each a name of its own, e.g. with -r __node:=name"

@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rosglass.cli.connecting import wait
+from rosglass.cli.connecting import left_out, wait
 from rosglass.cli.finding import Finding
 from rosglass.comm import ConnectionState, anonymous_name
 from rosglass.errors import ConnectionLostError, ConversionError, Error, MasterError
@@ -30,6 +30,8 @@ _CALLER = "/rosglass_doctor"
 _AT_ONCE = 16
 #: Seconds that the master may take to tell us that a parameter has changed.
 _ECHO = 3.0
+#: What helps against names that ROS's rules forbid.
+_RENAME = "rename them where they are made: letters, digits, '_' and '/', a letter first"
 _NETWORK = "set ROS_IP (or ROS_HOSTNAME) {where}, and restart the nodes there"
 
 
@@ -179,6 +181,8 @@ def _graph(node: Ros1Node) -> Iterator[Finding]:
         return
     text = f"{len(others)} nodes, {len(node.topics())} topics, {len(node.services())} services"
     yield Finding("ok", node.url, text)
+    if text := left_out(node):
+        yield Finding("warning", node.url, text, _RENAME)
 
 
 def _nodes(node: Ros1Node, options: Ros1Options, timeout: float) -> Iterator[Finding]:

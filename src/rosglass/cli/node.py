@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING
 
 from rosglass.cli import node_ros1
 from rosglass.cli.completion import complete
-from rosglass.cli.connecting import add_connection_options, await_types, connect, find, settle
+from rosglass.cli.connecting import (
+    add_connection_options,
+    await_types,
+    connect,
+    find,
+    note_invalid_names,
+    settle,
+)
 from rosglass.cli.endpoints import describe
 from rosglass.cli.output import Style, add_output_options, note, print_json
 from rosglass.cli.subcommands import Subcommands
@@ -56,6 +63,7 @@ def _others(node: Node) -> list[str]:
 def _list(args: argparse.Namespace) -> int:
     with connect(args) as node:
         settle(node)
+        note_invalid_names(node)
         found = _others(node)
     if args.json:
         print_json(found)

@@ -9,15 +9,20 @@ import sys
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
+from rosglass.errors import escape_controls
+
 if TYPE_CHECKING:
     import argparse
     from collections.abc import Iterable, Sequence
+    from typing import TextIO
 
     from rosglass.messages import MessageType
 
 __all__ = [
+    "CLEAR_LINE",
     "SHOWN",
     "SHOWN_JSON",
+    "EscapingStream",
     "Style",
     "add_output_options",
     "fields",
@@ -34,6 +39,10 @@ __all__ = [
 SHOWN = 36
 #: The same for programs, which take more, but no pictures.
 SHOWN_JSON = 10_000
+#: Stands for the ESC of our own sequences until a stream writes it: no peer can guess it.
+_ESCAPE = f"\0{os.urandom(8).hex()}\0"
+#: Goes back to the beginning of the line and clears it, on a terminal.
+CLEAR_LINE = f"{_ESCAPE}[G{_ESCAPE}[K"
 _CODES = {"bold": 1, "dim": 2, "red": 31, "green": 32, "yellow": 33, "cyan": 36}
 
 
@@ -49,6 +58,29 @@ def add_output_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+class EscapingStream:
+    """Standard output or error that writes no control characters but those of this module.
+
+    What robots say (names, types, texts) reaches the terminal through it, whichever command or log
+    prints it. All but :meth:`write` is the stream's.
+
+    Args:
+        stream: The stream to write to.
+    """
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        r"""Write a text, its control characters as ``\uXXXX``; returns its length."""
+        safe = "\033".join(map(escape_controls, text.split(_ESCAPE)))
+        self._stream.write(safe)
+        return len(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
 class Style:
     """Colours text, or leaves it as it is."""
 
@@ -58,11 +90,14 @@ class Style:
         self._on = wanted == "always" or (wanted == "auto" and not plain)
 
     def __call__(self, text: object, *kinds: str) -> str:
-        """Return `text` as ``bold``, ``dim``, ``red``, ``green``, ``yellow`` or ``cyan``."""
+        """Return `text` as ``bold``, ``dim``, ``red``, ``green``, ``yellow`` or ``cyan``.
+
+        It is for an :class:`EscapingStream`.
+        """
         if not self._on or not kinds:
             return str(text)
         codes = ";".join(str(_CODES[kind]) for kind in kinds)
-        return f"\033[{codes}m{text}\033[0m"
+        return f"{_ESCAPE}[{codes}m{text}{_ESCAPE}[0m"
 
 
 def note(text: str) -> None:

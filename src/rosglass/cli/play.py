@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rosglass.cli.connecting import End, add_connection_options, connect, seconds
-from rosglass.cli.output import note
+from rosglass.cli.output import CLEAR_LINE, note
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -170,7 +170,8 @@ def _watch(player: Player, bag: Bag, end: End, told: dict[str, str], *, keys: bo
                 f"rate {status.rate:g}, {status.sent} messages{lag}"
             )
             # A line that wraps cannot be written over.
-            print(f"\r\033[K{line[: shutil.get_terminal_size().columns - 1]}", end="", flush=True)
+            shown = line[: shutil.get_terminal_size().columns - 1]
+            print(f"{CLEAR_LINE}{shown}", end="", flush=True)
     if interactive:
         print()
 

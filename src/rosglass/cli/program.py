@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import rosglass
 from rosglass.cli import is_interrupt
 from rosglass.cli.completion import is_completing, offer
+from rosglass.cli.output import EscapingStream
 from rosglass.cli.subcommands import Parser, add_verbose
 from rosglass.cli.worlds import names_ros1
 
@@ -163,13 +164,17 @@ def _run(arguments: list[str]) -> int:
 
 
 def _prepare_output() -> None:
-    """Make sure that printing what robots say cannot fail for its characters."""
+    """Make sure that what robots say can be printed, and does nothing to the terminal."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:  # closed by whoever started us
             setattr(sys, name, io.StringIO())
-        elif hasattr(stream, "reconfigure"):
+            continue
+        if isinstance(stream, EscapingStream):
+            continue
+        if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
+        setattr(sys, name, EscapingStream(stream))
 
 
 def _drop_output() -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rosglass.cli.connecting import End, add_connection_options, connect, seconds
-from rosglass.cli.output import note
+from rosglass.cli.output import CLEAR_LINE, note
 from rosglass.comm import ConnectionState
 from rosglass.errors import Error
 
@@ -124,7 +124,9 @@ def _watch(node: Node, recorder: Recorder, end: End, args: argparse.Namespace) -
         news.tell(node, status)
         if shown:
             lines = shutil.get_terminal_size().columns
-            print(f"\r\033[K{_summary(status)[: lines - 1]}", end="", file=sys.stderr, flush=True)
+            print(
+                f"{CLEAR_LINE}{_summary(status)[: lines - 1]}", end="", file=sys.stderr, flush=True
+            )
     news.tell(node, recorder.status(), last=True)
     if shown:
         print(file=sys.stderr)
@@ -134,7 +136,7 @@ class _News:
     """Tells what is wrong when it begins, and when it is over."""
 
     def __init__(self, on_terminal: bool) -> None:
-        self._before = "\r\033[K" if on_terminal else ""
+        self._before = CLEAR_LINE if on_terminal else ""
         self._seen: dict[str, tuple[str, float]] = {}
         self._told: dict[str, str] = {}
 

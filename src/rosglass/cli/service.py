@@ -12,6 +12,7 @@ from rosglass.cli.connecting import (
     await_types,
     connect,
     find,
+    note_invalid_names,
     settle,
     telling,
     wait,
@@ -78,6 +79,7 @@ def _list(args: argparse.Namespace) -> int:
     style = Style(args)
     with connect(args) as node:
         settle(node)
+        note_invalid_names(node)
         if args.types or args.json:
             await_types(node, lambda: node.services().values(), args.timeout)
         found = {s: k for s, k in node.services().items() if args.hidden or not is_hidden(node, s)}

@@ -14,6 +14,7 @@ from rosglass.cli.connecting import (
     connect,
     find,
     natural,
+    note_invalid_names,
     seconds,
     settle,
     telling,
@@ -164,6 +165,7 @@ def _list(args: argparse.Namespace) -> int:
     style = Style(args)
     with connect(args) as node:
         settle(node)
+        note_invalid_names(node)
         found = {t: k for t, k in node.topics().items() if args.hidden or not is_hidden(node, t)}
         counts = {t: (len(node.publishers(t)), len(node.subscriptions(t))) for t in found}
     if args.count_topics:

@@ -306,6 +306,14 @@ class Node(Handle):
         """Return every action in the graph with the types announced for it."""
         raise self._unsupported("a list of actions")
 
+    def invalid_names(self) -> list[str]:
+        """Return what other nodes have announced, but is left out of the graph, sorted.
+
+        These names break ROS's rules, so that nothing could be done with them; control characters
+        in them are as they were sent.
+        """
+        return []
+
     def service_servers(self, name: str) -> list[EndpointInfo]:
         """Return the servers of a service."""
         raise self._unsupported("a list of services")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 import sys
 
+from rosglass.errors import escape_controls
+
 __all__ = ["warn_on_terminal"]
 
 
@@ -26,7 +28,7 @@ class _TerminalHandler(logging.Handler):
         if any(isinstance(handler, logging.StreamHandler) for handler in own):
             return
         try:
-            sys.stderr.write(f"{self.format(record)}\n")
+            sys.stderr.write(f"{escape_controls(self.format(record))}\n")
         except Exception:
             self.handleError(record)
 

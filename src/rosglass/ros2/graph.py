@@ -6,7 +6,7 @@ import threading
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointInfo, EndpointKind, NodeName
-from rosglass.ros2.names import action_of, hidden
+from rosglass.ros2.names import action_of, hidden, is_valid_node, is_valid_topic
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterable
@@ -21,6 +21,8 @@ class Graph:
     """Nodes and endpoints, each under the key its middleware knows it by.
 
     Middlewares put and remove entries from their threads; everyone may read from any thread.
+    What has a name that ROS's rules forbid is left out, for nothing could be done with it, and its
+    name is kept apart; see :meth:`invalid_names`.
 
     Args:
         changed: Called after each change, in the thread that made it; must return at once.
@@ -30,21 +32,31 @@ class Graph:
         self._changed = changed
         self._lock = threading.Lock()
         self._nodes: dict[Hashable, NodeName] = {}
+        self._invalid: dict[Hashable, str] = {}
         self._endpoints: dict[Hashable, EndpointInfo] = {}
         self._by_name: dict[str, dict[Hashable, EndpointInfo]] = {}
         self._by_node: dict[NodeName, dict[Hashable, EndpointInfo]] = {}
 
     def put_node(self, key: Hashable, node: NodeName) -> None:
         """Add the node known as `key`."""
+        if not is_valid_node(node.full):
+            self._leave_out(key, node.full)
+            return
         with self._lock:
             known = self._nodes.get(key) == node
             self._nodes[key] = node
+            self._invalid.pop(key, None)
         if not known:
             self._changed()
 
     def put_endpoint(self, key: Hashable, endpoint: EndpointInfo) -> None:
         """Add the endpoint known as `key`, or replace what was known about it."""
+        name, kind, node = endpoint.name, endpoint.type, endpoint.node.full
+        if not (is_valid_topic(name) and kind.isprintable() and is_valid_node(node)):
+            self._leave_out(key, f"{name} [{kind}] of {node}")
+            return
         with self._lock:
+            self._invalid.pop(key, None)
             known = self._endpoints.get(key)
             if known is not None and (known.name, known.node) != (endpoint.name, endpoint.node):
                 self._forget(key, known)
@@ -57,11 +69,8 @@ class Graph:
     def remove(self, key: Hashable) -> None:
         """Remove the node or endpoint known as `key`, if there is one."""
         with self._lock:
-            node = self._nodes.pop(key, None)
-            endpoint = self._endpoints.pop(key, None)
-            if endpoint is not None:
-                self._forget(key, endpoint)
-        if node is not None or endpoint is not None:
+            moved = self._remove(key)
+        if moved:
             self._changed()
 
     def nodes(self) -> list[NodeName]:
@@ -69,6 +78,11 @@ class Graph:
         with self._lock:
             names = {*self._nodes.values(), *self._by_node}
         return sorted(names)
+
+    def invalid_names(self) -> list[str]:
+        """Return what is left out because ROS's rules forbid its name, sorted."""
+        with self._lock:
+            return sorted(set(self._invalid.values()))
 
     def topics(self, *, hidden: bool = True) -> dict[str, list[str]]:
         """Return every topic with the types announced for it, both sorted.
@@ -119,6 +133,7 @@ class Graph:
         """Forget everything: what cannot be seen any more must not look alive."""
         with self._lock:
             self._nodes.clear()
+            self._invalid.clear()
             self._endpoints.clear()
             self._by_name.clear()
             self._by_node.clear()
@@ -134,6 +149,21 @@ class Graph:
                 if endpoint.kind in kinds
             ]
         return _sorted(found)
+
+    def _leave_out(self, key: Hashable, name: str) -> None:
+        with self._lock:
+            moved = self._remove(key) or self._invalid.get(key) != name
+            self._invalid[key] = name
+        if moved:
+            self._changed()
+
+    def _remove(self, key: Hashable) -> bool:
+        """Remove what is known as `key`; return whether there was anything. The lock is held."""
+        endpoint = self._endpoints.pop(key, None)
+        if endpoint is not None:
+            self._forget(key, endpoint)
+        node, name = self._nodes.pop(key, None), self._invalid.pop(key, None)
+        return not (endpoint is None and node is None and name is None)
 
     def _forget(self, key: Hashable, endpoint: EndpointInfo) -> None:
         named, owned = self._by_name[endpoint.name], self._by_node[endpoint.node]

@@ -19,6 +19,8 @@ __all__ = [
     "demangle_type",
     "expand",
     "hidden",
+    "is_valid_node",
+    "is_valid_topic",
     "mangle_type",
     "validate_namespace",
     "validate_node_name",
@@ -34,6 +36,7 @@ MAX_NAMESPACE = 245
 _FORBIDDEN = re.compile(r"[^A-Za-z0-9_/]")
 _FORBIDDEN_IN_PATTERN = re.compile(r"[^A-Za-z0-9_/~{}]")
 _FORBIDDEN_IN_NODE = re.compile(r"[^A-Za-z0-9_]")
+_FULL_NAME = re.compile(r"(?:/[A-Za-z_][A-Za-z0-9_]*)+\Z")
 _DIGIT_FIRST = re.compile(r"(?:^|/)([0-9])")
 _SUBSTITUTION = re.compile(r"\{([^{}]*)\}")
 _DDS_TYPE = re.compile(r"([A-Za-z]\w*)::(\w+)::dds_::(\w+)_\Z")
@@ -67,6 +70,16 @@ def validate_namespace(namespace: str) -> None:
         )
     if namespace != "/":
         _validate_full("namespace", namespace, MAX_NAMESPACE)
+
+
+def is_valid_topic(name: str) -> bool:
+    """Return whether `name` is an absolute topic or service name after ROS 2's rules."""
+    return len(name) <= MAX_TOPIC_NAME and _FULL_NAME.match(name) is not None
+
+
+def is_valid_node(full: str) -> bool:
+    """Return whether a node's full name can be shown: some peers have others than rcl's rules."""
+    return full.isprintable() and " " not in full
 
 
 def expand(name: str, node: str, namespace: str) -> str:

@@ -227,6 +227,10 @@ class Ros2Node(CoreNode):
         """Return the subscriptions of a topic."""
         return self._core.graph.endpoints(EndpointKind.SUBSCRIPTION, self.resolve(topic))
 
+    def invalid_names(self) -> list[str]:
+        """Return what is left out of the graph; see :meth:`rosglass.comm.Node.invalid_names`."""
+        return self._core.graph.invalid_names()
+
     def services(self) -> dict[str, list[str]]:
         """Return every service that is offered or called, with the types announced for it."""
         return self._core.graph.services()

@@ -208,7 +208,8 @@ def format_user_data(pairs: Mapping[str, str]) -> bytes:
 
 def hash_of(user_data: bytes) -> str:
     """Return the type hash that an endpoint's user data announces, empty when it has none."""
-    return parse_user_data(user_data).get("typehash", "")
+    found = parse_user_data(user_data).get("typehash", "")
+    return found if found.isprintable() else ""
 
 
 def is_rosglass(user_data: bytes) -> bool:

@@ -154,7 +154,7 @@ class Token:
             demangle_type(_demangle(dds_type)),
             node,
             decode_qos(qos),
-            "" if type_hash == HUMBLE_HASH else type_hash,
+            "" if type_hash == HUMBLE_HASH or not type_hash.isprintable() else type_hash,
             gid_of(key),
         )
         return cls(*head, endpoint)
