@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from rosglass.comm import EndpointInfo, EndpointKind, NodeName
 from rosglass.errors import InvalidNameError
 from rosglass.interfaces import join_name
-from rosglass.ros1.names import split
+from rosglass.ros1.names import is_valid_full, split
 
 if TYPE_CHECKING:
     from rosglass.ros1.master import Master
@@ -30,12 +30,14 @@ class _Seen(NamedTuple):
         subscribers: Nodes by topic.
         services: The node of each service, in a list.
         types: Type of each topic, as the master tells it.
+        invalid: What is left out because ROS's rules forbid its name.
     """
 
     publishers: _Offers
     subscribers: _Offers
     services: _Offers
     types: dict[str, str]
+    invalid: frozenset[str] = frozenset()
 
 
 _NOTHING = _Seen({}, {}, {}, {})
@@ -57,12 +59,10 @@ class Graph:
         Raises:
             ConnectionLostError: The master does not answer.
             MasterError: It refuses.
-            TypeError: Its answer has another form than ROS 1's.
-            ValueError: As before.
         """
+        invalid: set[str] = set()
         publishers, subscribers, services = (
-            {str(name): sorted(map(str, nodes)) for name, nodes in part}
-            for part in master.call("getSystemState")
+            _valid(part, invalid) for part in master.call("getSystemState")
         )
         known = self._seen
         types = known.types
@@ -70,14 +70,18 @@ class Graph:
         missing = any(types.get(name, "") in _UNKNOWN for name in (*publishers, *subscribers))
         if offers != known[:3] or (missing and time.monotonic() - self._asked > _LATE):
             self._asked = time.monotonic()
-            types = {str(name): str(kind) for name, kind in master.call("getTopicTypes")}
-        seen = _Seen(*offers, types)
+            types = dict(master.call("getTopicTypes"))
+        seen = _Seen(*offers, types, frozenset(invalid))
         self._seen = seen
         return seen != known
 
     def clear(self) -> None:
         """Forget everything."""
         self._seen = _NOTHING
+
+    def invalid_names(self) -> list[str]:
+        """Return what is left out because ROS's rules forbid its name, sorted."""
+        return sorted(self._seen.invalid)
 
     def topics(self) -> dict[str, list[str]]:
         """Return every topic with its type, none where nobody has told it yet."""
@@ -121,6 +125,18 @@ class Graph:
         return found
 
 
+def _valid(part: list[tuple[str, list[str]]], invalid: set[str]) -> _Offers:
+    """Return those of the names that can be used, with their nodes; the others go to `invalid`."""
+    found = {}
+    for name, nodes in part:
+        if not is_valid_full(name):
+            invalid.add(name)
+            continue
+        found[name] = sorted(node for node in nodes if node.isprintable())
+        invalid.update(node for node in nodes if not node.isprintable())
+    return found
+
+
 def full_type(name: str) -> str:
     """Return a message type's full name; empty for what stands for no type."""
     if name in _UNKNOWN:
@@ -128,4 +144,4 @@ def full_type(name: str) -> str:
     try:
         return join_name(name)
     except InvalidNameError:
-        return name
+        return name if name.isprintable() else ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointKind
 from rosglass.ros1.core import Member
@@ -173,10 +173,10 @@ class Intake(Member):
         """Tell the master, and connect with the publishers it names."""
         self._epoch += 1
         updates = self._updates
-        told: Any = ()
+        told: list[str] = []
         with self._topics.registering:
             told = master.call("registerSubscriber", self.topic, self.type_name, self.core.uri)
-        uris = [str(uri) for uri in told]
+        uris = list(told)
         self.core.loop.call(lambda: self._take_answer(uris, updates))
 
     def unregister(self, master: Master) -> Member | None:

@@ -7,19 +7,23 @@ APIs: ROS wiki, "ROS/Master_API", "ROS/Parameter Server API", "ROS/Slave_API": e
 from __future__ import annotations
 
 import http.client
+import math
 import reprlib
 import socket
 import threading
 import time
 import xmlrpc.client
 from contextlib import suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
-from xml.parsers.expat import ExpatError
+from xml.parsers.expat import ExpatError, ParserCreate
 
 from rosglass.errors import ConnectionLostError, ConversionError, MasterError
 
-__all__ = ["Master", "call_node", "reason_of"]
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+__all__ = ["Master", "call_node", "parse_xml", "reason_of"]
 
 #: Seconds that somebody may take to answer.
 _TIMEOUT = 5.0
@@ -27,8 +31,65 @@ _TIMEOUT = 5.0
 _MOST_BYTES = 64 * 2**20
 _CHUNK = 256 * 1024
 _SUCCESS = 1
+#: Levels of lists and namespaces that a parameter may have; nothing that people write has more.
+_DEEPEST = 100
 #: How the other end of a connection that was kept shows that it has closed it meanwhile.
 _STALE = (http.client.RemoteDisconnected, ConnectionResetError, BrokenPipeError)
+
+
+def parse_xml(data: bytes) -> tuple[tuple[Any, ...], str | None]:
+    """Return the values of a call or answer of XML-RPC, and the method's name.
+
+    Unlike :func:`xmlrpc.client.loads`, it refuses document types, in whatever encoding: their
+    entities can be made to fill the memory.
+
+    Raises:
+        ExpatError: It is no XML, or has a document type.
+        xmlrpc.client.Fault: It is a fault.
+        Exception: It is no XML-RPC; the library raises whatever that leads to.
+    """
+    target = xmlrpc.client.Unmarshaller()
+    target.xml("", None)  # texts are what the parser has decoded
+    parser = ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = target.start, target.end
+    parser.CharacterDataHandler, parser.StartDoctypeDeclHandler = target.data, _refuse_document_type
+    parser.Parse(data, True)
+    return target.close(), target.getmethodname()
+
+
+def _refuse_document_type(*_: object) -> None:
+    raise ExpatError("a document type, which can be made to fill the memory")
+
+
+class _Socket(socket.socket):
+    """A socket whose calls together end at a deadline, however slowly the peer drips.
+
+    Attributes:
+        deadline: Monotonic time.
+    """
+
+    deadline = math.inf
+
+    def recv_into(self, *arguments: Any) -> int:
+        """Receive; raises TimeoutError after the deadline."""
+        self._limit()
+        return super().recv_into(*arguments)
+
+    def sendall(self, *arguments: Any) -> None:
+        """Send; raises TimeoutError after the deadline."""
+        self._limit()
+        super().sendall(*arguments)
+
+    def connect(self, *arguments: Any) -> None:
+        """Connect; raises TimeoutError after the deadline."""
+        self._limit()
+        super().connect(*arguments)
+
+    def _limit(self) -> None:
+        left = self.deadline - time.monotonic()
+        if left <= 0:
+            raise TimeoutError
+        self.settimeout(left)
 
 
 class _Connection(http.client.HTTPConnection):
@@ -36,9 +97,18 @@ class _Connection(http.client.HTTPConnection):
 
     Attributes:
         cut: Whether it was cut.
+        sock: Its socket, once it is made.
     """
 
     cut = False
+    sock: _Socket
+    _deadline = 0.0
+
+    def limit(self, deadline: float) -> None:
+        """Let all that follows end at a deadline, in monotonic time."""
+        self._deadline = deadline
+        if self.sock is not None:
+            self.sock.deadline = deadline
 
     def connect(self) -> None:
         """Connect to the first address of the host that answers."""
@@ -46,11 +116,11 @@ class _Connection(http.client.HTTPConnection):
         for family, kind, protocol, _, place in socket.getaddrinfo(
             self.host, self.port, type=socket.SOCK_STREAM
         ):
-            self.sock = sock = socket.socket(family, kind, protocol)
+            self.sock = sock = _Socket(family, kind, protocol)
+            sock.deadline = self._deadline
             try:
                 if self.cut:
                     raise OSError("closed")
-                sock.settimeout(self.timeout)
                 sock.connect(place)
                 sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             except OSError as error:
@@ -119,29 +189,29 @@ class _Server:
         code, message, value = answer
         if code != _SUCCESS:
             raise MasterError(f"{self.uri} refuses {method}: {message}")
+        expected, fits = _ANSWERS.get(method, _ANYTHING)
+        if not fits(value):
+            raise ConnectionLostError(
+                f"{self.uri} answers {method}, but not as ROS 1 does: {expected} was expected, got "
+                f"{reprlib.repr(value)}"
+            )
         return value
 
     def _answer(self, connection: _Connection, body: bytes, timeout: float) -> Any:
-        connection.timeout = timeout
+        connection.limit(time.monotonic() + timeout)
         kept = connection.sock is not None
         try:
-            data = self._exchange(connection, body, timeout)
+            data = self._exchange(connection, body)
         except _STALE:
             connection.close()
             if not kept or connection.cut:
                 raise
-            data = self._exchange(connection, body, timeout)
-        if b"<!DOCTYPE" in data:
-            raise ExpatError("a document type, which can be made to fill the memory")
-        values, _ = xmlrpc.client.loads(data)
+            data = self._exchange(connection, body)
+        values, _ = parse_xml(data)
         return values[0]
 
-    def _exchange(self, connection: _Connection, body: bytes, timeout: float) -> bytes:
-        deadline = time.monotonic() + timeout
-        if connection.sock is not None:
-            connection.sock.settimeout(timeout)
+    def _exchange(self, connection: _Connection, body: bytes) -> bytes:
         connection.request("POST", self._path, body, {"Content-Type": "text/xml"})
-        sock = connection.sock
         with connection.getresponse() as response:
             if response.status != http.client.OK:
                 raise http.client.HTTPException(f"HTTP status {response.status}")
@@ -150,20 +220,82 @@ class _Server:
             while part := response.read1(_CHUNK):
                 parts.append(part)
                 size += len(part)
-                left = deadline - time.monotonic()
                 if size > _MOST_BYTES:
                     raise http.client.HTTPException(f"an answer of more than {_MOST_BYTES} bytes")
-                if left <= 0:
-                    raise TimeoutError
-                sock.settimeout(left)
         return b"".join(parts)
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str)
+
+
+def _are_texts(value: Any) -> bool:
+    return isinstance(value, (list, tuple)) and all(isinstance(item, str) for item in value)
+
+
+def _are_pairs(value: Any) -> bool:
+    return isinstance(value, (list, tuple)) and all(_are_texts(i) and len(i) == 2 for i in value)
+
+
+def _is_graph(value: Any) -> bool:
+    """Return whether a value is the system state: publishers, subscribers, services."""
+    return (
+        isinstance(value, (list, tuple))
+        and len(value) == 3
+        and all(isinstance(part, (list, tuple)) for part in value)
+        and all(
+            isinstance(i, (list, tuple)) and len(i) == 2 and _is_text(i[0]) and _are_texts(i[1])
+            for part in value
+            for i in part
+        )
+    )
+
+
+def _is_shallow(value: Any) -> bool:
+    """Return whether a parameter has at most :data:`_DEEPEST` levels."""
+    level = [value]
+    for _ in range(_DEEPEST):
+        inner: list[Any] = []
+        for item in level:
+            if isinstance(item, dict):
+                inner += item.values()
+            elif isinstance(item, (list, tuple)):
+                inner += item
+        if not inner:
+            return True
+        level = inner
+    return False
+
+
+#: What a method answers when it succeeds: in words, and whether a value is such.
+_Answer = tuple[str, "Callable[[Any], bool]"]
+_TEXT: _Answer = ("a text", _is_text)
+_TEXTS: _Answer = ("a list of texts", _are_texts)
+_NUMBER: _Answer = ("a whole number", lambda value: isinstance(value, int))
+_PARAMETER: _Answer = (f"a value of at most {_DEEPEST} levels", _is_shallow)
+#: For methods whose answers say nothing.
+_ANYTHING: _Answer = ("anything", lambda _: True)
+_ANSWERS: dict[str, _Answer] = {
+    "getParam": _PARAMETER,
+    "getParamNames": _TEXTS,
+    "getPid": _NUMBER,
+    "getSystemState": ("lists of publishers, subscribers and services", _is_graph),
+    "getTopicTypes": ("a list of topics with their types", _are_pairs),
+    "hasParam": ("true or false", lambda value: isinstance(value, int)),
+    "lookupNode": _TEXT,
+    "lookupService": _TEXT,
+    "registerSubscriber": _TEXTS,
+    "requestTopic": ("a list", lambda value: isinstance(value, (list, tuple))),
+    "searchParam": _TEXT,
+    "subscribeParam": _PARAMETER,
+}
 
 
 def call_node(uri: str, method: str, *arguments: Any, timeout: float = _TIMEOUT) -> Any:
     """Call a method of a node or the master and return the value it answers.
 
     Raises:
-        ConnectionLostError: Nobody answers there, or what is no ROS.
+        ConnectionLostError: There is no answer, or not of the form that the method has.
         MasterError: The answer is that it failed.
         ConversionError: The arguments cannot be sent.
     """

@@ -287,6 +287,10 @@ class Ros1Node(CoreNode):
         """Return every node in the graph, this one included, sorted."""
         return sorted({*self._core.graph.nodes(), self._core.name})
 
+    def invalid_names(self) -> list[str]:
+        """Return what is left out of the graph; see :meth:`rosglass.comm.Node.invalid_names`."""
+        return self._core.graph.invalid_names()
+
     def services(self) -> dict[str, list[str]]:
         """Return every service in the graph with its type.
 

@@ -143,8 +143,6 @@ class Registrations:
             self._lose(str(error))
         except MasterError as error:
             self._lose(str(error))
-        except (TypeError, ValueError) as error:
-            self._lose(f"{core.master.uri} answers, but not as a ROS 1 master does: {error}")
         else:
             self._answered = True
             self._look_at_address()

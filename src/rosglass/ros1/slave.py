@@ -17,6 +17,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Protocol
 
 from rosglass.comm.complaints import Complaints
+from rosglass.ros1.master import parse_xml
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -144,12 +145,13 @@ class Slave(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCDispatcher):
                     # What is being answered may go out; its thread ends at the next call.
                     sock.shutdown(socket.SHUT_RD)
 
-    def _marshaled_dispatch(self, data: Any, *arguments: Any, **named: Any) -> Any:
-        if b"<!DOCTYPE" in data:
-            # It could be made to fill the memory.
-            fault = xmlrpc.client.Fault(1, "calls have no document type")
-            return xmlrpc.client.dumps(fault, methodresponse=True).encode()
-        return super()._marshaled_dispatch(data, *arguments, **named)
+    def _marshaled_dispatch(self, data: Any, *_: Any, **__: Any) -> Any:
+        try:
+            arguments, method = parse_xml(data)
+            answer: Any = (self._dispatch(method or "", arguments),)
+        except Exception as error:
+            answer = xmlrpc.client.Fault(1, f"{type(error).__name__}: {error}")
+        return xmlrpc.client.dumps(answer, methodresponse=True, allow_none=True).encode()
 
     # -- what socketserver asks ------------------------------------------------------------------
 
