@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import logging
 from typing import TYPE_CHECKING
+from weakref import WeakValueDictionary
 
 from rosglass.comm import ConnectionState, EndpointKind, Status
 from rosglass.comm.core import NodeCore, NodeMember
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from rosglass.interfaces import Library
     from rosglass.ros2.arguments import Arguments
     from rosglass.ros2.middleware import Middleware
+    from rosglass.ros2.pacing import RequestWindow
 
 __all__ = ["Core", "Member"]
 
@@ -46,6 +48,7 @@ class Core(NodeCore[Member]):
         graph: What is seen of the ROS graph.
         types: Finds types.
         local_gids: Identities of the node's own publishers.
+        windows: The open requests to each service, which all its clients share.
 
     Raises:
         ConnectionLostError: The middleware cannot start on this machine.
@@ -68,6 +71,7 @@ class Core(NodeCore[Member]):
         }
         self.types = Types(library, url)
         self.local_gids: set[bytes] = set()
+        self.windows: WeakValueDictionary[str, RequestWindow] = WeakValueDictionary()
         self._moved = True
         self._told = middleware.status()
         self.graph = Graph(self.wake)

@@ -21,6 +21,7 @@ from rosglass.ros2.announced import (
 )
 from rosglass.ros2.core import Member
 from rosglass.ros2.middleware import CALL_DROPPED, SERVER_LEFT
+from rosglass.ros2.pacing import HOLD_S, LIMIT, STALL_S, RequestWindow
 from rosglass.ros2.requests import Link, Request
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ class Ros2ServiceClient(CallingClient[Request], Member):
         wanted: The type, or its name: then the version that the server announces is taken if the
             library has it; None takes whatever type the server announces.
         qos: Profile of requests and replies; None for the usual one.
-        patient: Whether calls go on as long as their server is away.
+        patient: Whether calls go on as long as their server is away, and its servers hold them.
         quiet: Whether somebody else logs what is wrong.
     """
 
@@ -74,6 +75,7 @@ class Ros2ServiceClient(CallingClient[Request], Member):
         self._announced: Announced[ServiceType] = Announced(core, core.types.service, given, fixed)
         self.type = given
         self._link: Link | None = None
+        self._window = core.windows.setdefault(name, RequestWindow(HOLD_S if patient else STALL_S))
         self._flushing = self._again = self._retrying = False
         self._choice = self._failure = ""
         self._adopt(retry=True)
@@ -148,15 +150,19 @@ class Ros2ServiceClient(CallingClient[Request], Member):
             self._flushing = False
             raise
         if self._queue and not self._retrying and self._fitting(self._servers()):
-            # In the graph, but not linked yet: that may come without news.
+            # In the graph, but not linked yet, or holding what it was sent: that may change without
+            # news.
             self._retrying = True
             self._core.timers.after(_RETRY, self._retry)
 
     def _send_waiting(self) -> None:
         while (link := self._link) is not None and self._queue and self.ready:
             with self._lock:
-                entry = self._queue.popleft() if self._queue else None
-            if entry is not None and not entry.call.done():
+                entry = self._queue[0] if self._queue else None
+                if entry is None or not self._window.enter(entry, self._flush):
+                    return
+                self._queue.popleft()
+            if not entry.call.done():
                 self._send(link, entry)
 
     def _retry(self) -> None:
@@ -208,7 +214,9 @@ class Ros2ServiceClient(CallingClient[Request], Member):
             f"({self._core.url}: {self._core.status()})"
         )
 
-    def _delay(self, entry: Request) -> str:  # noqa: ARG002 - nothing else holds one up
+    def _delay(self, entry: Request) -> str:  # noqa: ARG002 - it holds for all that wait
+        if self.ready:
+            return f"{LIMIT} requests before it still wait for {self._server_name()} to answer"
         return "its server appeared too late"
 
     def _ended(self, entry: Request) -> None:
@@ -221,6 +229,11 @@ class Ros2ServiceClient(CallingClient[Request], Member):
         if entry.link is not None:
             link, number = entry.link
             link.forget(number)
+        for send in self._window.leave(entry):
+            if entry.private:  # this may be in the middle of receiving
+                self._core.timers.after(0.0, send)
+            else:
+                send()
 
     # -- following the graph ---------------------------------------------------------------------
 

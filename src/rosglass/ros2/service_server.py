@@ -11,6 +11,7 @@ from rosglass.errors import Error, NodeClosedError
 from rosglass.ros2.announced import Announced, mismatches, nodes_of
 from rosglass.ros2.core import Member
 from rosglass.ros2.middleware import RequestId
+from rosglass.ros2.pacing import ReplyPacer
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
@@ -60,6 +61,7 @@ class Ros2ServiceServer(AnsweringServer[RequestId], Member):
         )
         # Others' executors may do anything.
         self._replier.quick = isinstance(self.executor, (Dispatcher, LoopExecutor))
+        self._pacer = ReplyPacer(core.timers)
         core.add(self)
         with self._lock:
             early, self._early = self._early or [], None
@@ -100,6 +102,7 @@ class Ros2ServiceServer(AnsweringServer[RequestId], Member):
         self._warned = problem
 
     def _withdraw(self) -> None:
+        self._pacer.flush()
         self._replier.close()
         self._core.remove(self)
 
@@ -111,6 +114,7 @@ class Ros2ServiceServer(AnsweringServer[RequestId], Member):
                 # The buffer is the middleware's, and ends with this call.
                 self._early.append((request, bytes(data)))
                 return
+        self._pacer.on_request(request.client)
         try:
             self._take(request, data)
         except Exception:
@@ -134,14 +138,21 @@ class Ros2ServiceServer(AnsweringServer[RequestId], Member):
                 error,
                 self._consequence,
             )
-            self._replier.fail(request, f"the server made no valid response: {error}")
-            return
+            self._fail(request, f"the server made no valid response: {error}")
+        else:
+            self._pacer.reply(request.client, lambda: self._reply(request, data))
+
+    def _reply(self, request: RequestId, data: bytes) -> None:
         try:
             self._replier.reply(request, data)
         except NodeClosedError:
             pass  # closed meanwhile
         except Error as error:
             _log.error("%s: cannot answer %s: %s", self.name, self._origin(request), error)
+
+    def _fail(self, request: RequestId, reason: str) -> None:
+        self._pacer.on_failure(request.client)
+        self._replier.fail(request, reason)
 
     @property
     def _consequence(self) -> str:
@@ -160,14 +171,14 @@ class Ros2ServiceServer(AnsweringServer[RequestId], Member):
             reason,
             exc_info=None if reason else error,
         )
-        self._replier.fail(request, f"{type(error).__name__}: {error}")
+        self._fail(request, f"{type(error).__name__}: {error}")
 
     def _refuse(self, request: RequestId, reason: str) -> None:
         """Turn a client's fault down, and name it in the log once."""
         if self._complaints.fresh(request.client):
             who = self._origin(request)
             _log.warning("%s: refusing requests of %s: %s", self.name, who, reason)
-        self._replier.fail(request, reason)
+        self._fail(request, reason)
 
     def _origin(self, request: RequestId) -> str:
         """Return who sent a request, for people."""

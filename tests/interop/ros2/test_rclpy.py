@@ -6,6 +6,7 @@ import itertools
 import os
 import threading
 import zlib
+from concurrent.futures import Future
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -192,6 +193,43 @@ def test_rclpy_calls_us(peer, node):
     assert answers == [{"success": n % 2 == 0, "message": "done"} for n in range(10)]
 
 
+def test_we_call_rclpy_a_hundred_times_at_once(peer, node):
+    """A server of ROS 2 keeps 10 requests that it has not taken; the others used to be lost."""
+    do(peer, "serve", service="/real/slow", type=SWITCH, delay=0.01)
+    with (
+        node.create_service_client("/real/slow", SWITCH) as client,
+        node.create_service_client("/real/slow", SWITCH) as other,
+    ):
+        assert client.wait_for_server(30), client.problem
+        calls = [end.call_async({"data": True}, timeout=60) for end in (client, other) * 50]
+        given_up = calls[60]
+        assert given_up.cancel()
+        done = [call for call in calls if call is not given_up]
+        assert all(call.result(60) for call in done)
+    served = [peer.event("served /real/slow") for _ in done]
+    assert len(served) == 99
+    assert peer.event("served /real/slow", 0.5, otherwise=None) is None
+
+
+def test_rclpy_gets_fifty_replies_that_are_ready_at_once(peer, node):
+    """A client of ROS 2 keeps 10 replies that it has not taken; the others used to be lost."""
+    promised: list[tuple[bool, Future[Any]]] = []
+
+    def answer_all_when_all_have_asked(request: Any) -> Future[Any]:
+        promised.append((request.data, Future()))
+        if len(promised) == 50:
+            for data, promise in promised:
+                promise.set_result({"success": not data})
+        return promised[-1][1]
+
+    with node.create_service_server("/own/late", SWITCH, answer_all_when_all_have_asked):
+        requests = [{"data": n % 3 == 0} for n in range(50)]
+        answers = do(
+            peer, "call", service="/own/late", type=SWITCH, requests=requests, at_once=True
+        )
+    assert [answer["success"] for answer in answers] == [n % 3 != 0 for n in range(50)]
+
+
 def test_every_basic_type_both_ways(peer, informed):
     do(peer, "serve", service="/real/echo", type=ECHO)
     client = informed.create_service_client("/real/echo", ECHO)
@@ -229,6 +267,16 @@ def test_we_send_goals_to_rclpy(peer, informed):
         endless.cancel()
         assert endless.result(30)[0] is GoalStatus.CANCELED
         assert client.problem == ""
+
+
+def test_we_send_rclpy_thirty_goals_at_once(peer, informed):
+    do(peer, "act", action="/real/many")
+    with informed.create_action_client("/real/many") as client:
+        assert client.wait_for_server(30), client.problem
+        goals = [client.send_goal({"order": 4}, timeout=60) for _ in range(30)]
+        ended = [goal.result(60) for goal in goals]
+    assert {status for status, _ in ended} == {GoalStatus.SUCCEEDED}
+    assert [list(result.sequence) for _, result in ended] == [[0, 1, 1, 2]] * 30
 
 
 def test_rclpy_sends_us_goals(peer, informed):

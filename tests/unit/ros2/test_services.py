@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import concurrent.futures
 import threading
+from concurrent.futures import Future
 from dataclasses import replace
 
 import pytest
@@ -22,6 +23,7 @@ from rosglass.comm import (
 from rosglass.interfaces import Library
 from rosglass.ros2 import Ros2Node
 from rosglass.ros2.middleware import CALL_DROPPED, SERVER_LEFT, RequestId
+from rosglass.ros2.pacing import RequestWindow
 from rosglass.ros2.service_client import Ros2ServiceClient
 
 pytestmark = pytest.mark.usefixtures("quick")
@@ -174,16 +176,99 @@ def test_a_reply_may_come_before_sending_returns(connect, network):
     assert node.create_service_client("/add", ADD).call({"a": 1, "b": 2}).sum == 3
 
 
-def test_many_calls_are_in_flight_and_answered_in_any_order(client, requester):
+def test_calls_in_flight_are_answered_in_any_order(client, requester):
     requester.linked = True
-    calls = [client.call_async({"a": value}) for value in range(20)]
-    assert client.pending == 20
-    for number in range(20, 0, -1):
+    calls = [client.call_async({"a": value}) for value in range(8)]
+    assert client.pending == 8
+    for number in range(8, 0, -1):
         requester.reply(number, answer(number))
     requester.reply(7, answer(0))  # twice, and one that nobody asked for
     requester.reply(99, answer(0))
-    assert [call.result(0).sum for call in calls] == list(range(1, 21))
+    assert [call.result(0).sum for call in calls] == list(range(1, 9))
     assert client.pending == 0
+
+
+def test_eight_requests_are_open_at_a_time_and_the_others_follow_in_order(client, requester):
+    """A server of ROS 2 keeps 10 requests that it has not taken, and drops the oldest."""
+    requester.linked = True
+    calls = [client.call_async({"a": value}) for value in range(20)]
+    assert len(requester.sent) == 8
+    assert calls[10].cancel()
+    requester.reply(3, answer())
+    assert len(requester.sent) == 9
+    calls[0].cancel()  # its place is free: nobody waits for the answer any more
+    assert len(requester.sent) == 10
+    for number in range(1, 20):
+        requester.reply(number, answer(number))
+    asked = [int.from_bytes(data[4:12], "little") for data in requester.sent]
+    assert asked == [value for value in range(20) if value != 10]
+    assert all(call.done() for call in calls)
+
+
+def test_clients_of_a_node_share_the_places_of_a_service(node, client, requester, middleware):
+    other = node.create_service_client("/add", ADD)
+    second = middleware.requesters[1]
+    requester.linked = second.linked = True
+    first_calls = [client.call_async() for _ in range(6)]
+    calls = [other.call_async() for _ in range(6)]
+    assert (len(requester.sent), len(second.sent)) == (6, 2)
+    for number in range(1, 5):
+        requester.reply(number, answer())
+    assert len(second.sent) == 6
+    assert not any(call.done() for call in calls)
+    assert sum(call.done() for call in first_calls) == 4
+
+
+def test_a_blocking_call_waits_for_its_place(client, requester, eventually):
+    requester.linked = True
+    with concurrent.futures.ThreadPoolExecutor(12) as pool:
+        calls = [pool.submit(client.call, {"a": n}) for n in range(12)]
+        for number in range(1, 13):
+            eventually(lambda number=number: len(requester.sent) >= number)
+            requester.reply(number, answer(number))
+        assert sorted(call.result(30).sum for call in calls) == list(range(1, 13))
+
+
+def test_a_call_that_found_no_place_says_so(client, requester):
+    requester.linked = True
+    held = [client.call_async(timeout=None) for _ in range(8)]
+    with pytest.raises(
+        rosglass.ServiceUnavailableError, match=r"8 requests before it.*nothing was"
+    ):
+        client.call(timeout=0.05)
+    assert len(requester.sent) == 8
+    assert not any(call.done() for call in held)
+
+
+def test_requests_that_a_server_holds_for_long_do_not_hold_up_others(eventually):
+    window = RequestWindow(stall_s=0.1)
+    assert all(window.enter(n, print) for n in range(8))
+    assert not window.enter(8, print)
+    eventually(lambda: window.enter(8, print))
+    assert window.leave(0) == []  # it does not count any more
+    assert all(window.enter(n, print) for n in range(9, 16))
+    assert not window.enter(16, print)
+    assert window.leave(8) == [print]
+
+
+def test_replies_to_one_client_come_in_bursts_that_it_can_keep(node, middleware, eventually):
+    promises = []
+    service = node.create_service_server("/add", ADD, lambda _: promises.append(Future()) or promises[-1])  # fmt: skip  # noqa: E501
+    (replier,) = middleware.repliers
+    data = rosglass.load(ADD).request.encode({})
+    for number in range(30):
+        replier.receive(RequestId(b"w" * 16, number), data)
+    replier.receive(RequestId(b"x" * 16, 99), data)
+    eventually(lambda: len(promises) == 31)
+    for promise in promises:
+        promise.set_result({})
+    numbers = [request.sequence for request, _ in replier.replies]
+    assert 99 in numbers  # another client's does not wait
+    assert [n for n in numbers if n != 99] == list(range(len(numbers) - 1))
+    assert len(numbers) < 31
+    eventually(lambda: len(replier.replies) == 31)
+    assert sorted(r.sequence for r, _ in replier.replies) == [*range(30), 99]
+    service.close()
 
 
 def test_the_middleware_is_told_how_long_a_reply_is_of_use(client, requester):

@@ -145,7 +145,10 @@ def call(service: str, type: str, requests: list[Any], at_once: bool = False) ->
     assert client.wait_for_service(LIMIT_S), service
     filled = [fill(kind.Request(), value) for value in requests]
     if at_once:
-        futures = [client.call_async(request) for request in filled]
+        futures = []
+        for request in filled:
+            futures.append(client.call_async(request))
+            time.sleep(0.01)  # its own writer keeps but 10 that are not sent yet
         answers = [finish(future) for future in futures]
     else:
         answers = [finish(client.call_async(request)) for request in filled]

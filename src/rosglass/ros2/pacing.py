@@ -1,0 +1,189 @@
+"""Requests and replies no faster than ROS 2's servers and clients take them.
+
+A server of ROS 2 keeps the last 10 requests that it has not taken, of all its clients together,
+and a client the last 10 replies (``rmw_qos_profile_services_default``, in every middleware). What
+comes beyond that displaces the oldest, and neither side is informed.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import OrderedDict, deque
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Hashable
+
+    from rosglass.comm.timers import Timers
+
+__all__ = ["HOLD_S", "LIMIT", "STALL_S", "ReplyPacer", "RequestWindow"]
+
+#: Requests that are open at a time, or replies in a burst: two less than the peer's queue holds.
+LIMIT = 8
+#: Seconds without any answer after which open requests count as taken: their server holds them
+#: until later, or they are lost.
+STALL_S = 30.0
+#: The same for requests that a server is known to hold, such as those for an action's result.
+HOLD_S = 0.1
+#: Seconds that a client is given to take a burst of replies.
+_BURST_S = 0.04
+#: Clients whose open requests are counted, and replies to one that wait at most: of more, sent to
+#: a client that asks faster than it listens, most will be lost.
+_MAX_CLIENTS = _MAX_WAITING = 1000
+
+
+class RequestWindow:
+    """The open requests of a node to one service, :data:`LIMIT` at most.
+
+    Args:
+        stall_s: Seconds without any answer after which all that are open count as taken.
+    """
+
+    def __init__(self, stall_s: float) -> None:
+        self._stall_s = stall_s
+        self._lock = threading.Lock()
+        self._open: set[Hashable] = set()
+        self._moved = 0.0
+        #: What to call when there is room, for those that found none.
+        self._waiting: dict[Callable[[], None], None] = {}
+
+    def enter(self, request: Hashable, retry: Callable[[], None]) -> bool:
+        """Return whether a request may be sent now.
+
+        Args:
+            request: It counts until it leaves.
+            retry: One of the calls that :meth:`leave` returns when there is room again.
+        """
+        now = time.monotonic()
+        with self._lock:
+            if len(self._open) >= LIMIT:
+                if now - self._moved < self._stall_s:
+                    self._waiting[retry] = None
+                    return False
+                self._open.clear()
+            self._open.add(request)
+            self._moved = now
+        return True
+
+    def leave(self, request: Hashable) -> list[Callable[[], None]]:
+        """Take note that a request is not open any more; return what to call, without a lock."""
+        with self._lock:
+            if request not in self._open:
+                return []
+            self._open.discard(request)
+            self._moved = time.monotonic()
+            waiting = list(self._waiting)
+            self._waiting.clear()
+        return waiting
+
+
+@dataclass
+class _Client:
+    """A client with open requests.
+
+    Attributes:
+        open: How many it has.
+        paced: Whether they were more than it can take the replies of at once.
+        burst: Replies sent since `since`, monotonic.
+        waiting: Replies to be sent, in order.
+        sending: Whether a thread sends them, or a timer will.
+    """
+
+    open: int = 0
+    paced: bool = False
+    burst: int = 0
+    since: float = 0.0
+    waiting: deque[Callable[[], None]] = field(default_factory=deque)
+    sending: bool = False
+
+
+class ReplyPacer:
+    """The replies of a server: to clients with many open requests in bursts of :data:`LIMIT`.
+
+    A client with fewer open requests gets each reply at once.
+
+    Args:
+        timers: Send what has to wait.
+    """
+
+    def __init__(self, timers: Timers) -> None:
+        self._timers = timers
+        self._lock = threading.Lock()
+        self._clients: OrderedDict[bytes, _Client] = OrderedDict()
+
+    def on_request(self, client: bytes) -> None:
+        """Count a request."""
+        with self._lock:
+            known = self._clients.get(client)
+            if known is None:
+                if len(self._clients) >= _MAX_CLIENTS:
+                    self._drop_oldest()
+                known = self._clients[client] = _Client()
+            known.open += 1
+            known.paced = known.paced or known.open > LIMIT
+
+    def reply(self, client: bytes, send: Callable[[], None]) -> None:
+        """Send a reply to one of its requests now, or soon; `send` raises nothing."""
+        with self._lock:
+            known = self._clients.get(client)
+            if known is not None:
+                known.waiting.append(send)
+                if known.sending:
+                    return
+                known.sending = True
+        if known is None:
+            send()
+        else:
+            self._send_waiting(client, known)
+
+    def on_failure(self, client: bytes) -> None:
+        """Count a request that gets no reply."""
+        with self._lock:
+            known = self._clients.get(client)
+            if known is not None:
+                self._close_one(client, known)
+
+    def flush(self) -> None:
+        """Send all that waits at once, before the server goes."""
+        with self._lock:
+            clients = list(self._clients.values())
+            self._clients.clear()
+        for known in clients:
+            while known.waiting:
+                with suppress(IndexError):  # another thread sent the last one
+                    known.waiting.popleft()()
+
+    def _send_waiting(self, client: bytes, known: _Client) -> None:
+        """Send as much as the client can take now, and the rest later."""
+        while True:
+            with self._lock:
+                if not known.waiting:
+                    known.sending = False
+                    return
+                now = time.monotonic()
+                if now - known.since >= _BURST_S:
+                    known.burst, known.since = 0, now
+                if known.paced and known.burst >= LIMIT and len(known.waiting) <= _MAX_WAITING:
+                    later = known.since + _BURST_S - now
+                    break
+                send = known.waiting.popleft()
+                known.burst += 1
+                self._close_one(client, known)
+            send()
+        self._timers.after(later, lambda: self._send_waiting(client, known))
+
+    def _close_one(self, client: bytes, known: _Client) -> None:
+        """Count one open request less; the lock is held."""
+        known.open -= 1
+        if known.open <= 0 and self._clients.get(client) is known:
+            del self._clients[client]
+
+    def _drop_oldest(self) -> None:
+        """Forget a client whose requests were not answered; the lock is held."""
+        for client, known in self._clients.items():
+            if not known.waiting:
+                del self._clients[client]
+                return
