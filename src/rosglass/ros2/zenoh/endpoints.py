@@ -18,7 +18,6 @@ from rosglass.comm import ConnectionState, Durability, Handle, History, Reliabil
 from rosglass.errors import ConnectionLostError, NodeClosedError
 from rosglass.ros2.middleware import Writer
 from rosglass.ros2.zenoh.keys import (
-    ATTACHMENT,
     ATTACHMENT_FULL,
     HUMBLE_HASH,
     gid_of,
@@ -195,7 +194,8 @@ class ZenohWriter(Declaration, Writer):
         self._quiet = threading.Condition(self._lock)
         # Kept for keys that are declared later: late subscriptions are owed the last samples.
         self._latched = self._qos.durability is Durability.TRANSIENT_LOCAL
-        self._history: deque[tuple[bytes | bytearray, bytes]] = deque(maxlen=self._qos.depth)
+        #: Payload, attachment, and when it was sent, in nanoseconds of the monotonic clock.
+        self._history: deque[tuple[bytes | bytearray, bytes, int]] = deque(maxlen=self._qos.depth)
         self._joining, self._joined = threading.Lock(), bytearray()
         # What is kept for late subscriptions would fill the shared memory for good.
         self._shared = None if self._latched else shared
@@ -250,7 +250,7 @@ class ZenohWriter(Declaration, Writer):
             number = next(self._numbers)
             note = ATTACHMENT_FULL.pack(number, now, 16, self.gid)
             if self._latched:
-                self._history.append((data, note))
+                self._history.append((data, note, time.monotonic_ns()))
             for publisher in self._publishers:
                 publisher.put(payload, attachment=note)
             for reader in self._readers.at(self._place):
@@ -305,9 +305,8 @@ class ZenohWriter(Declaration, Writer):
         publishers = [self._declare_publisher(session, name) for name in sorted(hashes)]
         # First: whatever is written from here on reaches them; some of it twice, under one number.
         self._publishers += tuple(publishers)
-        lifespan, now = self._qos.lifespan, time.time_ns()
-        for data, note in tuple(self._history):
-            sent = ATTACHMENT.unpack(note)[1]
+        lifespan, now = self._qos.lifespan, time.monotonic_ns()
+        for data, note, sent in tuple(self._history):
             if lifespan is None or now - sent <= lifespan.nanoseconds:
                 for publisher in publishers:
                     publisher.put(data, attachment=note)

@@ -202,7 +202,7 @@ class _Collected:
         self._take, self._drain = take, drain
         # Reentrant: what listens to events of a subscription may ask for its samples.
         self._lock = threading.RLock()
-        self._looked = time.time_ns()
+        self._looked = time.monotonic_ns()
         self._subscriber: Any = session.declare_subscriber(
             key, zenoh.handlers.FifoChannel(room), allowed_origin=_OTHERS
         )
@@ -220,9 +220,9 @@ class _Collected:
     def flush(self) -> None:
         """Hand on what waits, in the calling thread."""
         with self._lock, suppress(zenoh.ZError):  # undeclared, and empty
-            now = time.time_ns()
+            now = time.monotonic_ns()
             # What waited longer than it should must not look new: the program was held up.
-            received = min(now, self._looked + _INTERVAL_NS)
+            received = time.time_ns() - max(0, now - self._looked - _INTERVAL_NS)
             for _ in range(_MAX_WAITING):
                 sample = self._next()
                 if sample is None:
