@@ -38,27 +38,3 @@ def test_layers_are_drawn_without_holes_below_them(show: Any, grab: Any) -> None
     )
     picture = grab()
     assert colour(picture, 55, 70) == colour(picture, 85, 70) == (0, 128, 255)
-
-
-def test_camera_pictures_are_drawn(app: Any, show: Any, grab: Any, wait: Any, master: str) -> None:
-    import rosglass
-
-    show(
-        """import QtMultimedia 5.15
-        import Ros2 1.0
-        Item {
-        VideoOutput { x: 20; y: 20; width: 64; height: 48; fillMode: VideoOutput.Stretch
-            source: ImageTransportSubscription { topic: "/test/camera/image" } }
-        Component.onCompleted: Ros2.init("camera_overlay") }"""
-    )
-    with rosglass.connect(master.replace("http", "ros1"), name="camera") as node:
-        publisher = node.create_publisher("/test/camera/image", "sensor_msgs/Image")
-        data = bytes((255, 128, 0)) * (64 * 48)
-        image = {"height": 48, "width": 64, "encoding": "rgb8", "step": 192, "data": data}
-
-        def arrived() -> bool:
-            publisher.publish(image)
-            wait(50)
-            return colour(grab(), 50, 40) == (255, 128, 0)
-
-        wait(arrived)

@@ -147,11 +147,16 @@ def test_a_renderer_cannot_be_another_one_later(
 
 
 def test_a_graphics_card_is_used(monkeypatch: pytest.MonkeyPatch, app: Any) -> None:
+    from rosglass.qml import renderer_choice as qml_choice
     from rosglass.rviz import renderer_choice
 
-    monkeypatch.setattr(renderer_choice, "_taken", lambda: "")
-    monkeypatch.setattr(renderer_choice, "_graphics_device", lambda: "NVIDIA H200/PCIe/SSE2")
-    made = renderer_choice.RendererChoice()
+    monkeypatch.setattr(qml_choice, "taken_renderer", lambda: "")
+
+    class Choice(renderer_choice.OverlayRendererChoice):
+        def _graphics_device(self) -> str:
+            return "NVIDIA H200/PCIe/SSE2"
+
+    made = Choice()
     assert made._choose([]) == ("opengl", "NVIDIA H200/PCIe/SSE2")
 
 
@@ -160,7 +165,8 @@ def test_a_graphics_card_is_used(monkeypatch: pytest.MonkeyPatch, app: Any) -> N
     [
         ("Item { }", "import QtGraphicalEffects 1.15", ":2: QtGraphicalEffects"),
         ("Item { }", "import QtQuick.Particles 2.15", ":2: QtQuick.Particles"),
-        ("Item { Component { VideoOutput { } } }", "", ":3: VideoOutput"),
+        ("Item { Component { VideoOutput { } } }", "", ""),
+        ("Item { MediaPlayer { } VideoOutput { } }", "", ":3: MediaPlayer"),
         ('Item { Loader { source: "Late.qml" } }', "", "Late.qml:3: ShaderEffect"),
         ("Item { Late { } }", "", "Late.qml:3: ShaderEffect"),
         ("Item { Glow { } }", "import Our.Looks 1.0", "Our/Looks/Shining.qml:2: ShaderEffect"),
@@ -178,8 +184,8 @@ def test_a_graphics_card_is_used(monkeypatch: pytest.MonkeyPatch, app: Any) -> N
 def test_what_may_come_to_need_opengl_is_found_in_the_files(
     text: str, imports: str, need: str, qml: Any, app: Any, tmp_path: Path
 ) -> None:
+    from rosglass.qml.opengl_needs import need_in_file
     from rosglass.qt import QtQml
-    from rosglass.rviz.opengl_needs import need_in_file
 
     qml("Late", f"Item {{ {SHADER} }}")
     module = tmp_path / "Our" / "Looks"
@@ -193,7 +199,7 @@ def test_what_may_come_to_need_opengl_is_found_in_the_files(
 
 
 def test_folders_that_import_each_other_are_looked_through_once(tmp_path: Path) -> None:
-    from rosglass.rviz.opengl_needs import need_in_file
+    from rosglass.qml.opengl_needs import need_in_file
 
     places = {"First": "Parts", "Second": "More Pages", "Third": "Looks"}
     imports = "".join(f'import "../{folder}"\n' for folder in places.values())

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = [
     "add_import_paths",
     "add_longest_script",
+    "add_renderer",
     "add_screenshot",
     "configure",
     "format_log",
@@ -59,6 +60,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="fill the screen, ignore what would close the window (Alt-F4), and hide the pointer "
         "while it is not moved; Ctrl-C, SIGTERM and Qt.quit() end it",
     )
+    add_renderer(parser, "the interface")
     add_longest_script(parser)
     add_screenshot(parser, "the window", after=2.0)
     add_definitions_option(parser)
@@ -89,6 +91,17 @@ def add_import_paths(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         help="a folder with QML modules, searched besides QML_IMPORT_PATH; may be repeated",
+    )
+
+
+def add_renderer(parser: argparse.ArgumentParser, what: str) -> None:
+    """Declare the option that says which of Qt's renderers draws."""
+    parser.add_argument(
+        "--renderer",
+        choices=("auto", "opengl", "software"),
+        default="auto",
+        help=f"what draws {what}: OpenGL, Qt's software renderer (no shaders, particles and "
+        "films), or the one that is faster here (auto, the default)",
     )
 
 
@@ -143,6 +156,7 @@ def run(args: argparse.Namespace) -> int:
             watch=args.watch,
             fullscreen=args.fullscreen,
             kiosk=args.kiosk,
+            renderer=args.renderer,
             arguments=args.arguments,
             ros_arguments=args.ros_arguments,
         )

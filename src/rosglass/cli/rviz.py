@@ -11,7 +11,13 @@ from typing import TYPE_CHECKING
 
 from rosglass.cli.completion import complete_files
 from rosglass.cli.connecting import add_definitions_option, seconds
-from rosglass.cli.run import add_import_paths, add_longest_script, add_screenshot, format_log
+from rosglass.cli.run import (
+    add_import_paths,
+    add_longest_script,
+    add_renderer,
+    add_screenshot,
+    format_log,
+)
 from rosglass.errors import Error, QmlError
 
 if TYPE_CHECKING:
@@ -86,13 +92,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="draw the 3D view with hard edges: without a graphics card several times as fast",
     )
-    parser.add_argument(
-        "--renderer",
-        choices=("auto", "opengl", "software"),
-        default="auto",
-        help="what draws interfaces in QML: OpenGL, Qt's software renderer (no shaders, particles "
-        "and VideoOutput), or the one that is faster here (auto, the default)",
-    )
+    add_renderer(parser, "interfaces in QML")
     add_longest_script(parser)
     add_screenshot(parser, "RViz's window", after=3.0)
     add_definitions_option(parser)

@@ -13,6 +13,7 @@ from rosglass.qml.display import require_display
 from rosglass.qml.interrupt import QuitOnSignal, end_process_within
 from rosglass.qml.log import LocationFormatter
 from rosglass.qml.places import interface_file
+from rosglass.qml.renderer_choice import choice
 from rosglass.qml.runner import Runner, needs_widgets
 from rosglass.qml.session import Session
 from rosglass.qt import QtCore, QtGui, QtQml, QtQuick, optional, run_event_loop
@@ -50,6 +51,8 @@ class Application(Handle):
         fullscreen: Fill the screen.
         kiosk: Fill the screen, and let nobody close it by accident: Alt-F4 is ignored, the pointer
             disappears while it is not moved; ``Qt.quit()``, Ctrl-C and SIGTERM end it.
+        renderer: What draws: "opengl", "software" (Qt's own, without shaders), or "auto" for the
+            software renderer where there is no graphics card and the file needs none.
 
     Raises:
         QmlError: There is no such file or folder, or it is none of QML.
@@ -57,7 +60,7 @@ class Application(Handle):
         RosArgumentError: One of `ros_arguments` is not valid.
         Error: This is not the main thread, or the Qt application is one without windows; `session`
             is given together with what describes one; a name in `context` is none that QML can
-            write.
+            write; there is no such `renderer`, or another window has chosen another one.
     """
 
     def __init__(
@@ -74,6 +77,7 @@ class Application(Handle):
         watch: bool = False,
         fullscreen: bool = False,
         kiosk: bool = False,
+        renderer: str = "auto",
     ) -> None:
         if threading.current_thread() is not threading.main_thread():
             raise Error("a user interface must be made in the main thread of the program")
@@ -94,6 +98,7 @@ class Application(Handle):
             url or os.environ.get("ROSGLASS_URL", ""), name, arguments=ros_arguments
         )
         try:
+            choice.prefer(renderer)
             self._runner = Runner(
                 path,
                 self.session,

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 from rosglass.errors import QmlError
 from rosglass.qml.error_view import ERRORS, ERRORS_BELOW, PANEL, SCRIPT_ENDED, ErrorView
 from rosglass.qml.live_file import LiveFile
+from rosglass.qml.opengl_needs import need_in_items
+from rosglass.qml.renderer_choice import choice
 from rosglass.qml.runtime import runtime_of
 from rosglass.qt import QtCore, QtGui, QtQuick, Slot, is_alive, send_deferred_deletes
 
@@ -98,6 +100,8 @@ class Runner(QtCore.QObject):
         Raises:
             QmlError: The file has errors; the message lists them.
         """
+        choice.expect(self.file)
+        choice.choose(self.engine.importPathList())
         self.session.put_off()
         try:
             made = self._live.create()
@@ -216,6 +220,11 @@ class Runner(QtCore.QObject):
             window.sceneGraphError.connect(self._no_graphics)
             if self._kiosk is not None:
                 self._kiosk.keep(window)
+        if isinstance(root, QtQuick.QQuickItem):
+            self._tell_not_drawn(root)
+        else:
+            for window in {id(w): w for w in (*wanted, *others)}.values():
+                self._tell_not_drawn(window.contentItem())
         for window in wanted:
             if self._fullscreen:
                 window.showFullScreen()
@@ -266,8 +275,14 @@ class Runner(QtCore.QObject):
     def _tell_script_ended(self, text: str) -> None:
         self._notice.show(text, self.windows(), SCRIPT_ENDED)
 
+    def _tell_not_drawn(self, item: QtQuick.QQuickItem) -> None:
+        """Warn of what only OpenGL draws, as a file that is shown anew may come to need it."""
+        need = need_in_items(item, self.file) if choice.renderer == "software" else ""
+        if need:
+            _log.warning("%s", choice.tell_missing(need))
+
     def _no_graphics(self, error: Any, message: str) -> None:  # noqa: ARG002 - Qt's signature
-        _log.error("the window cannot be drawn: %s; try QT_QUICK_BACKEND=software", message)
+        _log.error("the window cannot be drawn: %s; try --renderer software", message)
         self.exit(1)
 
     def _quit(self, *_: Any) -> None:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 from rosglass.errors import QmlError
 from rosglass.qml.error_view import ERRORS, ERRORS_BELOW, PANEL, SCRIPT_ENDED, ErrorView
 from rosglass.qml.live_file import LiveFile
+from rosglass.qml.opengl_needs import need_in_items
 from rosglass.qml.places import interface_file
 from rosglass.qt import is_alive
-from rosglass.rviz.opengl_needs import need_in_items
 from rosglass.rviz.overlay import Overlay
 from rosglass.rviz.qml_input import QmlInput
 from rosglass.rviz.qt5 import QtCore, QtQuick

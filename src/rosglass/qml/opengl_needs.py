@@ -22,15 +22,18 @@ _CLASSES = {
     "QQuickShaderEffect": "ShaderEffect",
     "QQuickShaderEffectSource": "layer|ShaderEffectSource",
     "QQuickParticlePainter": "QtQuick.Particles",
-    "QDeclarativeVideoOutput": "VideoOutput",
     "QQuick3DViewport": "View3D",
     "QQuickWebEngineView": "WebEngineView",
     "QQuickFramebufferObject": "QQuickFramebufferObject",
 }
+#: Cameras of robots are painted where video is not drawn; nothing else that a VideoOutput shows is.
 _WRITTEN = re.compile(
-    r"\b(ShaderEffect|ShaderEffectSource|VideoOutput|View3D|WebEngineView|layer)\s*\{"
+    r"\b(ShaderEffect|ShaderEffectSource|MultiEffect|RectangularShadow|View3D|WebEngineView|layer"
+    r"|MediaPlayer|Video|Camera|CaptureSession)\s*\{"
     r"|\b(layer\.enabled)\b"
-    r"|^[ \t]*import\s+(QtGraphicalEffects|QtQuick\.Particles|QtQuick3D|QtWebEngine)\b",
+    r"|^[ \t]*import\s+(QtGraphicalEffects|Qt5Compat\.GraphicalEffects|QtQuick\.Effects"
+    r"|QtQuick\.Particles|QtQuick3D|QtQuick\.Scene3D|Qt3D|QtWebEngine|QtWebView|QtLocation"
+    r"|QtGraphs|QtDataVisualization)\b",
     re.MULTILINE,
 )
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
