@@ -17,5 +17,12 @@ def similar(name: str, known: Iterable[str]) -> str:
     names = [other for other in known if other != name]
     base = name.rpartition("/")[2]
     near = [other for other in names if other.rpartition("/")[2] == base]
+    plain = _plain(name)
+    near += [other for other in names if _plain(other) == plain]
     near += difflib.get_close_matches(name, names, 2, 0.8)
-    return f"; did you mean {' or '.join(dict.fromkeys(near[:2]))}?" if near else ""
+    return f"; did you mean {' or '.join(list(dict.fromkeys(near))[:2])}?" if near else ""
+
+
+def _plain(name: str) -> str:
+    """Return a name without what languages spell differently: frameId and frame_id."""
+    return name.replace("_", "").lower()

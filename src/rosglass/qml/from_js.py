@@ -125,7 +125,9 @@ class _Conversion:
         if not found and value.toString() != "[object Object]":
             # A Map, a Set, a url: their content would silently be lost.
             raise _no_message(value, schema, path)
-        if value.property("scalar").isNumber() and "scalar" not in schema.by_name:
+        # A name that is not there is not read: that would be taken for a mistake in the interface.
+        scalar = value.hasProperty("scalar") and value.property("scalar").isNumber()
+        if scalar and "scalar" not in schema.by_name:
             held = value.toVariant()
             if isinstance(held, QtGui.QQuaternion):
                 return {"x": held.x(), "y": held.y(), "z": held.z(), "w": held.scalar()}

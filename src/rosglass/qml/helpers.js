@@ -12,14 +12,62 @@
         return made
     }
 
-    const times = makeTimes(prototype, host)
+    // How often a name was read that a type does not have. Interfaces read such names to find out
+    // whether they are there; only the first readings cost a look at what may be meant.
+    const MOST_READ = 100, MOST_NAMES = 1000
+    const absent = new Map()
+
+    function readAbsent(value, name) {
+        // JavaScript asks any object for the latter two.
+        if (name[0] === "#" || name === "toJSON" || name === "then") return undefined
+        const type = value["#messageType"] || value["#kind"]
+        const key = type + "." + name, count = absent.get(key) || 0
+        if (type && count < MOST_READ && (count || absent.size < MOST_NAMES)) {
+            absent.set(key, count + 1)
+            host.missing(type, name, namesOf(value))
+        }
+        return undefined
+    }
+
+    // What all messages and times inherit from: asked for what neither they nor objects have.
+    const base = Object.create(new Proxy(Object.prototype, {
+        get: function (target, name, receiver) {
+            if (name === "__proto__") return Object.getPrototypeOf(receiver)
+            return typeof name !== "string" || name in target ? target[name] : readAbsent(receiver, name)
+        }
+    }))
+    // Qt's engine takes a Proxy for a function, and finds what functions have (`name`) before it asks.
+    for (const name of Object.getOwnPropertyNames(Function.prototype)) {
+        if (name in Object.prototype) {
+            Object.defineProperty(base, name, { value: Object.prototype[name], writable: true, configurable: true })
+            continue
+        }
+        Object.defineProperty(base, name, {
+            get: function () { return readAbsent(this, name) },
+            set: function (value) {
+                Object.defineProperty(this, name, { value: value, writable: true, enumerable: true, configurable: true })
+            },
+            configurable: true
+        })
+    }
+
+    function namesOf(value) {
+        let names = []
+        for (let at = value; at && at !== base; at = Object.getPrototypeOf(at))
+            names = names.concat(Object.getOwnPropertyNames(at).filter(name => name[0] !== "#"))
+        return names
+    }
+
+    function forgetAbsent() { absent.clear() }
+
+    const times = makeTimes(prototype, host, base)
     const arrays = makeArrays(prototype, host)
 
     // A type's shape: its prototype, and which of its fields need more than JSON.parse gives.
     // Each field is [name, kind of array element or "", shape of the compound or null]. Times have
     // a prototype of their own; `id` is what `host` knows the type by.
     function shape(name, time, fields, constants, id) {
-        const parent = time ? times.kinds[time] : Object.prototype
+        const parent = time ? times.kinds[time] : base
         const members = Object.assign({}, constants)
         members["#messageType"] = name
         return { proto: prototype(parent, members), fields: fields, id: id }
@@ -119,6 +167,6 @@
     return {
         build: build, buildWithNan: buildWithNan, shape: shape,
         makeTime: times.make, createTime: times.create, timeParts: times.parts,
-        makeQos: makeQos, makeOptions: makeOptions
+        makeQos: makeQos, makeOptions: makeOptions, forgetAbsent: forgetAbsent
     }
 })

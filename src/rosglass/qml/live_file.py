@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 from rosglass.errors import QmlError
 from rosglass.qml.creation import create
 from rosglass.qml.load_errors import error_list
+from rosglass.qml.log import forget_repeats
 from rosglass.qml.modules import install
 from rosglass.qml.places import import_folder, interface_file
+from rosglass.qml.runtime import runtime_of
 from rosglass.qml.watchdog import Watchdog
 from rosglass.qml.watcher import Watcher
 from rosglass.qt import QT6, QtCore, QtQml, Signal, is_alive
@@ -110,6 +112,10 @@ class LiveFile(QtCore.QObject):
         if not os.path.isfile(self.path):  # noqa: PTH113 - pathlib's may raise
             raise QmlError(f"{self.path}: there is no such file")
         self.engine.clearComponentCache()
+        forget_repeats()
+        runtime = runtime_of(self.engine)
+        if runtime is not None:
+            runtime.forget_warnings()
         component = QtQml.QQmlComponent(self.engine, QtCore.QUrl.fromLocalFile(str(self.path)))
         root = create(component, self.engine)
         if root is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -18,6 +19,8 @@ __all__ = [
     "Caller",
     "LocationFormatter",
     "RateLimit",
+    "explain",
+    "forget_repeats",
     "install_message_handler",
     "log_from_qml",
     "logger_name",
@@ -122,6 +125,61 @@ _HINTS = {
     "ReferenceError: rviz is not defined": "; it is over RViz alone: rosglass rviz --overlay FILE"
 }
 _handling = threading.local()
+#: Seconds until a warning that repeats is logged again, with how often it came.
+_REPEAT_S = 60.0
+#: Warnings and places that are remembered.
+_MOST = 1000
+
+
+class _Repeats:
+    """Warnings of QML's engine that come again: a binding's come with every message.
+
+    Each is logged the first, the tenth, the hundredth time and so on, and once a minute.
+    """
+
+    def __init__(self) -> None:
+        #: By place and text: how often it came, and how often and when (monotonic) it was logged.
+        self._seen: dict[tuple[Caller, str], tuple[int, int, float]] = {}
+        #: By place: what an error there comes from.
+        self._causes: dict[tuple[str, int], str] = {}
+
+    def forget(self) -> None:
+        self._seen.clear()
+        self._causes.clear()
+
+    def explain(self, caller: Caller, cause: str) -> None:
+        if len(self._causes) >= _MOST:
+            self._causes.clear()
+        self._causes[caller.file, caller.line] = cause
+
+    def cause(self, caller: Caller) -> str:
+        return self._causes.get((caller.file, caller.line), "")
+
+    def counted(self, caller: Caller, text: str) -> str:
+        """Return what to log, empty for nothing."""
+        now = time.monotonic()
+        if len(self._seen) >= _MOST:
+            self._seen.clear()
+        count, logged, at = self._seen.get((caller, text), (0, 0, -math.inf))
+        count += 1
+        if str(count).strip("0") != "1" and now - at < _REPEAT_S:
+            self._seen[caller, text] = count, logged, at
+            return ""
+        self._seen[caller, text] = count, count, now
+        return f"{text} ({count - logged} more times)" if logged else text
+
+
+_repeats = _Repeats()
+
+
+def explain(caller: Caller, cause: str) -> None:
+    """Add a cause to errors that Qt reports of a place in QML from now on."""
+    _repeats.explain(caller, cause)
+
+
+def forget_repeats() -> None:
+    """Log warnings again that were logged before: the files may have changed."""
+    _repeats.forget()
 
 
 def _handle(mode: Any, context: Any, message: str) -> None:
@@ -141,7 +199,12 @@ def _handle(mode: Any, context: Any, message: str) -> None:
             level = logging.INFO
         caller = Caller(plain_path(file), max(context.line, 0), context.function or "")
         text = message.removeprefix(f"{file}:{context.line}: ")
-        log_from_qml("", level, text + _HINTS.get(text, ""), caller)
+        text += _HINTS.get(text, "")
+        if category == "default" and level == logging.WARNING:
+            cause = _repeats.cause(caller) if text.startswith("TypeError") else ""
+            text = _repeats.counted(caller, f"{text}; {cause}" if cause else text)
+        if text:
+            log_from_qml("", level, text, caller)
     finally:
         _handling.busy = False
 

@@ -30,6 +30,8 @@ __all__ = ["UNPREPARED", "Runtime", "own_runtime", "runtime_of"]
 _log = logging.getLogger("rosglass.qml")
 _FOLDER = Path(__file__).parent
 _NAME = "rosglass.runtime"
+#: Where JavaScript is ours: no place that a message should name.
+_OWN_SCRIPTS = tuple(str(_FOLDER / name) for name in ("times.js", "arrays.js", "helpers.js"))
 #: What to say to an object in an engine that has no runtime.
 UNPREPARED = "call rosglass.qml.install(engine) before the QML engine loads anything"
 #: Bytes of long arrays handed to JavaScript after which it is asked to collect its garbage: it
@@ -45,6 +47,7 @@ _HELPERS = (
     "timeParts",
     "makeQos",
     "makeOptions",
+    "forgetAbsent",
 )
 _PROMISE = """(function () {
     let made = {}
@@ -120,9 +123,16 @@ class Runtime(QtCore.QObject):
         for frame in stack.splitlines()[1:]:
             function, _, place = frame.partition("@")
             file, _, line = place.rpartition(":")
-            if line.lstrip("-").isdigit():
-                return Caller(plain_path(file), max(int(line), 0), function)
+            path = plain_path(file)
+            if line.lstrip("-").isdigit() and not path.startswith(_OWN_SCRIPTS):
+                return Caller(path, max(int(line), 0), function)
         return Caller("<python>", 0, "")
+
+    def forget_warnings(self) -> None:
+        """Say again what was said before: the files may have changed."""
+        self._host.told.clear()
+        if "_helper" in self.__dict__:
+            self._call("forgetAbsent", [])
 
     def keep(self, item: QtCore.QObject) -> QtCore.QObject:
         """Hand an object to JavaScript: it lives until JavaScript has collected it."""

@@ -1,5 +1,6 @@
-// Times and durations of both modules, exact in nanoseconds. `host` does what doubles cannot.
-(function (prototype, host) {
+// Times and durations of both modules, exact in nanoseconds. `host` does what doubles cannot; they
+// inherit from `base`.
+(function (prototype, host, base) {
     "use strict"
 
     // Numbers that answer as methods and as properties: `t.seconds()` and `t.seconds * 2`.
@@ -52,15 +53,15 @@
         if (typeof value === "number") return fromUnits(value, 1000, wanted)
         if (value instanceof Date) return fromUnits(value.getTime(), 1000, wanted)
         if (value === null || typeof value !== "object") fail(value, wanted)
-        if (value.sec === undefined && value.secs === undefined) {
-            const total = typeof value.nanoseconds === "function" ? undefined : value.nanoseconds
-            if (total === undefined) fail(value, wanted)
+        // Names that are not there are not read: that would be taken for a mistake in the interface.
+        const sec = "sec" in value ? value.sec : "secs" in value ? value.secs : undefined
+        if (sec === undefined) {
+            const total = "nanoseconds" in value ? value.nanoseconds : undefined
+            if (total === undefined || typeof total === "function") fail(value, wanted)
             return host.parts(String(total), 9)
         }
-        const sec = value.sec !== undefined ? value.sec : value.secs
-        let rest = value.nanosec
-        if (rest === undefined) rest = value.nsec
-        if (rest === undefined) rest = value.nsecs
+        let rest = "nanosec" in value ? value.nanosec : "nsec" in value ? value.nsec
+            : "nsecs" in value ? value.nsecs : 0
         if (rest === undefined) rest = 0
         if (!Number.isSafeInteger(sec) || !Number.isSafeInteger(rest)) fail(value, wanted)
         return normal(sec, rest)
@@ -97,7 +98,7 @@
         return (text[0] === "-" ? "-" : "") + digits.slice(0, -9) + "." + digits.slice(-9)
     }
 
-    const common = prototype(Object.prototype, {
+    const common = prototype(base, {
         isZero: function () { const p = own(this); return p[0] === 0 && p[1] === 0 },
         exactNanoseconds: function () { return exact(this) },
         // So that < and > compare numbers, not texts.

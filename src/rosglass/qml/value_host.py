@@ -1,12 +1,15 @@
-"""What JavaScript asks Python for: long arrays, and arithmetic beyond doubles."""
+"""What JavaScript asks Python for: long arrays, arithmetic beyond doubles, near names."""
 
 from __future__ import annotations
 
+import logging
 from typing import TYPE_CHECKING, Any
 
+from rosglass.comm.similar import similar
 from rosglass.errors import ConversionError, Error
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.from_js import elements_from_js
+from rosglass.qml.log import explain, log_from_qml
 from rosglass.qml.times import number_from_text
 from rosglass.qml.to_js import exact, is_duration, milliseconds
 from rosglass.qt import QJSValue, QtCore, Slot
@@ -75,6 +78,27 @@ class Host(QtCore.QObject):
         super().__init__(runtime)
         self._runtime = runtime
         self._types: list[tuple[Schema, Dialect]] = []
+        #: Places and names of which was said that no such field is there.
+        self.told: set[tuple[str, int, str]] = set()
+
+    @Slot(str, str, "QStringList")
+    def missing(self, type: str, name: str, known: list[str]) -> None:
+        """Say that QML reads a field that a message does not have, once for each place.
+
+        A name that is like none of the message's may be read to find out whether it is there, so
+        that is no warning; an error that follows from it is explained.
+        """
+        caller = self._runtime.caller()
+        if not caller.line:
+            return  # Python reads it
+        hint = similar(name, known)
+        text = f"{type} has no field {name!r:.80}{hint or '; it has ' + ', '.join(known[:20])}"
+        explain(caller, text)
+        place = (caller.file, caller.line, name)
+        if place not in self.told:
+            self.told.add(place)
+            level, end = (logging.WARNING, "") if hint else (logging.INFO, ".")
+            log_from_qml("", level, f"{text}{end} It is undefined here.", caller)
 
     def know(self, schema: Schema, dialect: Dialect) -> int:
         """Return the number by which scripts ask for a type."""
