@@ -78,6 +78,7 @@ REFERENCE = {
 }
 
 _THROWS = "a value that does not fit throws a JavaScript Error with the field's path"
+_HELD = "right after it was made, messages are held until subscribers are connected"
 _LOST = "false again when the server is lost"
 #: Verdict and reason where it is not plainly the same, or new.
 NOTES = {
@@ -89,7 +90,8 @@ NOTES = {
     ),
     ("Ros", "Ros", "advertise"): ("better", "wrong arguments throw; no type, no queue: an error"),
     ("Ros", "Ros", "waitForMessageAsync"): ("better", "latched messages too; or a promise"),
-    ("Ros", "Publisher", "publish"): ("better", _THROWS),
+    ("Ros", "Publisher", "publish"): ("better", f"{_HELD}; {_THROWS}"),
+    ("Ros", "Ros", "shutdown"): ("better", "`rosnode kill` also ends `rosglass run`, with code 1"),
     ("Ros", "Subscriber", "throttleRate"): ("better", "0 delivers every message"),
     ("Ros", "Subscriber", "running"): ("better", "while false, nothing subscribes"),
     ("Ros", "Subscriber", "messageType"): ("better", "can be set"),
@@ -104,7 +106,7 @@ NOTES = {
     ("Ros", "TfTransform", "rotation"): ("better", "the identity while nothing is known"),
     ("Ros", "ActionClient", "connected"): ("better", _LOST),
     ("Ros", "ImageTransportSubscriber", "pause"): ("better", "really pauses"),
-    ("Ros2", "Publisher", "publish"): ("better", _THROWS),
+    ("Ros2", "Publisher", "publish"): ("better", f"{_HELD}; {_THROWS}"),
     ("Ros2", "Publisher", "isAdvertised"): ("better", "false after a shutdown, true after init"),
     ("Ros2", "Subscription", "enabled"): ("better", "while false, nothing subscribes"),
     ("Ros2", "Subscription", "queueSize"): ("better", "its change signal is sent"),

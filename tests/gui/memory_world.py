@@ -13,9 +13,11 @@ from rosglass.comm import (
     Executor,
     Handle,
     Listeners,
+    Matched,
     Node,
     NodeName,
     Publisher,
+    PublisherEvents,
     QoS,
     Sample,
     Status,
@@ -54,6 +56,8 @@ class MemoryWorld:
         return node
 
     def changed(self) -> None:
+        for publisher in list(self.publishers):
+            publisher.look()
         for node in self.nodes:
             node.graph_listeners.notify(None)
 
@@ -70,6 +74,7 @@ class MemoryPublisher(Publisher):
         self.closed = False
         #: For how many nanoseconds the network holds back what is sent.
         self.held_back = 0
+        self.events: PublisherEvents = PublisherEvents(node.dispatcher, self.look, topic)
         node.world.publishers.append(self)
         node.world.changed()
 
@@ -93,6 +98,17 @@ class MemoryPublisher(Publisher):
         now = Time.now().nanoseconds
         sent = now - self.held_back
         subscription.deliver(Sample(data, "cdr", self.type, now, sent, b"me", sequence))
+
+    def look(self) -> None:
+        """Tell who listens to the topic."""
+        there = [
+            EndpointInfo(
+                EndpointKind.SUBSCRIPTION, self.topic, "", NodeName("/", "x"), gid=b"%d" % id(one)
+            )
+            for one in self.node.world.subscriptions
+            if one.topic == self.topic
+        ]
+        self.events.matched.update(there, Matched)
 
     def subscription_count(self) -> int:
         return sum(s.topic == self.topic for s in self.node.world.subscriptions)
@@ -145,8 +161,14 @@ class MemoryNode(Node):
             callback,
             raw_callback,
         )
-        subscription.on_close = lambda: self.world.subscriptions.remove(subscription)
+
+        def leave() -> None:
+            self.world.subscriptions.remove(subscription)
+            self.world.changed()
+
+        subscription.on_close = leave
         self.world.subscriptions.append(subscription)
+        self.world.changed()
         latched = subscription.qos.durability is Durability.TRANSIENT_LOCAL
         for publisher in self.world.publishers:
             if latched and publisher.topic == subscription.topic:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import logging
+import threading
 from typing import Any
 
 import pytest
@@ -79,14 +80,49 @@ def test_nothing_is_lost_silently_before_and_after(
 ) -> None:
     root = load(running)
     send(root, 1.0)
-    assert root.property("sent") is False
-    assert "not advertised yet" in caplog.text
-    wait(lambda: root.property("advertised") == 1)
+    assert root.property("sent") is True, "it is held for a moment"
+    wait(lambda: received and received[0].linear.x == 1.0)
+    assert root.property("advertised") == 1
     running.session.node.set_status(ConnectionState.LOST, "no router")
     wait(lambda: running.session.state == "lost")
     send(root, 1.0)
     assert root.property("sent") is False
     assert "connection is lost: no router" in caplog.text
+
+
+def test_what_cannot_be_advertised_in_time_is_told(
+    running: Any, received: list, wait: Any, caplog: Any, monkeypatch: Any
+) -> None:
+    go = threading.Event()
+    create = running.session.node.create_publisher
+    monkeypatch.setattr(
+        running.session.node,
+        "create_publisher",
+        lambda *given: go.wait(30) and create(*given),
+    )
+    root = load(running)
+    send(root, 1.0)
+    told = "nothing was published on cmd_vel: it could not be advertised in time"
+    wait(lambda: told in caplog.text)
+    send(root, 2.0)
+    go.set()
+    wait(lambda: received)
+    assert [message.linear.x for message in received] == [2.0]
+
+
+def test_what_is_held_at_shutdown_is_told(
+    running: Any, received: list, wait: Any, caplog: Any, monkeypatch: Any
+) -> None:
+    go = threading.Event()
+    monkeypatch.setattr(running.session.node, "create_publisher", lambda *_: go.wait(30))
+    root = load(running)
+    send(root, 1.0)
+    running.session.shutdown()
+    go.set()
+    wait(lambda: "nothing was published on cmd_vel: " in caplog.text)
+    send(root, 2.0)
+    assert root.property("sent") is False
+    assert not received
 
 
 def test_who_forgot_to_ask_for_a_node_is_told(

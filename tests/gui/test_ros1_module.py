@@ -115,7 +115,7 @@ def test_latched_publishers(up: Bench, wait: Any) -> None:
     "call",
     [
         'Ros.advertise("std_msgs/String", "/mode")',
-        'Ros.advertise("std_msgs/String", "/mode", 0)',
+        'Ros.advertise("std_msgs/String", "/mode", -1)',
         'Ros.advertise("std_msgs/String", "/mode", "ten")',
         'Ros.advertise("", "/mode", 10)',
         'Ros.advertise("std_msgs/String", "no good", 10)',
@@ -123,7 +123,7 @@ def test_latched_publishers(up: Bench, wait: Any) -> None:
         'Ros.createActionClient("/arm", "a/BAction")',
         "Ros.advertise(1, 2, 3)",
         'Ros.subscribe("no good", 1)',
-        'Ros.subscribe("/x", 0)',
+        'Ros.subscribe("/x", -1)',
         "Ros.subscribe(3, 1)",
         "Ros.setThreads(-1)",
         'Ros.logInternal(17, "f", "file", 1, "text")',

@@ -83,10 +83,13 @@ class Status:
         state: The state.
         detail: One line saying what was tried and what happens next, e.g.
             ``no router at tcp/127.0.0.1:7447, retrying every second``.
+        killed: Whether another node asked this one to end, as ``rosnode kill`` does, and has not
+            taken its name.
     """
 
     state: ConnectionState
     detail: str = ""
+    killed: bool = False
 
     def __str__(self) -> str:
         return f"{self.state.name}: {self.detail}" if self.detail else self.state.name

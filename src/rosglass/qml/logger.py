@@ -7,7 +7,7 @@ import logging
 from enum import IntEnum
 from typing import TYPE_CHECKING
 
-from rosglass.qml.log import log_from_qml, logger_name
+from rosglass.qml.log import log_from_qml
 from rosglass.qt import QJSValue, QtCore, Slot
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ class Logger(QtCore.QObject):
                 self._runtime.caller(),
             )
             return False
-        logging.getLogger(logger_name(self._name)).setLevel(level)
+        self._runtime.session.set_logger_level(self._name, level)
         return True
 
     def _log(self, level: int, message: QJSValue) -> None:

@@ -4,9 +4,12 @@
 from __future__ import annotations
 
 import logging
+import os
+import time
+from collections import deque
 from typing import TYPE_CHECKING
 
-from rosglass.comm.qos import History
+from rosglass.comm.qos import Durability, History
 from rosglass.errors import ConversionError, Error, TypeNotFoundError
 from rosglass.qml.element import RETRY, Element
 from rosglass.qml.from_js import fields_from_js
@@ -18,14 +21,26 @@ if TYPE_CHECKING:
     from rosglass.comm.node import Node
     from rosglass.comm.publisher import Publisher as Sender
     from rosglass.comm.qos import QoS
+    from rosglass.messages import Message, MessageType
     from rosglass.messages.schema import Schema
     from rosglass.qml.runtime import Runtime
+    from rosglass.qml.session import Session
 
 __all__ = ["Publisher"]
+
+#: Seconds that a message is held at most until its topic is advertised.
+_ADVERTISE_TIMEOUT_S = 2.0
+#: Seconds after advertising in which messages are held until known subscribers are connected.
+_MATCH_TIMEOUT_S = 1.0
+#: Messages that are held at most with keep-all history.
+_MOST_HELD = 1000
 
 
 class Publisher(Element):
     """Sends messages of one type on one topic; advertises as soon as there is a node.
+
+    What is published right after it was made is held until the topic is advertised and its
+    subscribers are connected, and goes out in order then.
 
     Args:
         runtime: The engine's runtime.
@@ -46,6 +61,10 @@ class Publisher(Element):
         self._sender: Sender | None = None
         self._schema: Schema | None = None
         self._have: Node | None = None
+        #: What waits, each until a time by :func:`time.monotonic`.
+        self._held: deque[tuple[Message, float]] = deque()
+        self._advertised_at = 0.0
+        self._settled = False
         self._retry = QtCore.QTimer(self)
         self._retry.setSingleShot(True)
         self._retry.timeout.connect(self._advertise)
@@ -73,25 +92,30 @@ class Publisher(Element):
         A value that does not fit throws a JavaScript Error that names the field; nothing is sent.
 
         Returns:
-            Whether it was handed to a connected node: false before the topic is advertised and
-            while the connection is lost.
+            Whether it was handed to a connected node, or is held for a moment until the topic is
+            advertised: false while there is no node and none is connecting, while the topic cannot
+            be advertised, and while the connection is lost.
         """
         sender, schema = self._sender, self._schema
-        if sender is None or schema is None:
+        kind = self._early_type() if sender is None else sender.type
+        if kind is None:
             told = self._problem.removeprefix(f"{self._topic}: ")
             reason = told or "it is not advertised yet"
             if self._session is not None and not self._session.is_initialized:
                 reason += f"; {NOT_INITIALIZED}"
             self._complain(f"nothing was published on {self._topic}: {reason}", logging.WARNING)
             return False
+        if schema is None:
+            from rosglass.messages.schema import schema_of  # noqa: PLC0415 - loaded by now
+
+            schema = schema_of(kind.definition)
         try:
             fields = fields_from_js(message, schema, dialect=self.DIALECT)
-            if self._qos.history is History.KEEP_ALL and self._session is not None:
-                # Who must not lose anything waits for a network that is stuck: not here.
-                data = sender.type.encode(fields)
-                self._session.background(lambda: sender.publish_serialized(data), self._sent_late)
-            else:
-                sender.publish(fields)
+            if sender is None or self._held or not self._is_settled(sender):
+                # As bytes: what JavaScript does with the object later is nothing to it.
+                self._hold(kind.decode(kind.encode(fields)))
+                return True
+            self._send(sender, fields)
         except ConversionError as error:
             # Logged by Qt, with the place, unless somebody catches it.
             if self._runtime is not None:
@@ -108,11 +132,83 @@ class Publisher(Element):
             return False
         return True
 
+    def _send(self, sender: Sender, message: dict[str, object] | Message) -> None:
+        if self._qos.history is History.KEEP_ALL and self._session is not None:
+            # Who must not lose anything waits for a network that is stuck: not here.
+            data = sender.type.encode(message)
+            self._session.background(lambda: sender.publish_serialized(data), self._sent_late)
+        else:
+            sender.publish(message)
+
+    def _early_type(self) -> MessageType | None:
+        """Return the type of what is about to be advertised; None when it will not be, or may not.
+
+        A type that only the robot knows is not known before the topic is advertised.
+        """
+        session = self._session or (self._runtime.session if self._runtime is not None else None)
+        if session is None or self._problem or session.state not in ("connecting", "connected"):
+            return None
+        from rosglass.connection import default_url  # noqa: PLC0415 - few publish this early
+        from rosglass.messages import MessageType, load  # noqa: PLC0415 - brings in definitions
+
+        try:
+            if session.node is not None:
+                ros = 1 if session.node.wire == "ros1" else 2
+            else:
+                url = session.url or default_url(os.environ)
+                ros = 1 if url.lower().startswith("ros1:") else 2
+            found = load(self._type, ros=ros)
+        except Error:
+            return None
+        return found if isinstance(found, MessageType) else None
+
+    def _is_settled(self, sender: Sender) -> bool:
+        """Return whether those who subscribe get what is sent now, as far as is known."""
+        if not self._settled:
+            late = time.monotonic() - self._advertised_at > _MATCH_TIMEOUT_S
+            latched = self._qos.durability is Durability.TRANSIENT_LOCAL
+            self._settled = late or latched or self._is_matched(sender)
+        return self._settled
+
+    def _is_matched(self, sender: Sender) -> bool:
+        """Return whether somebody is connected, and all that the graph shows."""
+        if self._have is None:
+            return False
+        try:
+            count = sender.subscription_count()
+            return 0 < count >= len(self._have.subscriptions(self._resolved))
+        except Error:
+            return False
+
+    def _hold(self, message: Message) -> None:
+        most = _MOST_HELD if self._qos.history is History.KEEP_ALL else self._qos.depth
+        if len(self._held) >= most:
+            self._held.popleft()
+            text = f"{self._topic}: messages are dropped, the oldest first: more than {most} were "
+            self._complain(text + "published before it was advertised", logging.WARNING)
+        self._held.append((message, time.monotonic() + _ADVERTISE_TIMEOUT_S))
+
+    def _send_held(self) -> None:
+        """Send what was held, once that makes sense; give up what is too old."""
+        sender, held = self._sender, self._held
+        if sender is not None and self._is_settled(sender):
+            while held:
+                message, _ = held.popleft()
+                try:
+                    self._send(sender, message)
+                except Error as error:
+                    self._sent_late(error)
+        elif sender is None:
+            while held and time.monotonic() > held[0][1]:
+                held.popleft()
+                why = self._problem or "it could not be advertised in time"
+                self._sent_late(Error(why))
+
     def _sent_late(self, result: Error | None) -> None:
         """Tell that what waited for the network was not sent in the end."""
         if result is not None and is_alive(self):
-            text = f"nothing was published on {self._resolved}: {result}"
-            self._complain(text, logging.ERROR)
+            text = f"nothing was published on {self._resolved or self._topic}: {result}"
+            self._tell(self.DIALECT.spelled(text), logging.ERROR)
 
     def _complain(self, text: str, level: int) -> None:
         """Log with the QML place, but not for every message of a stream."""
@@ -130,6 +226,9 @@ class Publisher(Element):
         self._have = node
         if node is not None:
             self._advertise()
+        elif self._held:
+            self._held.clear()
+            self._sent_late(Error("the node was shut down"))
 
     @Slot()
     def _advertise(self) -> None:
@@ -154,13 +253,22 @@ class Publisher(Element):
         assert session is not None
         self._sender, self._resolved = result, result.topic
         self._schema = schema_of(result.type.definition)
+        self._advertised_at, self._settled = time.monotonic(), False
         self._at_end["sender"] = lambda: session.background(result.close)
+        self._watch(result, session)
         self._say("")
         self.topicChanged.emit()
         self.advertised.emit()
+        if is_alive(self):
+            self._send_held()
+
+    def _watch(self, sender: Sender, session: Session) -> None:
+        """Listen to what a new publisher tells."""
 
     @Slot()
     def _on_tick(self) -> None:
+        if self._held:
+            self._send_held()
         if self._sender is not None:
             self._say(self._sender.problem)
 

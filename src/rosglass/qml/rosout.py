@@ -42,7 +42,7 @@ class QmlRosout(logging.Handler):
             logger = self._node.logger
         except Error:
             return
-        if not logger.isEnabledFor(record.levelno):
+        if not (logger.isEnabledFor(record.levelno) or _has_level(record.name)):
             return
         told = copy.copy(record)
         told.name = logger.name + record.name.removeprefix(ROOT)
@@ -55,3 +55,12 @@ class QmlRosout(logging.Handler):
         """Hand on no more; safe to call twice."""
         logging.getLogger(ROOT).removeHandler(self)
         super().close()
+
+
+def _has_level(name: str) -> bool:
+    """Return whether a named QML logger was given a level of its own, which it has passed."""
+    while name.startswith(f"{ROOT}."):
+        if logging.getLogger(name).level != logging.NOTSET:
+            return True
+        name = name.rpartition(".")[0]
+    return False

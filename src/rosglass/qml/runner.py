@@ -76,6 +76,7 @@ class Runner(QtCore.QObject):
         self._fullscreen = fullscreen or kiosk
         self.engine.quit.connect(self._quit)
         self.engine.exit.connect(self.exit)
+        session.killed.connect(self._on_killed)
         #: The window the interface is in, or the first of those it opens; None while it has none.
         self.window: QtQuick.QQuickWindow | None = None
         #: The window whose first frame has not been seen yet.
@@ -283,6 +284,11 @@ class Runner(QtCore.QObject):
 
     def _no_graphics(self, error: Any, message: str) -> None:  # noqa: ARG002 - Qt's signature
         _log.error("the window cannot be drawn: %s; try --renderer software", message)
+        self.exit(1)
+
+    @Slot()
+    def _on_killed(self) -> None:
+        _log.error("the interface ends with its node: %s", self.session.detail)
         self.exit(1)
 
     def _quit(self, *_: Any) -> None:

@@ -8,6 +8,7 @@ import os
 import re
 import threading
 import time
+from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
@@ -16,6 +17,7 @@ from rosglass.comm.graph import ConnectionState, Status
 from rosglass.errors import ConnectionLostError, Error, InvalidNameError
 from rosglass.qml.executor import GuiExecutor
 from rosglass.qml.load_balancer import LoadBalancer
+from rosglass.qml.log import logger_name
 from rosglass.qml.rosout import QmlRosout
 from rosglass.qml.script_limit import ScriptLimit
 from rosglass.qt import QtCore, Signal, is_alive
@@ -80,8 +82,10 @@ class Session(QtCore.QObject):
 
     #: The node was asked for; :attr:`is_initialized` is true already.
     initialized = Signal()
-    #: The node is about to be closed.
+    #: The node is about to be closed, or others have closed it.
     about_to_shutdown = Signal()
+    #: Another node asked this one to end, as ``rosnode kill`` does.
+    killed = Signal()
     #: :attr:`node` exists now, or exists no longer.
     node_changed = Signal()
     #: :attr:`state` or :attr:`detail` changed.
@@ -134,6 +138,7 @@ class Session(QtCore.QObject):
         self._closed = False
         self._handles: list[Handle] = []
         self._rosout: QmlRosout | None = None
+        self._logger_level: int | None = None
         self._worker = Dispatcher("rosglass-qml")
         self._loaded: set[str] = set()
         self._ticking = 0
@@ -287,7 +292,8 @@ class Session(QtCore.QObject):
         """Close the node; everything made from it stops, and starts again after the next init."""
         if not self.is_initialized or self.holding:
             return
-        self.about_to_shutdown.emit()
+        if self._status.state is not ConnectionState.CLOSED:
+            self.about_to_shutdown.emit()
         self.name = self.namespace = ""
         self._drop_node()
         self._owns_node = True
@@ -454,6 +460,7 @@ class Session(QtCore.QObject):
             node.on_graph_change(self.graph_changed.emit, self.executor),
         ]
         self._rosout = QmlRosout(node)
+        self._apply_logger_level()
         self._set_status(node.status())
         self.node_changed.emit()
         # What it saw before anybody listened is told to nobody else.
@@ -477,8 +484,34 @@ class Session(QtCore.QObject):
                 self.background(node.close)
 
     def _on_status(self, status: Status) -> None:
-        if self.node is not None:
-            self._set_status(status)
+        if self.node is None:
+            return
+        closed = ConnectionState.CLOSED
+        ended = status.state is closed and self._status.state is not closed
+        self._set_status(status)
+        if ended:
+            self.about_to_shutdown.emit()
+        # A handler may have asked for another node.
+        if ended and status.killed and self._status is status:
+            self.killed.emit()
+
+    def set_logger_level(self, name: str, level: int) -> None:
+        """Log only what is at least as important; the node's own logger follows on ``/rosout``.
+
+        Args:
+            name: Name of the QML logger; empty for the node's own.
+            level: Python's level.
+        """
+        logging.getLogger(logger_name(name)).setLevel(level)
+        if not name:
+            self._logger_level = level
+            self._apply_logger_level()
+
+    def _apply_logger_level(self) -> None:
+        level, node = self._logger_level, self.node
+        if level is not None and node is not None:
+            with suppress(Error):  # a recording has no log
+                node.logger.setLevel(level or logging.INFO)
 
     def _set_status(self, status: Status) -> None:
         before = (self.state, self.detail)

@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import logging
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rosglass.comm.node import Executor
-from rosglass.comm.qos import Durability, QoS, Reliability
+from rosglass.comm.qos import Durability, History, QoS, Reliability
 from rosglass.errors import ConversionError, DecodeError, Error, TypeNotFoundError
+from rosglass.qml.dialect import Dialect
 from rosglass.qml.element import DEFAULT_TIMEOUT, RETRY, TopicElement, changed_enough
 from rosglass.qml.profiles import qos_from_js
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
@@ -164,22 +166,29 @@ class Subscription(TopicElement):
 
     def _take_qos(self, qos: QoS) -> None:
         # A queue size that was set wins, whichever of the two QML happens to set last.
-        size = self._queue_size
-        before, self._qos = self._qos, qos if size is None else qos.with_depth(size)
-        qos = self._qos
+        size, before_size, before = self._queue_size, self._get_queue_size(), self._qos
+        if size is not None:
+            history = History.KEEP_LAST if size else History.KEEP_ALL
+            qos = replace(qos, history=history, depth=size or qos.depth)
+        self._qos = qos
         if qos == before:
             return
         self.qosChanged.emit()
-        if qos.depth != before.depth:
+        if self._get_queue_size() != before_size:
             self.queueSizeChanged.emit()
         self._schedule()
 
     def _get_queue_size(self) -> int:
-        return self._qos.depth
+        unlimited = self._qos.history is History.KEEP_ALL
+        return 0 if unlimited and self.DIALECT is Dialect.ROS1 else self._qos.depth
 
     def _set_queue_size(self, size: int) -> None:
-        if size < 1:
-            self._refuse(f"Subscription {self._topic!r}: queueSize must be at least 1, got {size}")
+        # In ROS 1, 0 means no limit.
+        least = 0 if self.DIALECT is Dialect.ROS1 else 1
+        if size < least:
+            self._refuse(
+                f"Subscription {self._topic!r}: queueSize must be at least {least}, got {size}"
+            )
             return
         self._queue_size = size
         self._take_qos(self._qos)

@@ -227,15 +227,16 @@ class Core(NodeCore[Member]):
         if owner and owner not in told:
             told += f"; {owner} has the name {self.name} now"
         _log.warning("%s: %s", self.name, told)
-        self.close(told)
+        self.close(told, killed=not owner and "same name" not in reason)
 
-    def close(self, reason: str = "closed") -> None:
+    def close(self, reason: str = "closed", *, killed: bool = False) -> None:
         """Close every member, leave the graph and end the threads; safe to call twice.
 
         Takes about two seconds when the master does not answer.
 
         Args:
             reason: What the status says from now on.
+            killed: As of the status.
         """
         if self.forked:
             self._closed = True
@@ -263,7 +264,7 @@ class Core(NodeCore[Member]):
         if self._api is not None:
             self._api.close()
         self.graph.clear()
-        self.tell(Status(ConnectionState.CLOSED, reason))
+        self.tell(Status(ConnectionState.CLOSED, reason, killed))
         self.graph_listeners.clear()
         if reason != "closed":
             # Nobody here has asked for it: who listens must know.

@@ -7,7 +7,7 @@ import logging
 from enum import IntEnum
 from typing import TYPE_CHECKING
 
-from rosglass.qml.log import log_from_qml, logger_name
+from rosglass.qml.log import log_from_qml
 from rosglass.qt import Property, QtCore, Slot
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ class Console(QtCore.QObject):
                 self._runtime.caller(),
             )
             return False
-        logging.getLogger(logger_name(short_logger(name))).setLevel(_LEVELS[level])
+        self._runtime.session.set_logger_level(short_logger(name), _LEVELS[level])
         return True
 
 

@@ -75,7 +75,8 @@ class RosGoalHandle(GoalHandle):
     def cancel(self) -> None:
         """Ask the server to cancel it."""
         super().cancel()
-        if not self._native and not self._over:
+        # As with actionlib, at once; the robot tells what follows.
+        if self.sent and not self._over:
             self._go(_Comm.WAITING_FOR_CANCEL_ACK)
 
     @Slot()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.image_subscription import ImageTransportSubscription
 from rosglass.qml.ros1.namespaces import resolved, within
-from rosglass.qt import Property, QtCore, Signal
+from rosglass.qt import Property, QtCore, Signal, is_alive
 
 if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime
@@ -27,14 +27,22 @@ class ImageTransportSubscriber(ImageTransportSubscription):
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         super().__init__(parent, runtime)
-        self._namespace = ""
+        self._namespace = self._shown_ns = ""
 
     def _set_namespace(self, namespace: str) -> None:
         if namespace != self._namespace:
             self._namespace, self._resolved = namespace, ""
+            self._shown_ns = resolved(self.node, namespace)
             self._clear_sink()
             self.nsChanged.emit()
             self._schedule()
+
+    def _update(self) -> None:
+        before, self._shown_ns = self._shown_ns, resolved(self.node, self._namespace)
+        if before != self._shown_ns:
+            self.nsChanged.emit()
+        if is_alive(self):
+            super()._update()
 
     def _resolve(self, topic: str) -> str:
         return super()._resolve(within(self._namespace, topic))

@@ -3,16 +3,21 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from rosglass.comm.qos import Durability, QoS
+from rosglass.comm.qos import Durability, History, QoS
+from rosglass.errors import UnsupportedError
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.publisher import Publisher
 from rosglass.qml.singleton import full_type
-from rosglass.qt import Property, Signal, Slot
+from rosglass.qt import Property, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
+    from rosglass.comm.events import Matched
+    from rosglass.comm.publisher import Publisher as Sender
     from rosglass.qml.runtime import Runtime
+    from rosglass.qml.session import Session
 
 __all__ = ["RosPublisher"]
 
@@ -24,7 +29,7 @@ class RosPublisher(Publisher):
         runtime: The engine's runtime.
         type_name: Message type, as in QML.
         topic: Topic name, as in QML.
-        queue_size: Messages that wait for a slow subscriber.
+        queue_size: Messages that wait for a slow subscriber; 0 for no limit.
         latch: Whether new subscribers get the last message at once.
     """
 
@@ -36,11 +41,11 @@ class RosPublisher(Publisher):
     def __init__(
         self, runtime: Runtime, type_name: str, topic: str, queue_size: int, latch: bool
     ) -> None:
-        qos = QoS(depth=queue_size)
+        qos = QoS(depth=queue_size) if queue_size else QoS(history=History.KEEP_ALL)
         if latch:
             qos = QoS(depth=1, durability=Durability.TRANSIENT_LOCAL)
         super().__init__(runtime, topic, full_type(type_name), qos)
-        self._written, self._size, self._subscribers = type_name, queue_size, 0
+        self._written, self._size = type_name, queue_size
 
     type = Property(str, lambda self: self._written, constant=True)
     queueSize = Property(int, lambda self: self._size, constant=True)
@@ -53,11 +58,10 @@ class RosPublisher(Publisher):
         """Return how many subscribers are connected; 0 before the topic is advertised."""
         return self.getSubscriptionCount()
 
-    @Slot()
-    def _on_tick(self) -> None:
-        super()._on_tick()
-        before, self._subscribers = self._subscribers, self.getSubscriptionCount()
-        for _ in range(self._subscribers - before):
-            self.connected.emit()
-        for _ in range(before - self._subscribers):
-            self.disconnected.emit()
+    def _watch(self, sender: Sender, session: Session) -> None:
+        def on_matched(event: Matched) -> None:
+            if is_alive(self):
+                (self.connected if event.change > 0 else self.disconnected).emit()
+
+        with suppress(UnsupportedError):  # a recording, which nobody subscribes to
+            sender.on_matched(on_matched, session.executor)

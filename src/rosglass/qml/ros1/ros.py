@@ -6,16 +6,16 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING
 
+from rosglass.comm.qos import History
 from rosglass.errors import Error, InvalidNameError
 from rosglass.qml.action_server import server_functions
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.graph import GraphSingleton
 from rosglass.qml.log import Caller, log_from_qml
 from rosglass.qml.message_waiting import next_message
-from rosglass.qml.profiles import qos_from_js
 from rosglass.qml.ros1.action_server import RosActionServer
 from rosglass.qml.ros1.console import Console, InitOptions, short_logger
-from rosglass.qml.ros1.namespaces import within
+from rosglass.qml.ros1.namespaces import queue_from_js, within
 from rosglass.qml.ros1.package import Package
 from rosglass.qml.ros1.publisher import RosPublisher
 from rosglass.qml.ros1.service_server import RosServiceServer
@@ -104,13 +104,15 @@ class Ros(ValueFunctions, GraphSingleton):
     def advertise(self, *given: QJSValue) -> QtCore.QObject | None:
         """Return a publisher; it lives as long as JavaScript holds it.
 
-        Arguments are optional namespace, message type, topic, queue size, and optionally whether
+        Arguments are optional namespace, message type, topic, queue size (0 for no limit), and
+        optionally whether
         new subscribers get the last message.
         """
         try:
             texts, rest = _split(given, "Ros.advertise([ns,] type, topic, queueSize, latch)")
             namespace, type_name, topic = texts
-            size = qos_from_js(rest[0], DEFAULT_QOS).depth
+            qos = queue_from_js(rest[0], DEFAULT_QOS)
+            size = 0 if qos.history is History.KEEP_ALL else qos.depth
             check_type(type_name, topic)
             topic = within(namespace, topic)
             self._check_topic(topic)
@@ -128,14 +130,14 @@ class Ros(ValueFunctions, GraphSingleton):
             if not all(value.isString() for value in given[:-1]):
                 raise InvalidNameError("write Ros.subscribe([ns,] topic, queueSize)")
             names = [value.toString() for value in given[:-1]]
-            topic = within(names[0] if len(names) > 1 else "", names[-1])
-            self._check_topic(topic)
-            qos = qos_from_js(given[-1], DEFAULT_QOS)
+            namespace = names[0] if len(names) > 1 else ""
+            self._check_topic(within(namespace, names[-1]))
+            qos = queue_from_js(given[-1], DEFAULT_QOS)
         except Error as error:
             self._runtime.throw(f"Ros.subscribe: {error}")
             return None
         subscriber = Subscriber(None, self._runtime)
-        subscriber.configure(topic, "", qos)
+        subscriber.configure_within(namespace, names[-1], qos)
         return self._runtime.keep(subscriber)
 
     @Slot(str, QJSValue, result=QJSValue)

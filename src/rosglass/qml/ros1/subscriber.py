@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.ros1.namespaces import resolved, within
 from rosglass.qml.subscription import Subscription
-from rosglass.qt import Property, QtCore, Signal, Slot
+from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
+    from rosglass.comm.qos import QoS
     from rosglass.qml.runtime import Runtime
 
 __all__ = ["Subscriber"]
@@ -28,15 +29,28 @@ class Subscriber(Subscription):
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         super().__init__(parent, runtime)
-        self._namespace = ""
+        self._namespace = self._shown_ns = ""
         self.enabledChanged.connect(self.runningChanged)
+
+    def configure_within(self, namespace: str, topic: str, qos: QoS) -> None:
+        """Set what ``Ros.subscribe`` was given."""
+        self.configure(topic, "", qos)
+        self._namespace = self._shown_ns = namespace
 
     def _set_namespace(self, namespace: str) -> None:
         if namespace != self._namespace:
             self._namespace, self._resolved = namespace, ""
+            self._shown_ns = resolved(self.node, namespace)
             self._forget()
             self.nsChanged.emit()
             self._schedule()
+
+    def _update(self) -> None:
+        before, self._shown_ns = self._shown_ns, resolved(self.node, self._namespace)
+        if before != self._shown_ns:
+            self.nsChanged.emit()
+        if is_alive(self):
+            super()._update()
 
     def _resolve(self, topic: str) -> str:
         return super()._resolve(within(self._namespace, topic))
