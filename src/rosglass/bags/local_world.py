@@ -26,8 +26,10 @@ from rosglass.comm import (
     Subscription,
     Time,
 )
+from rosglass.comm.logger import NodeLogger
 from rosglass.comm.loop import check_plain
 from rosglass.comm.similar import similar
+from rosglass.comm.terminal import show_on_terminal
 from rosglass.errors import ConversionError, NodeClosedError
 from rosglass.interfaces.names import join_name
 from rosglass.messages import Message, MessageType, OpaqueType, load
@@ -231,6 +233,9 @@ class LocalNode(Node):
         self._status = Status(ConnectionState.CONNECTED)
         self._status_listeners: Listeners[Status] = Listeners()
         self._closed = False
+        self._logger = NodeLogger(name, logging.getLogger())
+        self._logger.setLevel(logging.INFO)
+        show_on_terminal(self._logger)
 
     def create_publisher(
         self, topic: str, type: str | MessageType, qos: QoS | int = 10
@@ -351,9 +356,9 @@ class LocalNode(Node):
         return self.world.clock
 
     @property
-    def logger(self) -> logging.Logger:
-        """A logger of this program."""
-        return logging.getLogger(f"rosglass.node.{self.name}")
+    def logger(self) -> NodeLogger:
+        """The node's logger; its messages go to nobody else."""
+        return self._logger
 
     def now(self) -> Time:
         """Return the world's time."""

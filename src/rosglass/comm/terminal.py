@@ -1,4 +1,4 @@
-"""Warnings on the terminal, of programs that have not said where they log to."""
+"""Log messages on the terminal, of programs that have not said where they log to."""
 
 from __future__ import annotations
 
@@ -7,25 +7,29 @@ import sys
 
 from rosglass.errors import escape_controls
 
-__all__ = ["warn_on_terminal"]
+__all__ = ["show_on_terminal", "warn_on_terminal"]
 
 
 class _TerminalHandler(logging.Handler):
     """Does what `logging.lastResort` does, which says nothing once there is any handler.
 
     There always is: what is logged goes to /rosout as well.
+
+    Args:
+        logger: The logger that it is for.
+        level: Least severe level that it shows.
     """
 
-    def __init__(self) -> None:
-        super().__init__(logging.WARNING)
+    def __init__(self, logger: logging.Logger, level: int) -> None:
+        super().__init__(level)
+        self._logger = logger
         self.setFormatter(logging.Formatter("%(levelname)s %(name)s: %(message)s"))
 
     def emit(self, record: logging.LogRecord) -> None:
         """Write a record to stderr, unless the program has made its own arrangements."""
-        own = logging.getLogger("rosglass").handlers
         if logging.lastResort is None or logging.getLogger().handlers:
             return
-        if any(isinstance(handler, logging.StreamHandler) for handler in own):
+        if any(isinstance(handler, logging.StreamHandler) for handler in self._logger.handlers):
             return
         try:
             sys.stderr.write(f"{escape_controls(self.format(record))}\n")
@@ -33,7 +37,12 @@ class _TerminalHandler(logging.Handler):
             self.handleError(record)
 
 
-_handler = _TerminalHandler()
+_handler = _TerminalHandler(logging.getLogger("rosglass"), logging.WARNING)
+
+
+def show_on_terminal(logger: logging.Logger) -> None:
+    """Show what a node's logger logs, as ROS does, where `logging` has not been configured."""
+    logger.addHandler(_TerminalHandler(logger, logging.NOTSET))
 
 
 def warn_on_terminal(formatter: logging.Formatter | None = None) -> None:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm import QoS
 from rosglass.comm.logger import NodeLogger
 from rosglass.comm.rosout import LibraryLog, RosoutHandler, clean, message_of
+from rosglass.comm.terminal import show_on_terminal
 from rosglass.ros1.core import Member
 
 if TYPE_CHECKING:
@@ -73,6 +74,7 @@ class Rosout:
         )
         self.logger.addHandler(self._handler)
         self._library = LibraryLog(self._handler, core.runs_here)
+        show_on_terminal(self.logger)
 
     def open(self) -> None:
         """Announce the publisher."""

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm import Duration, QoS
 from rosglass.comm.logger import NodeLogger
 from rosglass.comm.rosout import LibraryLog, RosoutHandler, clean, message_of
+from rosglass.comm.terminal import show_on_terminal
 from rosglass.ros2.core import Member
 
 if TYPE_CHECKING:
@@ -67,6 +68,8 @@ class Rosout:
         if self.handler is not None:
             self.logger.addHandler(self.handler)
             self._library = LibraryLog(self.handler, core.runs_here)
+        if arguments.stdout:
+            show_on_terminal(self.logger)
 
     def open(self) -> None:
         """Announce the publisher, if there is to be one."""
