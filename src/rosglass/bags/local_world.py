@@ -28,6 +28,7 @@ from rosglass.comm import (
 )
 from rosglass.comm.logger import NodeLogger
 from rosglass.comm.loop import check_plain
+from rosglass.comm.rclpy_names import check_order
 from rosglass.comm.similar import similar
 from rosglass.comm.terminal import show_on_terminal
 from rosglass.errors import ConversionError, NodeClosedError
@@ -242,6 +243,7 @@ class LocalNode(Node):
     ) -> Publisher:
         """Announce a topic; arguments and errors as for every node."""
         self._check_open()
+        check_order("create_publisher", topic, type)
         kind = self.world.find(type) if isinstance(type, str) else type
         return LocalPublisher(self.world, self, self.resolve(topic), kind, _profile(qos))
 
@@ -258,6 +260,7 @@ class LocalNode(Node):
     ) -> Subscription:
         """Subscribe to a topic; arguments and errors as for every node."""
         self._check_open()
+        check_order("create_subscription", topic, type)
         name = self.resolve(topic)
         sources = self.world.publishers(name)
         kind = self.world.find(type) if isinstance(type, str) else type

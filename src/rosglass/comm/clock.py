@@ -20,6 +20,7 @@ from rosglass.comm.executor import RetryingExecutor
 from rosglass.comm.listeners import Listeners
 from rosglass.comm.loop import check_plain
 from rosglass.comm.node import Executor, Handle
+from rosglass.comm.rclpy_names import raise_missing
 from rosglass.comm.time import Duration, Time
 from rosglass.comm.unique import Unique
 from rosglass.errors import ConversionError, NodeClosedError
@@ -65,6 +66,9 @@ class Clock(Unique):
         name: Of the node, for threads and messages.
         executor: Where callbacks run that bring no executor of their own.
     """
+
+    if not TYPE_CHECKING:
+        __getattr__ = raise_missing
 
     def __init__(self, name: str, executor: Executor) -> None:
         self._name, self._executor = name, executor

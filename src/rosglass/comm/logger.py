@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import logging
+from typing import TYPE_CHECKING
+
+from rosglass.comm.rclpy_names import raise_missing
 
 __all__ = ["NodeLogger"]
 
@@ -19,6 +22,9 @@ class NodeLogger(logging.Logger):
         parent: Where its messages go, too.
         levels: Least severe levels of it and its children, by name.
     """
+
+    if not TYPE_CHECKING:
+        __getattr__ = raise_missing
 
     def __init__(
         self, name: str, parent: logging.Logger, levels: dict[str, int] | None = None

@@ -10,7 +10,10 @@ import time
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
+from rosglass.comm.graph import ConnectionState
 from rosglass.comm.qos import QoS
+from rosglass.comm.rclpy_names import raise_missing
+from rosglass.comm.receiving import check_may_wait
 from rosglass.comm.unique import Unique
 from rosglass.errors import (
     NodeClosedError,
@@ -40,6 +43,8 @@ if TYPE_CHECKING:
 __all__ = ["Answer", "Executor", "Handle", "Node"]
 
 _H = TypeVar("_H", bound="Handle")
+#: Seconds between two looks whether a node that spins is closed.
+_SPIN_POLL_S = 0.2
 #: What answers a request: a response, or the promise of one.
 Answer: TypeAlias = (
     "Message | dict[str, Any] | Future[Message] | Future[dict[str, Any] | None] | None"
@@ -58,6 +63,9 @@ class Executor(ABC):
 
 class Handle(Unique, ABC):
     """Something started or registered that can be ended; ends by itself as a context manager."""
+
+    if not TYPE_CHECKING:  # for type checkers, what is not there is an error
+        __getattr__ = raise_missing
 
     @abstractmethod
     def close(self) -> None:
@@ -411,6 +419,19 @@ class Node(Handle):
     @abstractmethod
     def now(self) -> Time:
         """Return the time of the node's clock."""
+
+    def spin(self) -> None:
+        """Wait until the node is closed, or until Ctrl-C, which closes it.
+
+        For programs that have nothing else to do: callbacks run on threads of their own, and are
+        called whether or not a program waits here.
+        """
+        check_may_wait(f"{self!r} is not closed")
+        try:
+            while self.status().state is not ConnectionState.CLOSED:
+                time.sleep(_SPIN_POLL_S)
+        except KeyboardInterrupt:
+            self.close()
 
     def steady(self) -> float:
         """Return seconds by which the ages of messages are told; they never run back.

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import time as _time
 from dataclasses import dataclass
-from typing import overload
+from typing import TYPE_CHECKING, Any, overload
 
+from rosglass.comm.rclpy_names import raise_missing
 from rosglass.errors import ConversionError
+
+if TYPE_CHECKING:
+    from rosglass.messages.message import Stamp
 
 __all__ = ["Duration", "Time"]
 
@@ -27,6 +31,9 @@ class Duration:
     """
 
     nanoseconds: int = 0
+
+    if not TYPE_CHECKING:
+        __getattr__ = raise_missing
 
     def __post_init__(self) -> None:
         _check("Duration", self.nanoseconds, "Duration.from_seconds() takes fractions")
@@ -70,6 +77,9 @@ class Time:
 
     nanoseconds: int = 0
 
+    if not TYPE_CHECKING:
+        __getattr__ = raise_missing
+
     def __post_init__(self) -> None:
         _check("Time", self.nanoseconds, "Time.from_parts() takes seconds and nanoseconds")
 
@@ -102,10 +112,11 @@ class Time:
         """Return the value of a ``builtin_interfaces/msg/Time`` field."""
         return {"sec": self.sec, "nanosec": self.nanosec}
 
-    def __add__(self, other: Duration) -> Time:
-        if not isinstance(other, Duration):
+    def __add__(self, other: Duration | Stamp) -> Time:
+        span = _from_field(other)
+        if not isinstance(span, Duration):
             return NotImplemented
-        return Time(self.nanoseconds + other.nanoseconds)
+        return Time(self.nanoseconds + span.nanoseconds)
 
     @overload
     def __sub__(self, other: Time) -> Duration: ...
@@ -113,9 +124,30 @@ class Time:
     @overload
     def __sub__(self, other: Duration) -> Time: ...
 
-    def __sub__(self, other: Time | Duration) -> Duration | Time:
-        if isinstance(other, Time):
-            return Duration(self.nanoseconds - other.nanoseconds)
-        if isinstance(other, Duration):
-            return Time(self.nanoseconds - other.nanoseconds)
+    @overload
+    def __sub__(self, other: Stamp) -> Any: ...
+
+    def __sub__(self, other: Time | Duration | Stamp) -> Any:
+        value = _from_field(other)
+        if isinstance(value, Time):
+            return Duration(self.nanoseconds - value.nanoseconds)
+        if isinstance(value, Duration):
+            return Time(self.nanoseconds - value.nanoseconds)
         return NotImplemented
+
+    def __rsub__(self, other: Stamp) -> Duration:
+        when = _from_field(other)
+        if not isinstance(when, Time):
+            return NotImplemented
+        return Duration(when.nanoseconds - self.nanoseconds)
+
+
+def _from_field(value: object) -> object:
+    """Return the time or duration that a message's field holds; anything else as it is."""
+    if isinstance(value, (Time, Duration)):
+        return value
+    from rosglass.messages.message import Stamp  # noqa: PLC0415 - only for those who calculate
+
+    if not isinstance(value, Stamp):
+        return value
+    return (Duration if value.is_duration else Time)(value.nanoseconds)

@@ -242,6 +242,11 @@ class Stamp:
         return int(whole) * 1_000_000_000 + int(rest)
 
     @property
+    def is_duration(self) -> bool:
+        """Whether it is a span of time, not a point in time."""
+        return self._schema__.name.lower().endswith("duration")
+
+    @property
     def seconds(self) -> float:
         """The whole in seconds; a float loses accuracy below a microsecond."""
         return self.nanoseconds / 1e9

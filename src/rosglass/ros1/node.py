@@ -8,6 +8,7 @@ from rosglass.comm import EndpointKind, History, NodeName, QoS, Subscription
 from rosglass.comm.core_node import CoreNode
 from rosglass.comm.flags import check_flag
 from rosglass.comm.promise import check_timeout
+from rosglass.comm.rclpy_names import check_order
 from rosglass.comm.receiving import check_may_wait
 from rosglass.errors import InvalidNameError
 from rosglass.ros1.action_types import actions
@@ -101,6 +102,7 @@ class Ros1Node(CoreNode):
     ) -> Ros1Publisher:
         """Announce `topic`; see :meth:`rosglass.comm.Node.create_publisher`."""
         self._core.check_open()
+        check_order("create_publisher", topic, type)
         return self._topics.publish(
             self.resolve(topic), self._core.types.message(type), _profile(qos)
         )
@@ -118,6 +120,7 @@ class Ros1Node(CoreNode):
     ) -> Subscription:
         """Subscribe to `topic`; see :meth:`rosglass.comm.Node.create_subscription`."""
         self._core.check_open()
+        check_order("create_subscription", topic, type)
         full = self.resolve(topic)
         kind = type_if_known(self._core, full, type)
         subscription = Subscription(
@@ -153,6 +156,7 @@ class Ros1Node(CoreNode):
                 connection of its own, as ROS 1 does, and calls do not wait for each other.
         """
         self._core.check_open()
+        check_order("create_service_client", name, type)
         check_flag(persistent, "persistent", name)
         return self._services.client(self.resolve(name), type, qos, persistent)
 
@@ -171,6 +175,7 @@ class Ros1Node(CoreNode):
             ServiceError: This node offers it already.
         """
         self._core.check_open()
+        check_order("create_service_server", name, type)
         return self._services.serve(self.resolve(name), type, callback, qos, executor)
 
     # -- actions ---------------------------------------------------------------------------------
@@ -182,6 +187,7 @@ class Ros1Node(CoreNode):
         from rosglass.ros1.action_client import Ros1ActionClient  # noqa: PLC0415
 
         self._core.check_open()
+        check_order("create_action_client", name, type)
         wanted = None if type is None else self._core.types.action(type)
         return Ros1ActionClient(self._core, self._topics, self.resolve(name), wanted)
 
@@ -211,6 +217,7 @@ class Ros1Node(CoreNode):
         from rosglass.ros1.action_server import Ros1ActionServer  # noqa: PLC0415
 
         self._core.check_open()
+        check_order("create_action_server", name, type)
         return Ros1ActionServer(
             self._core,
             self._topics,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from rosglass.comm import EndpointKind, NodeName, QoS, Subscription
 from rosglass.comm.core_node import CoreNode
 from rosglass.comm.flags import check_flag
+from rosglass.comm.rclpy_names import check_order
 from rosglass.errors import UnsupportedError
 from rosglass.ros2.arguments import NO_ARGUMENTS
 from rosglass.ros2.core import Core
@@ -93,6 +94,7 @@ class Ros2Node(CoreNode):
     ) -> Publisher:
         """Announce `topic`; see :meth:`rosglass.comm.Node.create_publisher`."""
         self._core.check_open()
+        check_order("create_publisher", topic, type)
         self._core.types.ensure(type)
         full = self.resolve(topic)
         return Ros2Publisher(self._core, full, self._core.types.message(type), _profile(qos, full))
@@ -110,6 +112,7 @@ class Ros2Node(CoreNode):
     ) -> Subscription:
         """Subscribe to `topic`; see :meth:`rosglass.comm.Node.create_subscription`."""
         self._core.check_open()
+        check_order("create_subscription", topic, type)
         full = self.resolve(topic)
         check_flag(ignore_local, "ignore_local", full)
         subscription = Subscription(
@@ -128,6 +131,7 @@ class Ros2Node(CoreNode):
     ) -> ServiceClient:
         """Return a client; see :meth:`rosglass.comm.Node.create_service_client`."""
         self._core.check_open()
+        check_order("create_service_client", name, type)
         self._core.types.ensure(type)
         profile = _service_profile(qos, name)
         return Ros2ServiceClient(self._core, self._core.resolve(name, "service"), type, profile)
@@ -143,6 +147,7 @@ class Ros2Node(CoreNode):
     ) -> ServiceServer:
         """Offer a service; see :meth:`rosglass.comm.Node.create_service_server`."""
         self._core.check_open()
+        check_order("create_service_server", name, type)
         self._core.types.ensure(type)
         profile = _service_profile(qos, name)
         full = self._core.resolve(name, "service")
@@ -151,6 +156,7 @@ class Ros2Node(CoreNode):
     def create_action_client(self, name: str, type: str | ActionType | None = None) -> ActionClient:
         """Return a client; see :meth:`rosglass.comm.Node.create_action_client`."""
         self._core.check_open()
+        check_order("create_action_client", name, type)
         self._core.types.ensure(type)
         from rosglass.ros2.action_client import Ros2ActionClient  # noqa: PLC0415 - few need it
 
@@ -168,6 +174,7 @@ class Ros2Node(CoreNode):
     ) -> ActionServer:
         """Offer an action; see :meth:`rosglass.comm.Node.create_action_server`."""
         self._core.check_open()
+        check_order("create_action_server", name, type)
         self._core.types.ensure(type)
         from rosglass.ros2.action_server import Ros2ActionServer  # noqa: PLC0415 - few need it
 
