@@ -179,6 +179,24 @@ def test_a_peer_that_calls_us_is_killed(start_services, peer, node, types, wait_
 # -- several at once -----------------------------------------------------------------------------
 
 
+def test_the_first_request_of_a_new_rclpy_client_is_answered(start_rclpy, node):
+    # Fast DDS tells of a client's writer at the same moment as it sends the first request.
+    got: list[int] = []
+
+    def answer(_: Any) -> dict[str, Any]:
+        got.append(1)
+        return {"success": True}
+
+    server = node.create_service_server("/trigger", "std_srvs/srv/Trigger", answer)
+    clients = start_rclpy("rclpy_clients", "/trigger", "100")
+    assert clients.stdout is not None
+    ends = [clients.stdout.readline().strip() for _ in range(100)]
+    server.close()
+    assert "lost" not in ends
+    assert ends.count("answered") == len(got)
+    assert ends.count("answered") >= 95
+
+
 def test_clients_of_all_kinds_at_one_server_get_their_own_replies(
     start_services, node, dds_connect, types
 ):

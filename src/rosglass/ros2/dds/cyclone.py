@@ -14,7 +14,10 @@ from __future__ import annotations
 import ctypes
 import itertools
 import logging
+import os
+import struct
 import sys
+from contextlib import suppress
 from ctypes import POINTER, c_bool, c_char_p, c_int32, c_int64, c_size_t, c_uint32, c_uint64
 from ctypes import c_void_p as pointer
 from functools import cache
@@ -52,6 +55,7 @@ __all__ = [
     "matched_publications",
     "matched_subscriptions",
     "sertype",
+    "start_at_first_sample",
 ]
 
 _log = logging.getLogger("rosglass.ros2")
@@ -287,6 +291,32 @@ def sertype(entity: int) -> int:
     return value.value or 0
 
 
+def start_at_first_sample(reader: int) -> str:
+    """Let a reliable reader ask writers that come from now on for all that they still have for it.
+
+    A volatile reader starts at the newest sample of another vendor's writer otherwise, and loses
+    what was sent before the writer was discovered. A writer sends volatile readers nothing from
+    before it discovered them; what the reader had before it lost sight of a writer may come again.
+
+    Returns:
+        Why it cannot be done on this machine, empty when it was.
+    """
+    if strange := strange_version():
+        return strange
+    lib, entity = library(), pointer()
+    lib.dds_entity_pin.argtypes = [_entity, POINTER(pointer)]
+    lib.dds_entity_unpin.argtypes = [pointer]
+    check_alive(lib.dds_entity_pin(reader, ctypes.byref(entity)), "dds_entity_pin", "reader")
+    try:
+        address = _reader_flags(entity.value or 0, guid(reader))
+        if address is None:
+            return f"Cyclone DDS {VERSION} is built differently on this machine"
+        ctypes.c_ubyte.from_address(address).value |= _HANDLE_AS_TRANSIENT_LOCAL
+    finally:
+        lib.dds_entity_unpin(entity)
+    return ""
+
+
 def matched_publications(reader: int) -> list[int]:
     """Return the handles of the writers that a reader is matched with."""
     return _matched("dds_get_matched_publications", reader)
@@ -351,6 +381,39 @@ def _descriptor(type_name: str, size: int) -> _Descriptor:
 @cache
 def _shared(type_name: str) -> _Descriptor:
     return _descriptor(type_name, 1)
+
+
+#: Where a ``dds_reader`` has the pointer to its ``ddsi_reader``: somewhere in these bytes.
+_DDSI_READER = slice(400, 1000)
+#: Where the flags of a ``ddsi_reader`` are, from its pointer back to the ``dds_reader``: behind
+#: those to the history and the profile. Two of the flags.
+_FLAGS = 24
+_RELIABLE, _HANDLE_AS_TRANSIENT_LOCAL = 1, 2
+#: Where pointers of this process end.
+_LAST_ADDRESS = 2**47
+
+
+def _reader_flags(address: int, identity: bytes) -> int | None:
+    """Return where the flags of a reliable reader are, by its ``dds_reader``; None when unknown.
+
+    Memory is read by way of the kernel, which refuses addresses that are not this process's.
+    """
+    # A GUID is four numbers, big endian for others.
+    own = struct.pack("=4I", *struct.unpack(">4I", identity))
+    back = struct.pack("=Q", address)
+    with suppress(OSError), open("/proc/self/mem", "rb", buffering=0) as memory:  # noqa: PTH123
+        file = memory.fileno()
+        size = _DDSI_READER.stop - _DDSI_READER.start
+        words = os.pread(file, size, address + _DDSI_READER.start)
+        for (found,) in struct.iter_unpack("=Q", words[: len(words) // 8 * 8]):
+            if not 0 < found < _LAST_ADDRESS:
+                continue
+            with suppress(OSError):
+                data = os.pread(file, 400, found)
+                at = data.find(back) + _FLAGS
+                if data[4:20] == own and _FLAGS <= at < len(data) and at % 8 == 0:
+                    return found + at if data[at] & _RELIABLE else None
+    return None
 
 
 def _of(qos: Qos | None) -> int | None:

@@ -41,6 +41,8 @@ __all__ = ["DdsReplier"]
 _log = logging.getLogger("rosglass.ros2")
 #: Seconds that a reply waits for its client's reader to be found, or to take something.
 _REPLY_PATIENCE = 3.0
+#: Clients whose newest request is remembered, beside those that are there.
+_MAX_REMEMBERED = 1024
 #: Seconds that closing waits for replies that are on their way.
 _FAREWELL = 0.5
 
@@ -80,6 +82,8 @@ class DdsReplier(Replier):
         #: Clients whose readers of replies are matched, as found out since the last change.
         self._hearing: set[bytes] = set()
         self._strangers = False
+        #: The newest request of each client that was taken, by its writer; not Cyclone DDS's.
+        self._newest: dict[bytes, int] = {}
         #: Origins, by their identity, of requests left to the pump: none may overtake them.
         self._left: OrderedDict[int, Origin] = OrderedDict()
         self._leaving = threading.Lock()
@@ -181,7 +185,9 @@ class DdsReplier(Replier):
             text = "cannot answer %s: %s; %s"
             why = cyclone_origins.problem() or "its requests have no identity"
             self._ends.name(client.guid, text, self._ends.who(client.guid), why, REMEDY)
-        else:
+        elif origin.sequence > self._newest.get(client.guid, 0):
+            # A client that was out of reach and is back sends what it holds once more.
+            self._newest[client.guid] = origin.sequence
             given = origin.related
             reader = b"" if given is None or given.guid == UNKNOWN_GUID else given.guid
             identity = Identity(reader or client.guid, origin.sequence)
@@ -213,6 +219,9 @@ class DdsReplier(Replier):
         """Take note of the clients that are there now."""
         self._hearing = set()
         readers = () if self._ends.readers is None else self._ends.readers.all
+        if len(self._newest) > _MAX_REMEMBERED:
+            here = self._ends.writers.by_guid
+            self._newest = {guid: last for guid, last in self._newest.items() if guid in here}
         # RustDDS's clients fail when they get a reply without identity, whosever it is.
         self._strangers = not cyclone_inline_qos.problem() and any(
             scheme_of(found.guid) is Scheme.IDENTITY for found in readers

@@ -15,6 +15,7 @@ from collections import Counter
 from contextlib import suppress
 from dataclasses import replace
 from enum import Enum
+from functools import cache
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointKind
@@ -331,6 +332,13 @@ class Ends:
     def _open(self) -> None:
         """Create the writer."""
         with self._participant.in_use():
+            if self._server:
+                # Clients that come from now on find a server that is complete, and call it at once:
+                # their requests may come before we discover them. Those that were there before us
+                # may have called another, whose requests are none of ours.
+                problem = cyclone.start_at_first_sample(self.reader.entity)
+                if problem:
+                    _warn_loss(problem)
             writer = SampleWriter(
                 self._participant,
                 *self._sent,
@@ -403,9 +411,10 @@ class Ends:
     def _start_probe(self) -> None:
         """Have a second reader for a while.
 
-        A writer tells a reader that it discovers where its samples begin. When it discovered ours
-        before we discovered it, that was lost, and Cyclone DDS drops the writer's next sample; what
-        it tells the second reader counts for both.
+        A writer tells a reader that it discovers where its samples begin (its heartbeat). When it
+        discovered ours before we discovered it, that was lost, and Cyclone DDS drops the writer's
+        next sample, or, with :func:`cyclone.start_at_first_sample`, gets it with the next
+        heartbeat, 3 s later from Fast DDS. What it tells the second reader counts for both.
         """
         self._end_probe()
         try:
@@ -465,6 +474,11 @@ class Ends:
                 return
         if not (self.outbox.retry() or unsettled or self.writer is None):
             self._participant.pump.visit(self.reader.entity, None)
+
+
+@cache
+def _warn_loss(problem: str) -> None:
+    _log.warning("the first request of a client on Fast DDS or RustDDS may be lost: %s", problem)
 
 
 def in_main_thread() -> bool:
