@@ -153,6 +153,30 @@ def test_others_see_our_nodes_by_plain_cyclone_dds(cyclone, dds_connect, wait_fo
     wait_for(lambda: not {"/ours/chatter", "/heard"} & set(node.topics()))
 
 
+@pytest.mark.parametrize("kind", ["writer", "reader"])
+def test_our_graph_topic_announces_the_type_hash_that_rclpy_announces(
+    cyclone, dds_connect, start_rclpy, kind
+):
+    """rmw_cyclonedds warns of a ``ros_discovery_info`` without one."""
+    start_rclpy("rclpy_peer", "real")
+    node = dds_connect("cockpit")
+    node.create_publisher("/chatter", STRING)
+    ours = node.publishers("/chatter")[0].gid[:12].hex()
+    observer = cyclone(observe=True)
+    announced: dict[str, str] = {}
+
+    def both(found: dict[str, Any]) -> bool:
+        # Fast DDS's GUIDs begin with its number as a vendor.
+        for who in (ours, "010f"):
+            if found["topic"] == "ros_discovery_info" and found["guid"].startswith(who):
+                announced[who] = found["user_data"]
+        return len(announced) == 2
+
+    event(observer, kind, both)
+    assert announced[ours] == announced["010f"]
+    assert announced[ours].startswith("typehash=RIHS01_")
+
+
 @pytest.mark.parametrize("choice", ["as the others", "distro=humble"])
 def test_humble_sees_our_nodes_too(cyclone, dds_connect, choice):
     options = "" if choice == "as the others" else f"&{choice}"

@@ -15,6 +15,7 @@ from rosglass.ros2.dds.discovery_info import (
     READER_QOS,
     TOPIC,
     TYPE,
+    USER_DATA,
     WRITER_QOS,
     NodeEntities,
     ParticipantEntities,
@@ -68,14 +69,14 @@ class DdsDiscovery:
         self.had_peers = False
         self._strange: set[int] = set()
         self._readers: dict[BuiltinTopic, int] = {}
-        self._writer = SampleWriter(participant, TOPIC, TYPE, WRITER_QOS, b"", _PLACE)
+        self._writer = SampleWriter(participant, TOPIC, TYPE, WRITER_QOS, USER_DATA, _PLACE)
         for topic in BuiltinTopic:
             place = f"discovery of each {topic.name.lower()}"
             self._readers[topic] = cyclone.create_reader(participant.entity, topic, None, place)
         for reader in self._readers.values():
             participant.pump.watch(reader, Event.DATA_AVAILABLE, self._take)
         self._reader = SampleReader(
-            participant, TOPIC, TYPE, READER_QOS, b"", _PLACE, self._on_entities
+            participant, TOPIC, TYPE, READER_QOS, USER_DATA, _PLACE, self._on_entities
         )
         participant.seen = self._seen
         participant.on_nodes = self._on_nodes

@@ -24,6 +24,7 @@ __all__ = [
     "READER_QOS",
     "TOPIC",
     "TYPE",
+    "USER_DATA",
     "WRITER_QOS",
     "NodeEntities",
     "ParticipantEntities",
@@ -37,6 +38,9 @@ __all__ = [
 TOPIC = "ros_discovery_info"
 #: Its DDS type, the same for both widths.
 TYPE = "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"
+#: User data of its writers and readers since Iron: the hash of its type. rmw_cyclonedds logs a
+#: warning for an endpoint without one.
+USER_DATA = b"typehash=RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e;"
 #: Profiles that rmw's implementations use for it.
 WRITER_QOS = QoS(depth=1, durability=Durability.TRANSIENT_LOCAL)
 READER_QOS = QoS(depth=1, durability=Durability.TRANSIENT_LOCAL, history=History.KEEP_ALL)
