@@ -62,12 +62,18 @@ def join(network: Any, middleware: Any) -> Iterator[Callable[..., Ros2Node]]:
         node = Ros2Node(fake, "fake://", name, "/", library or Library(), own_services=serves)
         node.fake = fake
         made.append(node)
-        if serves:
-            service = f"/{name}/get_type_description"
-            deadline = time.monotonic() + 30
-            while not node.service_servers(service):
-                assert time.monotonic() < deadline
-                time.sleep(0.01)
+        # With a grace of 0.1 s, what others serve has to be in the graph before anything is asked.
+        expected = [f"/{name}/get_type_description"] if serves else []
+        expected += [
+            end.info.name
+            for other in network.middlewares
+            for end in other.repliers
+            if not end.closed and end.info.name.endswith("/get_type_description")
+        ]
+        deadline = time.monotonic() + 30
+        while not all(node.service_servers(service) for service in expected):
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
         return node
 
     yield join
