@@ -130,6 +130,32 @@ def test_its_children_end_with_it(
     wait_gone(pids, 30)
 
 
+def test_a_second_demo_says_that_there_is_a_robot_already(
+    demo: tuple[subprocess.Popen[str], list[int]], tmp_path: Path, url: str
+) -> None:
+    """It must not show, nor steer, another robot under the same name as its own."""
+    import rosglass
+
+    came: list[float] = []
+    with rosglass.connect(url, "me") as me:
+        me.create_subscription(
+            "/odom", "nav_msgs/msg/Odometry", lambda _: came.append(time.monotonic())
+        )
+        end = time.monotonic() + 30
+        # One that starts at the same time has the same right to the name.
+        while not came or came[-1] - came[0] < 6:
+            assert time.monotonic() < end
+            time.sleep(0.05)
+        second = start(tmp_path, "demo", "--url", url, "--seconds", "60")
+        output, _ = second.communicate(timeout=60)
+        assert second.returncode == 1, output
+        assert "a robot called /robot is on" in output
+        assert "rosglass demo --no-robot" in output
+        assert "driven" not in output
+        assert demo[0].poll() is None
+        assert "/robot" not in me.duplicate_nodes()
+
+
 def test_without_xvfb_it_says_what_to_install(tmp_path: Path, url: str) -> None:
     process = start(tmp_path, "demo", "--url", url, PATH=str(tmp_path))
     output, _ = process.communicate(timeout=30)

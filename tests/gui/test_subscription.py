@@ -574,3 +574,34 @@ def test_what_a_function_made_is_told_with_its_line(running: Any, wait: Any, cap
     record = next(one for one in caplog.records if "Nothing" in one.getMessage())
     assert record.pathname.endswith("Test1.qml")
     assert record.lineno == 7
+
+
+@pytest.mark.parametrize("url", ["zenoh"], indirect=True, scope="module")
+def test_two_robots_of_one_name_are_a_problem(live: Any, wait: Any, caplog: Any) -> None:
+    root: Any = live.load("""
+        QtObject {
+            property int received: 0
+            property Subscription s: Subscription { topic: "/twins"; onNewMessage: received++ }
+            property ImageTransportSubscription i: ImageTransportSubscription { topic: "/eyes" }
+            property VideoOutput v: VideoOutput { source: i }
+            function problems() { return s.problem + "|" + i.problem }
+        }
+    """)
+    twin = live.world.connect(None, "robot")
+    publishers = [
+        node.create_publisher(topic, kind)
+        for node in (live.robot, twin)
+        for topic, kind in (("/twins", "std_msgs/msg/Int32"), ("/eyes", "sensor_msgs/msg/Image"))
+    ]
+
+    def is_told() -> bool:
+        publishers[0].publish({"data": 1})
+        return bool(root.property("received")) and root.problems() == (
+            "/twins: 2 nodes called /robot publish this topic, and are shown mixed|"
+            "/eyes: 2 nodes called /robot publish this topic, and are shown mixed"
+        )
+
+    wait(is_told)
+    assert "2 nodes are called /robot" in caplog.text
+    twin.close()
+    wait(lambda: root.problems() == "|")

@@ -9,6 +9,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rosglass.cli.robot import DUPLICATE_EXIT
 from rosglass.errors import Error
 
 if TYPE_CHECKING:
@@ -102,9 +103,22 @@ def _show(
 
     if headless:
         cockpit.fly()
+
+    def is_duplicate() -> bool:
+        return robot is not None and robot.poll() == DUPLICATE_EXIT
+
+    def leave_duplicate() -> None:
+        if is_duplicate():
+            cockpit.window.close()
+
+    for half in range(1, 20):
+        cockpit.at(half / 2, leave_duplicate)
     if screenshot is not None and seconds is not None:
         cockpit.at(max(0.5, seconds - 1.5), shoot)
     code = cockpit.run(seconds)
+    if is_duplicate():
+        # The robot has said why. What the cockpit shows and steers is another one.
+        return 1
     if screenshot is not None and seconds is None:
         shoot()
     print(f"\n{cockpit.report()}", flush=True)

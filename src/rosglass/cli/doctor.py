@@ -6,14 +6,13 @@ import os
 import platform
 import shlex
 import sys
-from collections import Counter
 from dataclasses import asdict, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rosglass.cli.connecting import add_connection_options, left_out, settle, wait
-from rosglass.cli.endpoints import problems
+from rosglass.cli.endpoints import DUPLICATES_FIX, duplicates, problems
 from rosglass.cli.finding import Finding
 from rosglass.cli.network import ask, interfaces, is_loopback
 from rosglass.cli.output import Style, add_output_options, print_json
@@ -287,10 +286,8 @@ def _graph(node: Node) -> Iterator[Finding]:
     )
     if text := left_out(node):
         yield Finding("warning", node.url, text, _RENAME)
-    for name, count in Counter(others).items():
-        if count > 1:
-            fix = "give each a name of its own, e.g. with -r __node:=name"
-            yield Finding("warning", node.url, f"{count} nodes are called {name}", fix)
+    for name, count in node.duplicate_nodes().items():
+        yield Finding("warning", node.url, duplicates(name, count), DUPLICATES_FIX)
     for topic in topics:
         ends = [*node.publishers(topic), *node.subscriptions(topic)]
         for problem in problems(ends):

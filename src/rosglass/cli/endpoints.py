@@ -12,8 +12,21 @@ if TYPE_CHECKING:
 
     from rosglass.comm import EndpointInfo, Node
 
-__all__ = ["Problem", "describe", "problems", "short", "sources"]
+__all__ = [
+    "DUPLICATES_FIX",
+    "Problem",
+    "describe",
+    "duplicates",
+    "problems",
+    "short",
+    "sources",
+]
 
+#: What to do about nodes of one name.
+DUPLICATES_FIX = (
+    "give each robot a namespace (-r __ns:=/name), or a domain or router of its own; over DDS, a "
+    "node that was killed is seen for some 10 to 20 s"
+)
 
 #: Best effort and volatile fits every publisher.
 _QOS_FIX = (
@@ -27,6 +40,11 @@ class Problem(NamedTuple):
 
     text: str
     fix: str
+
+
+def duplicates(name: str, count: int) -> str:
+    """Return what to say of a name that several nodes bear."""
+    return f"{count} nodes are called {name}: what they publish is mixed, and all obey commands"
 
 
 def describe(node: Node, end: EndpointInfo) -> dict[str, Any]:

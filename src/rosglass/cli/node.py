@@ -14,7 +14,7 @@ from rosglass.cli.connecting import (
     note_invalid_names,
     settle,
 )
-from rosglass.cli.endpoints import describe
+from rosglass.cli.endpoints import DUPLICATES_FIX, describe, duplicates
 from rosglass.cli.output import Style, add_output_options, note, print_json
 from rosglass.cli.subcommands import Subcommands
 from rosglass.cli.worlds import is_hidden, spelled
@@ -65,6 +65,9 @@ def _list(args: argparse.Namespace) -> int:
         settle(node)
         note_invalid_names(node)
         found = _others(node)
+        shared = node.duplicate_nodes()
+    for name, count in shared.items():
+        note(f"{duplicates(name, count)}; {DUPLICATES_FIX}")
     if args.json:
         print_json(found)
         return 0

@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
@@ -17,7 +18,13 @@ if TYPE_CHECKING:
 
     from rosglass.comm import Status
 
-__all__ = ["configure", "run"]
+__all__ = ["DUPLICATE_EXIT", "configure", "run"]
+
+#: Exit code when a robot of the same name is there already.
+DUPLICATE_EXIT = 3
+#: Seconds after the start in which another robot, whose odometry comes 30 times a second, ends
+#: this one.
+_DUPLICATE_WATCH_S = 5.0
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -87,15 +94,38 @@ def run(args: argparse.Namespace) -> int:
             full = f"{node.namespace.rstrip('/')}/{node.name}"
             print(f"robot: simulated, node {full} on {args.url}; Ctrl-C ends it", flush=True)
             _tell(node.status())
+            duplicate = threading.Event()
+            # One that was killed may still be seen, but sends nothing.
+            watch = node.create_subscription(
+                "/odom",
+                "nav_msgs/msg/Odometry",
+                raw_callback=lambda _: duplicate.set() if full in node.duplicate_nodes() else None,
+                ignore_local=True,
+            )
+            watched_until = time.monotonic() + _DUPLICATE_WATCH_S
             robot.start()
-            while not end.is_set() and not robot.wait(0.1):
-                pass
+            while not end.is_set() and not duplicate.is_set() and not robot.wait(0.1):
+                if time.monotonic() > watched_until:
+                    watch.close()
+            if duplicate.is_set():
+                print(f"rosglass: {_duplicate(full, args.url)}", file=sys.stderr, flush=True)
+                return DUPLICATE_EXIT
             failed = not end.is_set()
         finally:
             robot.close()
     finally:
         node.close()
     return 1 if failed else 0
+
+
+def _duplicate(name: str, url: str) -> str:
+    """Return what to say when a robot of the name is there already."""
+    other = "dds://?domain=1" if url.startswith("dds:") else "zenoh://127.0.0.1:7448"
+    return (
+        f"a robot called {name} is on {url} already, and what both publish would be mixed. To look "
+        f"at that one: rosglass demo --no-robot --url '{url}'; to have one of your own: "
+        f"rosglass demo --url '{other}'"
+    )
 
 
 def _default_url(env: Mapping[str, str]) -> str:
@@ -123,6 +153,7 @@ def _tell(status: Status) -> None:
 
 def _follow_leash(end: threading.Event) -> None:
     # Whoever started us holds the other end; it closes however that program ends, SIGKILL included.
-    while sys.stdin.buffer.read(4096):
+    # Not by sys.stdin, whose lock would have Python abort if the robot ends by itself.
+    while os.read(sys.stdin.fileno(), 4096):
         pass
     end.set()

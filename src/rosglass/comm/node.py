@@ -388,6 +388,13 @@ class Node(Handle):
     def nodes(self) -> list[NodeName]:
         """Return every node in the graph, this one included, sorted."""
 
+    def duplicate_nodes(self) -> dict[str, int]:
+        """Return the full names that several nodes bear, and how many do.
+
+        In ROS 1 none: the master ends the first node of a name when a second one registers.
+        """
+        return {}
+
     @abstractmethod
     def publishers(self, topic: str) -> list[EndpointInfo]:
         """Return the publishers of a topic."""

@@ -438,7 +438,7 @@ class ImageTransportSubscription(LookElement):
                 now["networkLatency"] = network
                 now["processingLatency"] = processing
                 now["latency"] = latency
-        now["problem"] = self._problem or now["problem"]
+        now["problem"] = self._problem or now["problem"] or self._mixed
         for name, value in now.items():
             before = self._values[name]
             real = isinstance(value, float)

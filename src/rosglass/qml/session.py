@@ -20,7 +20,7 @@ from rosglass.qml.load_balancer import LoadBalancer
 from rosglass.qml.log import logger_name
 from rosglass.qml.rosout import QmlRosout
 from rosglass.qml.script_limit import ScriptLimit
-from rosglass.qt import QtCore, Signal, is_alive
+from rosglass.qt import QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -132,6 +132,8 @@ class Session(QtCore.QObject):
         self._owns_node = True
         self._status = Status(ConnectionState.CLOSED)
         self._failed = False
+        #: Full names that several nodes bear, and how many do.
+        self.duplicate_nodes: dict[str, int] = {}
         self._steady: tuple[Callable[[], float], float] = (time.monotonic, 0.0)
         self._generation = 0
         self._put_off = False
@@ -146,6 +148,8 @@ class Session(QtCore.QObject):
         self._ticker.setInterval(TICK)
         self._ticker.timeout.connect(self.tick)
         self._reminder: QtCore.QTimer | None = None
+        # Before the elements, which ask for them.
+        self.graph_changed.connect(self._find_duplicates)
         self._handlers: dict[str, dict[int, tuple[QtCore.QObject, Callable[[], None]]]] = {}
         for signal in ("node_changed", "connection_changed", "graph_changed", "tick"):
             handlers = self._handlers[signal] = {}
@@ -482,6 +486,21 @@ class Session(QtCore.QObject):
             self.graph_changed.emit()
             if self._owns_node:
                 self.background(node.close)
+
+    @Slot()
+    def _find_duplicates(self) -> None:
+        found: dict[str, int] = {}
+        if self.node is not None:
+            with suppress(Error):  # a node that has just been closed
+                found = self.node.duplicate_nodes()
+        for name in found.keys() - self.duplicate_nodes.keys():
+            _log.warning(
+                "%d nodes are called %s: what they publish is mixed, and all obey commands; give "
+                "each robot a namespace, or a domain or router of its own",
+                found[name],
+                name,
+            )
+        self.duplicate_nodes = found
 
     def _on_status(self, status: Status) -> None:
         if self.node is None:

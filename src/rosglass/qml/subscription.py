@@ -247,7 +247,7 @@ class Subscription(TopicElement):
         return self._feed is not None and self._feed.subscription is not None
 
     def _get_problem(self) -> str:
-        return self._problem or self._inner_problem
+        return self._problem or self._inner_problem or self._mixed
 
     message = Property(QJSValue, _get_message, notify=messageChanged)
     subscribed = Property(bool, _get_subscribed, notify=subscribedChanged)

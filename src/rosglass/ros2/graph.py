@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections import Counter
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointInfo, EndpointKind, NodeName
@@ -83,6 +84,12 @@ class Graph:
         """Return what is left out because ROS's rules forbid its name, sorted."""
         with self._lock:
             return sorted(set(self._invalid.values()))
+
+    def duplicate_nodes(self) -> dict[str, int]:
+        """Return the full names that several nodes bear, and how many do."""
+        with self._lock:
+            counts = Counter(self._nodes.values())
+        return {name.full: count for name, count in sorted(counts.items()) if count > 1}
 
     def topics(self, *, hidden: bool = True) -> dict[str, list[str]]:
         """Return every topic with the types announced for it, both sorted.

@@ -226,6 +226,10 @@ class Ros2Node(CoreNode):
         """Return every node in the graph, this one included, sorted."""
         return self._core.graph.nodes()
 
+    def duplicate_nodes(self) -> dict[str, int]:
+        """Return the full names that several nodes bear, and how many do."""
+        return self._core.graph.duplicate_nodes()
+
     def publishers(self, topic: str) -> list[EndpointInfo]:
         """Return the publishers of a topic."""
         return self._core.graph.endpoints(EndpointKind.PUBLISHER, self.resolve(topic))

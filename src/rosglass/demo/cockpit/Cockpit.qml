@@ -119,6 +119,29 @@ Item {
         height: cockpit.cameraTall
         reason: link.reason
     }
+    // What is live may still not be what the operator takes it for.
+    Rectangle {
+        objectName: "warning"
+        visible: link.alive && link.problem !== ""
+        anchors { horizontalCenter: camera.horizontalCenter; top: camera.top; topMargin: 48 }
+        width: Math.min(camera.width - 24, warning.implicitWidth + 32)
+        height: warning.height + 16
+        radius: Theme.radius
+        color: "#f0332708"
+        border { color: Theme.warn; width: 2 }
+        Text {
+            id: warning
+            objectName: "warningText"
+            anchors.centerIn: parent
+            width: Math.min(implicitWidth, camera.width - 56)
+            text: link.problem
+            textFormat: Text.PlainText
+            color: Theme.warn
+            wrapMode: Text.Wrap
+            horizontalAlignment: Text.AlignHCenter
+            font { pixelSize: Theme.normal; weight: Font.DemiBold }
+        }
+    }
     Item {
         id: side
         objectName: "side"

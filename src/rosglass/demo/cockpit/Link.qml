@@ -8,7 +8,9 @@ QtObject {
     // The feed that beats fastest.
     required property var pulse
     readonly property bool alive: pulse.fresh
-    readonly property string text: alive ? "CONNECTED"
+    // Why what is shown may be another robot's.
+    readonly property string problem: pulse.subscription.problem
+    readonly property string text: alive ? (problem ? "CHECK THE ROBOT" : "CONNECTED")
         : pulse.received ? "ROBOT LOST " + pulse.age.toFixed(0) + " s AGO" : "WAITING FOR THE ROBOT"
     // Why there is nothing to see, for the places that have room for it.
     readonly property string reason: alive ? ""

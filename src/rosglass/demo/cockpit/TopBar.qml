@@ -50,8 +50,9 @@ Rectangle {
         width: state_.width + 44
         height: 28
         radius: 14
-        color: bar.link.alive ? "#12291f" : "#33060c"
-        border { color: bar.link.alive ? Theme.good : Theme.bad; width: 1 }
+        readonly property color tint: !bar.link.alive ? Theme.bad : bar.link.problem ? Theme.warn : Theme.good
+        color: !bar.link.alive ? "#33060c" : bar.link.problem ? "#33270a" : "#12291f"
+        border { color: tint; width: 1 }
         Row {
             id: state_
             anchors.centerIn: parent
@@ -59,7 +60,7 @@ Rectangle {
             Rectangle {
                 anchors.verticalCenter: parent.verticalCenter
                 width: 9; height: 9; radius: 5
-                color: bar.link.alive ? Theme.good : Theme.bad
+                color: state_.parent.tint
             }
             Text {
                 objectName: "linkText"
