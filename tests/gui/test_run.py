@@ -166,6 +166,23 @@ def test_a_screenshot_that_cannot_be_written(start: Any, file: Path, tmp_path: P
     assert "could not be written" in program.text
 
 
+@pytest.mark.parametrize("ending", ["Qt.quit()", "Qt.exit(7)", "nothing"])
+def test_a_screenshot_that_was_not_taken_is_missed(
+    start: Any, file: Path, tmp_path: Path, ending: str
+) -> None:
+    target = tmp_path / "shot.png"
+    quits = "" if ending == "nothing" else f"Timer {{ running: true; onTriggered: {ending} }}"
+    file.write_text(GOOD.replace("width: 200", f"{quits} width: 200", 1))
+    program = start("run", file, "--screenshot", target, "--after", "600")
+    if ending == "nothing":
+        program.until("up")
+        program.kill(signal.SIGTERM)
+    assert program.end() == {"Qt.quit()": 1, "Qt.exit(7)": 7, "nothing": 143}[ending]
+    told = f"{target} was not written: the program was ended before 600 s were over (--after)"
+    assert (told in program.text) == (ending == "Qt.quit()")
+    assert not target.exists()
+
+
 def test_live_reload_keeps_the_last_good_interface(start: Any, file: Path) -> None:
     part = file.with_name("Part.qml")
     file.write_text(GOOD.replace("width: 200", "Part {}\nwidth: 200"))

@@ -112,6 +112,16 @@ def test_shows_overlays_over_rviz_and_takes_a_picture(
     assert "#303030" in colours
 
 
+def test_a_picture_that_was_not_taken_is_missed(
+    start: Callable[..., Program], tmp_path: Path
+) -> None:
+    file, picture = interface(tmp_path, "Qt.quit()"), tmp_path / "picture.png"
+    program = start("--overlay", file, "--screenshot", picture, "--after", "600")
+    assert program.process.wait(PATIENCE) == 1, program.output
+    assert f"{picture} was not written: the program was ended before 600 s" in program.output
+    assert not picture.exists()
+
+
 def test_edges_are_hard_if_asked_for(start: Callable[..., Program], tmp_path: Path) -> None:
     picture = tmp_path / "rviz.png"
     for options in ((), ("--disable-anti-aliasing",)):

@@ -93,11 +93,13 @@ def _show(
     headless: bool,
 ) -> int:
     failures: list[Error] = []
+    taken: list[Path] = []
 
     def shoot() -> None:
         assert screenshot is not None
         try:
             cockpit.screenshot(screenshot)
+            taken.append(screenshot.resolve())
         except Error as error:
             failures.append(error)
 
@@ -122,8 +124,10 @@ def _show(
     if screenshot is not None and seconds is None:
         shoot()
     print(f"\n{cockpit.report()}", flush=True)
-    if screenshot is not None and not failures:
-        print(f"picture of the cockpit: {screenshot.resolve()}")
+    for path in taken:
+        print(f"picture of the cockpit: {path}")
+    if screenshot is not None and not taken and not failures:
+        failures.append(Error(f"{screenshot} was not written: the cockpit was ended before"))
     if robot is not None and robot.poll() is not None:
         print(f"the robot (process {robot.pid}) had ended with code {robot.poll()}")
     for error in failures:

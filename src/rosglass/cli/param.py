@@ -9,6 +9,7 @@ from rosglass.cli.connecting import add_connection_options, connect, settle, tel
 from rosglass.cli.output import Style, add_output_options, note, print_json, to_yaml
 from rosglass.cli.subcommands import Subcommands
 from rosglass.cli.worlds import names_ros1
+from rosglass.comm import ParameterType
 from rosglass.comm.similar import similar
 from rosglass.errors import Error
 
@@ -164,7 +165,39 @@ def _set(node: Node, args: argparse.Namespace) -> int:
 
     # Nothing between quotes is an empty text, as for ros2.
     value = parse_value(args.value, f"the value {args.value!r}") if args.value else ""
-    return _change(node, args, value, "set")
+    with node.create_parameter_client(args.node) as client:
+        fitting = _fitting(client, args, value)
+    if repr(fitting) != repr(value):
+        note(f"{args.parameter} is declared otherwise: it is set to {fitting!r}")
+    return _change(node, args, fitting, "set")
+
+
+def _fitting(
+    client: ParameterClient, args: argparse.Namespace, value: ParameterValue
+) -> ParameterValue:
+    """Return a value as the parameter is declared: 5 may mean the double 5.0, or the text "5".
+
+    In ROS 2, a parameter keeps its type, and refuses the integer 5 for 5.0. What does not fit is
+    for the node to refuse.
+    """
+    if isinstance(value, str):
+        return value
+    known = client.describe([args.parameter], timeout=args.timeout).get(args.parameter)
+    if known is None or known.dynamic_typing:
+        return value
+    if known.type is ParameterType.STRING:
+        return str(args.value)
+    if known.type is ParameterType.DOUBLE and type(value) is int:
+        return _double(value)
+    if known.type is ParameterType.DOUBLE_ARRAY and isinstance(value, list):
+        return [_double(item) if type(item) is int else item for item in value]  # type: ignore[return-value]
+    return value
+
+
+def _double(value: int) -> float:
+    if int(float(value)) != value:
+        raise Error(f"{value} is no double: the nearest one is {float(value)!r}")
+    return float(value)
 
 
 def _delete(node: Node, args: argparse.Namespace) -> int:
@@ -210,10 +243,6 @@ def _load(node: Node, args: argparse.Namespace) -> int:
 
 
 def _unknown(client: ParameterClient, args: argparse.Namespace) -> int:
-    import difflib
-
-    names = client.names(timeout=args.timeout)
-    close = difflib.get_close_matches(args.parameter, names, 3, 0.5)
-    hint = f" Did you mean {' or '.join(close)}?" if close else ""
-    note(f"{client.node} has no parameter {args.parameter}.{hint}")
+    hint = similar(args.parameter, client.names(timeout=args.timeout))
+    note(f"{client.node} has no parameter {args.parameter}{hint}")
     return 1

@@ -11,12 +11,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rosglass.cli.connecting import add_definitions_option, seconds
-from rosglass.errors import QmlError, UnsupportedError
+from rosglass.cli.output import note
+from rosglass.errors import Error, QmlError, UnsupportedError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rosglass.qml.application import Application
 
 __all__ = [
+    "Picture",
     "add_import_paths",
     "add_longest_script",
     "add_renderer",
@@ -229,35 +233,76 @@ def _show(
     install_message_handler()
     app = Application(file, **options)
     app.session.longest_script = longest_script
+    picture = None if screenshot is None else Picture(screenshot, after)
 
     def shown() -> None:
         gc.enable()
-        if screenshot is not None:
-            QtCore.QTimer.singleShot(round(after * 1000), lambda: app.quit(_save(app, screenshot)))
+        if picture is not None:
+            picture.take(app.quit, lambda target: _save(app, target))
 
     QtCore.QTimer.singleShot(0, shown)
-    return app.run(end_process=end_process)
+    code = app.run(end_process=end_process)
+    return code if picture is None else picture.check(code)
 
 
-def _save(app: Application, target: Path) -> int:
-    try:
-        if app.window is None:
-            raise UnsupportedError("the interface has no window to take a picture of")
-        image = app.grab()
-        if image.isNull():
-            raise UnsupportedError(
-                "Qt gave no picture of the window, as Qt 5 does offscreen; use a virtual screen: "
-                "xvfb-run -s '-screen 0 1280x800x24' rosglass run ..."
+class Picture:
+    """The picture that ``--screenshot`` asks for, and whether it was taken.
+
+    Args:
+        target: The file.
+        after: Seconds until it is taken.
+    """
+
+    def __init__(self, target: Path, after: float) -> None:
+        self._target, self._after = target, after
+        self._taken = False
+
+    def take(self, end: Callable[[int], None], save: Callable[[Path], None]) -> None:
+        """Take it when it is time to.
+
+        Args:
+            end: Ends the program with an exit code.
+            save: Writes the file; raises Error.
+        """
+        from rosglass.qt import QtCore
+
+        def take() -> None:
+            self._taken = True
+            try:
+                save(self._target)
+            except Error as error:
+                note(str(error))
+                end(1)
+            else:
+                end(0)
+
+        QtCore.QTimer.singleShot(round(self._after * 1000), take)
+
+    def check(self, code: int) -> int:
+        """Return the program's exit code, which is no success where no picture was taken."""
+        if code == 0 and not self._taken:
+            note(
+                f"{self._target} was not written: the program was ended before {self._after:g} s "
+                "were over (--after)"
             )
-        if not image.save(str(target)):
-            raise UnsupportedError(
-                f"the picture could not be written to {target}; "
-                "its folder must exist and its name end in .png or .jpg"
-            )
-    except UnsupportedError as error:
-        print(f"rosglass: {error}", file=sys.stderr)
-        return 1
-    return 0
+            return 1
+        return code
+
+
+def _save(app: Application, target: Path) -> None:
+    if app.window is None:
+        raise UnsupportedError("the interface has no window to take a picture of")
+    image = app.grab()
+    if image.isNull():
+        raise UnsupportedError(
+            "Qt gave no picture of the window, as Qt 5 does offscreen; use a virtual screen: "
+            "xvfb-run -s '-screen 0 1280x800x24' rosglass run ..."
+        )
+    if not image.save(str(target)):
+        raise UnsupportedError(
+            f"the picture could not be written to {target}; "
+            "its folder must exist and its name end in .png or .jpg"
+        )
 
 
 def format_log(verbose: bool) -> None:

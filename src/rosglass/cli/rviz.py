@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import os
 import signal
 import sys
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING
 from rosglass.cli.completion import complete_files
 from rosglass.cli.connecting import add_definitions_option, seconds
 from rosglass.cli.run import (
+    Picture,
     add_import_paths,
     add_longest_script,
     add_renderer,
@@ -23,7 +23,6 @@ from rosglass.errors import Error, QmlError
 if TYPE_CHECKING:
     import argparse
     from collections.abc import Iterator
-    from pathlib import Path
 
     from rosglass.rviz import Application
 
@@ -174,30 +173,20 @@ def _show(args: argparse.Namespace, config: str, remappings: list[str], received
     app.session.longest_script = args.longest_script
     with app:
         _add_overlays(app, args)
+        picture = None if args.screenshot is None else Picture(args.screenshot, args.after)
+        if picture is not None:
+            picture.take(app.quit, app.screenshot)
         if received:
             return 128 + received[0]
-        return app.run(end_process=True)
+        code = app.run(end_process=True)
+        return code if picture is None else picture.check(code)
 
 
 def _add_overlays(app: Application, args: argparse.Namespace) -> None:
     from rosglass.qml.places import interface_file
-    from rosglass.qt import QtCore
 
     shown = {getattr(overlay, "file", None) for overlay in app.overlays}
     for file in args.overlays:
         # The config may have it already.
         if interface_file(file) not in shown:
             app.add_qml(file, watch=args.watch)
-    if args.screenshot is not None:
-        QtCore.QTimer.singleShot(
-            round(args.after * 1000), lambda: app.quit(_save(app, args.screenshot))
-        )
-
-
-def _save(app: Application, target: Path) -> int:
-    try:
-        app.screenshot(target)
-    except Error as error:
-        logging.getLogger("rosglass.rviz").error("%s", error)
-        return 1
-    return 0

@@ -67,7 +67,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     sub.add_argument(
         "-l", "--truncate", "--truncate-length", type=natural, metavar="N",
-        help="elements of an array to print (default: 36; with --json 10000)",
+        help="elements of an array to print (default: 36; with --json 10000; with --csv all)",
     )  # fmt: skip
     sub.add_argument("--csv", action="store_true", help="print values separated by commas")
     sub.add_argument("--raw", action="store_true", help="print the bytes, in hexadecimal")

@@ -23,7 +23,8 @@ __all__ = ["echo"]
 def echo(args: argparse.Namespace) -> int:
     """Print messages until Ctrl-C, or as many as were asked for."""
     style = Style(args)
-    limit = args.truncate or (SHOWN_JSON if args.json else SHOWN)
+    # What reads a table would take what is cut for another value, or for fewer columns.
+    limit = args.truncate or (None if args.csv else SHOWN_JSON if args.json else SHOWN)
     received = 0
     with connect(args, patient=True) as node:
         subscription = node.create_subscription(args.topic, args.type, qos=profile(args))

@@ -28,7 +28,7 @@ def main(seconds: float | None = None, picture: Path | None = None) -> int:
 
     Args:
         seconds: When it ends by itself; None for not at all.
-        picture: Where to save what it looks like.
+        picture: Where to save what it looks like then.
 
     Returns:
         RViz's exit code.
@@ -58,8 +58,8 @@ def main(seconds: float | None = None, picture: Path | None = None) -> int:
         # Both at a time: whoever has ended RViz waits.
         stack.callback(_close, rviz, robot)
         code = _wait(rviz)
-        if picture is not None and code == 0:
-            print(f"picture of RViz: {picture.resolve()}")
+        if ending and code == 0:  # RViz fails where it took none
+            print(f"picture of RViz: {Path(ending[1]).resolve()}")
         return code
 
 

@@ -128,6 +128,12 @@ def test_echo_cuts_long_arrays_and_gets_latched_messages(run: Any) -> None:
     assert out.count("7") < 100
     _, out, _ = run("topic", "echo", "/lab/map", "--once", "--full", "--json")
     assert json.loads(out)["data"] == [7] * 1000
+    _, out, _ = run("topic", "echo", "/lab/map", "--once", "--csv")
+    cells = out.strip().split(",")
+    assert cells[-1000:] == ["7"] * 1000
+    assert "in all" not in out
+    _, out, _ = run("topic", "echo", "/lab/map", "--once", "--csv", "--truncate", "3")
+    assert out.strip().endswith(",7,7,7,... 1000 in all")
     _, out, _ = run("topic", "echo", "/lab/chatter", "-f", "point.x", "-n", "2")
     first, second = map(float, out.split())
     assert second == first + 1
@@ -216,6 +222,10 @@ def test_parameters(run: Any, robot: Node, tmp_path: Path) -> None:
     assert run("param", "dump", "/lab/robot", "-o", str(file))[0] == 0
     assert run("param", "set", "/lab/robot", "speed", "2.5")[0] == 0
     assert robot.parameters.get("speed") == 2.5
+    code, _, err = run("param", "set", "/lab/robot", "speed", "3")
+    assert code == 0, err
+    assert (robot.parameters.get("speed"), type(robot.parameters.get("speed"))) == (3.0, float)
+    assert "speed is declared otherwise: it is set to 3.0" in err
     code, _, err = run("param", "set", "/lab/robot", "speed", "fast")
     assert code == 1
     assert "refuses to set speed" in err
@@ -224,7 +234,7 @@ def test_parameters(run: Any, robot: Node, tmp_path: Path) -> None:
     assert robot.parameters.get("speed") == 1.5
     code, _, err = run("param", "get", "/lab/robot", "sped")
     assert code == 1
-    assert "Did you mean speed" in err
+    assert "; did you mean speed?" in err
     code, _, err = run("param", "list", "/lab/robott", "--timeout", "4")
     assert code == 1
     told = "rosglass: waiting: there is no node /lab/robott; did you mean /lab/robot?"
