@@ -128,7 +128,10 @@ class ConversionError(Error):
     """
 
     def __init__(self, path: str, value: object, expected: str, type_name: str = "") -> None:
-        shown = repr(value)
+        try:
+            shown = repr(value)
+        except Exception as error:  # an integer of 5,000 digits, or a class of the user's
+            shown = f"a value that cannot be shown ({type(error).__name__}: {error})"
         if len(shown) > 80:
             shown = shown[:77] + "..."
         where = f"{type_name}: " if type_name else ""

@@ -12,7 +12,7 @@ from rosglass.bags.bag import Bag, BagMessage, Channel
 from rosglass.bags.nearly_sorted import by_time
 from rosglass.bags.qos_text import read_profiles
 from rosglass.comm import QoS
-from rosglass.errors import BagError
+from rosglass.errors import BagError, InvalidNameError
 from rosglass.interfaces.names import join_name
 
 if TYPE_CHECKING:
@@ -140,6 +140,11 @@ class McapBag(Bag):
                 what += f" described by {schema.encoding}"
             self._foreign[channel.topic] = what
             return
+        try:
+            name = join_name(schema.name)
+        except InvalidNameError:
+            self._foreign[channel.topic] = f"type {schema.name!r:.80}"
+            return
         told = channel.metadata
         offered: tuple[QoS, ...]
         if wire == "ros1":
@@ -148,7 +153,7 @@ class McapBag(Bag):
             offered = read_profiles(told.get("offered_qos_profiles", ""))
         self._known[number] = Channel(
             channel.topic,
-            join_name(schema.name),
+            name,
             wire,
             schema.data.decode("utf-8", "replace"),
             language or "msg",

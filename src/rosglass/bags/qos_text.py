@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from rosglass.comm import Durability, Duration, History, Liveliness, QoS, Reliability
+from rosglass.comm.text_files import load_yaml
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -35,9 +36,10 @@ def write_profiles(profiles: Iterable[QoS]) -> str:
 def read_profiles(text: str) -> tuple[QoS, ...]:
     """Return the profiles that a recording names; what is not understood counts as the default."""
     try:
-        entries = yaml.safe_load(text or "[]")
+        documents = load_yaml(text or "[]")
     except yaml.YAMLError:
         return ()
+    entries = documents[0] if documents else None
     if not isinstance(entries, list):
         return ()
     return tuple(profile(entry) for entry in entries if isinstance(entry, dict))
@@ -92,6 +94,6 @@ def _duration(value: object) -> Duration | None:
         return None
     try:
         total = int(value.get("sec", 0)) * _NS + int(value.get("nsec", 0))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return None
     return Duration(total) if 0 < total < _CENTURY else None

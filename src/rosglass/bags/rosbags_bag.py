@@ -11,6 +11,7 @@ from rosbags.rosbag1 import Reader
 from rosglass.bags.bag import Bag, BagMessage, Channel
 from rosglass.bags.qos_text import profile
 from rosglass.comm import QoS
+from rosglass.comm.text_files import check_yaml, read_text
 from rosglass.errors import BagError
 from rosglass.interfaces.names import join_name
 
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 __all__ = ["RosbagsBag"]
+
+#: Bytes of a metadata.yaml.
+_MOST_METADATA = 64 * 2**20
 
 
 class RosbagsBag(Bag):
@@ -31,6 +35,7 @@ class RosbagsBag(Bag):
     def __init__(self, path: Path) -> None:
         self.path = path
         try:
+            _check_metadata(path / "metadata.yaml")
             # AnyReader refuses whole bags for one definition that is missing or wrong.
             self._reader: Any = Reader(path) if path.suffix == ".bag" else AnyReader([path])
             self._reader.open()
@@ -80,6 +85,19 @@ class RosbagsBag(Bag):
         if self._open:
             self._open = False
             self._reader.close()
+
+
+def _check_metadata(path: Path) -> None:
+    """Raise YAMLError where YAML in a bag's metadata stands for more than it may."""
+    import yaml  # noqa: PLC0415 - for few recordings
+
+    if path.is_file():
+        text, _ = read_text(path, _MOST_METADATA)
+        check_yaml(text)
+        for event in yaml.parse(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)):
+            # Profiles are YAML in a text of YAML.
+            if isinstance(event, yaml.ScalarEvent) and "*" in event.value:
+                check_yaml(event.value)
 
 
 def _words(error: Exception) -> str:

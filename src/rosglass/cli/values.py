@@ -28,12 +28,15 @@ def parse_fields(text: str, type_name: str, template: str = "") -> dict[str, Any
     """
     import yaml
 
+    from rosglass.comm.text_files import load_yaml
+
     hint = f"YAML such as '{template}'" if template else "YAML such as '{x: 1, name: arm}'"
     try:
-        value = yaml.safe_load(text) if text.strip() else {}
+        documents = load_yaml(text) if text.strip() else [{}]
     except yaml.YAMLError as error:
         where = str(getattr(error, "problem", "") or error).splitlines()[0]
         raise ConversionError("values", text, f"{hint} ({where})", type_name) from error
+    value = documents[0] if len(documents) == 1 else documents or {}
     if value is None:
         value = {}
     if not isinstance(value, dict):

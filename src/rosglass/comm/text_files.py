@@ -1,4 +1,4 @@
-"""Small text files that people write: read whole, written in one go."""
+"""Small text files that people write: read whole, written in one go; and YAML from anywhere."""
 
 from __future__ import annotations
 
@@ -6,10 +6,75 @@ import os
 import tempfile
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from rosglass.errors import ParameterError
 
-__all__ = ["read_text", "write_text"]
+__all__ = ["check_yaml", "load_yaml", "read_text", "write_text"]
+
+#: Values that YAML may stand for, aliases written out: ``&a [*b, *b]`` makes small texts large.
+_MOST_VALUES = 1_000_000
+#: Levels that it may have; libyaml's and PyYAML's loaders recurse.
+_DEEPEST = 100
+
+
+def load_yaml(text: str, loader: Any = None) -> list[Any]:
+    """Return the documents of a YAML text, whose aliases may stand for a million values at most.
+
+    Args:
+        text: The text.
+        loader: A class of loaders; PyYAML's safe one by default.
+
+    Raises:
+        yaml.YAMLError: It is no YAML, or stands for too much.
+    """
+    import yaml  # noqa: PLC0415 - few programs read any
+
+    check_yaml(text)
+    try:
+        return list(yaml.load_all(text, Loader=loader or yaml.SafeLoader))
+    except yaml.YAMLError:
+        raise
+    except Exception as error:  # dates and numbers that there are not, tags that do not fit
+        raise yaml.YAMLError(f"{type(error).__name__}: {error}") from error
+
+
+def check_yaml(text: str) -> None:
+    """Raise yaml.YAMLError if what a text stands for is too large or too deep to be loaded."""
+    import yaml  # noqa: PLC0415
+
+    #: Anchor and number of values of each list and mapping that is open; the text's first.
+    open_ = [("", 0)]
+    sizes: dict[str, int] = {}
+    events = yaml.parse(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+    while True:
+        try:
+            event = next(events)
+        except (StopIteration, yaml.YAMLError):
+            return  # what is no YAML at all is the loader's to say
+        anchor, size = getattr(event, "anchor", None) or "", 1
+        if isinstance(event, yaml.CollectionStartEvent):
+            open_.append((anchor, 1))
+            sizes.pop(anchor, None)  # it stands for nothing before its end
+            problem = f"more than {_DEEPEST} levels" if len(open_) > _DEEPEST + 1 else ""
+            size = 0
+        elif isinstance(event, yaml.CollectionEndEvent):
+            anchor, size = open_.pop()
+            problem = ""
+        elif isinstance(event, (yaml.ScalarEvent, yaml.AliasEvent)):
+            size = sizes.get(anchor, 1) if isinstance(event, yaml.AliasEvent) else 1
+            inside = isinstance(event, yaml.AliasEvent) and anchor in dict(open_)
+            problem = f"*{anchor} is recursive: it stands for what it is in" if inside else ""
+        else:
+            continue
+        if size:
+            sizes[anchor] = size
+            open_[-1] = open_[-1][0], open_[-1][1] + size
+        if open_[-1][1] > _MOST_VALUES:
+            problem = f"it stands for more than {_MOST_VALUES} values"
+        if problem:
+            mark: Any = event.start_mark
+            raise yaml.MarkedYAMLError(problem=problem, problem_mark=mark)
 
 
 def read_text(path: str | os.PathLike[str], most: int) -> tuple[str, str]:

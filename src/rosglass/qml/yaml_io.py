@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rosglass.comm.text_files import load_yaml
 from rosglass.comm.time import Duration, Time
 from rosglass.errors import Error, UnsupportedError
 from rosglass.qml.dialect import Dialect
@@ -169,12 +170,14 @@ def _yaml() -> tuple[Any, Any]:
         def construct_mapping(self, node: Any, deep: bool = False) -> Any:
             # PyYAML lets the last of two equal keys win.
             keys = [key.value for key, _ in node.value if key.tag != "tag:yaml.org,2002:merge"]
+            seen: set[str] = set()
             for key in keys:
-                if isinstance(key, str) and keys.count(key) > 1:
+                if isinstance(key, str) and key in seen:
                     place = node.start_mark
                     raise yaml.constructor.ConstructorError(
                         None, None, f"the key {key!r} occurs twice", place
                     )
+                seen.update([key] if isinstance(key, str) else [])
             return super().construct_mapping(node, deep)
 
     class Dumper(yaml.SafeDumper):
@@ -200,9 +203,12 @@ def _load(text: str, file: Path) -> Any:
     import yaml  # noqa: PLC0415 - few interfaces have files
 
     try:
-        return yaml.load(text, Loader=_yaml()[0])
-    except (yaml.YAMLError, ValueError) as error:
+        documents = load_yaml(text, _yaml()[0])
+    except yaml.YAMLError as error:
         raise UnsupportedError(f"{file}: {error}") from None
+    if len(documents) > 1:
+        raise UnsupportedError(f"{file}: it holds {len(documents)} documents, one is expected")
+    return documents[0] if documents else None
 
 
 class _Reader:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from rosglass.comm.text_files import read_text, write_text
+from rosglass.comm.text_files import load_yaml, read_text, write_text
 from rosglass.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -92,8 +92,8 @@ def write(path: str | os.PathLike[str], value: Any) -> None:
 
 def _documents(text: str, label: str, fault: str = "no parameter file") -> list[Any]:
     try:
-        return list(yaml.load_all(text, Loader=_Loader))
-    except (yaml.YAMLError, RecursionError) as error:
+        return load_yaml(text, _Loader)
+    except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
         problem = getattr(error, "problem", None) or str(error).partition("\n")[0]

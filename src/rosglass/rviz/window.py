@@ -8,6 +8,9 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import yaml
+
+from rosglass.comm.text_files import check_yaml
 from rosglass.errors import Error
 from rosglass.qml.places import locate, near
 from rosglass.qt import QtCore, Signal
@@ -295,6 +298,11 @@ def config_file(place: str | os.PathLike[str]) -> Path:
         raise Error(
             f"{path} is an interface, not a config file of RViz: rosglass rviz --overlay {path}"
         )
+    try:
+        # RViz writes aliases out, and recurses.
+        check_yaml(path.read_text(encoding="utf-8", errors="replace"))
+    except (OSError, yaml.YAMLError) as error:
+        raise Error(f"{path}: RViz cannot read it: {error}") from None
     bindings = rviz()
     reader, config = bindings.YamlConfigReader(), bindings.Config()
     reader.readFile(config, str(path))
