@@ -22,7 +22,8 @@ from cyclonedds.util import duration
 from summary import VALUES, summary, tell
 
 # What is in the plan: "domain"; types by topic to "publish" and "subscribe"; how many to publish in
-# "count", seconds between them in "period" and before them in "start"; "texts" to number them;
+# "count", seconds between them in "period"; "asked" to begin when a line comes on standard input
+# (readers say "linked" when they know a writer); "texts" to number them;
 # "rubbish" with the lengths of sequences to be sent as Strings. What is in "qos": "best_effort",
 # "latched", "xcdr2" (no other encoding), "depth" (0 keeps all), and seconds of "deadline",
 # "lifespan" and "lease".
@@ -124,7 +125,11 @@ def profile(writer: bool) -> Qos:
 
 
 def subscribe(name: str, kind: type, reader: DataReader) -> None:
+    linked = False
     while True:
+        if not linked and reader.get_matched_publications():
+            linked = True
+            tell(linked=name)
         for sample in reader.take(100):
             if isinstance(sample, kind):
                 tell(received=name, value=summary(sample))
@@ -134,7 +139,9 @@ def subscribe(name: str, kind: type, reader: DataReader) -> None:
 def publish(name: str, type_name: str, kind: type, writer: DataWriter) -> None:
     samples = [value(kind, VALUES.get(type_name, {"data": 7}))] if kind is not Rubbish else []
     samples += [Rubbish(2**32 - 1 - size, [size] * size) for size in plan.get("rubbish", ())]
-    time.sleep(plan.get("start", 0))
+    begin.wait()
+    while "asked" in plan and not writer.get_matched_subscriptions():
+        time.sleep(0.01)
     count = plan.get("count", -1)
     number = 0
     while number != count:
@@ -151,6 +158,9 @@ def publish(name: str, type_name: str, kind: type, writer: DataWriter) -> None:
 participant = DomainParticipant(plan["domain"])
 kept: list[DataWriter] = []
 threads: list[threading.Thread] = []
+begin = threading.Event()
+if "asked" not in plan:
+    begin.set()
 # Here, not in the threads: cyclonedds prepares a type with no regard to others that do the same.
 for name, of_type in plan.get("subscribe", {}).items():
     kind = TYPES[of_type]
@@ -165,4 +175,6 @@ for name, of_type in plan.get("publish", {}).items():
 for thread in threads:
     thread.start()
 tell(ready=True)
+sys.stdin.readline()
+begin.set()
 sys.stdin.read()
