@@ -8,13 +8,14 @@ from typing import Any
 import pytest
 from values import convert, converted
 
+import rosglass
 from rosglass.errors import ConversionError
 
 POINT = {"x": 1.0, "y": 2.0, "z": 3.0}
 XYZ, XYZW = "geometry_msgs/msg/Vector3", "geometry_msgs/msg/Quaternion"
 
 
-def of_property(bench: Any, body: str, type_name: str, module: int = 2) -> dict:
+def of_property(bench: Any, body: str, type_name: Any, module: int = 2) -> dict:
     """Return the message that the property `v` of a QML object is."""
     root = bench.load(f"Item {{ {body} }}", "import QtQuick 2.15")
     value = bench.engine.toScriptValue(root).property("v")
@@ -104,6 +105,40 @@ def test_item_models_of_python_are_arrays(bench: Any) -> None:
     value.setProperty("ranges", bench.engine.newQObject(model))
     made = converted(value, "sensor_msgs/msg/LaserScan")
     assert list(made["ranges"]) == [0.5 * i for i in range(40)]
+
+
+@pytest.mark.parametrize("module", [1, 2])
+def test_the_single_role_of_an_item_model_holds_the_elements(bench: Any, module: int) -> None:
+    from rosglass.qt import QtCore
+
+    class Points(QtCore.QAbstractListModel):
+        def rowCount(self, parent: Any = None) -> int:
+            return 2
+
+        def data(self, index: Any, role: int = 0) -> Any:
+            return {"x": 1.0 + index.row(), "y": 2.0, "z": 3.0}
+
+        def roleNames(self) -> dict:
+            return {256: QtCore.QByteArray(b"modelData")}
+
+    model = Points(bench.engine)
+    value = bench.engine.newObject()
+    value.setProperty("points", bench.engine.newQObject(model))
+    made = converted(value, "geometry_msgs/msg/Polygon", module=module)
+    assert made["points"] == [POINT, {"x": 2.0, "y": 2.0, "z": 3.0}]
+
+
+@pytest.mark.parametrize("module", [1, 2])
+@pytest.mark.parametrize("field", ["Time", "Duration"])
+def test_a_role_of_milliseconds_fills_times(bench: Any, module: int, field: str) -> None:
+    body = """property var keep: ListModel { id: list
+                  ListElement { at: 1500 } ListElement { at: 2000 } }
+              property var v: ({times: list})"""
+    library = rosglass.Library()
+    library.add_text(f"odd_msgs/msg/{field}s", f"builtin_interfaces/{field}[] times\n")
+    kind = rosglass.load(f"odd_msgs/msg/{field}s", library=library)
+    made = of_property(bench, body, kind, module)
+    assert made["times"] == [{"sec": 1, "nanosec": 500_000_000}, {"sec": 2, "nanosec": 0}]
 
 
 def test_unknown_roles_are_named(bench: Any) -> None:

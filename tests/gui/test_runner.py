@@ -465,3 +465,49 @@ def test_connecting_does_not_wait_while_a_call_of_qml_does(
     assert wait_for(session, session.node_changed.connect)
     assert session.node is not None
     session.close()
+
+
+def texts(runner: Runner) -> str:
+    """Return what the items over the interface say."""
+    found: list[str] = []
+
+    def read(item: Any) -> None:
+        for child in item.childItems():
+            found.append(str(child.property("text") or ""))
+            read(child)
+
+    for window in runner.windows():
+        read(window.contentItem())
+    return "\n".join(found)
+
+
+@pytest.mark.parametrize(("module", "element"), [("Ros", "Subscriber"), ("Ros2", "Subscription")])
+def test_an_interface_that_asks_for_no_node_is_shown_the_line_to_add(
+    app: Any,
+    file: Path,
+    world: MemoryWorld,
+    wait: Any,
+    monkeypatch: pytest.MonkeyPatch,
+    module: str,
+    element: str,
+) -> None:
+    monkeypatch.setattr("rosglass.qml.session._FORGOTTEN", 20)
+    text = f"""import QtQuick 2.15
+        import {module} 1.0
+        Item {{ {element} {{ topic: "/x" }} }}"""
+    file.write_text(text)
+    runner = Runner(file, Session(connect=world.connect))
+    line = f'Component.onCompleted: {module}.init("main")'
+    try:
+        runner.load()
+        wait(lambda: line in texts(runner))
+        assert "This interface has no node: nothing is received or sent." in texts(runner)
+        assert runner.reload()
+        wait(lambda: line in texts(runner))
+        file.write_text(text.replace("Item {", f"Item {{ {line}; "))
+        assert runner.reload()
+        wait(lambda: world.subscriptions)
+        wait(lambda: "no node" not in texts(runner))
+    finally:
+        runner.close()
+        runner.session.close()

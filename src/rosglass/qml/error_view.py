@@ -10,13 +10,14 @@ from rosglass.qt import QtCore, QtQml, is_alive
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-__all__ = ["ERRORS", "ERRORS_BELOW", "PANEL", "SCRIPT_ENDED", "ErrorView"]
+__all__ = ["ERRORS", "ERRORS_BELOW", "NO_NODE", "PANEL", "SCRIPT_ENDED", "ErrorView"]
 
 #: The QML file of an item that is no larger than its text, and can be closed.
 PANEL = Path(__file__).with_name("ErrorPanel.qml")
 #: Headings, by what is below.
 ERRORS = "This interface has errors. It is shown once they are mended."
 ERRORS_BELOW = "The interface below is the last one without errors."
+NO_NODE = "This interface has no node: nothing is received or sent."
 SCRIPT_ENDED = "The interface below goes on, but a part of what it should have done was left out."
 
 

@@ -221,16 +221,20 @@ class _Conversion:
         return self._single(value, member, path)
 
     def _rows(self, model: Any, member: Member, path: str) -> list[Any]:
-        """Return the rows of an item model: its first role, or messages of its roles."""
+        """Return the rows of an item model: its first role, or messages of its roles.
+
+        A single role that is no field of the message holds the elements themselves.
+        """
         roles = roles_of(model)
         struct = member.struct
+        whole = struct is None or (len(roles) == 1 and not {*roles} & {*self._names(struct)})
         found: list[Any] = []
         count = model.rowCount()
         if count > _LONGEST:
             raise ConversionError(path, Shown(f"{count} rows"), f"at most {_LONGEST} rows")
         for row in range(count):
             index, here = model.index(row, 0), f"{path}[{row}]"
-            if struct is None:
+            if struct is None or whole:
                 item = model.data(index, min(roles.values(), default=0))
                 found.append(self._python(item, member, here))
                 continue

@@ -119,7 +119,7 @@ class Publisher(Element):
         except ConversionError as error:
             # Logged by Qt, with the place, unless somebody catches it.
             if self._runtime is not None:
-                text = f"nothing was published on {self._resolved}: {error}"
+                text = f"nothing was published on {self._resolved or self._topic}: {error}"
                 self._runtime.throw(self.DIALECT.spelled(text))
             return False
         except Error as error:

@@ -9,7 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import QmlError
-from rosglass.qml.error_view import ERRORS, ERRORS_BELOW, PANEL, SCRIPT_ENDED, ErrorView
+from rosglass.qml.error_view import (
+    ERRORS,
+    ERRORS_BELOW,
+    NO_NODE,
+    PANEL,
+    SCRIPT_ENDED,
+    ErrorView,
+)
 from rosglass.qml.live_file import LiveFile
 from rosglass.qml.opengl_needs import need_in_items
 from rosglass.qml.renderer_choice import choice
@@ -28,12 +35,24 @@ __all__ = ["Runner", "needs_widgets"]
 _log = logging.getLogger("rosglass.qml")
 _DEFAULT_SIZE = (1024, 640)
 _ERRORS = Path(__file__).with_name("ErrorOverlay.qml")
+_ROS2_MODULE = re.compile(r"^\s*import\s+Ros2\b", re.MULTILINE)
 _WIDGET_MODULES = re.compile(r"^\s*import\s+(QtCharts|Qt\.labs\.platform)\b", re.MULTILINE)
 
 
 def needs_widgets(file: Path) -> bool:
     """Return whether an interface imports a module that crashes without a QApplication."""
     return any(_WIDGET_MODULES.search(_text(path)) for path in {file, *file.parent.glob("*.qml")})
+
+
+def _line_to_add(file: Path) -> str:
+    """Return what is to be added to a file that asks for no node."""
+    module = "Ros2" if _ROS2_MODULE.search(_text(file)) else "Ros"
+    name = re.sub(r"\W+", "_", file.stem, flags=re.ASCII).strip("_").lower()
+    name = name if name[:1].isalpha() else f"ui_{name}".rstrip("_")
+    return (
+        f"Add this line to the root object of {file}:\n\n"
+        f'    Component.onCompleted: {module}.init("{name}")'
+    )
 
 
 def _text(path: Path) -> str:
@@ -77,6 +96,8 @@ class Runner(QtCore.QObject):
         self.engine.quit.connect(self._quit)
         self.engine.exit.connect(self.exit)
         session.killed.connect(self._on_killed)
+        session.forgotten.connect(self._on_forgotten)
+        session.initialized.connect(self._on_initialized)
         #: The window the interface is in, or the first of those it opens; None while it has none.
         self.window: QtQuick.QQuickWindow | None = None
         #: The window whose first frame has not been seen yet.
@@ -87,6 +108,8 @@ class Runner(QtCore.QObject):
         self._own = False
         self._errors = ErrorView(self.engine, _ERRORS)
         self._notice = ErrorView(self.engine, PANEL)
+        #: Whether the interface asked for no node, and its author is shown the line to add.
+        self._without_node = False
         self._live.script_ended.connect(self._tell_script_ended)
         self._kiosk: Kiosk | None = None
         app: Any = QtCore.QCoreApplication.instance()
@@ -145,6 +168,8 @@ class Runner(QtCore.QObject):
 
         # Cleaning up, the old interface may shut Ros2 down, which the new one already uses.
         self._live.replace(made, show)
+        if self._without_node:
+            self._on_forgotten()
         _log.info("%s reloaded in %.0f ms", self.file, (time.perf_counter() - started) * 1000)
         return True
 
@@ -287,9 +312,23 @@ class Runner(QtCore.QObject):
         self.exit(1)
 
     @Slot()
+    def _on_forgotten(self) -> None:
+        self._without_node = not self.session.is_initialized
+        if self._without_node:
+            self._notice.show(_line_to_add(self.file), self.windows(), NO_NODE)
+
+    @Slot()
+    def _on_initialized(self) -> None:
+        if self._without_node:
+            self._without_node = False
+            self._notice.hide()
+
+    @Slot()
     def _on_killed(self) -> None:
-        _log.error("the interface ends with its node: %s", self.session.detail)
-        self.exit(1)
+        # It may have called Qt.quit() when it was told of the shutdown.
+        if self.exit_code is None:
+            _log.error("the interface ends with its node: %s", self.session.detail)
+            self.exit(1)
 
     def _quit(self, *_: Any) -> None:
         self.exit(0)

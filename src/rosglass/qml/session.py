@@ -95,6 +95,8 @@ class Session(QtCore.QObject):
     graph_changed = Signal()
     #: Ten times per second while anybody holds :meth:`use_ticks`.
     tick = Signal()
+    #: Elements have waited for some seconds for a node that nothing has asked for.
+    forgotten = Signal()
     #: A call from QML that waited has ended, and returns to QML.
     call_ended = Signal()
 
@@ -407,6 +409,7 @@ class Session(QtCore.QObject):
         """Tell once that elements wait for a node that nobody has asked for."""
         if self._ticking > 0 and not self._closed and not self.is_initialized:
             _log.warning("nothing is received or sent: %s", NOT_INITIALIZED)
+            self.forgotten.emit()
 
     def _start(self) -> None:
         self._generation += 1

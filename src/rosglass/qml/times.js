@@ -151,6 +151,10 @@
         toSec: function () { return seconds(this) },
         toNSec: function () { return nanoseconds(this) }
     }
+    // Older versions of R1 gave times as Date, and its examples ask them so: `stamp.getHours()`.
+    for (const name of ["getDate", "getDay", "getFullYear", "getHours", "getMilliseconds", "getMinutes",
+                        "getMonth", "getSeconds", "getTime", "getYear"])
+        ros1[name] = function () { return toDate.call(this)[name]() }
     const CLOCK = 1  // Ros2ClockTypes.Ros
     const kinds = {
         time2: getters(prototype(common, { "#kind": "time", "#make": make2, toJSDate: toDate }),
@@ -163,8 +167,9 @@
             { "#kind": "time", "#make": make1, toJSDate: toDate }, ros1)),
         duration1: prototype(common, Object.assign({
             "#kind": "duration", "#make": make1, multiply: times,
-            toJSDuration: function () { return milliseconds(this) }
-        }, ros1))
+            toJSDuration: function () { return milliseconds(this) },
+            toSec: ros1.toSec, toNSec: ros1.toNSec
+        }))
     }
 
     function make2(kind, sec, nanosec) {
