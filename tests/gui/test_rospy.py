@@ -386,3 +386,26 @@ def test_a_second_node_of_the_name_leaves_the_screen(
     live.session.shutdown()
     assert root.property("n") == 1, "it is told once"
     assert not killed
+
+
+@pytest.mark.parametrize("module", ["Ros 1.0", "Ros2 1.0"])
+def test_a_type_of_the_robots_workspace_is_told_with_package_and_command(
+    live: Bench, wait: Any, module: str
+) -> None:
+    live.module = module
+    package = "action_tutorials_interfaces"
+    make = {
+        "Ros 1.0": f'Ros.createActionClient("{package}/FibonacciAction", "/count")',
+        "Ros2 1.0": f'Ros2.createActionClient("/count", "{package}/action/Fibonacci")',
+    }
+    root: Any = live.load(f"""
+        QtObject {{
+            property var client: {make[module]}
+            function problem() {{ return client.problem }}
+        }}
+    """)
+    wait(root.problem)
+    find = "rospack find" if live.robot.wire == "ros1" else "ros2 pkg prefix --share"
+    told = f"copy the folder of its package {package} from the robot ({find} {package} says where"
+    assert told in root.problem()
+    assert f"add it: --definitions {package} on the command line" in root.problem()

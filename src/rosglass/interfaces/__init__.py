@@ -22,7 +22,7 @@ from rosglass.interfaces.hashes import announced_hashes, full_text, md5, rihs01,
 from rosglass.interfaces.idl import parse_idl
 from rosglass.interfaces.library import Library
 from rosglass.interfaces.literals import INTEGER_RANGES
-from rosglass.interfaces.names import join_name, ros1_name, split_name
+from rosglass.interfaces.names import adding_definitions, join_name, ros1_name, split_name
 from rosglass.interfaces.parser import (
     PRIMITIVES,
     parse,
@@ -59,6 +59,7 @@ __all__ = [
     "TypeCache",
     "Value",
     "add_type_sources",
+    "adding_definitions",
     "announced_hashes",
     "cache_folder",
     "full_text",

@@ -22,7 +22,13 @@ from rosglass.interfaces.distributions import Distributions
 from rosglass.interfaces.folders import Folders, workspace
 from rosglass.interfaces.hashes import announced_hashes, check_definition, md5
 from rosglass.interfaces.idl import parse_idl
-from rosglass.interfaces.names import KINDS, join_name, ros1_name, split_name
+from rosglass.interfaces.names import (
+    KINDS,
+    adding_definitions,
+    join_name,
+    ros1_name,
+    split_name,
+)
 from rosglass.interfaces.parser import parse
 from rosglass.interfaces.provider import MemoryProvider, Provider, difference
 from rosglass.interfaces.resolver import Resolver
@@ -393,9 +399,8 @@ class Library:
             raise problem
         known = "; ".join(f"{place} has {actual}" for actual, place in tried.items())
         raise DefinitionConflictError(
-            f"no definition of {name} has the hash {wanted} that the peer announces: {known}. Add "
-            "the peer's definition with Library.add_path(), or --definitions FOLDER on the command "
-            "line, or source its workspace"
+            f"no definition of {name} has the hash {wanted} that the peer announces: {known}. "
+            f"Source the peer's workspace, or {adding_definitions(name, ros)}"
         )
 
     def _views(self, ros: int) -> Iterator[tuple[Resolver, list[Provider], bool]]:
@@ -459,10 +464,7 @@ class Library:
             text += f" Did you mean {' or '.join(close)}?"
         if any(n.split("/")[0] + "/" + n.split("/")[2] == wanted for n in other):
             text += f" ROS {3 - ros} has it."
-        return (
-            f"{text} Source its workspace, or add its folder with Library.add_path(), or "
-            "--definitions FOLDER on the command line"
-        )
+        return f"{text} Source its workspace, or {adding_definitions(name, ros)}"
 
 
 def _full_names(name: str) -> list[str]:

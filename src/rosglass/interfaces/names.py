@@ -8,6 +8,7 @@ from rosglass.errors import InvalidNameError
 
 __all__ = [
     "KINDS",
+    "adding_definitions",
     "check_constant_name",
     "check_field_name",
     "check_package_name",
@@ -25,6 +26,8 @@ KINDS = ("msg", "srv", "action")
 _IN_TEXT = re.compile(
     r"(?<![\w./-])([A-Za-z]\w*)/(?:msg|srv|action)/([A-Za-z]\w*)(?![\w/]|\.(?:msg|srv|action)\b)"
 )
+#: What says where a package is, on a robot of ROS 1 and of ROS 2.
+_FIND = {1: "rospack find", 2: "ros2 pkg prefix --share"}
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _ROS1_CONSTANT = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _ROS2_LOWER = re.compile(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)*")
@@ -133,3 +136,18 @@ def check_constant_name(name: str, ros: int) -> str:
 
 def _identifier_fault(what: str, name: str) -> str:
     return f"{what} name {name!r} must start with a letter, then letters, digits and underscores"
+
+
+def adding_definitions(name: str, ros: int) -> str:
+    """Return what to do, in words, about a type that only the robot's workspace has.
+
+    Args:
+        name: Its name, with the package.
+        ros: The robot's version of ROS.
+    """
+    package = name.partition("/")[0] if "/" in name else "PACKAGE"
+    return (
+        f"copy the folder of its package {package} from the robot ({_FIND[ros]} {package} says "
+        f"where it is there) and add it: --definitions {package} on the command line, "
+        f"Library.add_path({package!r}) in Python"
+    )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from rosglass.comm import QoS, Subscription
 from rosglass.errors import Error
-from rosglass.interfaces import ros1_name
+from rosglass.interfaces import adding_definitions, ros1_name
 from rosglass.ros1.action_types import (
     FEEDBACK,
     GOAL,
@@ -76,8 +76,7 @@ class ActionDiscovery:
             short = ros1_name(kind.replace("/action/", "/msg/"))
             self.problem = (
                 f"no definition of {short}Goal is known, and the server of {self._name} does not "
-                f"tell it: add the folder of its package with Library.add_path(), or "
-                "--definitions FOLDER on the command line"
+                f"tell it: {adding_definitions(kind, 1)}"
             )
             return None
         action = assemble(kind, goal, result, feedback)

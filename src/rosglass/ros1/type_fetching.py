@@ -21,7 +21,7 @@ from rosglass.errors import (
     NodeClosedError,
     TypeNotFoundError,
 )
-from rosglass.interfaces import ros1_name, split_name
+from rosglass.interfaces import adding_definitions, ros1_name, split_name
 from rosglass.ros1.action_discovery import ActionDiscovery
 from rosglass.ros1.action_types import actions
 from rosglass.ros1.core import Member
@@ -42,7 +42,6 @@ if TYPE_CHECKING:
 __all__ = ["fetch"]
 
 _PUBLISHER = EndpointKind.PUBLISHER
-_REMEDY = "add the definition with Library.add_path(), or --definitions FOLDER on the command line"
 _MD5 = re.compile("[0-9a-f]{32}")
 #: Seconds that a publisher may take to answer, and for which others are waited for once one has.
 _TIMEOUT, _GRACE = 5.0, 1.0
@@ -212,7 +211,7 @@ class _Fetch(Member):
                 if not ends:
                     self._problem = (
                         f"{topic} is subscribed to only, and only publishers tell definitions; "
-                        f"{_REMEDY}"
+                        f"{adding_definitions(full, 1)}"
                     )
         return found
 

@@ -7,7 +7,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, TypeVar
 
 from rosglass.errors import DefinitionConflictError, Error, TypeNotFoundError, UnsupportedError
-from rosglass.interfaces import full_text, join_name, split_name
+from rosglass.interfaces import adding_definitions, full_text, join_name, split_name
 
 if TYPE_CHECKING:
     from rosglass.interfaces import Library
@@ -121,10 +121,7 @@ class Types:
 
         if not name:
             raise TypeNotFoundError("its server does not tell its type; name it")
-        hint = (
-            "ROS 1 servers send no definitions: add the robot's package with Library.add_path(), "
-            "or its folder to ROS_PACKAGE_PATH"
-        )
+        hint = "ROS 1 servers send no definitions"
         try:
             found = load(name, ros=1, library=self._library, hash="" if md5 == ANY else md5)
         except (TypeNotFoundError, DefinitionConflictError) as error:
@@ -155,13 +152,13 @@ class Types:
         if not text.strip():
             raise TypeNotFoundError(
                 f"{full}: its publisher sends no definition, and no other one with md5 {md5} is "
-                "known; add it with Library.add_path()"
+                f"known; {adding_definitions(full, 1)}"
             )
         found = MessageType.from_text(full, text, ros=1)
         if found.md5 != md5:
             raise TypeNotFoundError(
                 f"{full}: its publisher announces md5 {md5}, but the definition it sends has "
-                f"{found.md5}; add the right one with Library.add_path()"
+                f"{found.md5}; {adding_definitions(full, 1)}"
             )
         with suppress(DefinitionConflictError):
             self.library.add(found.definition)

@@ -23,7 +23,14 @@ from rosglass.errors import (
     NodeClosedError,
     TypeNotFoundError,
 )
-from rosglass.interfaces import TypeCache, announced_hashes, cache_folder, rihs01, split_name
+from rosglass.interfaces import (
+    TypeCache,
+    adding_definitions,
+    announced_hashes,
+    cache_folder,
+    rihs01,
+    split_name,
+)
 from rosglass.ros2.announced import nodes_of
 from rosglass.ros2.core import Member
 from rosglass.ros2.type_clients import TypeClients
@@ -53,7 +60,6 @@ if TYPE_CHECKING:
 __all__ = ["TypeFetcher"]
 
 _log = logging.getLogger("rosglass.ros2")
-_REMEDY = "add the definition with Library.add_path(), or --definitions FOLDER on the command line"
 
 #: Seconds that a node has to answer, and after which the next one is asked meanwhile.
 _TIMEOUT, _HEDGE = 5.0, 1.0
@@ -278,7 +284,7 @@ class TypeFetcher(Member):
                 want,
                 f"{nodes_of(users.get(name, want.endpoints))} announces no type hash and sends no "
                 "definitions (ROS 2 Humble and older, or a program that is not built on rcl)"
-                f"{_told(want)}; {_REMEDY}",
+                f"{_told(want)}; {adding_definitions(want.name, 2)}",
                 now,
             )
         return ""
@@ -379,9 +385,9 @@ class TypeFetcher(Member):
         if self._core.middleware.announces_requests and "/msg/" not in want.name:
             told += (
                 ". Over DDS, ROS 2 nodes announce a service by the hash of its request, and do not "
-                f"find its type by that when asked: {_REMEDY}"
+                "find its type by that when asked"
             )
-        return told
+        return f"{told}; {adding_definitions(want.name, 2)}"
 
     def _ask(self, want: Want, key: bytes | str, server: EndpointInfo, name: str) -> None:
         ask = Ask(server, name)

@@ -383,4 +383,6 @@ def test_services_and_actions_that_only_rclpy_knows_are_refused_with_the_reason(
     with node.create_service_client("/real/unknown") as client:
         problem = wait_for(lambda: "Over DDS" in client.problem and client.problem)
     assert ECHO in problem
-    assert "--definitions FOLDER" in problem
+    package = ECHO.partition("/")[0]
+    assert f"ros2 pkg prefix --share {package} says where" in problem
+    assert f"--definitions {package} on the command line" in problem

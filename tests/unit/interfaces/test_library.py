@@ -96,7 +96,7 @@ def test_bad_world(library: Library) -> None:
         ("bond/Status", 2, "ROS 1 has it."),
         ("nobody_msgs/Knows", 2, "looked in distribution sets (jazzy, kilted"),
         ("nobody_msgs/Knows", 1, "looked in distribution sets (noetic)"),
-        ("nobody_msgs/Knows", 1, "Library.add_path()"),
+        ("nobody_msgs/Knows", 1, "Library.add_path('nobody_msgs')"),
     ],
 )
 def test_unknown_types(library: Library, name: str, ros: int, words: str) -> None:

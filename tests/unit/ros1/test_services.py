@@ -350,7 +350,7 @@ def test_a_type_that_nobody_knows_here_is_named_with_what_to_do(node, start_robo
     client = node.create_service_client("/add")
     eventually(lambda: "acme_srvs" in client.problem)
     assert "/robot offers it as acme_srvs/srv/Dance" in client.problem
-    assert "Library.add_path()" in client.problem
+    assert "Library.add_path('acme_srvs')" in client.problem
     assert not client.ready
     with pytest.raises(rosglass.ServiceUnavailableError, match="acme_srvs/srv/Dance"):
         client.call(timeout=0.1)
