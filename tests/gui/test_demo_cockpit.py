@@ -283,6 +283,97 @@ def test_the_emergency_stop_stops_and_stays(
     assert robot.speed == 0.0
 
 
+@pytest.mark.parametrize("key", ["Key_Return", "Key_Enter"])
+def test_the_emergency_stop_is_released_by_a_key_that_is_held(
+    cockpit: CockpitProcess, robot: RobotSide, key: str
+) -> None:
+    cockpit.key("press", "Key_Space")
+    cockpit.key("release", "Key_Space")
+    cockpit.until("stop", "stopped")
+    cockpit.key("press", key)
+    time.sleep(0.2)
+    cockpit.key("release", key)
+    time.sleep(0.8)
+    assert robot.stopped, "a short press does not release"
+    # As X11 repeats a key that is held down.
+    cockpit.key("press", key)
+    cockpit.repeat(key, 10)
+    cockpit.key("press", "Key_Space")
+    cockpit.repeat(key, 20)
+    cockpit.key("release", "Key_Space")
+    assert robot.stopped, "stopping goes before releasing"
+    cockpit.key("release", key)
+    time.sleep(0.1)
+    cockpit.key("press", key)
+    cockpit.repeat(key, 10)
+    robot.until(lambda: robot.stopped is False)
+    cockpit.key("release", key)
+    assert robot.speed == 0.0
+
+
+def test_the_focus_is_seen_and_keys_count_wherever_it_is(
+    cockpit: CockpitProcess, robot: RobotSide, tmp_path: Path
+) -> None:
+    def ring() -> np.ndarray:
+        pixels = grab(cockpit, tmp_path / "focus.png", "cockpit").astype(int)
+        x, y, *_ = cockpit.place("camera")
+        left, top, right, bottom = (
+            round(at - corner)
+            for at, corner in zip(cockpit.place("stop"), (x, y, x, y), strict=True)
+        )
+        around = pixels[top - 8 : bottom + 8, left - 8 : right + 8]
+        # The accent of the theme, which nothing else here has.
+        accent = np.abs(around - np.array([0x3F, 0xD2, 0xE8])).sum(axis=2) < 60
+        return int(np.count_nonzero(accent))
+
+    assert ring() < 50
+    tabs = 0
+    while not cockpit.get("stop", "activeFocus"):
+        cockpit.key("press", "Key_Tab")
+        cockpit.key("release", "Key_Tab")
+        tabs += 1
+        assert tabs < 10
+    assert ring() > 500
+    cockpit.key("press", "Key_Space")
+    cockpit.key("release", "Key_Space")
+    cockpit.until("stop", "stopped")
+    cockpit.key("press", "Key_Return")
+    robot.until(lambda: robot.stopped is False)
+    cockpit.key("release", "Key_Return")
+    cockpit.call("cockpit", "forceActiveFocus")
+
+
+def test_diagnostics_are_merged_worst_first_and_counted(
+    cockpit: CockpitProcess, robot: RobotSide
+) -> None:
+    kind = "diagnostic_msgs/msg/DiagnosticArray"
+    arm, base = (robot.node.create_publisher("/diagnostics", kind) for _ in range(2))
+    parts = [{"level": [0], "name": f"joint {n:02}", "message": "fine"} for n in range(20)]
+    for part in parts:
+        part["level"] = 0
+    worn = {"level": 1, "name": "track", "message": "worn"}
+    broken = {"level": 2, "name": "zoom", "message": "stuck", "hardware_id": "camera"}
+
+    def shown() -> list[str]:
+        return [state["name"] for state in cockpit.get("diagnostics", "states")]
+
+    end = time.monotonic() + 30
+    while shown()[:2] != ["zoom", "track"] or len(shown()) != 27:
+        assert time.monotonic() < end, shown()
+        # One right after the other: none may take the other's place.
+        arm.publish({"status": [*parts, broken]})
+        base.publish({"status": [worn]})
+        time.sleep(0.05)
+    assert cockpit.get("diagnostics", "note") == "1 error, 1 warning"
+    hidden = cockpit.get("diagnostics", "hidden")
+    assert 0 < hidden < 27
+    assert cockpit.get("more", "text") == f"{hidden} more"
+    for publisher in (arm, base):
+        publisher.close()
+    # What its node says no more about is no news.
+    cockpit.until("diagnostics", "note", "22 stale")
+
+
 @pytest.mark.parametrize(
     ("width", "height"), [(640, 480), (800, 480), (640, 600), (480, 800), (320, 240), (900, 300)]
 )

@@ -52,6 +52,7 @@ Item {
     // Whatever was held down: its release may never be seen.
     function letGo() {
         keyboard.clear()
+        stop.cancelHold()
         keys.clear()
         drive.release()
     }
@@ -66,6 +67,10 @@ Item {
             return
         else if (keys.press(event.key))
             return
+        else if (event.key === Qt.Key_Return || event.key === Qt.Key_Enter)
+            stop.beginHold()
+        else if (event.key === Qt.Key_Tab || event.key === Qt.Key_Backtab)
+            event.accepted = false
         else if (event.key === Qt.Key_L)
             lamp.toggle()
         else if (event.key === Qt.Key_R || event.key === Qt.Key_F)
@@ -99,7 +104,11 @@ Item {
     }
     HeldKeys {
         id: keyboard
-        onLifted: function (key) { keys.lift(key) }
+        onLifted: function (key) {
+            keys.lift(key)
+            if (key === Qt.Key_Return || key === Qt.Key_Enter)
+                stop.cancelHold()
+        }
     }
 
     TopBar {

@@ -7,34 +7,87 @@ Panel {
     title: "Diagnostics"
     fresh: feed.fresh
     age: feed.age
-    readonly property int worst: {
-        let level = 0
-        for (const status of states)
-            level = Math.max(level, status.level)
-        return level
-    }
-    note: !feed.received ? "" : worst === 0 ? "all good" : worst === 1 ? "warnings" : "errors"
+    // Seconds after which what a part said last is no news of it any more.
+    readonly property real limit: 5
+    // Of more parts, only how many there are is kept.
+    readonly property int most: 200
+    // What each part said last, by its name and hardware: several nodes report, each its own parts.
+    property var parts: ({})
     property var states: []
+    property int uncounted: 0
+    readonly property int hidden: Math.max(0, states.length - list.shown)
+    readonly property var counts: {
+        const found = [0, 0, 0, 0]
+        for (const state of states)
+            found[state.level] += 1
+        return found
+    }
+    note: {
+        const said = []
+        for (const level of [2, 3, 1])
+            if (counts[level])
+                said.push(counts[level] + [" ok", " warning", " error", " stale"][level] + (counts[level] > 1 && level !== 3 ? "s" : ""))
+        return !feed.received ? "" : said.join(", ") || "all good"
+    }
+
+    function rank(level) { return [0, 1, 3, 2][level] }
+
+    function take(message) {
+        for (let i = 0; i < message.status.length; ++i) {
+            const status = message.status[i]
+            const key = status.name + "\n" + status.hardware_id
+            if (!(key in parts) && Object.keys(parts).length >= most) {
+                uncounted += 1
+                continue
+            }
+            parts[key] = {
+                level: [0, 1, 2, 3].includes(status.level) ? status.level : 2,
+                name: status.name, text: status.message,
+                value: status.values.length ? status.values[0].value : "", at: Date.now()
+            }
+        }
+        sort()
+    }
+
+    // The worst first.
+    function sort() {
+        const now = Date.now()
+        const list = Object.values(parts).map(function (part) {
+            const silent = now - part.at > limit * 1000
+            return { level: silent ? 3 : part.level, name: part.name, value: silent ? "" : part.value,
+                     text: silent ? "silent, said: " + part.text : part.text }
+        })
+        list.sort((a, b) => rank(b.level) - rank(a.level) || (a.name < b.name ? -1 : a.name > b.name ? 1 : 0))
+        // Assigned only when it differs: the rows would be rebuilt each time.
+        if (JSON.stringify(list) !== JSON.stringify(states))
+            states = list
+    }
 
     property Feed feed: Feed {
         topic: "/diagnostics"
         messageType: "diagnostic_msgs/msg/DiagnosticArray"
         limit: 1.5
-        onArrived: function (message) {
-            const list = []
-            for (let i = 0; i < message.status.length; ++i) {
-                const status = message.status[i]
-                const value = status.values.length ? status.values[0].value : ""
-                list.push({ level: status.level, name: status.name, text: status.message, value: value })
-            }
-            // Assigned only when it differs: the rows would be rebuilt each time.
-            if (JSON.stringify(list) !== JSON.stringify(panel.states))
-                panel.states = list
-        }
+        // Each message counts: another node's follows at once.
+        throttleRate: 0
+        queueSize: 100
+    }
+    Connections {
+        target: panel.feed.subscription
+        function onNewMessage(message) { panel.take(message) }
+    }
+    Timer {
+        interval: 1000
+        repeat: true
+        running: true
+        onTriggered: panel.sort()
     }
 
     ListView {
-        anchors.fill: parent
+        id: list
+        objectName: "list"
+        // Rows that are wholly in sight from the top.
+        readonly property int shown: Math.floor((height + spacing) / (20 + spacing))
+        anchors { fill: parent; bottomMargin: panel.states.length * 22 > parent.height + 2 || panel.uncounted ? 16 : 0 }
         model: panel.states
         clip: true
         interactive: contentHeight > height
@@ -76,5 +129,15 @@ Panel {
                 font.pixelSize: Theme.small
             }
         }
+    }
+    Text {
+        objectName: "more"
+        anchors { left: parent.left; leftMargin: 16; bottom: parent.bottom }
+        visible: text !== ""
+        text: panel.uncounted ? "and more than " + panel.most + " parts"
+            : panel.hidden ? panel.hidden + " more" : ""
+        textFormat: Text.PlainText
+        color: panel.hidden && panel.states[list.shown].level > 0 ? Theme.warn : Theme.dim
+        font.pixelSize: Theme.small
     }
 }

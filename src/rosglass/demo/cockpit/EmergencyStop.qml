@@ -24,10 +24,14 @@ Item {
     property var publisher: null
     Component.onCompleted: publisher = Ros2.createPublisher(topic, "std_msgs/msg/Bool", 10)
 
+    // By Tab; the keys that stop and release count wherever the focus is.
+    activeFocusOnTab: true
+
     implicitWidth: 168
     implicitHeight: 168
 
     function press() {
+        cancelHold()
         wanted = true
         begin()
     }
@@ -36,6 +40,17 @@ Item {
         wanted = false
         sinceRelease.restart()
         begin()
+    }
+
+    // Releasing takes a deliberate long press, of the finger or of the key.
+    function beginHold() {
+        if (blocks)
+            hold.restart()
+    }
+
+    function cancelHold() {
+        hold.stop()
+        unlock.progress = 0
     }
 
     function begin() {
@@ -101,6 +116,10 @@ Item {
         onTriggered: stop.wanted = null
     }
 
+    FocusRing {
+        item: stop
+        radius: width / 2
+    }
     Rectangle {
         id: collar
         anchors.fill: parent
@@ -161,13 +180,12 @@ Item {
         onPressed: stop.press()
     }
 
-    // Releasing takes a deliberate long press.
     Rectangle {
         id: unlock
         objectName: "unlock"
         anchors { horizontalCenter: parent.horizontalCenter; bottom: parent.top; bottomMargin: 10 }
         visible: stop.blocks
-        width: Math.min(150, stop.width + 12)
+        width: Math.min(190, stop.width + 24)
         height: 34
         radius: 17
         color: Theme.shade
@@ -182,9 +200,14 @@ Item {
             opacity: 0.5
         }
         Text {
-            anchors.centerIn: parent
-            text: "hold to release"
+            objectName: "unlockText"
+            anchors { fill: parent; leftMargin: 8; rightMargin: 8 }
+            horizontalAlignment: Text.AlignHCenter
+            verticalAlignment: Text.AlignVCenter
+            text: "hold, or Enter, to release"
             color: Theme.text
+            fontSizeMode: Text.HorizontalFit
+            minimumPixelSize: 8
             font { pixelSize: Theme.normal; weight: Font.DemiBold }
         }
         NumberAnimation {
@@ -202,9 +225,9 @@ Item {
         MultiPointTouchArea {
             anchors.fill: parent
             maximumTouchPoints: 1
-            onPressed: hold.restart()
-            onReleased: { hold.stop(); unlock.progress = 0 }
-            onCanceled: { hold.stop(); unlock.progress = 0 }
+            onPressed: stop.beginHold()
+            onReleased: stop.cancelHold()
+            onCanceled: stop.cancelHold()
         }
     }
 }

@@ -8,6 +8,8 @@ QtObject {
     property alias topic: subscription.topic
     property alias messageType: subscription.messageType
     property alias age: subscription.age
+    property alias throttleRate: subscription.throttleRate
+    property alias queueSize: subscription.queueSize
     // Seconds without a message after which the one received last is no longer true.
     property real limit: 0.7
     // Whether to show a message at once instead of together with the next camera picture.

@@ -19,6 +19,10 @@ Rectangle {
         urgent: true
     }
 
+    activeFocusOnTab: true
+    Keys.onReturnPressed: function (event) { if (!event.isAutoRepeat) toggle() }
+    Keys.onEnterPressed: function (event) { if (!event.isAutoRepeat) toggle() }
+
     width: 54
     height: 54
     radius: 27
@@ -26,6 +30,10 @@ Rectangle {
     border { color: on ? Theme.warn : Theme.faint; width: 2 }
     opacity: state_.fresh ? 1 : 0.4
 
+    FocusRing {
+        item: lamp
+        radius: width / 2
+    }
     Rectangle {
         anchors { horizontalCenter: parent.horizontalCenter; top: parent.top; topMargin: 13 }
         width: 16; height: 16; radius: 8
