@@ -1,5 +1,6 @@
 // The emergency stop. It shows what the robot confirms, not what was clicked; a wish that is not
 // confirmed is sent again and again. It stops when pressed, and releases only after a long press.
+// With the keyboard's focus, which Tab moves and a white frame shows: Space stops, Enter held releases.
 import QtQuick 2.15
 import Ros 1.0
 
@@ -13,7 +14,35 @@ Rectangle {
     readonly property bool stopped: known && state_.message.data
     readonly property bool pending: wanted !== null && (!known || stopped !== wanted)
 
+    activeFocusOnTab: true
+    onActiveFocusChanged: if (!activeFocus) cancelHold()
+
+    Keys.onPressed: function (event) {
+        event.accepted = true
+        if (event.key === Qt.Key_Space)
+            want(true)
+        else if (event.key !== Qt.Key_Return && event.key !== Qt.Key_Enter)
+            event.accepted = false
+        else if (lifted.running)
+            lifted.stop()
+        else if (!event.isAutoRepeat && stopped && !pending)
+            hold.restart()
+    }
+    Keys.onReleased: function (event) {
+        if (!event.isAutoRepeat && (event.key === Qt.Key_Return || event.key === Qt.Key_Enter))
+            lifted.restart()
+    }
+    // X11 repeats a key that is held as releases and presses: a release counts if no press follows.
+    Timer { id: lifted; interval: 50; onTriggered: stop.cancelHold() }
+
+    function cancelHold() {
+        hold.stop()
+        hold.progress = 0
+    }
+
     function want(stopped) {
+        if (stopped)
+            cancelHold()
         wanted = stopped
         publisher.publish({data: wanted})
     }
@@ -35,6 +64,14 @@ Rectangle {
         onTriggered: stop.wanted = null
     }
 
+    Rectangle {
+        objectName: "focus ring"
+        anchors { fill: parent; margins: 3 }
+        visible: stop.activeFocus
+        radius: 6
+        color: "transparent"
+        border { color: "white"; width: 2 }
+    }
     Column {
         anchors.centerIn: parent
         spacing: 4
@@ -47,7 +84,7 @@ Rectangle {
         Text {
             anchors.horizontalCenter: parent.horizontalCenter
             text: !stop.known && !stop.pending ? "STATE UNKNOWN" : stop.pending ? "NOT CONFIRMED"
-                : stop.stopped ? "hold to release" : "emergency stop"
+                : stop.stopped ? (stop.activeFocus ? "hold, or Enter, to release" : "hold to release") : "emergency stop"
             color: !stop.known || stop.pending ? "#ffe24a" : "#ffd9dc"
             font { pixelSize: 12; weight: Font.DemiBold }
         }
@@ -68,12 +105,13 @@ Rectangle {
     MouseArea {
         anchors.fill: parent
         onPressed: {
+            stop.forceActiveFocus()
             if (stop.stopped && !stop.pending)
                 hold.restart()
             else
                 stop.want(true)
         }
-        onReleased: { hold.stop(); hold.progress = 0 }
-        onCanceled: { hold.stop(); hold.progress = 0 }
+        onReleased: stop.cancelHold()
+        onCanceled: stop.cancelHold()
     }
 }

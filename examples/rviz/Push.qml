@@ -17,7 +17,16 @@ Rectangle {
     radius: 5
     opacity: enabled ? 1 : 0.4
     color: checked ? Qt.darker(tint, 2.2) : area.pressed ? "#2b3a4a" : Theme.button
-    border.color: checked ? tint : area.containsMouse ? Theme.dim : Theme.edge
+    border { color: activeFocus ? "white" : checked ? tint : area.containsMouse ? Theme.dim : Theme.edge; width: activeFocus ? 2 : 1 }
+    activeFocusOnTab: true
+    Keys.onPressed: function (event) {
+        event.accepted = [Qt.Key_Space, Qt.Key_Return, Qt.Key_Enter].indexOf(event.key) >= 0
+        if (event.accepted && !event.isAutoRepeat && !lifted.running)
+            clicked()
+    }
+    Keys.onReleased: lifted.restart()
+    // X11 repeats a key that is held as releases and presses.
+    Timer { id: lifted; interval: 50 }
     Row {
         id: label
         x: push.leading ? 9 : (push.width - width) / 2

@@ -109,6 +109,36 @@ def test_everything_says_that_the_robot_is_silent(
         wait(lambda: live(dashboard))
 
 
+def test_the_stop_is_operated_by_keyboard_and_shows_the_focus(
+    dashboard: Dashboard, hand: Any, wait: Any
+) -> None:
+    from rosglass.rviz.qt5 import QtCore
+
+    stop, ring = dashboard.find("emergency stop"), dashboard.find("focus ring")
+    assert not ring.isVisible()
+    place = stop.mapToScene(QtCore.QPointF(stop.width() / 2, stop.height() / 2))
+    hand.click(place.x(), place.y())
+    wait(lambda: stop.property("stopped"))
+    wait(ring.isVisible)
+    wait(lambda: "hold, or Enter, to release" in dashboard.seen())
+    hand.key("Return")
+    wait(1000)
+    assert stop.property("stopped"), "a short press does not release"
+    hand.do("keydown", "Return")
+    wait(lambda: not stop.property("stopped"))
+    hand.do("keyup", "Return")
+    hand.key("space")
+    wait(lambda: stop.property("stopped"))
+    hand.key("Tab")
+    wait(lambda: not ring.isVisible())
+    # A button has it now, and leaves Enter to itself.
+    hand.key("ISO_Left_Tab")
+    wait(ring.isVisible)
+    hand.do("keydown", "Return")
+    wait(lambda: not stop.property("stopped"))
+    hand.do("keyup", "Return")
+
+
 def test_what_the_robot_refuses_is_told(dashboard: Dashboard, master: str, wait: Any) -> None:
     import rosglass
 
