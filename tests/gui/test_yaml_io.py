@@ -93,6 +93,25 @@ def test_messages_models_and_objects_are_written(bench: Any, tmp_path: Path) -> 
     assert shown["bag"] == {"x": 1, "y": [2]}
 
 
+@pytest.mark.parametrize("kind", ["UInt64", "Int64"])
+@pytest.mark.parametrize("count", [3, 40])
+def test_arrays_of_wide_integers_come_back(
+    bench: Any, tmp_path: Path, kind: str, count: int
+) -> None:
+    file = tmp_path / "a.yaml"
+    most = str(2**64 - 1 if kind == "UInt64" else -(2**63))
+    import rosglass
+    from rosglass.qml.runtime import runtime_of
+
+    values = [1, int(most), *[7] * (count - 2)]
+    received = rosglass.load(f"std_msgs/msg/{kind}MultiArray").create(data=values)
+    bench.module = "Ros2 1.0"
+    root = bench.load(f"""QtObject {{
+        function go(m) {{ return Ros2.io.writeYaml("{file}", m) }} }}""")
+    assert root.go(runtime_of(bench.engine).message(received)) is True
+    assert read(bench, file, "v.data") == [1, most, *[7] * (count - 2)]
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [

@@ -30,8 +30,9 @@ def plain_from_js(value: QJSValue) -> Any:
     return _Reader().read(value, "", 0)
 
 
-def _number(number: float) -> float:
-    return integral(number) if abs(number) < 2**53 else number
+def _number(number: float | str) -> float | str:
+    # Integers that JavaScript's numbers do not hold come as text.
+    return integral(number) if not isinstance(number, str) and abs(number) < 2**53 else number
 
 
 class _Reader:
