@@ -126,7 +126,7 @@ class Message:
 
         Arrays are lists; floats that JSON cannot say become the strings ``"NaN"``,
         ``"Infinity"`` and ``"-Infinity"``, as in protobuf's JSON mapping; bytes of strings that
-        are not UTF-8 become U+FFFD.
+        are not UTF-8, and surrogates that are no pair, become U+FFFD.
         """
         return text.to_json(self, indent)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,8 @@ __all__ = ["finite", "plain", "short", "to_dict", "to_json", "to_yaml"]
 
 _SHOWN = 6
 _LONGEST = 60
+#: What stands for a byte that is not UTF-8, or for half a pair in a ``wstring``.
+_SURROGATE = re.compile("[\ud800-\udfff]")
 
 
 def to_dict(message: Message) -> dict[str, Any]:
@@ -44,11 +47,7 @@ def plain(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: plain(inner) for key, inner in value.items()}
     if isinstance(value, str):
-        try:
-            value.encode()
-        except UnicodeEncodeError:
-            return value.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
-        return value
+        return _SURROGATE.sub("\N{REPLACEMENT CHARACTER}", value)
     if isinstance(value, (bytes, bytearray, memoryview)):
         return list(value)
     if hasattr(value, "tolist"):

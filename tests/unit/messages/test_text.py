@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from rosglass.messages import load
+from rosglass.messages import MessageType, load
 
 JOINTS = load("sensor_msgs/msg/JointState")
 
@@ -33,6 +33,19 @@ def test_json_is_strict_and_says_what_it_cannot() -> None:
     assert "grüße" in text
     assert text.encode()
     assert message.to_json(indent=2).count("\n") > 10
+
+
+@pytest.mark.parametrize("width", [2, 4])
+@pytest.mark.parametrize("unit", [0xD800, 0xDBFF, 0xDC00, 0xDC80, 0xDFFF])
+def test_wide_strings_with_half_a_pair_are_shown(unit: int, width: int) -> None:
+    kind = MessageType.from_text("t/msg/W", "wstring a\nwstring[] b\nuint8 c")
+    value = {"a": f"x{chr(unit)}y🤖", "b": [chr(unit)], "c": 1}
+    message = kind.decode(kind.encode(value, wstring_width=width), wstring_width=width)
+    assert message.to_dict() == value
+    shown = {"a": "x\N{REPLACEMENT CHARACTER}y🤖", "b": ["\N{REPLACEMENT CHARACTER}"], "c": 1}
+    assert json.loads(message.to_json().encode()) == shown
+    assert yaml.safe_load(message.to_yaml().encode()) == shown
+    assert str(message).encode()
 
 
 def test_json_of_bytes_and_nested_messages() -> None:
