@@ -97,6 +97,8 @@ class Pair:
         only_two: Fields that only ROS 2's has: left out for ROS 1, default the other way.
         exact: Whether the bytes of the fields are the same in one wire format, ``Header.seq`` at
             the very beginning excepted.
+        has_times: Whether there are times or durations in it, at any depth.
+        has_seq: Whether there is a ``Header.seq`` in it that ROS 2 has not.
     """
 
     one: Definition
@@ -105,6 +107,8 @@ class Pair:
     only_one: tuple[str, ...] = ()
     only_two: tuple[str, ...] = ()
     exact: bool = False
+    has_times: bool = False
+    has_seq: bool = False
 
     def lost(self, ros: int, prefix: str = "") -> Iterator[str]:
         """Yield the paths of fields that ROS `ros` has and the other has not."""
@@ -118,6 +122,10 @@ class Pair:
                 yield from field.inner.lost(ros, f"{prefix}{path}{many}.")
 
 
+#: Pairs by the identities of both definitions, which are kept with them.
+_Pairs = dict[tuple[int, int], tuple[Definition, Definition, "Pair | None"]]
+
+
 class Counterparts:
     """Finds the type that a type is in the other ROS, or derives it.
 
@@ -127,6 +135,9 @@ class Counterparts:
 
     def __init__(self, library: Library) -> None:
         self._library = library
+        #: Nested types are looked up, derived and compared once, however often they occur.
+        self._found: dict[int, tuple[Definition, Pair]] = {}
+        self._pairs: _Pairs = {}
 
     def message(self, source: Definition, *wanted: Definition) -> Pair:
         """Return a message and its counterpart.
@@ -138,14 +149,27 @@ class Counterparts:
         Raises:
             UnsupportedError: There can be none: names of fields differ only in case.
         """
-        for candidate in (*wanted, *self._candidates(source.name, source.ros)):
+        for candidate in wanted:
+            pair = self._match(source, candidate)
+            if pair is not None:
+                return pair
+        if id(source) not in self._found:
+            self._found[id(source)] = source, self._counterpart(source)
+        return self._found[id(source)][1]
+
+    def _counterpart(self, source: Definition) -> Pair:
+        for candidate in self._candidates(source.name, source.ros):
             if isinstance(candidate, Definition):
-                pair = _match(source, candidate)
+                pair = self._match(source, candidate)
                 if pair is not None:
                     return pair
-        pair = _match(source, self._derived(source))
+        pair = self._match(source, self._derived(source))
         assert pair is not None, source.name
         return pair
+
+    def _match(self, source: Definition, other: Definition) -> Pair | None:
+        one, two = (source, other) if source.ros == 1 else (other, source)
+        return match(one, two, self._pairs)
 
     def service(
         self, source: ServiceDefinition, *wanted: ServiceDefinition
@@ -156,8 +180,8 @@ class Counterparts:
         """
         for candidate in (*wanted, *self._candidates(source.name, source.ros)):
             if isinstance(candidate, ServiceDefinition):
-                request = _match(source.request, candidate.request)
-                response = _match(source.response, candidate.response)
+                request = self._match(source.request, candidate.request)
+                response = self._match(source.response, candidate.response)
                 if request is not None and response is not None:
                     return candidate, request, response
         ros = 3 - source.ros
@@ -166,7 +190,7 @@ class Counterparts:
         told = replace(self._derived(source.response), name=f"{source.name}{joint}Response")
         text = f"{asked.text}---\n{told.text}"
         found = ServiceDefinition(source.name, ros, asked, told, text, asked.source)
-        first, second = _match(source.request, asked), _match(source.response, told)
+        first, second = self._match(source.request, asked), self._match(source.response, told)
         assert first is not None
         assert second is not None
         return found, first, second
@@ -182,7 +206,7 @@ class Counterparts:
         for candidate in (*wanted, *self._candidates(source.name, source.ros)):
             if isinstance(candidate, ActionDefinition):
                 others = candidate.goal, candidate.result, candidate.feedback
-                pairs = [_match(one, two) for one, two in zip(parts, others, strict=True)]
+                pairs = [self._match(one, two) for one, two in zip(parts, others, strict=True)]
                 first, second, third = pairs
                 if first is not None and second is not None and third is not None:
                     return candidate, first, second, third
@@ -195,7 +219,7 @@ class Counterparts:
         text = f"{goal.text}---\n{result.text}---\n{feedback.text}"
         found = ActionDefinition(source.name, ros, goal, result, feedback, text, goal.source)
         first, second, third = (
-            _match(one, two) for one, two in zip(parts, (goal, result, feedback), strict=True)
+            self._match(one, two) for one, two in zip(parts, (goal, result, feedback), strict=True)
         )
         assert first is not None
         assert second is not None
@@ -256,11 +280,25 @@ class Counterparts:
         )
 
 
-def match(one: Definition, two: Definition) -> Pair | None:
+def match(one: Definition, two: Definition, known: _Pairs | None = None) -> Pair | None:
     """Return how the fields of a message of ROS 1 and one of ROS 2 correspond.
 
     None when they do not: a field of ROS 1 has no place in ROS 2, or means something else there.
+
+    Args:
+        one: ROS 1's message.
+        two: ROS 2's.
+        known: What was found before, and takes what is found.
     """
+    known = {} if known is None else known
+    key = id(one), id(two)
+    if key not in known:
+        # With both, so that no other object gets the same identity.
+        known[key] = one, two, _match(one, two, known)
+    return known[key][2]
+
+
+def _match(one: Definition, two: Definition, known: _Pairs) -> Pair | None:
     if one.name == "rosgraph_msgs/msg/Log" and two.name == "rcl_interfaces/msg/Log":
         return _log(one, two)
     if _TIMES_BACK.get(two.name) is not None and [f.type.name for f in one.fields] == [
@@ -269,7 +307,7 @@ def match(one: Definition, two: Definition) -> Pair | None:
         field = one.fields[0]
         # The only field is what the other message is.
         paired = PairedField((field.name,), (), field.type, FieldType(two.name))
-        return Pair(one, two, (paired,), exact=True)
+        return Pair(one, two, (paired,), exact=True, has_times=True)
     ours = [field for field in one.fields if not _left_out(one, field)]
     theirs = {field.name.lower(): field for field in two.fields if field.name != _FILLER}
     names = [_name_in(field.name, theirs) for field in ours]
@@ -285,19 +323,26 @@ def match(one: Definition, two: Definition) -> Pair | None:
                 return None
         elif field.type.is_compound:
             found = two.nested.get(other.type.name)
-            inner = None if found is None else match(one.nested[field.type.name], found)
+            inner = None if found is None else match(one.nested[field.type.name], found, known)
             if inner is None:
                 return None
         elif other.type.name not in _PRIMITIVES.get(field.type.name, (field.type.name,)):
             return None
         fields.append(PairedField((field.name,), (other.name,), field.type, other.type, inner))
     left = tuple(field.name for key, field in theirs.items() if key not in names)
-    made = Pair(one, two, tuple(fields), (), left)
+    inners = [field.inner for field in fields if field.inner is not None]
+    made = Pair(
+        one,
+        two,
+        tuple(fields),
+        (),
+        left,
+        has_times=any(field.type_one.name in _TIMES for field in fields)
+        or any(inner.has_times for inner in inners),
+        has_seq=(one.name == _HEADER and len(one.fields) > len(two.fields))
+        or any(inner.has_seq for inner in inners),
+    )
     return replace(made, exact=_exact(made, list(theirs) == names))
-
-
-def _match(source: Definition, other: Definition) -> Pair | None:
-    return match(source, other) if source.ros == 1 else match(other, source)
 
 
 def _exact(pair: Pair, same_order: bool) -> bool:
@@ -310,24 +355,11 @@ def _exact(pair: Pair, same_order: bool) -> bool:
         if field.type_one.name in _TIMES and many:
             return False  # whether each fits must be looked at
         if field.inner is not None:
-            if not field.inner.exact or (many and _has_times(field.inner)):
+            if not field.inner.exact or (many and field.inner.has_times):
                 return False
-            if (place or many) and _has_seq(field.inner):
+            if (place or many) and field.inner.has_seq:
                 return False
     return True
-
-
-def _has_seq(pair: Pair) -> bool:
-    if pair.one.name == _HEADER and len(pair.one.fields) > len(pair.two.fields):
-        return True
-    return any(field.inner is not None and _has_seq(field.inner) for field in pair.fields)
-
-
-def _has_times(pair: Pair) -> bool:
-    return any(
-        field.type_one.name in _TIMES or (field.inner is not None and _has_times(field.inner))
-        for field in pair.fields
-    )
 
 
 def _log(one: Definition, two: Definition) -> Pair:
@@ -339,7 +371,7 @@ def _log(one: Definition, two: Definition) -> Pair:
         PairedField((name,), (name,), ours[name].type, theirs[name].type)
         for name in ("level", "name", "msg", "file", "function", "line")
     ]
-    return Pair(one, two, (stamp, *fields), ("header.frame_id", "topics"))
+    return Pair(one, two, (stamp, *fields), ("header.frame_id", "topics"), has_times=True)
 
 
 def _same_array(one: FieldType, two: FieldType) -> bool:

@@ -26,6 +26,7 @@ from rosglass.interfaces.definition import (
 from rosglass.interfaces.idl_lexer import Lexer
 from rosglass.interfaces.literals import LiteralError, parse_constant, parse_default, unescape
 from rosglass.interfaces.names import check_package_name, check_type_name, join_name
+from rosglass.interfaces.parser import MAX_TEXT
 
 if TYPE_CHECKING:
     from rosglass.interfaces.definition import InterfaceDefinition, Value
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
 
 __all__ = ["parse_idl"]
 
-_MAX_TEXT = 4 * 1024 * 1024
 _MAX_COUNT = 2**32 - 1
 _MAX_MODULES = 16
 _PLACEHOLDER = "structure_needs_at_least_one_member"
@@ -98,9 +98,9 @@ def parse_idl(
         raise DefinitionError(
             f"the definition must be a str, got {type(text).__name__}", source.file
         )
-    if len(text) > _MAX_TEXT:
+    if len(text) > MAX_TEXT:
         raise DefinitionError(
-            f"the definition has {len(text)} characters, the limit is {_MAX_TEXT}", source.file
+            f"the definition has {len(text)} characters, the limit is {MAX_TEXT}", source.file
         )
     parser = _Parser(Lexer(text.removeprefix("\ufeff"), source.file))
     messages = parser.messages(text, source)

@@ -24,8 +24,8 @@ from rosglass.interfaces.names import check_package_name, check_type_name, join_
 
 __all__ = ["MAX_TEXT", "PRIMITIVES", "parse", "parse_action", "parse_message", "parse_service"]
 
-#: Longest definition that is read, in characters; real ones have less than a hundredth of it.
-MAX_TEXT = 4 * 1024 * 1024
+#: Longest definition that is read, in characters; real ones have less than a tenth of it.
+MAX_TEXT = 1024 * 1024
 
 _NEWLINE = re.compile(r"\r\n|\r|\n")
 _SEPARATOR = re.compile(r"={3,}[ \t]*")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.errors import CyclicTypeError, DefinitionError
 from rosglass.interfaces.definition import (
@@ -19,15 +19,105 @@ if TYPE_CHECKING:
 
     from rosglass.interfaces.definition import Field, InterfaceDefinition
 
-__all__ = ["MAX_DEPTH", "MAX_FIXED_SIZE", "MAX_TYPES", "Resolver"]
+__all__ = [
+    "MAX_DEPTH",
+    "MAX_EMPTY",
+    "MAX_FIELDS",
+    "MAX_FIXED_SIZE",
+    "MAX_TYPES",
+    "MAX_VALUES",
+    "Extent",
+    "Resolver",
+]
 
-#: How deep types may nest, how many types one definition may need in all, and how many bytes
-#: its fixed arrays may take. Real definitions stay below 10, 100 and a few megabytes.
+#: How deep types may nest, and how many types one definition may need in all. ROS's own stay below
+#: 10 and 20.
 MAX_DEPTH = 64
-MAX_TYPES = 1000
-MAX_FIXED_SIZE = 1 << 30
+MAX_TYPES = 500
+#: Fields of a message, at every depth, each as often as it occurs and those of an array's elements
+#: once: what is generated for a type grows with them. ROS's own stay below 500.
+MAX_FIELDS = 3000
+#: Values of a message whose sequences are empty, an array of numbers being one, and bytes of its
+#: fixed arrays: what a message takes before anything is in it.
+MAX_VALUES = 100_000
+MAX_FIXED_SIZE = 1 << 25
+#: Messages without fields in a message, or in one of its sequences: in ROS 1 they take no bytes,
+#: so that nothing in a buffer limits their number.
+MAX_EMPTY = 1024
 
 _SIZES = {"bool": 1, "byte": 1, "char": 1, "string": 4, "wstring": 4, "time": 8, "duration": 8}
+
+
+class Extent(NamedTuple):
+    """How much there is in a message.
+
+    Attributes:
+        depth: Levels of messages, itself included.
+        fields: Fields at every depth, those of an array's elements once.
+        values: Values at every depth when sequences are empty; an array of numbers is one.
+        empties: Messages without fields among them.
+        size: Bytes of its fields on the wire when sequences and strings are empty, roughly.
+    """
+
+    depth: int = 1
+    fields: int = 0
+    values: int = 0
+    empties: int = 0
+    size: int = 0
+
+    def plus(self, owner: Definition, field: Field, inner: Extent | None) -> Extent:
+        """Return the extent with one more field.
+
+        Args:
+            owner: The message, for errors.
+            field: The field.
+            inner: The extent of the message that an element of it is, None for primitives.
+
+        Raises:
+            DefinitionError: The message goes beyond a limit.
+        """
+        kind = field.type
+        element = inner or Extent(depth=0, size=_size(kind.name))
+        values, empties = 1 + element.values, element.empties
+        if inner is not None and not inner.fields:
+            empties += 1
+        size = element.size
+        if kind.array is ArrayKind.FIXED:
+            count = kind.size or 1
+            size *= count
+            if inner is not None or kind.name in ("string", "wstring"):
+                values, empties = values * count, empties * count
+        elif kind.array is not ArrayKind.NONE:
+            values, empties, size = 1, 0, 4
+        made = Extent(
+            max(self.depth, 1 + element.depth),
+            self.fields + 1 + element.fields,
+            self.values + values,
+            self.empties + empties,
+            self.size + size,
+        )
+        beyond = made._beyond(owner.name)
+        if beyond:
+            raise _error(owner, field, beyond)
+        return made
+
+    def _beyond(self, name: str) -> str:
+        """Say which limit is exceeded, empty when none is."""
+        if self.depth > MAX_DEPTH:
+            return f"types nest deeper than {MAX_DEPTH} levels"
+        if self.size > MAX_FIXED_SIZE:
+            return f"a {name} would always take more than {MAX_FIXED_SIZE} bytes"
+        if self.fields > MAX_FIELDS:
+            return f"{name} has more than {MAX_FIELDS} fields, those of nested messages included"
+        if self.empties > MAX_EMPTY:
+            return f"a {name} would always hold more than {MAX_EMPTY} messages without fields"
+        if self.values > MAX_VALUES:
+            return f"a {name} would always hold more than {MAX_VALUES} values"
+        return ""
+
+
+def _size(name: str) -> int:
+    return _SIZES.get(name) or int(name.lstrip("uintfloa")) // 8
 
 
 class Resolver:
@@ -41,7 +131,7 @@ class Resolver:
     def __init__(self, find: Callable[[str, Definition, Field], Definition]) -> None:
         self._find = find
         self._done: dict[str, Definition] = {}
-        self._sizes: dict[str, int] = {}
+        self._extents: dict[str, Extent] = {}
         self._chain: list[str] = []
 
     def known(self, name: str) -> Definition | None:
@@ -76,35 +166,27 @@ class Resolver:
         if done is not None:
             return done
         nested: dict[str, Definition] = {}
-        size = 0
+        extent = Extent()
         self._chain.append(definition.name)
         try:
             for field in definition.fields:
-                element = self._field(definition, field, nested)
-                count = field.type.size if field.type.array is ArrayKind.FIXED else 1
-                if field.type.array in (ArrayKind.BOUNDED, ArrayKind.UNBOUNDED):
-                    element = 4
-                size += element * (count or 1)
-                if size > MAX_FIXED_SIZE:
-                    raise _error(
-                        definition,
-                        field,
-                        f"a {definition.name} would always take more than {MAX_FIXED_SIZE} bytes",
-                    )
+                extent = extent.plus(definition, field, self._element(definition, field, nested))
         finally:
             self._chain.pop()
         resolved = replace(definition, nested=MappingProxyType(nested))
         self._done[definition.name] = resolved
-        self._sizes[definition.name] = max(size, 1)
+        self._extents[definition.name] = extent
         return resolved
 
-    def _field(self, owner: Definition, field: Field, nested: dict[str, Definition]) -> int:
-        """Resolve a field's type into `nested`; returns an element's smallest size in bytes."""
+    def _element(
+        self, owner: Definition, field: Field, nested: dict[str, Definition]
+    ) -> Extent | None:
+        """Resolve a field's type into `nested`; returns its extent, None for a primitive."""
         name = field.type.name
         if not field.type.is_compound:
-            return _SIZES.get(name) or int(name.lstrip("uintfloa")) // 8
+            return None
         if name in nested:
-            return self._sizes[name]
+            return self._extents[name]
         if name in self._chain:
             chain = [*self._chain[self._chain.index(name) :], name]
             raise _error(
@@ -119,7 +201,7 @@ class Resolver:
         nested[name] = child
         if len(nested) > MAX_TYPES:
             raise _error(owner, field, f"{owner.name} needs more than {MAX_TYPES} other types")
-        return self._sizes[name]
+        return self._extents[name]
 
 
 def _error(

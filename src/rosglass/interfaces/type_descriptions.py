@@ -160,9 +160,11 @@ class _Reader:
             raise DefinitionError(f"it has more than {_MAX_FIELDS} fields", label)
         fields = tuple(_field(field, label) for field in described)
         names = [field.name for field in fields]
-        if len(set(names)) != len(names):
-            twice = next(name for name in names if names.count(name) > 1)
-            raise DefinitionError(f"field {twice} appears twice", label)
+        seen: set[str] = set()
+        for twice in names:
+            if twice in seen:
+                raise DefinitionError(f"field {twice} appears twice", label)
+            seen.add(twice)
         if names == [_PLACEHOLDER] and fields[0].type == FieldType("uint8"):
             fields = ()  # what rosidl puts into empty structs
         source = Source(self._provider, f"<{name} from {self._provider}>")

@@ -9,7 +9,7 @@ from rosglass.errors import ConversionError, DecodeError
 from rosglass.messages import diagnosis, layout
 from rosglass.messages.conversion import complete, convert
 from rosglass.messages.emit_read import Reader
-from rosglass.messages.emit_write import write_function
+from rosglass.messages.emit_write import nested_write_function, write_function
 from rosglass.messages.layout import ANYWHERE, START, Cursor, Wire
 from rosglass.messages.message import await_fill, plain_class, shell_class
 from rosglass.messages.runtime import MAX_EMPTY, OddValueError
@@ -139,6 +139,20 @@ class Codec:
         )
         return found
 
+    @property
+    def reader_of_one(self) -> Callable[[Any, int], tuple[Message, int]]:
+        """The function ``read(buffer, offset) -> (message, end)``, which others call."""
+        return self.made("one", self._one)  # type: ignore[no-any-return]
+
+    def _one(self) -> Any:
+        source = Source()
+        reader = Reader(self, source, Cursor(self.wire, "o", 0, ANYWHERE))
+        source.line(f"m = {source.bind(self.cls, 'C')}()")
+        reader.fields(self.schema, "m")
+        reader.settle("o")
+        source.line("return m, o")
+        return source.compile("read_one(b, o)", self._title("nested"))
+
     def reader_of_many(self, known: Knowledge) -> Callable[[Any, int, int], tuple[Any, int]]:
         """Return ``read(buffer, offset, count) -> (list, end)`` for what is known of the offset."""
         return self.made(("many", known), lambda: self._many(known))  # type: ignore[no-any-return]
@@ -179,17 +193,21 @@ class Codec:
 
     def skip(self, buffer: bytes | memoryview, offset: int) -> int:
         """Return the offset after the message at `offset`."""
-        skipper = self.made("skip", self._skip)
         try:
-            end: int = skipper(buffer, offset)
+            end: int = self.skipper(buffer, offset)
         except Exception as error:
             raise diagnosis.explain(self.schema, self.wire, buffer, offset, error) from None
         return end
 
+    @property
+    def skipper(self) -> Callable[[Any, int], int]:
+        """The function ``skip(buffer, offset) -> end``, which raises anything for damaged bytes."""
+        return self.made("skip", self._skip)  # type: ignore[no-any-return]
+
     def _skip(self) -> Any:
         source = Source()
         reader = Reader(self, source, Cursor(self.wire, "o", 0, ANYWHERE))
-        reader.skip(self.schema)
+        reader.skip_members(self.schema)
         reader.prove()
         source.line(f"return {reader.cursor.at()}")
         return source.compile("skip(b, o)", self._title("skip"))
@@ -229,7 +247,7 @@ class Codec:
     def _scan(self) -> Any:
         source = Source()
         reader = Reader(self, source, self._start())
-        reader.skip(self.schema)
+        reader.skip_members(self.schema)
         reader.prove()
         source.line(f"return {reader.cursor.at()}")
         return source.compile("scan(b)", self._title("scan"))
@@ -257,6 +275,13 @@ class Codec:
                 raise ConversionError("", value, limit, self.schema.name) from None
 
         return write_function(self, from_dict, joined, slowly)
+
+    def nested_writer(self, from_dict: bool, joined: bool, lenient: bool) -> Callable[..., int]:
+        """Return the function that other writers call for a message inside theirs."""
+        return self.made(  # type: ignore[no-any-return]
+            ("write nested", from_dict, joined, lenient),
+            lambda: nested_write_function(self, from_dict, joined, lenient),
+        )
 
     def _converted_writer(self, from_dict: bool, joined: bool) -> Callable[[Any], Any]:
         """Return the writer for values that were converted already."""

@@ -108,7 +108,7 @@ def _constant_offset(schema: Schema, route: Route, wire: Wire) -> int | None:
         for member in inside.members:
             if member is target:
                 break
-            after = _after(member, wire, position)
+            after = layout.member_span(member, wire, position)
             if after is None:
                 return None
             position = after
@@ -120,22 +120,6 @@ def _constant_offset(schema: Schema, route: Route, wire: Wire) -> int | None:
         return None
     position += -position % number.size if wire.aligned else 0
     return position + wire.origin
-
-
-def _after(member: Member, wire: Wire, position: int) -> int | None:
-    if member.kind is Kind.TEXT or (member.is_array and member.fixed_count is None):
-        return None
-    count = 1 if member.fixed_count is None else member.fixed_count
-    if member.number is not None:
-        position += -position % member.number.size if wire.aligned else 0
-        return position + member.number.size * count
-    assert member.struct is not None
-    for _ in range(count):
-        after = layout.span(member.struct, wire, position)
-        if after is None:
-            return None
-        position = after
-    return position
 
 
 class _Walk:

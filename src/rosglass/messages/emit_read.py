@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from rosglass.messages import layout
-from rosglass.messages.emit_skip import Skipper
+from rosglass.messages.emit_skip import Skipper, is_shared
 from rosglass.messages.runtime import number_type, read_wide
 from rosglass.messages.schema import Kind
 from rosglass.messages.source import Source, iterator
@@ -78,6 +78,14 @@ class Reader(Skipper):
             self.source.line(f"{name}._offset__ = {self.cursor.at()}")
             if not last:
                 self.skip(schema)
+            return
+        if is_shared(schema, self.source):
+            self.flush()
+            read = self.source.bind(self.codec.of(schema).reader_of_one, "one")
+            var, known = self.var, self.cursor.known
+            self.source.line(f"{target}, {var} = {read}(b, {self.cursor.at()})")
+            self.cursor.move(var, layout.after_schema(known, self.wire, schema))
+            self.unproved = True
             return
         cls = self.source.bind(self.codec.of(schema).cls, "C")
         if target.isidentifier():
@@ -211,7 +219,8 @@ class Reader(Skipper):
         line("out = []")
         line("add = out.append")
         stride = layout.constant_stride(schema, self.wire)
-        if stride is not None and stride[0] == stride[1] and layout.all_numbers(schema):
+        together = stride is not None and stride[0] == stride[1] and layout.all_numbers(schema)
+        if stride is not None and together and not is_shared(schema, self.source):
             self._records(schema, stride[0], count, cls)
             return
         with self.schema_loop(f"for _ in range({count}):", schema):

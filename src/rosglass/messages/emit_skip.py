@@ -23,9 +23,20 @@ if TYPE_CHECKING:
     from rosglass.messages.codec import Codec
     from rosglass.messages.schema import Member, Schema
 
-__all__ = ["Skipper"]
+__all__ = ["Skipper", "is_shared"]
 
 _NEAR = 256
+#: Fields, at every depth, up to which a nested message's code is repeated in each function that
+#: needs it: that is quicker than a call.
+_MOST_INLINE = 200
+
+
+def is_shared(schema: Schema, source: Source) -> bool:
+    """Return whether a nested message is left to a function of its own, which all others call.
+
+    What is generated for a type then grows with its definition, not with its messages.
+    """
+    return bool(schema.members) and (schema.extent.fields > _MOST_INLINE or source.is_full)
 
 
 class Skipper:
@@ -211,11 +222,21 @@ class Skipper:
     def skip(self, schema: Schema) -> None:
         """Step over a message."""
         self.flush()
+        if is_shared(schema, self.source):
+            passed = self.source.bind(self.codec.of(schema).skipper, "pass_one")
+            var, known = self.var, self.cursor.known
+            self.source.line(f"{var} = {passed}(b, {self.cursor.at()})")
+            self.cursor.move(var, layout.after_schema(known, self.wire, schema))
+        else:
+            self.skip_members(schema)
+        self.unproved = True
+
+    def skip_members(self, schema: Schema) -> None:
+        """Step over the fields of a message."""
         if not schema.members and self.wire.aligned:
             self.cursor.advance(1)
         for member in schema.members:
             self.skip_member(member)
-        self.unproved = True
 
     def skip_member(self, member: Member) -> None:
         """Step over a field."""

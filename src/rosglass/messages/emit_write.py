@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.messages import layout
 from rosglass.messages.conversion import array_packer, as_bool, as_float, as_int
-from rosglass.messages.layout import START, Cursor, Knowledge
+from rosglass.messages.emit_skip import is_shared
+from rosglass.messages.layout import ANYWHERE, START, Cursor, Knowledge
 from rosglass.messages.runtime import MAX_EMPTY, as_list, odd, own, write_wide
 from rosglass.messages.schema import Kind
 from rosglass.messages.sequences import same_bytes
@@ -58,6 +59,18 @@ class Writer:
         self._header = bytes((0, 0 if self.wire.big else 1, 0, 0)) if self.wire.aligned else b""
         #: Locals holding the parts so far; None once there is a list called ``parts``.
         self._parts: list[str] | None = []
+        #: Whether nested messages are written here, whatever their size.
+        self._inline = False
+
+    def join(self) -> None:
+        """Write behind the parts of another function: ``add`` adds one, ``o`` is where it is."""
+        self.cursor.move("o", ANYWHERE)
+        self._header, self._parts = b"", None
+
+    def leave(self) -> None:
+        """Emit the end of a function that joined another: it returns the position."""
+        self._zeros()
+        self.source.line(f"return {self.cursor.at()}")
 
     # -- output ----------------------------------------------------------------------------------
 
@@ -180,7 +193,8 @@ class Writer:
         elif len(self._parts) == 1 and not self._parts[0].startswith("a"):
             self.source.line(f"return {self._parts[0]}")
         else:
-            self.source.line(f'return b"".join(({", ".join(self._parts)}))')
+            items = "".join(f"{part}, " for part in self._parts)
+            self.source.line(f'return b"".join(({items}))')
 
     # -- values ----------------------------------------------------------------------------------
 
@@ -226,10 +240,25 @@ class Writer:
             self._text(member, value)
         else:
             assert member.struct is not None
+            self._struct(member.struct, value)
+
+    def _struct(self, schema: Schema, value: str) -> None:
+        if not self._inline and is_shared(schema, self.source):
+            self._zeros()
+            self._open_list()
+            inner = self.codec.of(schema).nested_writer(self.from_dict, self.joined, self.lenient)
+            write, end = self.source.bind(inner, "write_one"), self.source.fresh("o")
+            self.source.line(f"{end} = {write}({value}, add, {self.cursor.at()})")
+            if self.wire.aligned:
+                known = layout.after_schema(self.cursor.known, self.wire, schema)
+                self.cursor.move(end, known)
+            return
+        holder = value
+        if not value.isidentifier():
             holder = self.source.fresh("d")
-            line(f"{holder} = {value}")
-            self.check_holder(member.struct, holder)
-            self.fields(member.struct, holder)
+            self.source.line(f"{holder} = {value}")
+        self.check_holder(schema, holder)
+        self.fields(schema, holder)
 
     def _text(self, member: Member, value: str) -> None:
         line = self.source.line
@@ -315,13 +344,12 @@ class Writer:
                 self._text(member, item)
             return
         stride = layout.constant_stride(schema, self.wire)
-        simple = layout.leaves(schema) < layout.MANY
+        simple = layout.leaves(schema) < layout.MANY and not is_shared(schema, self.source)
         if stride is not None and stride[0] == stride[1] and schema.members and simple:
             self._records(schema, stride[0], head, item, count, block)
             return
         with self._loop(head, lambda known: layout.after_schema(known, self.wire, schema)):
-            self.check_holder(schema, item)
-            self.fields(schema, item)
+            self._struct(schema, item)
 
     def _block(self, member: Member, items: str) -> str:
         """Emit the search for elements whose bytes can be written as they are.
@@ -361,7 +389,9 @@ class Writer:
         with self.source.block(head):
             self.check_holder(schema, item)
             self.cursor.known = Knowledge(align, 0) if self.wire.aligned else START
+            outer, self._inline = self._inline, True
             self.fields(schema, item)
+            self._inline = outer
             self._zeros()
         self.cursor = after
         if count.isdigit():
@@ -388,6 +418,21 @@ class Writer:
         if self.cursor.at() != "o":
             self.source.line(f"o = {self.cursor.at()}")
         self.cursor.move("o", known)
+
+
+def nested_write_function(codec: Codec, from_dict: bool, joined: bool, lenient: bool) -> Any:
+    """Return ``write(value, add, o) -> o``, which other write functions call.
+
+    ``add`` takes the parts, ``o`` is the position in the message (0 on wires that do not align).
+    """
+    source = Source()
+    writer = Writer(codec, source, from_dict, joined, lenient)
+    writer.join()
+    writer.check_holder(codec.schema, "m")
+    writer.fields(codec.schema, "m")
+    writer.leave()
+    what = f"encode nested {'dict' if from_dict else 'message'}{'' if joined else ' parts'}"
+    return source.compile("write(m, add, o)", f"{what} {codec.schema.name} {codec.wire.title}")
 
 
 def write_function(

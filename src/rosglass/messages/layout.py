@@ -75,6 +75,11 @@ def align_of(member: Member, wire: Wire) -> int:
 def _max_align(schema: Schema, wire: Wire) -> int:
     if not wire.aligned:
         return 1
+    largest: int = schema.cached("largest alignment", lambda: _largest_align(schema, wire))
+    return largest
+
+
+def _largest_align(schema: Schema, wire: Wire) -> int:
     found = 1
     for member in schema.members:
         if member.kind is Kind.STRUCT:
@@ -101,25 +106,38 @@ def _span(schema: Schema, wire: Wire, position: int) -> int | None:
     if not schema.members:
         return position + (1 if wire.aligned else 0)
     for member in schema.members:
-        if member.kind is Kind.TEXT or (member.is_array and member.fixed_count is None):
+        end = member_span(member, wire, position)
+        if end is None:
             return None
-        count = 1 if member.fixed_count is None else member.fixed_count
-        if member.number is not None:
-            size = member.number.size
-            if wire.aligned and count:
-                position += -position % size
-            position += size * count
-        else:
-            assert member.struct is not None
-            for index in range(count):
-                end = span(member.struct, wire, position)
-                if end is None:
-                    return None
-                step, position = end - position, end
-                # Once an element starts where the last one did (modulo 8), all others do too.
-                if step % 8 == 0 or not wire.aligned:
-                    position += step * (count - index - 1)
-                    break
+        position = end
+    return position
+
+
+def member_span(member: Member, wire: Wire, position: int) -> int | None:
+    """Return the position after a field that starts at `position`, None if its size varies."""
+    if member.kind is Kind.TEXT or (member.is_array and member.fixed_count is None):
+        return None
+    count = 1 if member.fixed_count is None else member.fixed_count
+    if member.number is not None:
+        size = member.number.size
+        return position + (-position % size if wire.aligned else 0) + size * count
+    assert member.struct is not None
+    # What an element takes depends on where it starts, modulo 8: soon they take turns.
+    before: dict[int, tuple[int, int]] = {}
+    left = count
+    while left:
+        start = position % 8
+        if start in before:
+            then, place = before[start]
+            rounds, left = divmod(left, then - left)
+            position += rounds * (position - place)
+            before.clear()
+            continue
+        before[start] = left, position
+        end = span(member.struct, wire, position)
+        if end is None:
+            return None
+        position, left = end, left - 1
     return position
 
 
@@ -174,6 +192,11 @@ MANY = 1000
 
 def leaves(schema: Schema) -> int:
     """Return how many values the schema holds; arrays of messages count as very many."""
+    total: int = schema.cached("leaves", lambda: _leaves(schema))
+    return total
+
+
+def _leaves(schema: Schema) -> int:
     total = 0
     for member in schema.members:
         if member.struct is None:
@@ -187,6 +210,11 @@ def leaves(schema: Schema) -> int:
 
 def all_numbers(schema: Schema) -> bool:
     """Return whether a message holds at least one number, no string and no array at any depth."""
+    found: bool = schema.cached("all numbers", lambda: _all_numbers(schema))
+    return found
+
+
+def _all_numbers(schema: Schema) -> bool:
     return bool(schema.members) and all(
         not member.is_array
         and (
@@ -249,6 +277,13 @@ def after_schema(known: Knowledge, wire: Wire, schema: Schema) -> Knowledge:
     """Return what is known of the position after a message."""
     if not wire.aligned:
         return ANYWHERE
+    after: Knowledge = schema.cached(
+        ("after", wire.wide, known), lambda: _after_schema(known, wire, schema)
+    )
+    return after
+
+
+def _after_schema(known: Knowledge, wire: Wire, schema: Schema) -> Knowledge:
     if not schema.members:
         return known.after(1)
     for member in schema.members:

@@ -147,15 +147,20 @@ def load(
     if library is not None and not isinstance(library, interfaces.Library):
         raise UnsupportedError(f"a library is a rosglass.Library, not {library!r:.80}")
     source = default_library() if library is None else library
+    definition = source.definition(name, ros=ros, hash=hash)
     with _lock:
         types = _libraries.setdefault(source, {})
-        definition = source.definition(name, ros=ros, hash=hash)
+        found, usual = types.get((name, ros, hash)), types.get((name, ros, ""))
+    if found is not None and found.definition is definition:
+        return found
+    # The usual version, when it is the one that was asked for, stays one object. Without the lock:
+    # a large type must not keep others from being loaded.
+    same = usual is not None and usual.definition is definition
+    made = usual if usual and same else _make(definition)
+    with _lock:
         found = types.get((name, ros, hash))
         if found is None or found.definition is not definition:
-            # The usual version, when it is the one that was asked for, stays one object.
-            usual = types.get((name, ros, ""))
-            same = usual is not None and usual.definition is definition
-            found = types[name, ros, hash] = usual if usual and same else _make(definition)
+            found = types[name, ros, hash] = made
     return found
 
 

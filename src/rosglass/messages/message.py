@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 __all__ = ["Message", "NoSuchFieldError", "plain_class", "touch", "type_of"]
 
 _PATIENCE = 0.1
+#: Fields from which on a message does not get a function for each field that is read first.
+_MANY_FIELDS = 64
 
 
 class NoSuchFieldError(FieldPathError, AttributeError):
@@ -308,6 +310,9 @@ def _first_access(attr: str, compile_fill: Callable[[Any, str], Callable[[Any], 
     def get(message: Message) -> Any:
         shell = type(message)
         if shell._fill__ is None:  # another thread was quicker
+            return getattr(message, attr)
+        if len(shell._schema__.members) > _MANY_FIELDS:
+            touch(message)
             return getattr(message, attr)
         made = compile_fill(shell, attr)
         setattr(shell, attr, property(made, put))

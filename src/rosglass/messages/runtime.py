@@ -7,14 +7,12 @@ from functools import lru_cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from rosglass.interfaces.resolver import MAX_EMPTY
+
 if TYPE_CHECKING:
     import numpy as np
 
 __all__ = ["MAX_EMPTY", "TooShortError", "number_type", "read_wide", "too_short", "write_wide"]
-
-#: Elements allowed in an array of messages that take no bytes (ROS 1's ``std_msgs/Empty[]``):
-#: nothing in the buffer limits their count.
-MAX_EMPTY = 1024
 
 
 class TooShortError(Exception):

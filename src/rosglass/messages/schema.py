@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.errors import CyclicTypeError, DefinitionError
 from rosglass.interfaces.definition import ArrayKind, Definition, Field, FieldType
+from rosglass.interfaces.resolver import MAX_DEPTH, Extent
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Mapping
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Kind", "Member", "Number", "Schema", "schema_of"]
 
-_MAX_DEPTH = 64
 #: Names of :class:`~rosglass.messages.message.Message` that no field may take.
 _PRIVATE = ("_buffer__", "_fill__", "_offset__", "_root__", "_schema__")
 
@@ -152,14 +152,15 @@ class Schema:
         by_name: The same, by wire name and by attribute.
         is_time: Whether it is a time or duration (two numbers: seconds and nanoseconds).
         has_wide: Whether a ``wstring`` occurs anywhere in it.
+        extent: How many fields and values it has, those of nested messages included.
         cache: What other modules derive from the schema (class, codecs), by key.
     """
 
     #: Makes the public type of a schema; :mod:`rosglass.messages.types` puts itself here.
     make_type: ClassVar[Callable[[Schema], MessageType]]
 
-    def __init__(self, definition: Definition, members: tuple[Member, ...]) -> None:
-        self.definition = definition
+    def __init__(self, definition: Definition, members: tuple[Member, ...], extent: Extent) -> None:
+        self.definition, self.extent = definition, extent
         self.name, self.ros = definition.name, definition.ros
         self.members = members
         self.by_name = {member.attr: member for member in members}
@@ -190,7 +191,8 @@ class Schema:
 
 
 _interned: weakref.WeakValueDictionary[Hashable, Schema] = weakref.WeakValueDictionary()
-_intern_lock = threading.RLock()
+#: Held for a look at `_interned` only: whoever resolves a large type holds up no other.
+_intern_lock = threading.Lock()
 
 
 def schema_of(definition: Definition) -> Schema:
@@ -198,27 +200,26 @@ def schema_of(definition: Definition) -> Schema:
 
     Raises:
         CyclicTypeError: The type contains itself.
-        DefinitionError: A nested type is missing, a field name repeats, nesting is too deep.
+        DefinitionError: A nested type is missing, a field name repeats, or a limit of
+            :mod:`rosglass.interfaces.resolver` is exceeded.
     """
-    with _intern_lock:
-        return _resolve(definition, definition.nested, ())
+    return _resolve(definition, definition.nested, (), {})
 
 
 def _resolve(
-    definition: Definition, nested: Mapping[str, Definition], above: tuple[str, ...]
+    definition: Definition,
+    nested: Mapping[str, Definition],
+    above: tuple[str, ...],
+    done: dict[tuple[int, int], Schema],
 ) -> Schema:
+    """Return a schema; each nested definition is resolved once, and then found in `done`."""
     file = definition.source.file
-    if definition.name in above:
-        chain = " -> ".join((*above[above.index(definition.name) :], definition.name))
-        raise CyclicTypeError(f"cyclic type: {chain}", file)
-    if len(above) >= _MAX_DEPTH:
-        raise DefinitionError(f"types nest deeper than {_MAX_DEPTH} levels", file)
     numbers = _NUMBERS_ROS1 if definition.ros == 1 else _NUMBERS
-    members: list[Member] = []
+    members: dict[str, Member] = {}
     taken: set[str] = set(_PRIVATE)
-    used: dict[str, Definition] = {}
+    extent = Extent()
     for field in definition.fields:
-        if any(field.name == member.name for member in members):
+        if field.name in members:
             raise DefinitionError(f"field {field.name!r} appears twice in {definition.name}", file)
         # Names end up in generated code; definitions made by hand were seen by no parser.
         if not (field.name.isascii() and field.name.isidentifier()):
@@ -230,46 +231,75 @@ def _resolve(
         if ftype.name in ("string", "wstring"):
             kind = Kind.TEXT
         elif number is None:
-            inner = _BUILTIN_ROS1.get(ftype.name) if definition.ros == 1 else None
-            inner = inner or nested.get(ftype.name)
-            if inner is None:
-                raise DefinitionError(
-                    f"{definition.name}.{field.name}: no definition of {ftype.name!r}",
-                    file,
-                    *field.place,
-                )
             kind = Kind.STRUCT
-            inside = inner.nested if inner.nested else nested
-            struct = _resolve(inner, inside, (*above, definition.name))
-            if inner.name not in _BUILTIN_ROS1:
-                used[inner.name] = struct.definition
-                used.update(struct.definition.nested)
-        members.append(
-            Member(
-                field.name,
-                attr,
-                field,
-                kind,
-                ftype.array,
-                ftype.size,
-                number,
-                struct,
-                ftype.name == "wstring",
-                ftype.string_bound,
-            )
+            struct = _struct(definition, field, nested, above, done)
+        extent = extent.plus(definition, field, None if struct is None else struct.extent)
+        members[field.name] = Member(
+            field.name,
+            attr,
+            field,
+            kind,
+            ftype.array,
+            ftype.size,
+            number,
+            struct,
+            ftype.name == "wstring",
+            ftype.string_bound,
         )
+    return _intern(definition, tuple(members.values()), extent)
+
+
+def _struct(
+    owner: Definition,
+    field: Field,
+    nested: Mapping[str, Definition],
+    above: tuple[str, ...],
+    done: dict[tuple[int, int], Schema],
+) -> Schema:
+    """Return the schema of a field that is a message."""
+    name, file = field.type.name, owner.source.file
+    inner = _BUILTIN_ROS1.get(name) if owner.ros == 1 else None
+    inner = inner or nested.get(name)
+    if inner is None:
+        raise DefinitionError(
+            f"{owner.name}.{field.name}: no definition of {name!r}", file, *field.place
+        )
+    inside = inner.nested if inner.nested else nested
+    key = id(inner), id(inside)
+    found = done.get(key)
+    if found is None:
+        chain = (*above, owner.name)
+        if inner.name in chain:
+            cycle = " -> ".join((*chain[chain.index(inner.name) :], inner.name))
+            raise CyclicTypeError(f"cyclic type: {cycle}", inner.source.file)
+        if len(chain) >= MAX_DEPTH:
+            raise DefinitionError(f"types nest deeper than {MAX_DEPTH} levels", inner.source.file)
+        found = done[key] = _resolve(inner, inside, chain, done)
+    return found
+
+
+def _intern(definition: Definition, members: tuple[Member, ...], extent: Extent) -> Schema:
+    """Return the schema with these members: one that there is, or a new one."""
     key = (
         definition.ros,
         definition.name,
         tuple((m.name, str(m.field.type), repr(m.field.default), id(m.struct)) for m in members),
         tuple((c.name, c.type, repr(c.value)) for c in definition.constants),
     )
-    schema = _interned.get(key)
-    if schema is None:
-        if not definition.nested and used:
-            definition = replace(definition, nested=used)
-        schema = _interned[key] = Schema(definition, tuple(members))
-    return schema
+    with _intern_lock:
+        schema = _interned.get(key)
+    if schema is not None:
+        return schema
+    if not definition.nested:
+        used: dict[str, Definition] = {}
+        for member in members:
+            if member.struct is not None and member.struct.name not in _BUILTIN_ROS1:
+                used[member.struct.name] = member.struct.definition
+                used.update(member.struct.definition.nested)
+        definition = replace(definition, nested=used) if used else definition
+    made = Schema(definition, members, extent)
+    with _intern_lock:
+        return _interned.setdefault(key, made)
 
 
 def _attribute(name: str, taken: set[str]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterable, Iterator, MutableSequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar, overload
@@ -19,8 +18,6 @@ if TYPE_CHECKING:
     from rosglass.messages.schema import Schema
 
 __all__ = ["MessageSequence", "record_type", "same_bytes"]
-
-_lock = threading.RLock()
 
 
 class MessageSequence(MutableSequence["Message"]):
@@ -39,7 +36,7 @@ class MessageSequence(MutableSequence["Message"]):
     _count: int
 
     def _all(self) -> list[Message]:
-        with _lock:
+        with self._codec.schema.lock:
             items = self._items
             if items.__class__ is list:
                 return items
@@ -52,7 +49,7 @@ class MessageSequence(MutableSequence["Message"]):
             return found
 
     def _one(self, index: int) -> Message:
-        with _lock:
+        with self._codec.schema.lock:
             items = self._items
             if items is None:
                 items = self._items = {}
@@ -131,7 +128,7 @@ class MessageSequence(MutableSequence["Message"]):
         if dtype is None or codec.stride is None:
             raise UnsupportedError(f"{codec.schema.name}: its elements are not of constant size")
         numpy = import_module("numpy")
-        with _lock:
+        with codec.schema.lock:
             if self._items is None:
                 made = numpy.ndarray(
                     (self._count,), dtype, self._buffer, self._start, codec.stride[:1]
@@ -171,13 +168,19 @@ def _row(message: Message) -> tuple[Any, ...]:
 
 def record_type(schema: Schema, wire: Wire) -> np.dtype | None:
     """Return the structured numpy type of a schema of constant layout, None if it has none."""
+    return _record_at(schema, wire, 0)
+
+
+def _record_at(schema: Schema, wire: Wire, position: int) -> np.dtype | None:
+    """Return the structured numpy type of a schema that starts at a position."""
+    start = position % 8 if wire.aligned else 0
     found: np.dtype | None = schema.cached(
-        ("record", wire.aligned, wire.big), lambda: _record_type(schema, wire)
+        ("record", wire.aligned, wire.big, start), lambda: _record_type(schema, wire, start)
     )
     return found
 
 
-def _record_type(schema: Schema, wire: Wire, start: int = 0) -> np.dtype | None:
+def _record_type(schema: Schema, wire: Wire, start: int) -> np.dtype | None:
     from rosglass.messages import layout  # noqa: PLC0415 - not needed unless asked for
 
     numpy = import_module("numpy")
@@ -198,7 +201,7 @@ def _record_type(schema: Schema, wire: Wire, start: int = 0) -> np.dtype | None:
             if member.is_array:
                 return None
             after = layout.span(member.struct, wire, position)
-            inner = _record_type(member.struct, wire, position)
+            inner = _record_at(member.struct, wire, position)
             if after is None or inner is None:
                 return None
             end = after

@@ -324,7 +324,7 @@ def _converter(field: PairedField, ros: int, ours: Member, theirs: Member) -> _C
         return None
     if field.type_one.array is ArrayKind.NONE:
         return convert
-    alike = field.inner is not None and field.inner.exact and _plain(field.inner)
+    alike = field.inner is not None and field.inner.exact and not field.inner.has_times
     return _each(convert, theirs.struct if alike else None)
 
 
@@ -406,14 +406,6 @@ def _level(level: int, ros: int) -> int:
 
 
 # -- by their bytes --------------------------------------------------------------------------------
-
-
-def _plain(pair: Pair) -> bool:
-    """Return whether an element can keep its bytes: there is no ``seq`` and no time in it."""
-    return all(
-        field.type_one.name not in _TIME_NAMES and (field.inner is None or _plain(field.inner))
-        for field in pair.fields
-    )
 
 
 def _starts_with_seq(pair: Pair) -> bool:

@@ -417,7 +417,10 @@ class MessageType:
                 return write(value)  # type: ignore[no-any-return]
         codec = self._writing_codec(wire, byteorder, wstring_width)
         if value.__class__ is dict:
-            return codec.writer(True, True)(value)  # type: ignore[no-any-return]
+            write = codec.writer(True, True)
+            if byteorder == "little" and wstring_width is None:
+                self._dict_writers[wire] = write
+            return write(value)  # type: ignore[no-any-return]
         untouched = _untouched(value, codec)
         if untouched is None:
             return codec.writer(False, True)(value)  # type: ignore[no-any-return]
@@ -459,8 +462,6 @@ class MessageType:
         if big and name == "ros1":
             raise UnsupportedError("ROS 1 messages are little endian; byteorder='big' is for CDR")
         codec = self._codecs[wire, byteorder, wide] = self._codec(name, big, _width(wide))
-        if not big and wide is None:
-            self._dict_writers[wire] = codec.writer(True, True)
         return codec
 
 

@@ -366,8 +366,8 @@ RUBBISH: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
         "described twice",
     ),
     "too many types": (
-        lambda d: d.update(referenced_type_descriptions=[d["type_description"]] * 1001),
-        "more than 1000",
+        lambda d: d.update(referenced_type_descriptions=[d["type_description"]] * 501),
+        "more than 500 other types",
     ),
     "too many fields": (
         lambda d: d["type_description"].update(fields=[field(d, "big")] * 50_001),

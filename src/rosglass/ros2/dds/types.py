@@ -22,7 +22,7 @@ from rosglass.errors import (
     TimeoutError,  # noqa: A004 - the field's own word
 )
 from rosglass.interfaces import Definition, parse_type_description
-from rosglass.interfaces.resolver import MAX_TYPES
+from rosglass.interfaces.resolver import MAX_DEPTH, MAX_FIELDS, MAX_TYPES
 from rosglass.ros2.names import demangle_type
 
 if TYPE_CHECKING:
@@ -32,6 +32,8 @@ __all__ = ["announced_definition", "describe_struct"]
 
 #: Endpoints that are read at once.
 _ROOM = 100
+#: Aliases that may lead to a type, one to the next.
+_MAX_ALIASES = 16
 #: Type ids of ``type_description_interfaces/msg/FieldType`` by the kind's number in XTypes.
 _PRIMITIVES = {
     1: 15, 2: 16, 3: 4, 4: 6, 5: 8, 6: 5, 7: 7, 8: 9, 9: 10, 10: 11, 11: 12, 12: 2, 13: 3, 16: 3,
@@ -134,6 +136,7 @@ class _Describer:
         self._fetch = fetch
         self._objects: dict[bytes, Any] = {}
         self._described: dict[str, dict[str, Any]] = {}
+        self._depth = self._fields = 0
 
     def describe(self, root: Any) -> dict[str, Any]:
         """Return the description of the struct with the identifier `root`."""
@@ -170,6 +173,12 @@ class _Describer:
         label = f"<{name[:300]} from TypeLookup>"
         if struct.struct_flags.IS_MUTABLE or struct.header.base_type.discriminator:
             raise DefinitionError("mutable and derived structs are not ROS 2's", label)
+        self._depth += 1
+        self._fields += len(struct.member_seq)
+        if self._depth > MAX_DEPTH:
+            raise DefinitionError(f"types nest deeper than {MAX_DEPTH} levels", label)
+        if self._fields > MAX_FIELDS:
+            raise DefinitionError(f"it has more than {MAX_FIELDS} fields", label)
         fields: list[dict[str, Any]] = []
         self._described[name] = {"type_name": name, "fields": fields}
         for member in struct.member_seq:
@@ -178,6 +187,7 @@ class _Describer:
                 raise DefinitionError("optional fields are not ROS 2's", where)
             kind = self._field(member.common.member_type_id, where)
             fields.append({"name": member.detail.name, "type": kind, "default_value": ""})
+        self._depth -= 1
         return name
 
     def _field(self, type_id: Any, where: str) -> dict[str, Any]:
@@ -216,12 +226,12 @@ class _Describer:
 
     def _unaliased(self, type_id: Any, where: str) -> Any:
         """Return what a type identifier stands for in the end."""
-        for _ in range(MAX_TYPES):
+        for _ in range(_MAX_ALIASES):
             if type_id.discriminator != _COMPLETE or self._object(type_id, where) is not None:
-                break
+                return type_id
             alias = self._objects[bytes(type_id.equivalence_hash)].alias_type
             type_id = alias.body.common.related_type
-        return type_id
+        raise DefinitionError(f"more than {_MAX_ALIASES} aliases lead to its type", where)
 
 
 def _refusal(kind: int, where: str) -> DefinitionError:
