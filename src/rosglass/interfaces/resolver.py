@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from rosglass.errors import CyclicTypeError, DefinitionError
 from rosglass.interfaces.definition import (
@@ -46,10 +46,13 @@ MAX_FIXED_SIZE = 1 << 25
 MAX_EMPTY = 1024
 
 _SIZES = {"bool": 1, "byte": 1, "char": 1, "string": 4, "wstring": 4, "time": 8, "duration": 8}
+_SIZES |= {f"{kind}{8 * size}": size for kind in ("int", "uint") for size in (1, 2, 4, 8)}
+_SIZES |= {"float32": 4, "float64": 8}
+_NONE, _FIXED = ArrayKind.NONE, ArrayKind.FIXED
 
 
-class Extent(NamedTuple):
-    """How much there is in a message.
+class Extent:
+    """How much there is in a message, field by field.
 
     Attributes:
         depth: Levels of messages, itself included.
@@ -59,14 +62,14 @@ class Extent(NamedTuple):
         size: Bytes of its fields on the wire when sequences and strings are empty, roughly.
     """
 
-    depth: int = 1
-    fields: int = 0
-    values: int = 0
-    empties: int = 0
-    size: int = 0
+    __slots__ = ("depth", "empties", "fields", "size", "values")
 
-    def plus(self, owner: Definition, field: Field, inner: Extent | None) -> Extent:
-        """Return the extent with one more field.
+    def __init__(self) -> None:
+        self.depth = 1
+        self.fields = self.values = self.empties = self.size = 0
+
+    def add(self, owner: Definition, field: Field, inner: Extent | None) -> None:
+        """Count one more field.
 
         Args:
             owner: The message, for errors.
@@ -77,32 +80,34 @@ class Extent(NamedTuple):
             DefinitionError: The message goes beyond a limit.
         """
         kind = field.type
-        element = inner or Extent(depth=0, size=_size(kind.name))
-        values, empties = 1 + element.values, element.empties
-        if inner is not None and not inner.fields:
-            empties += 1
-        size = element.size
-        if kind.array is ArrayKind.FIXED:
+        array, count = kind.array, 1
+        if array is _FIXED:
             count = kind.size or 1
-            size *= count
-            if inner is not None or kind.name in ("string", "wstring"):
-                values, empties = values * count, empties * count
-        elif kind.array is not ArrayKind.NONE:
-            values, empties, size = 1, 0, 4
-        made = Extent(
-            max(self.depth, 1 + element.depth),
-            self.fields + 1 + element.fields,
-            self.values + values,
-            self.empties + empties,
-            self.size + size,
-        )
-        beyond = made._beyond(owner.name)
-        if beyond:
-            raise _error(owner, field, beyond)
-        return made
+        self.fields += 1
+        if inner is not None:
+            self.fields += inner.fields
+            self.depth = max(self.depth, 1 + inner.depth)
+        if array is not _NONE and array is not _FIXED:
+            self.values += 1
+            self.size += 4
+        elif inner is None:
+            self.values += count if kind.name in ("string", "wstring") else 1
+            self.size += count * _SIZES[kind.name]
+        else:
+            self.values += count * (1 + inner.values)
+            self.empties += count * (inner.empties if inner.fields else 1)
+            self.size += count * inner.size
+        if (
+            self.fields > MAX_FIELDS
+            or self.values > MAX_VALUES
+            or self.size > MAX_FIXED_SIZE
+            or self.empties > MAX_EMPTY
+            or self.depth > MAX_DEPTH
+        ):
+            raise _error(owner, field, self._beyond(owner.name))
 
     def _beyond(self, name: str) -> str:
-        """Say which limit is exceeded, empty when none is."""
+        """Say which limit is exceeded."""
         if self.depth > MAX_DEPTH:
             return f"types nest deeper than {MAX_DEPTH} levels"
         if self.size > MAX_FIXED_SIZE:
@@ -111,13 +116,7 @@ class Extent(NamedTuple):
             return f"{name} has more than {MAX_FIELDS} fields, those of nested messages included"
         if self.empties > MAX_EMPTY:
             return f"a {name} would always hold more than {MAX_EMPTY} messages without fields"
-        if self.values > MAX_VALUES:
-            return f"a {name} would always hold more than {MAX_VALUES} values"
-        return ""
-
-
-def _size(name: str) -> int:
-    return _SIZES.get(name) or int(name.lstrip("uintfloa")) // 8
+        return f"a {name} would always hold more than {MAX_VALUES} values"
 
 
 class Resolver:
@@ -170,7 +169,7 @@ class Resolver:
         self._chain.append(definition.name)
         try:
             for field in definition.fields:
-                extent = extent.plus(definition, field, self._element(definition, field, nested))
+                extent.add(definition, field, self._element(definition, field, nested))
         finally:
             self._chain.pop()
         resolved = replace(definition, nested=MappingProxyType(nested))

@@ -233,7 +233,7 @@ def _resolve(
         elif number is None:
             kind = Kind.STRUCT
             struct = _struct(definition, field, nested, above, done)
-        extent = extent.plus(definition, field, None if struct is None else struct.extent)
+        extent.add(definition, field, None if struct is None else struct.extent)
         members[field.name] = Member(
             field.name,
             attr,
