@@ -48,6 +48,8 @@ _DISCOVERY = 3.0
 _PATIENCE, _KNOCK = 2.0, 0.5
 #: The same once the robot has answered.
 _SOON = 1.0
+#: Seconds that programs have to name their nodes; Fast DDS takes 1 to 4.
+_INTRODUCTION_S = 8.0
 #: Seconds without news after which the graph counts as known; some know it at once.
 _QUIET = {"zenoh": 0.3, "dds": 0.7, "ros1": 0.0, "replay": 0.0}
 
@@ -146,7 +148,9 @@ def join(url: str, name: str, timeout: float) -> Node:
 
 
 def settle(node: Node, least: float = 0.0) -> None:
-    """Wait until the graph is known: no news for a moment.
+    """Wait until the graph is known: no news for a moment, and every program has named its nodes.
+
+    Says on standard error when programs do not name theirs, and goes on without after a while.
 
     Args:
         node: Whose graph.
@@ -158,10 +162,19 @@ def settle(node: Node, least: float = 0.0) -> None:
         nonlocal moved
         moved = time.monotonic()
 
+    def reason() -> str:
+        count = node.unnamed_programs()
+        programs = "1 program has not named its" if count == 1 else f"{count} have not named their"
+        return f"{programs} nodes yet" if count else ""
+
     quiet = _QUIET[node.url.partition(":")[0]]
-    with node.on_graph_change(touch):
+    with node.on_graph_change(touch), telling(reason):
         while time.monotonic() < min(max(moved + quiet, began + least), began + 5.0):
             time.sleep(0.05)
+        while node.unnamed_programs() and time.monotonic() < began + _INTRODUCTION_S:
+            time.sleep(0.05)
+    if unnamed := reason():
+        note(f"{unnamed}; there may be more than is shown")
 
 
 def wait(node: Node, look: Callable[[], _T], timeout: float) -> _T:

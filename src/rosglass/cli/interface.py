@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rosglass.cli.completion import complete
-from rosglass.cli.connecting import add_connection_options, add_definitions_option, connect
+from rosglass.cli.connecting import add_connection_options, add_definitions_option, connect, settle
 from rosglass.cli.output import Style, add_output_options, note, print_json, template
 from rosglass.cli.subcommands import Subcommands
 from rosglass.cli.worlds import names_ros1
@@ -138,6 +138,7 @@ def _find(args: argparse.Namespace) -> MessageType | ServiceType | ActionType:
             raise TypeNotFoundError(f"{error}; {where}") from error
     try:
         with connect(args) as node:
+            settle(node)  # who has it may not have introduced itself yet
             return node.fetch_type(args.type, timeout=args.timeout)
     except (TypeNotFoundError, UnsupportedError) as error:
         raise TypeNotFoundError(f"{args.type}: {error}. {hint}".rstrip(". ")) from error

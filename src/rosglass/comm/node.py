@@ -314,6 +314,14 @@ class Node(Handle):
         """Return every action in the graph with the types announced for it."""
         raise self._unsupported("a list of actions")
 
+    def unnamed_programs(self) -> int:
+        """Return how many programs were found that have not said yet which nodes they have.
+
+        Over DDS, nodes on Fast DDS do so up to four seconds after they were found; until then the
+        graph is not complete. Always 0 elsewhere.
+        """
+        return 0
+
     def invalid_names(self) -> list[str]:
         """Return what other nodes have announced, but is left out of the graph, sorted.
 

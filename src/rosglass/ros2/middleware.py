@@ -245,6 +245,10 @@ class Middleware(ABC):
     def status(self) -> Status:
         """Return the state of the connection."""
 
+    def unnamed(self) -> int:
+        """Return how many programs are there that have not said yet which nodes they have."""
+        return 0
+
     @abstractmethod
     def announce(self, node: NodeName) -> Handle:
         """Show a node in the graph until the handle is closed."""

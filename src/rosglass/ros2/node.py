@@ -238,6 +238,10 @@ class Ros2Node(CoreNode):
         """Return the subscriptions of a topic."""
         return self._core.graph.endpoints(EndpointKind.SUBSCRIPTION, self.resolve(topic))
 
+    def unnamed_programs(self) -> int:
+        """Return how many; see :meth:`rosglass.comm.Node.unnamed_programs`."""
+        return self._core.middleware.unnamed()
+
     def invalid_names(self) -> list[str]:
         """Return what is left out of the graph; see :meth:`rosglass.comm.Node.invalid_names`."""
         return self._core.graph.invalid_names()

@@ -65,6 +65,9 @@ _log = logging.getLogger("rosglass.ros2")
 _TIMEOUT, _HEDGE = 5.0, 1.0
 #: Seconds that the graph has to become complete: a node's service may show after its publishers.
 _GRACE = 1.0
+#: The same while programs are there that have not said which nodes they have: Fast DDS takes 1 to
+#: 4 s, and until then its services belong to nobody who could be asked.
+_INTRODUCTION_S = 8.0
 #: Seconds until a node that did not answer is asked again: at first, and at most (it doubles).
 _AGAIN, _RARELY = 5.0, 60.0
 #: Seconds for which a definition that nobody asks for any more is still fetched.
@@ -473,9 +476,10 @@ class TypeFetcher(Member):
 
     def _give_up(self, want: Want, reason: str, now: float) -> None:
         """Say why nothing will come, unless the graph may not be complete yet."""
-        left = max(want.since, self._since) + _GRACE - now
+        limit = _INTRODUCTION_S if self._core.middleware.unnamed() else _GRACE
+        left = max(want.since, self._since) + limit - now
         if left > 0:
-            self._core.timers.after(left + 0.01, self._kick)
+            self._core.timers.after(min(left, _GRACE) + 0.01, self._kick)
         else:
             self._settle(want, TypeNotFoundError(f"no definition of {want.name}: {reason}"), reason)
 

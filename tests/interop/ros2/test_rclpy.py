@@ -386,3 +386,33 @@ def test_services_and_actions_that_only_rclpy_knows_are_refused_with_the_reason(
     package = ECHO.partition("/")[0]
     assert f"ros2 pkg prefix --share {package} says where" in problem
     assert f"--definitions {package} on the command line" in problem
+
+
+# -- commands: to each, a new participant, Fast DDS introduces itself after some seconds -----------
+
+
+@pytest.fixture
+def rosglass_command(run_command, dds_domain) -> Callable[..., tuple[int, str, str]]:
+    def run(*arguments: str) -> tuple[int, str, str]:
+        return run_command(*arguments, "--url", f"dds://?domain={dds_domain}")
+
+    return run
+
+
+@pytest.mark.parametrize("attempt", range(3))
+def test_lists_wait_until_rclpy_has_introduced_itself(peer, rosglass_command, attempt):
+    do(peer, "advertise", topic=f"/listed{attempt}", type=TWIST)
+    assert NAME in rosglass_command("node", "list")[1].splitlines()
+    topics = rosglass_command("topic", "list", "--verbose")[1]
+    assert f"/listed{attempt}" in topics
+
+
+@pytest.mark.parametrize("attempt", range(3))
+def test_types_that_only_rclpy_knows_are_waited_for(peer, rosglass_command, attempt):
+    do(peer, "advertise", topic=f"/unknown{attempt}", type=BASIC, latched=True)
+    do(peer, "publish", topic=f"/unknown{attempt}", values=[{"int32_value": 7}], matched=0)
+    code, told, error = rosglass_command("interface", "show", BASIC)
+    assert (code, "float64 float64_value" in told) == (0, True), error
+    echo = ("topic", "echo", "--once", "--qos", "latched", f"/unknown{attempt}")
+    code, told, error = rosglass_command(*echo)
+    assert (code, "int32_value: 7" in told) == (0, True), told + error

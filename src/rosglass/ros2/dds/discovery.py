@@ -87,6 +87,11 @@ class DdsDiscovery:
         """How many other participants are in the domain."""
         return self._seen.peers
 
+    @property
+    def unnamed(self) -> int:
+        """How many other participants have not said which nodes they have."""
+        return self._seen.unnamed
+
     def show(self, endpoint: EndpointInfo) -> None:
         """Show an endpoint of ours in the graph at once; it goes when its reader or writer does.
 

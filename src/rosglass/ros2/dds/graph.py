@@ -29,6 +29,10 @@ __all__ = ["UNKNOWN", "DdsGraph"]
 UNKNOWN = "/_dds"
 #: A participant's readers and writers share the beginning of its GUID (RTPS 2.5, section 8.2.4.1).
 _PREFIX = 12
+#: What the user data of every participant of rmw_cyclonedds, rmw_fastrtps and rosglass has.
+_ENCLAVE = b"enclave="
+#: Seconds that endpoints may come later than the nodes that they belong to.
+_ARRIVING_S = 1.0
 _REQUESTS = {
     ("rq", True): EndpointKind.SERVICE_SERVER,
     ("rq", False): EndpointKind.SERVICE_CLIENT,
@@ -47,6 +51,8 @@ class _Participant:
     unknown: NodeName
     ours: bool
     info: ParticipantEntities | None = None
+    #: When the first of these came, monotonic.
+    introduced: float = 0.0
     owners: dict[bytes, NodeName] = field(default_factory=dict)
     only: NodeName | None = None
 
@@ -88,6 +94,20 @@ class DdsGraph:
     def prefixes(self) -> list[bytes]:
         """Return what the GUIDs of each participant begin with, our own included."""
         return list(self._participants)
+
+    @property
+    def unnamed(self) -> int:
+        """How many other participants of ROS 2 have not said, or just have, which nodes they have.
+
+        Fast DDS does so 1 to 4 s after it was found; what else it has may come a moment later.
+        """
+        now = time.monotonic()
+        return sum(
+            _ENCLAVE in other.found.user_data
+            and (other.info is None or now - other.introduced < _ARRIVING_S)
+            for prefix, other in list(self._participants.items())
+            if prefix != self._own
+        )
 
     @property
     def humble(self) -> bool:
@@ -145,6 +165,8 @@ class DdsGraph:
         }
         known.only = info.nodes[0].node if len(info.nodes) == 1 else None
         self._set_nodes(prefix, known, tuple(entities.node for entities in info.nodes))
+        if known.info is None:
+            known.introduced = time.monotonic()
         known.info = info
         for guid in self._of.get(prefix, ()):
             if known.only != only or before.get(guid) != known.owners.get(guid):

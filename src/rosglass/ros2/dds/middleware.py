@@ -66,6 +66,10 @@ class DdsMiddleware(Middleware):
             return Status(ConnectionState.LOST, f"everyone has left {where}, waiting for them")
         return Status(ConnectionState.CONNECTING, f"nobody else is in {where}, waiting for them")
 
+    def unnamed(self) -> int:
+        """Return how many participants of ROS 2 have not said which nodes they have."""
+        return 0 if self._discovery is None else self._discovery.unnamed
+
     def announce(self, node: NodeName) -> Handle:
         """Show a node in the graph until the handle is closed."""
         return _Announcement(self._joined(), node)
