@@ -9,7 +9,7 @@ from rosglass.interfaces.names import split_name
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from rosglass.interfaces.definition import Definition, FieldType, Value
+    from rosglass.interfaces.definition import Constant, Definition, Field, FieldType, Value
 
 __all__ = ["message_text"]
 
@@ -21,19 +21,40 @@ def message_text(definition: Definition) -> str:
 
     Parsing the text gives the same fields, defaults and constants.
     """
-    lines: list[str] = []
-    if definition.comment:
-        lines += [*_comment(definition.comment), ""]
+    head = definition.comment
+    members: list[Constant | Field] = [*definition.constants, *definition.fields]
+    # A head comment that touches the first member is that member's, too.
+    shared = bool(head and members and _begins(members[0].comment, head))
+    touching = shared and "\n" not in _own(members[0].comment, head)
+    lines = list(_comment(head))
+    if head and not touching:
+        lines.append("")
+
+    def write(member: Constant | Field, code: str) -> None:
+        own = _own(member.comment, head)
+        if touching and member is members[0]:
+            lines.append(f"{code}  # {own}" if own else code)
+        else:
+            lines.extend((*_comment(own), code))
+
     for constant in definition.constants:
-        lines += _comment(constant.comment)
-        lines.append(f"{constant.type} {constant.name}={_value(constant.value)}")
+        write(constant, f"{constant.type} {constant.name}={_value(constant.value)}")
     if definition.constants and definition.fields:
         lines.append("")
     for field in definition.fields:
-        lines += _comment(field.comment)
         default = "" if field.default is None else f" {_value(field.default)}"
-        lines.append(f"{_type(field.type)} {field.name}{default}")
+        write(field, f"{_type(field.type)} {field.name}{default}")
     return "\n".join(lines)
+
+
+def _begins(comment: str, head: str) -> bool:
+    """Return whether a member's comment begins with the message's, which touches it."""
+    return f"{comment}\n".startswith(f"{head}\n")
+
+
+def _own(comment: str, head: str) -> str:
+    """Return a member's comment without that of the message, which stands at the beginning."""
+    return comment[len(head) :].lstrip("\n") if head and _begins(comment, head) else comment
 
 
 def _comment(text: str) -> Iterator[str]:

@@ -163,6 +163,29 @@ def test_text_is_written_for_people_and_parsers() -> None:
     assert [p.fields for p in parts(parsed)] == [p.fields for p in parts(service)]
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "# Head\n# more\nint8 a\t# beside\nint8 b",
+        "# Head\n\nint8 a",
+        "# Head\n\n# of a\nint8 a",
+        "# Head\nint8 A=1 # c\nint8 b",
+        "# Head\nint8 a\nint8 A=1",
+        "# Head",
+    ],
+)
+def test_a_head_comment_is_written_once(text):
+    """It belongs to the message and to the first field that it touches."""
+    definition = parse_message(text, "my_msgs/Odd")
+    written = message_text(definition)
+    assert written.count("Head") == 1
+    again = parse_message(written, "my_msgs/Odd")
+    assert again.comment == definition.comment
+    assert [f.name for f in again.fields] == [f.name for f in definition.fields]
+    if not (definition.constants and definition.fields):
+        assert again.fields == definition.fields
+
+
 def mangle(text: str) -> str:
     """What rosidl's generator makes of a text: escaped, and cut to the original's length."""
     lines = (str(line.encode())[2:-1] for line in text.splitlines())
