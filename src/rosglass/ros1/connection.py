@@ -6,6 +6,7 @@ Protocol: ROS wiki, "ROS/TCPROS". Everything here runs in the loop's thread, exc
 from __future__ import annotations
 
 import errno
+import itertools
 import logging
 import os
 import socket
@@ -47,6 +48,7 @@ _LITTLE = 4096
 _MUCH = 64 * 1024
 #: Seconds between looks whether a stalled connection goes on.
 _STALLED = 0.1
+_serials = itertools.count(1)
 _PENDING = (errno.EINPROGRESS, errno.EWOULDBLOCK, errno.EAGAIN)
 
 
@@ -65,6 +67,7 @@ class Connection:
     Attributes:
         peer: The other end's name once it is known, else its address; for people.
         header: The peer's header; empty before it came.
+        serial: Tells it from all others of this process, also those that are gone.
         on_room: Called when everything is sent; None for nobody.
     """
 
@@ -80,6 +83,7 @@ class Connection:
         peer: str = "",
     ) -> None:
         self.peer, self.header = peer, dict[str, str]()
+        self.serial = next(_serials)
         self.on_room: Callable[[], None] | None = None
         self._loop, self._sock = loop, sock
         self._on_header, self._on_frame, self._on_closed = on_header, on_frame, on_closed

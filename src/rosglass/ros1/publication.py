@@ -296,7 +296,7 @@ class Publication(Member):
             self.type.name,
             NodeName(*split(link.peer)),
             type_hash=self.type.md5,
-            gid=b"%d" % id(link),
+            gid=b"%d" % link.serial,
         )
 
     def __repr__(self) -> str:
