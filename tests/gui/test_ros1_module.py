@@ -230,6 +230,16 @@ def test_packages(ros1: Bench, tmp_path: Path, monkeypatch: Any, caplog: Any) ->
     """)
     assert shown == [str(folder), "", True, {"arm_ui": [f"{folder}/p.xml"]}, ""]
     assert "rospack is not installed" in caplog.text
+    # The environment changes while the program runs.
+    other = tmp_path / "other" / "leg_ui"
+    other.mkdir(parents=True)
+    (other / "package.xml").write_text("<package format='2'><name>leg_ui</name></package>")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(other.parent))
+    script = """
+        const p = Ros.package
+        return [p.getPath("arm_ui"), p.getPath("leg_ui"), p.getAll().includes("leg_ui")]
+    """
+    assert ros1.run(script) == ["", str(other), True]
 
 
 def test_the_environment(ros1: Bench, monkeypatch: Any) -> None:

@@ -46,6 +46,13 @@ def test_colours_of_a_fixed_range(name: str) -> None:
         assert (out[..., 3] == 255).all()
 
 
+def test_gray_from_0_to_1_is_the_scaling_of_qml_ros_plugin() -> None:
+    values = np.zeros((H, W), np.float32)
+    values[0, :6] = [0.0, 0.25, 0.5, 1.0, 2.0, np.nan]
+    shown = colors(DepthColors("gray", 0.0, 1.0).convert(metres(values)))
+    assert shown[0, :6, 0].tolist() == [0, 63, 127, 255, 255, 0]
+
+
 def test_unknown_depths_are_black() -> None:
     depths = ramp()
     depths[0] = 0

@@ -25,6 +25,8 @@ __all__ = ["Package"]
 
 _T = TypeVar("_T")
 
+#: Environment variables that name the folders of packages.
+_VARIABLES = ("AMENT_PREFIX_PATH", "CMAKE_PREFIX_PATH", "ROS_PACKAGE_PATH")
 #: Seconds that the program ``rospack`` is given.
 _PATIENCE = 10
 
@@ -41,15 +43,17 @@ class Package(QtCore.QObject):
         super().__init__(parent)
         self._runtime = runtime
         self._found: Folders | None = None
+        self._searched: tuple[str | None, ...] = ()
 
     def _look(self, search: Callable[[Folders], _T], otherwise: _T, *, again: bool = False) -> _T:
-        """Return what is found in the folders, which are searched once."""
+        """Return what is found in the folders, searched once for each state of the environment."""
+        paths = tuple(map(os.environ.get, _VARIABLES))
 
         def look() -> _T:
-            if self._found is None or again:
+            if self._found is None or paths != self._searched or again:
                 from rosglass.interfaces.folders import workspace  # noqa: PLC0415 - few need it
 
-                self._found = workspace(os.environ)
+                self._found, self._searched = workspace(os.environ), paths
             return search(self._found)
 
         try:
