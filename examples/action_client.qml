@@ -30,7 +30,7 @@ Column {
         })
     }
 
-    Label { text: client.name + (client.ready ? " is there" : " is awaited") }
+    Label { textFormat: Text.PlainText; text: client.name + (client.ready ? " is there" : " is awaited") }
     Row {
         spacing: 8
         Button { text: "Face north"; enabled: client.ready; onClicked: turn(90) }
@@ -41,5 +41,5 @@ Column {
             onClicked: root.goal.cancel()
         }
     }
-    Label { text: outcome; font.bold: true }
+    Label { textFormat: Text.PlainText; text: outcome; font.bold: true }
 }

@@ -32,8 +32,9 @@ Column {
             job.succeed({sequence: [done]})
     }
 
-    Label { text: server.ready ? "rosglass action send /fetch '{order: 3}'" : server.problem }
+    Label { textFormat: Text.PlainText; text: server.ready ? "rosglass action send /fetch '{order: 3}'" : server.problem }
     Label {
+        textFormat: Text.PlainText
         text: !root.job ? "nothing to do"
             : root.job.isCancelRequested ? "The robot changed its mind!"
             : "Fetch " + (root.job.goal.order - root.done) + " more"

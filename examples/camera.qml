@@ -14,6 +14,7 @@ Item {
         padding: 6
         background: Rectangle { color: "black"; opacity: 0.6 }
         color: camera.stale ? "red" : "white"
+        textFormat: Text.PlainText
         text: camera.stale ? "NO PICTURE " + camera.problem
                            : camera.encoding + " over " + camera.transport + ", "
                              + camera.framerate.toFixed(0) + " Hz, " + camera.latency.toFixed(0) + " ms"

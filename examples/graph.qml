@@ -14,7 +14,7 @@ Column {
     Component.onCompleted: Ros2.init("graph_example")
     Connections { target: Ros2; function onGraphChanged() { look() } }
 
-    Label { text: "Nodes: " + (topics.length ? Ros2.queryNodes().join(", ") : ""); font.bold: true }
-    Label { text: "Actions: " + (topics.length ? Ros2.queryActions().join(", ") : "") }
-    Repeater { model: topics; Label { text: modelData } }
+    Label { textFormat: Text.PlainText; text: "Nodes: " + (topics.length ? Ros2.queryNodes().join(", ") : ""); font.bold: true }
+    Label { textFormat: Text.PlainText; text: "Actions: " + (topics.length ? Ros2.queryActions().join(", ") : "") }
+    Repeater { model: topics; Label { textFormat: Text.PlainText; text: modelData } }
 }

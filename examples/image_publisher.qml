@@ -24,6 +24,7 @@ Row {
             Text {
                 anchors.centerIn: parent
                 color: "white"; font.pixelSize: 32
+                textFormat: Text.PlainText
                 text: battery.message ? (battery.message.percentage * 100).toFixed(1) + " %" : "?"
             }
         }
@@ -46,6 +47,7 @@ Row {
             source: ImageTransportSubscription { id: receiver; topic: "/panel/gauge"; defaultTransport: "raw" }
         }
         Label {
+            textFormat: Text.PlainText
             text: receiver.stale ? "no picture " + sender.problem
                                  : "the picture, " + sender.frequency.toFixed(0) + " Hz"
         }

@@ -25,5 +25,5 @@ Column {
         Button { text: "Warn"; onClicked: arm.warn("the arm is warm") }
         Button { text: "Debug on"; onClicked: arm.setLoggerLevel(Ros2LoggerLevel.Debug) }
     }
-    Repeater { model: lines; Label { text: modelData } }
+    Repeater { model: lines; Label { textFormat: Text.PlainText; text: modelData } }
 }

@@ -11,9 +11,9 @@ Column {
     Subscription { id: battery; topic: "/battery_state" }
     MessageItemModel { id: tree; message: battery.message; messageType: battery.messageType }
 
-    Label { text: battery.topic + " [" + battery.messageType + "]"; font.bold: true }
+    Label { textFormat: Text.PlainText; text: battery.topic + " [" + battery.messageType + "]"; font.bold: true }
     Repeater {
         model: tree
-        Label { text: model.display + ": " + tree.data(tree.index(index, 1)) }
+        Label { textFormat: Text.PlainText; text: model.display + ": " + tree.data(tree.index(index, 1)) }
     }
 }

@@ -10,7 +10,7 @@ Column {
 
     Parameter { id: speed; nodeName: "/robot"; name: "max_speed"; onRejected: function (reason) { note.text = reason } }
 
-    Label { text: speed.description || speed.name }
+    Label { textFormat: Text.PlainText; text: speed.description || speed.name }
     Slider {
         enabled: speed.ready
         from: speed.minimum || 0
@@ -18,6 +18,6 @@ Column {
         value: speed.value || 0
         onMoved: speed.value = value
     }
-    Label { text: speed.ready ? Number(speed.value).toFixed(2) + " m/s" : "waiting for " + speed.nodeName }
-    Label { id: note; color: "red" }
+    Label { textFormat: Text.PlainText; text: speed.ready ? Number(speed.value).toFixed(2) + " m/s" : "waiting for " + speed.nodeName }
+    Label { textFormat: Text.PlainText; id: note; color: "red" }
 }

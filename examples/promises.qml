@@ -28,5 +28,5 @@ Column {
     }
 
     Button { text: "Again"; onClicked: run() }
-    Repeater { model: steps; Label { text: (index + 1) + ". " + modelData } }
+    Repeater { model: steps; Label { textFormat: Text.PlainText; text: (index + 1) + ". " + modelData } }
 }

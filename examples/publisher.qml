@@ -17,5 +17,5 @@ Column {
         checked: state.message ? state.message.data : false
         onClicked: pub.publish({data: checked})
     }
-    Label { text: "heard by " + (state.message ? "the robot, which says " + state.message.data : "nobody yet") }
+    Label { textFormat: Text.PlainText; text: "heard by " + (state.message ? "the robot, which says " + state.message.data : "nobody yet") }
 }

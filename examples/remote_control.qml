@@ -31,5 +31,5 @@ Item {
         text: "Flashlight: " + (isOn ? "On" : "Off")
         onClicked: pub.publish({data: (isOn = !isOn)})
     }
-    Label { text: camera.stale ? "NO PICTURE: " + Ros2.connectionDetail : ""; color: "red" }
+    Label { textFormat: Text.PlainText; text: camera.stale ? "NO PICTURE: " + Ros2.connectionDetail : ""; color: "red" }
 }

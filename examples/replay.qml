@@ -50,6 +50,7 @@ Column {
         Button { text: replay.playing ? "Pause" : "Play"; onClicked: replay.playing = !replay.playing }
         Button { text: replay.rate + " x"; onClicked: replay.rate = replay.rate === 1 ? 4 : 1 }
         Label {
+            textFormat: Text.PlainText
             text: replay.position.toFixed(1) + " of " + replay.duration.toFixed(1) + " s  " + replay.problem
         }
     }

@@ -16,11 +16,11 @@ Column {
             function (error) { answer = error.message })
     }
 
-    Label { text: client.name + (client.ready ? " is there" : " is awaited") }
+    Label { textFormat: Text.PlainText; text: client.name + (client.ready ? " is there" : " is awaited") }
     Row {
         spacing: 8
         Button { text: "On"; enabled: client.ready; onClicked: call(true) }
         Button { text: "Off"; enabled: client.ready; onClicked: call(false) }
     }
-    Label { text: "answer: " + answer }
+    Label { textFormat: Text.PlainText; text: "answer: " + answer }
 }

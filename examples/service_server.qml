@@ -23,8 +23,8 @@ Column {
         answer = null
     }
 
-    Label { text: server.ready ? "rosglass service call /ask_operator '{}'" : server.problem }
-    Label { text: answer ? "The robot asks: may I?" : "no question"; font.bold: true }
+    Label { textFormat: Text.PlainText; text: server.ready ? "rosglass service call /ask_operator '{}'" : server.problem }
+    Label { textFormat: Text.PlainText; text: answer ? "The robot asks: may I?" : "no question"; font.bold: true }
     Row {
         spacing: 8
         Button { text: "Yes"; enabled: !!root.answer; onClicked: decide(true) }

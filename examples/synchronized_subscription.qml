@@ -23,10 +23,11 @@ Column {
         }
     }
 
-    Label { text: "nearest obstacle: " + nearest.toFixed(2) + " m" }
-    Label { text: "at a speed of " + speed.toFixed(2) + " m/s" }
-    Label { text: "the stamps are " + Math.abs(apart).toFixed(1) + " ms apart" }
+    Label { textFormat: Text.PlainText; text: "nearest obstacle: " + nearest.toFixed(2) + " m" }
+    Label { textFormat: Text.PlainText; text: "at a speed of " + speed.toFixed(2) + " m/s" }
+    Label { textFormat: Text.PlainText; text: "the stamps are " + Math.abs(apart).toFixed(1) + " ms apart" }
     Label {
+        textFormat: Text.PlainText
         text: pair.stale ? "NO PAIRS " + pair.problem : pair.frequency.toFixed(0) + " pairs per second"
         color: pair.stale ? "red" : "green"
     }

@@ -26,6 +26,7 @@ Column {
         }
     }
     Label {
+        textFormat: Text.PlainText
         text: seen.valid ? "from the robot: " + seen.translation.x.toFixed(2) + " m ahead, "
                            + seen.translation.y.toFixed(2) + " m to the left"
                          : seen.message.message

@@ -17,6 +17,7 @@ Column {
 
     Label {
         color: pose.stale ? "red" : "black"
+        textFormat: Text.PlainText
         text: pose.valid ? "base_link in odom: " + pose.translation.x.toFixed(2) + ", "
                            + pose.translation.y.toFixed(2)
                          : pose.message.message
@@ -24,6 +25,7 @@ Column {
     Repeater {
         model: frames
         Label {
+            textFormat: Text.PlainText
             text: modelData.frameId + (modelData.parentId ? " in " + modelData.parentId : "")
                   + (modelData.isStatic ? ", static" : "")
         }

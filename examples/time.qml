@@ -12,9 +12,10 @@ Column {
 
     Subscription { id: odom; topic: "/odom" }
 
-    Label { text: "now: " + now.toJSDate().toLocaleTimeString() }
-    Label { text: "seconds: " + now.seconds().toFixed(3) }
+    Label { textFormat: Text.PlainText; text: "now: " + now.toJSDate().toLocaleTimeString() }
+    Label { textFormat: Text.PlainText; text: "seconds: " + now.seconds().toFixed(3) }
     Label {
+        textFormat: Text.PlainText
         text: odom.message ? "the odometry's stamp: "
                              + odom.message.header.stamp.toJSDate().toLocaleTimeString()
                            : "no odometry yet"

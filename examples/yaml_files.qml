@@ -16,7 +16,7 @@ Column {
     function save() { return Ros2.io.writeYaml(file, {speed: slider.value, opened: Ros2.now()}) }
 
     Slider { id: slider; value: settings.speed; onMoved: note.text = save() ? "saved" : "NOT SAVED" }
-    Label { text: "speed " + slider.value.toFixed(2) + " m/s, in " + file }
-    Label { text: settings.opened ? "opened at " + settings.opened.toJSDate().toLocaleTimeString() : "" }
-    Label { id: note }
+    Label { textFormat: Text.PlainText; text: "speed " + slider.value.toFixed(2) + " m/s, in " + file }
+    Label { textFormat: Text.PlainText; text: settings.opened ? "opened at " + settings.opened.toJSDate().toLocaleTimeString() : "" }
+    Label { textFormat: Text.PlainText; id: note }
 }

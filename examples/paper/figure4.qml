@@ -33,7 +33,7 @@ Rectangle {
                                                     1 - 2 * (q.x * q.x + q.y * q.y)) : 0
         readonly property real pitch: q ? Math.asin(Math.max(-1, Math.min(1, 2 * (q.w * q.y - q.z * q.x)))) : 0
         spacing: 6
-        Label { text: name; color: "white"; anchors.horizontalCenter: parent.horizontalCenter }
+        Label { textFormat: Text.PlainText; text: name; color: "white"; anchors.horizontalCenter: parent.horizontalCenter }
         Rectangle {
             width: 180; height: 180; clip: true; color: "#3b7dd8"; border.color: "white"
             Item {
@@ -51,6 +51,7 @@ Rectangle {
         Label {
             color: "#c0c8d0"
             anchors.horizontalCenter: parent.horizontalCenter
+            textFormat: Text.PlainText
             text: "roll " + (roll * 180 / Math.PI).toFixed(1) + "°, pitch " + (pitch * 180 / Math.PI).toFixed(1) + "°"
         }
     }
@@ -68,13 +69,14 @@ Rectangle {
         ProgressBar { width: parent.width; value: root.step ? root.step.stability : 0 }
         Label {
             color: root.problem ? "#ff6060" : "white"
+            textFormat: Text.PlainText
             text: root.problem ? root.problem
                 : "stability " + (root.step ? root.step.stability.toFixed(2) : "-")
         }
         Row {
             spacing: 12
             width: parent.width
-            Label { text: "iteration " + slider.value; color: "white"; width: 90 }
+            Label { textFormat: Text.PlainText; text: "iteration " + slider.value; color: "white"; width: 90 }
             Slider {
                 id: slider
                 width: parent.width - 102

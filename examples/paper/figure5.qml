@@ -30,7 +30,7 @@ Rectangle {
         radius: 8; color: "white"
         border.color: old ? "#d03030" : "#d0d6de"; border.width: old ? 3 : 1
         Layout.fillWidth: true; Layout.fillHeight: true
-        Label { x: 12; y: 8; font.bold: true; text: parent.name + (parent.old ? "  (OLD)" : "") }
+        Label { x: 12; y: 8; font.bold: true; textFormat: Text.PlainText; text: parent.name + (parent.old ? "  (OLD)" : "") }
         Item { id: content; anchors { fill: parent; margins: 12; topMargin: 34 } opacity: parent.old ? 0.4 : 1 }
     }
     component Gauge: Column {
@@ -39,7 +39,7 @@ Rectangle {
         property real full: 1
         property string unit
         width: parent ? parent.width : 0
-        Label { text: name + ": " + value.toFixed(1) + " " + unit }
+        Label { textFormat: Text.PlainText; text: name + ": " + value.toFixed(1) + " " + unit }
         ProgressBar { width: parent.width; value: parent.value / parent.full }
     }
 
@@ -52,13 +52,13 @@ Rectangle {
             old: state.stale
             Column {
                 spacing: 10
-                Label { text: root.state_; font.pixelSize: 28 }
+                Label { textFormat: Text.PlainText; text: root.state_; font.pixelSize: 28 }
                 Row {
                     spacing: 8
                     Button { text: "Stand up"; enabled: stand.ready; onClicked: set(true) }
                     Button { text: "Sit down"; enabled: stand.ready; onClicked: set(false) }
                 }
-                Label { id: note; color: "#d03030" }
+                Label { textFormat: Text.PlainText; id: note; color: "#d03030" }
             }
             function set(up) {
                 stand.call({data: up}).then(function () { note.text = "" },
@@ -74,6 +74,7 @@ Rectangle {
                     model: root.gestures
                     Button {
                         text: modelData
+                        contentItem: Label { textFormat: Text.PlainText; text: modelData }
                         enabled: root.state_ === "standing"
                         highlighted: root.state_ === modelData
                         onClicked: gesture.publish({data: modelData})
@@ -98,7 +99,7 @@ Rectangle {
                     }
                     Button { text: "Say"; enabled: text.text !== ""; onClicked: text.say() }
                 }
-                Label { text: spoken.message ? "said: " + spoken.message.data : "" }
+                Label { textFormat: Text.PlainText; text: spoken.message ? "said: " + spoken.message.data : "" }
             }
         }
         Panel {
@@ -123,6 +124,7 @@ Rectangle {
                     Column {
                         width: (parent.width - 32) / 3
                         Label {
+                            textFormat: Text.PlainText
                             text: joints.message.name.at(index) + "  "
                                   + (joints.message.position.at(index) * 180 / Math.PI).toFixed(0) + "°"
                         }

@@ -18,11 +18,12 @@ Row {
         Subscriber { id: odom; topic: "/odom"; queueSize: 1 }
         Label {
             readonly property var at: odom.message ? odom.message.pose.pose.position : null
+            textFormat: Text.PlainText
             text: at ? "x " + at.x.toFixed(2) + " m, y " + at.y.toFixed(2) + " m" : "nothing yet"
             color: odom.stale ? "red" : "black"
         }
-        Label { text: odom.message ? "stamp " + odom.message.header.stamp.toSec().toFixed(2) + " s" : "" }
-        Label { id: clock }
+        Label { textFormat: Text.PlainText; text: odom.message ? "stamp " + odom.message.header.stamp.toSec().toFixed(2) + " s" : "" }
+        Label { textFormat: Text.PlainText; id: clock }
         Timer {
             interval: 100; repeat: true; running: true
             onTriggered: clock.text = "now " + Time.now().toSec().toFixed(2) + " s"

@@ -12,6 +12,7 @@ Panel {
     Subscriber { id: battery; topic: "/battery_state"; messageType: "sensor_msgs/BatteryState"; timeout: 2000 }
     Text {
         anchors.horizontalCenter: parent.horizontalCenter
+        textFormat: Text.PlainText
         text: battery.message ? (100 * panel.share).toFixed(0) + " %" : "–"
         color: panel.tint
         font { pixelSize: 22; weight: Font.Light }
@@ -23,6 +24,7 @@ Panel {
     }
     Text {
         y: 47; anchors.horizontalCenter: parent.horizontalCenter
+        textFormat: Text.PlainText
         text: battery.stale ? "" : battery.message.voltage.toFixed(1) + " V"
         color: Theme.dim
         font.pixelSize: 10

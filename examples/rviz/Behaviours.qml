@@ -44,6 +44,7 @@ Column {
         wrapMode: Text.Wrap
         maximumLineCount: 2
         elide: Text.ElideRight
+        textFormat: Text.PlainText
         text: !behaviours.live ? "ROBOT SILENT" + (behaviours.active ? ": " + behaviours.name + " may go on" : "")
             : !behaviours.client.connected ? "NO BEHAVIOUR SERVER" : behaviours.active
             ? behaviours.name + ": " + (behaviours.goal.feedback ? behaviours.goal.feedback.current_state : "on its way")

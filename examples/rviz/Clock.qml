@@ -14,12 +14,14 @@ Rectangle {
     }
     Text {
         x: 10; y: 4
+        textFormat: Text.PlainText
         text: Qt.formatTime(now, "hh:mm:ss")
         color: Theme.text
         font { pixelSize: 21; weight: Font.Light }
     }
     Text {
         x: 11; y: 29
+        textFormat: Text.PlainText
         text: Qt.formatDate(now, "ddd d MMM yyyy")
         color: Theme.dim
         font.pixelSize: 10

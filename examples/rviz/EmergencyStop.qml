@@ -77,12 +77,14 @@ Rectangle {
         spacing: 4
         Text {
             anchors.horizontalCenter: parent.horizontalCenter
+            textFormat: Text.PlainText
             text: stop.stopped ? "STOPPED" : "STOP"
             color: "white"
             font { pixelSize: stop.stopped ? 25 : 36; weight: Font.Black; letterSpacing: 1 }
         }
         Text {
             anchors.horizontalCenter: parent.horizontalCenter
+            textFormat: Text.PlainText
             text: !stop.known && !stop.pending ? "STATE UNKNOWN" : stop.pending ? "NOT CONFIRMED"
                 : stop.stopped ? (stop.activeFocus ? "hold, or Enter, to release" : "hold to release") : "emergency stop"
             color: !stop.known || stop.pending ? "#ffe24a" : "#ffd9dc"

@@ -18,6 +18,7 @@ Column {
     Text {
         width: parent.width
         wrapMode: Text.Wrap
+        textFormat: Text.PlainText
         text: state_.stale ? "STATE UNKNOWN" : state_.message.data
         color: state_.stale ? Theme.bad : Theme.text
         font { pixelSize: 17; weight: Font.Light }
@@ -33,6 +34,7 @@ Column {
                 border { color: index === mission.next ? Theme.accent : Theme.edge; width: 2 }
                 Text {
                     anchors.centerIn: parent
+                    textFormat: Text.PlainText
                     text: index + 1
                     color: index < mission.next ? "black" : Theme.text
                     font.pixelSize: 11
@@ -41,6 +43,7 @@ Column {
         }
     }
     Text {
+        textFormat: Text.PlainText
         text: "next waypoint " + (mission.next + 1) + " of " + mission.count
         visible: mission.count > 0 && !state_.stale
         color: Theme.dim
@@ -56,6 +59,7 @@ Column {
     Text {
         width: parent.width
         wrapMode: Text.Wrap
+        textFormat: Text.PlainText
         text: request.note
         color: request.failed ? Theme.bad : Theme.dim
         font.pixelSize: 11

@@ -16,7 +16,7 @@ Column {
         color: Theme.bar
         border { color: tint; width: 2 }
         Text {
-            id: label; text: parent.text
+            id: label; textFormat: Text.PlainText; text: parent.text
             anchors.centerIn: parent
             color: parent.tint
             font { pixelSize: 14; weight: Font.DemiBold }

@@ -20,6 +20,7 @@ Rectangle {
         x: 9; y: 6
         width: (panel.narrow ? parent.width : note.x) - 13
         elide: Text.ElideRight
+        textFormat: Text.PlainText
         text: panel.title.toUpperCase()
         color: Theme.dim
         font { pixelSize: 10; letterSpacing: 1; weight: Font.DemiBold }
@@ -33,6 +34,7 @@ Rectangle {
         id: note
         x: panel.narrow ? (panel.width - width) / 2 : panel.width - width - 9
         y: panel.narrow ? panel.height - height - 7 : 6
+        textFormat: Text.PlainText
         text: panel.stale ? "NO DATA" : panel.note
         color: panel.stale || panel.alarming ? Theme.bad : Theme.dim
         font { pixelSize: 10; weight: panel.stale || panel.alarming ? Font.Bold : Font.Normal }

@@ -59,6 +59,7 @@ Panel {
         Item { id: body; x: parent.width / 2; y: parent.height / 2; rotation: lean * 180 / Math.PI }
         Text {
             anchors { horizontalCenter: parent.horizontalCenter; bottom: parent.bottom }
+            textFormat: Text.PlainText
             text: label
             color: panel.steep ? Theme.warn : Theme.dim
             font.pixelSize: 10

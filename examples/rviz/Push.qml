@@ -40,6 +40,7 @@ Rectangle {
         }
         Text {
             anchors.verticalCenter: parent.verticalCenter
+            textFormat: Text.PlainText
             text: push.text
             color: push.checked ? "white" : Theme.text
             font.pixelSize: push.size

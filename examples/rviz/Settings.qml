@@ -19,6 +19,7 @@ Column {
     Subscriber { id: lamp; topic: "/flashlight/state"; messageType: "std_msgs/Bool"; timeout: 2000 }
 
     Text {
+        textFormat: Text.PlainText
         text: "Highest speed   " + (known ? Number(speed.value).toFixed(2) + " m/s" : "unknown")
         color: known ? Theme.text : Theme.bad
         font.pixelSize: 12
@@ -59,9 +60,10 @@ Column {
     Text {
         width: parent.width
         wrapMode: Text.Wrap
+        textFormat: Text.PlainText
         text: request.note
         color: request.failed ? Theme.bad : Theme.dim
         font.pixelSize: 11
     }
-    Text { id: refused; width: parent.width; wrapMode: Text.Wrap; color: Theme.bad; font.pixelSize: 11 }
+    Text { textFormat: Text.PlainText; id: refused; width: parent.width; wrapMode: Text.Wrap; color: Theme.bad; font.pixelSize: 11 }
 }

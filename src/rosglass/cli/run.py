@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Picture",
+    "add_allow_network",
     "add_import_paths",
     "add_longest_script",
     "add_renderer",
@@ -65,6 +66,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "while it is not moved; Ctrl-C, SIGTERM and Qt.quit() end it",
     )
     add_renderer(parser, "the interface")
+    add_allow_network(parser)
     add_longest_script(parser)
     add_screenshot(parser, "the window", after=2.0)
     add_definitions_option(parser)
@@ -106,6 +108,15 @@ def add_renderer(parser: argparse.ArgumentParser, what: str) -> None:
         default="auto",
         help=f"what draws {what}: OpenGL, Qt's software renderer (no shaders, particles and "
         "films), or the one that is faster here (auto, the default)",
+    )
+
+
+def add_allow_network(parser: argparse.ArgumentParser) -> None:
+    """Declare the option that lets Qt fetch what QML names on other machines."""
+    parser.add_argument(
+        "--allow-network",
+        action="store_true",
+        help="let the interface fetch pictures, QML files and modules from other machines (http:)",
     )
 
 
@@ -161,6 +172,7 @@ def run(args: argparse.Namespace) -> int:
             fullscreen=args.fullscreen,
             kiosk=args.kiosk,
             renderer=args.renderer,
+            allow_network=args.allow_network,
             arguments=args.arguments,
             ros_arguments=args.ros_arguments,
         )

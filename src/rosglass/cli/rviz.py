@@ -12,6 +12,7 @@ from rosglass.cli.completion import complete_files
 from rosglass.cli.connecting import add_definitions_option, seconds
 from rosglass.cli.run import (
     Picture,
+    add_allow_network,
     add_import_paths,
     add_longest_script,
     add_renderer,
@@ -92,6 +93,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="draw the 3D view with hard edges: without a graphics card several times as fast",
     )
     add_renderer(parser, "interfaces in QML")
+    add_allow_network(parser)
     add_longest_script(parser)
     add_screenshot(parser, "RViz's window", after=3.0)
     add_definitions_option(parser)
@@ -165,6 +167,7 @@ def _show(args: argparse.Namespace, config: str, remappings: list[str], received
         splash=args.splash,
         anti_aliasing=not args.disable_anti_aliasing,
         renderer=args.renderer,
+        allow_network=args.allow_network,
         timeout=args.timeout,
         import_paths=args.import_paths,
         arguments=args.arguments,

@@ -14,6 +14,7 @@ from rosglass.qml import Session
 from rosglass.qml.display import require_display
 from rosglass.qml.interrupt import QuitOnSignal
 from rosglass.qml.log import install_message_handler
+from rosglass.qml.network_access import close_network
 from rosglass.qml.runner import Runner
 from rosglass.qml.subscription import Subscription
 from rosglass.qt import QtCore, QtGui, QtQuick
@@ -57,6 +58,7 @@ class Cockpit:
         QtQuick.QQuickWindow.setTextRenderType(
             QtQuick.QQuickWindow.TextRenderType.NativeTextRendering
         )
+        close_network()
         pictures.register()
         keyboard.register()
         self.session = Session(url)

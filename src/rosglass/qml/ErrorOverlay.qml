@@ -18,6 +18,7 @@ Rectangle {
         font.family: "monospace"
         font.pixelSize: 15
         wrapMode: Text.Wrap
+        textFormat: Text.PlainText
         text: overlay.heading + "\n\n" + overlay.text
     }
 }

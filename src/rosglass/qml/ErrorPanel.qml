@@ -46,6 +46,7 @@ Rectangle {
             font.bold: true
             font.pixelSize: 14
             wrapMode: Text.Wrap
+            textFormat: Text.PlainText
             text: panel.heading
         }
 

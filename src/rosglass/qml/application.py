@@ -12,6 +12,7 @@ from rosglass.errors import Error
 from rosglass.qml.display import require_display
 from rosglass.qml.interrupt import QuitOnSignal, end_process_within
 from rosglass.qml.log import LocationFormatter
+from rosglass.qml.network_access import close_network
 from rosglass.qml.places import interface_file
 from rosglass.qml.renderer_choice import choice
 from rosglass.qml.runner import Runner, needs_widgets
@@ -53,6 +54,8 @@ class Application(Handle):
             disappears while it is not moved; ``Qt.quit()``, Ctrl-C and SIGTERM end it.
         renderer: What draws: "opengl", "software" (Qt's own, without shaders), or "auto" for the
             software renderer where there is no graphics card and the file needs none.
+        allow_network: Let Qt fetch what QML and texts name on other machines: pictures, files of
+            QML, modules. Otherwise it cannot in this process, from now on.
 
     Raises:
         QmlError: There is no such file or folder, or it is none of QML.
@@ -78,6 +81,7 @@ class Application(Handle):
         fullscreen: bool = False,
         kiosk: bool = False,
         renderer: str = "auto",
+        allow_network: bool = False,
     ) -> None:
         if threading.current_thread() is not threading.main_thread():
             raise Error("a user interface must be made in the main thread of the program")
@@ -99,6 +103,8 @@ class Application(Handle):
         )
         try:
             choice.prefer(renderer)
+            if not allow_network:
+                close_network()
             self._runner = Runner(
                 path,
                 self.session,

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import logging
 import math
+import re
 import threading
 import time
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rosglass.qml.network_access import NETWORK_HINT
 from rosglass.qt import QtCore
 
 if TYPE_CHECKING:
@@ -124,6 +126,8 @@ _TYPES = {
 _HINTS = {
     "ReferenceError: rviz is not defined": "; it is over RViz alone: rosglass rviz --overlay FILE"
 }
+#: How Qt words that the proxy is not there through which all is refused.
+_REFUSED = re.compile(r"\b[Pp]roxy\b")
 _handling = threading.local()
 #: Seconds until a warning that repeats is logged again, with how often it came.
 _REPEAT_S = 60.0
@@ -199,7 +203,7 @@ def _handle(mode: Any, context: Any, message: str) -> None:
             level = logging.INFO
         caller = Caller(plain_path(file), max(context.line, 0), context.function or "")
         text = message.removeprefix(f"{file}:{context.line}: ")
-        text += _HINTS.get(text, "")
+        text += NETWORK_HINT if _REFUSED.search(text) else _HINTS.get(text, "")
         if category == "default" and level == logging.WARNING:
             cause = _repeats.cause(caller) if text.startswith("TypeError") else ""
             text = _repeats.counted(caller, f"{text}; {cause}" if cause else text)

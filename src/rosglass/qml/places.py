@@ -15,6 +15,7 @@ from rosglass.errors import QmlError
 __all__ = ["import_folder", "interface_file", "locate", "near"]
 
 _PACKAGE = "package://"
+_REMOTE = ("http://", "https://", "ftp://")
 
 
 def locate(place: str | os.PathLike[str]) -> Path:
@@ -53,6 +54,8 @@ def interface_file(place: str | os.PathLike[str]) -> Path:
     Raises:
         QmlError: There is no such file, or it is none of QML.
     """
+    if os.fspath(place).lower().startswith(_REMOTE):
+        raise QmlError(f"{os.fspath(place)}: interfaces are run from files of this machine only")
     path = locate(place)
     shown = path if os.fspath(place).startswith(_PACKAGE) else place
     if os.path.isdir(path):

@@ -14,6 +14,7 @@ from rosglass.errors import ConnectionLostError, Error, UnsupportedError
 from rosglass.qml.display import require_display
 from rosglass.qml.interrupt import QuitOnSignal, end_process_within
 from rosglass.qml.log import LocationFormatter
+from rosglass.qml.network_access import close_network
 from rosglass.qml.places import import_folder
 from rosglass.qml.session import Session
 from rosglass.qt import QtCore, run_event_loop
@@ -85,7 +86,9 @@ class Application(Handle):
         anti_aliasing: Smooth edges in the 3D view, where RViz can. Without a graphics card, RViz
             takes several times as long for each frame with it.
         renderer: What draws overlays in QML: ``opengl``, ``software`` (Qt's own renderer, without
-            shaders, particles and VideoOutput), or ``auto`` for the one that is faster here.
+            shaders, particles and films), or ``auto`` for the one that is faster here.
+        allow_network: Let Qt fetch what QML and texts name on other machines: pictures, files of
+            QML, modules. Otherwise it cannot in this process, from now on.
         timeout: Seconds to wait for the master; None for as long as it takes.
         import_paths: Further folders with QML modules; ``package://`` as well.
         arguments: What QML finds in ``Qt.application.arguments``.
@@ -117,6 +120,7 @@ class Application(Handle):
         splash: bool = False,
         anti_aliasing: bool = True,
         renderer: str = "auto",
+        allow_network: bool = False,
         timeout: float | None = None,
         import_paths: Sequence[str | os.PathLike[str]] = (),
         arguments: Sequence[str] = (),
@@ -138,6 +142,8 @@ class Application(Handle):
         self._import_paths = [import_folder(path) for path in import_paths]
         require_rviz()
         choice.prefer(renderer)
+        if not allow_network:
+            close_network()
         if config:
             config_file(config)
         #: The Qt application.

@@ -84,6 +84,7 @@ Panel {
                         color: "#b0e8f2fa"
                         Text {
                             anchors { right: parent.left; rightMargin: 4; verticalCenter: parent.verticalCenter }
+                            textFormat: Text.PlainText
                             text: Math.abs(parent.modelData)
                             color: "#b0e8f2fa"
                             font.pixelSize: 9

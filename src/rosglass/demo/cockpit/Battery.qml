@@ -31,6 +31,7 @@ Panel {
             anchors.horizontalCenter: parent.horizontalCenter
             Text {
                 objectName: "charge"
+                textFormat: Text.PlainText
                 text: panel.state_.received ? (100 * panel.share).toFixed(1) : "–"
                 color: panel.tint
                 font { pixelSize: Math.round(36 * column.part); weight: Font.Light }
@@ -74,6 +75,7 @@ Panel {
         }
         Text {
             anchors.horizontalCenter: parent.horizontalCenter
+            textFormat: Text.PlainText
             text: !panel.state_.received ? ""
                 : (panel.charging ? "charging " : "") + Math.abs(panel.state_.message.current).toFixed(1) + " A"
             color: panel.charging ? Theme.good : Theme.dim

@@ -101,6 +101,7 @@ Item {
             }
             Text {
                 anchors.verticalCenter: parent.verticalCenter
+                textFormat: Text.PlainText
                 text: "front camera   " + (view.framerate < 0 ? "" : view.framerate.toFixed(0) + " Hz   ")
                     + (view.latency >= 0 ? view.latency.toFixed(0) + " ms" : "")
                 color: Theme.dim
@@ -132,6 +133,7 @@ Item {
                 spacing: 8
                 Text {
                     anchors.horizontalCenter: parent.horizontalCenter
+                    textFormat: Text.PlainText
                     text: !view.late ? "NO SIGNAL" : view.latency > 0 ? "PICTURE DELAYED" : "CLOCKS DIFFER"
                     color: Theme.bad
                     font { pixelSize: Math.max(12, Math.min(38, view.width / 14)); weight: Font.Black; letterSpacing: view.width / 200 }
@@ -147,6 +149,7 @@ Item {
                 Text {
                     objectName: "noSignalText"
                     anchors.horizontalCenter: parent.horizontalCenter
+                    textFormat: Text.PlainText
                     text: !view.received ? "no picture received yet"
                         : view.late
                             ? "by " + Math.abs(view.latency / 1000).toFixed(1) + " s"
@@ -158,6 +161,7 @@ Item {
                     anchors.horizontalCenter: parent.horizontalCenter
                     width: Math.max(1, Math.min(implicitWidth, view.width - 50))
                     visible: text !== ""
+                    textFormat: Text.PlainText
                     text: view.late ? "or the clocks of robot and cockpit differ by that much"
                         : view.reason || camera.problem
                     color: Theme.dim

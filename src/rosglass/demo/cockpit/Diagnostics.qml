@@ -108,6 +108,7 @@ Panel {
                 x: 16
                 anchors.verticalCenter: parent.verticalCenter
                 width: Math.min(82, row.width * 0.4)
+                textFormat: Text.PlainText
                 text: row.modelData.name
                 color: Theme.text
                 elide: Text.ElideRight
@@ -116,6 +117,7 @@ Panel {
             Text {
                 visible: width > 24
                 anchors { left: name.right; right: value.left; rightMargin: 8; verticalCenter: parent.verticalCenter }
+                textFormat: Text.PlainText
                 text: row.modelData.text
                 color: row.modelData.level === 0 ? Theme.dim : row.tint
                 elide: Text.ElideRight
@@ -124,6 +126,7 @@ Panel {
             Text {
                 id: value
                 anchors { right: parent.right; verticalCenter: parent.verticalCenter }
+                textFormat: Text.PlainText
                 text: row.modelData.value
                 color: Theme.dim
                 font.pixelSize: Theme.small

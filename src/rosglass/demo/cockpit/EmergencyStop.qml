@@ -149,6 +149,7 @@ Item {
             anchors.centerIn: parent
             Text {
                 anchors.horizontalCenter: parent.horizontalCenter
+                textFormat: Text.PlainText
                 text: stop.stopped ? "STOPPED" : "STOP"
                 color: "white"
                 font { pixelSize: stop.width * (stop.stopped ? 0.125 : 0.2); weight: Font.Black; letterSpacing: 1 }
@@ -157,6 +158,7 @@ Item {
                 objectName: "confirmation"
                 anchors.horizontalCenter: parent.horizontalCenter
                 horizontalAlignment: Text.AlignHCenter
+                textFormat: Text.PlainText
                 text: stop.overdue ? "NOT CONFIRMED\n" + (stop.problem ? "not sent" : "sending…")
                     : stop.pending ? "sending…"
                     : stop.stopped ? (stop.wanted ? "confirmed"

@@ -141,6 +141,7 @@ Panel {
         Text {
             anchors.centerIn: parent
             visible: !map.received
+            textFormat: Text.PlainText
             text: map.problem || "waiting for the map"
             color: Theme.dim
             font.pixelSize: Theme.normal

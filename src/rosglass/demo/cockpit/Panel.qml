@@ -23,6 +23,7 @@ Rectangle {
         anchors { left: parent.left; right: aside.left; top: parent.top }
         anchors { leftMargin: 12; rightMargin: 6; topMargin: panel.small ? 6 : 9 }
         elide: Text.ElideRight
+        textFormat: Text.PlainText
         text: panel.title.toUpperCase()
         color: Theme.dim
         font { pixelSize: Theme.small; letterSpacing: 1.2; weight: Font.DemiBold }
@@ -30,6 +31,7 @@ Rectangle {
     Text {
         id: aside
         anchors { right: parent.right; baseline: heading.baseline; rightMargin: 12 }
+        textFormat: Text.PlainText
         text: panel.fresh ? panel.note
             : panel.age < 0 ? "NO DATA YET" : "OLD: " + panel.age.toFixed(0) + " s"
         color: panel.fresh ? Theme.dim : Theme.bad

@@ -29,12 +29,14 @@ Rectangle {
             property string unit
             Text {
                 anchors.horizontalCenter: parent.horizontalCenter
+                textFormat: Text.PlainText
                 text: parent.value
                 color: Theme.text
                 font { pixelSize: 22; weight: Font.DemiBold }
             }
             Text {
                 anchors.horizontalCenter: parent.horizontalCenter
+                textFormat: Text.PlainText
                 text: parent.unit
                 color: Theme.dim
                 font.pixelSize: 10
@@ -60,6 +62,7 @@ Rectangle {
         wrapMode: Text.Wrap
         maximumLineCount: 2
         elide: Text.ElideRight
+        textFormat: Text.PlainText
         text: "NOT DRIVING: " + (speed.drive.problem || speed.drive.obstacle || "let go first")
         color: Theme.text
         font { pixelSize: Theme.normal; weight: Font.Bold }

@@ -65,6 +65,7 @@ Rectangle {
             Text {
                 objectName: "linkText"
                 anchors.verticalCenter: parent.verticalCenter
+                textFormat: Text.PlainText
                 text: bar.link.text
                 color: bar.link.alive ? Theme.text : Theme.bad
                 font { pixelSize: Theme.normal; weight: Font.DemiBold }
@@ -81,12 +82,14 @@ Rectangle {
             property string label
             Text {
                 anchors.right: parent.right
+                textFormat: Text.PlainText
                 text: parent.value
                 color: Theme.text
                 font { pixelSize: Theme.normal; weight: Font.DemiBold }
             }
             Text {
                 anchors.right: parent.right
+                textFormat: Text.PlainText
                 text: parent.label
                 color: Theme.dim
                 font.pixelSize: 9
