@@ -140,8 +140,13 @@ def test_a_relay_of_rospy_that_names_no_type_is_understood_when_we_give_one(
     untyped = node.create_subscription("/relayed/out")
     wait_for(source.subscription_count)
     wait_for(typed.publisher_count)
-    source.publish(data="whatever")
-    assert typed.wait(30).message().data == "whatever"
+
+    def relayed():
+        # rospy tells a subscriber that it is connected, and sends it what comes a moment later.
+        source.publish(data="whatever")
+        return typed.wait(0.5)
+
+    assert wait_for(relayed).message().data == "whatever"
     # With the type known for the topic, or not: it must not stay silent without a reason.
     wait_for(lambda: untyped.problem or untyped.type)
     if untyped.type is None:
