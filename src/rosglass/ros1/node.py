@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import EndpointKind, History, NodeName, QoS, Subscription
+from rosglass.comm.complaints import Complaints
 from rosglass.comm.core_node import CoreNode
 from rosglass.comm.flags import check_flag
 from rosglass.comm.promise import check_timeout
@@ -50,6 +52,10 @@ if TYPE_CHECKING:
 
 __all__ = ["Ros1Node"]
 
+_log = logging.getLogger("rosglass.ros1")
+#: Connections at a time whose other end has not said what it wants.
+_MOST_STRANGERS = 100
+
 
 class Ros1Node(CoreNode):
     """A node of a ROS 1 graph.
@@ -88,6 +94,10 @@ class Ros1Node(CoreNode):
         self.url, self.name, self.namespace = url, name, namespace
         self._core = Core(NodeName(namespace, name), url, options, library)
         self._topics = Topics(self._core)
+        #: Connections that others have made; those without a header, the oldest first.
+        self._guests: set[Connection] = set()
+        self._strangers: dict[Connection, None] = {}
+        self._most_guests, self._complaints = _most_guests(), Complaints()
         self._services = Services(self._core)
         self._furniture = Furniture(self, self._core, self._topic_names, parameters or {})
         self._core.start(
@@ -375,12 +385,19 @@ class Ros1Node(CoreNode):
     def _accept(self, sock: socket.socket, address: str) -> None:
         """Take a connection in; its header says what it is for."""
         link: Connection
+        if len(self._guests) >= self._most_guests:
+            if self._complaints.fresh("crowded"):
+                told = "%s: refused, for this node has %d connections; others are not named"
+                _log.warning(told, address, len(self._guests))
+            sock.close()
+            return
 
         def refuse(reason: str) -> None:
             link.send_header({"error": reason})
             link.finish(1.0)
 
         def on_header(header: dict[str, str]) -> None:
+            self._strangers.pop(link, None)
             if "topic" in header:
                 outlast(sock)
                 reason = self._topics.accept(link, header)
@@ -399,9 +416,15 @@ class Ros1Node(CoreNode):
             lambda _: self._drop(link),
             peer=address,
         )
+        if len(self._strangers) >= _MOST_STRANGERS:
+            next(iter(self._strangers)).end("others want to connect, and it has sent no header")
+        self._guests.add(link)
+        self._strangers[link] = None
         link.accept()
 
     def _drop(self, link: Connection) -> None:
+        self._guests.discard(link)
+        self._strangers.pop(link, None)
         self._topics.drop(link)
         self._services.drop(link)
 
@@ -411,6 +434,16 @@ class Ros1Node(CoreNode):
 
     def _topic_names(self) -> list[str]:
         return sorted({*self._topics.published(), *self._topics.subscribed()})
+
+
+def _most_guests() -> int:
+    """Return how many connections of others to hold: half of the files that may be open."""
+    try:
+        import resource  # noqa: PLC0415 - not on Windows
+    except ImportError:
+        return 1000
+    soft = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+    return 10_000 if soft == resource.RLIM_INFINITY else min(10_000, soft // 2)
 
 
 def _profile(qos: QoS | int) -> QoS:

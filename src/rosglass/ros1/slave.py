@@ -15,6 +15,7 @@ import xmlrpc.client
 import xmlrpc.server
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Protocol
+from urllib.parse import urlsplit
 
 from rosglass.comm.complaints import Complaints
 from rosglass.ros1.master import parse_xml
@@ -104,7 +105,10 @@ class Slave(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCDispatcher):
         self._api = api
         self._lock = threading.Lock()
         self._complaints = Complaints()
-        self._connections: set[socket.socket] = set()
+        #: The oldest first.
+        self._connections: dict[socket.socket, None] = {}
+        #: Of the connection that a thread serves: the other end's address, and this one's.
+        self._ends = threading.local()
         for name, method in (
             ("getBusStats", lambda _: api.bus_stats()),
             ("getBusInfo", lambda _: api.bus_info()),
@@ -120,17 +124,21 @@ class Slave(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCDispatcher):
             self.register_function(_answering(name, method), name)
 
     def accept(self, sock: socket.socket, address: str) -> None:
-        """Serve a connection, unless there are far too many; in the loop's thread."""
+        """Serve a connection; of far too many the oldest is cut, so that the master gets through.
+
+        In the loop's thread.
+        """
         with self._lock:
             crowded = len(self._connections) >= _MOST_CONNECTIONS
-            if not crowded:
-                self._connections.add(sock)
-        if crowded:
-            if self._complaints.fresh("crowded"):
-                told = "%s: not served, the node's API has %d connections; others are not named"
-                _log.warning(told, address, _MOST_CONNECTIONS)
-            sock.close()
-            return
+            if crowded:
+                oldest = next(iter(self._connections))
+                del self._connections[oldest]
+                with suppress(OSError):
+                    oldest.shutdown(socket.SHUT_RDWR)  # its thread ends
+            self._connections[sock] = None
+        if crowded and self._complaints.fresh("crowded"):
+            told = "%s: the node's API has more than %d connections, the oldest are cut"
+            _log.warning(told, address, _MOST_CONNECTIONS)
         try:
             self.process_request(sock, address)
         except RuntimeError:  # no more threads
@@ -157,12 +165,15 @@ class Slave(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCDispatcher):
 
     def finish_request(self, request: Any, client_address: Any) -> None:
         """Serve a connection until it ends; on its own thread."""
+        self._ends.addresses = tuple(
+            _plain(place[0]) for place in (request.getpeername(), request.getsockname())
+        )
         _Handler(request, client_address, self)  # type: ignore[arg-type]
 
     def shutdown_request(self, request: Any) -> None:
         """Close a connection."""
         with self._lock:
-            self._connections.discard(request)
+            self._connections.pop(request, None)
             with suppress(OSError):
                 request.shutdown(socket.SHUT_WR)
             request.close()
@@ -174,6 +185,12 @@ class Slave(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCDispatcher):
     # -- calls -----------------------------------------------------------------------------------
 
     def _shutdown(self, caller: object, reason: object = "") -> int:
+        peer, own = self._ends.addresses
+        if peer != own and peer not in _addresses(self._api.master_uri()):
+            if self._complaints.fresh(("shutdown", peer)):
+                told = "%s at %s wanted to end this node: only its own and the master's host may"
+                _log.warning(told, caller, peer)
+            raise ValueError(f"taken from this node's own and the master's host, not from {peer}")
         self._api.shut_down(_text(caller, "caller_id"), _text(reason, "msg"))
         return 0
 
@@ -196,6 +213,19 @@ class Slave(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCDispatcher):
         if not isinstance(protocols, list):
             raise TypeError("protocols is no list")
         return self._api.request_topic(_text(topic, "topic"), protocols)
+
+
+def _addresses(uri: str) -> set[str]:
+    """Return the addresses of a URI's host; none where it is not known."""
+    found: list[Any] = []
+    with suppress(OSError, UnicodeError, ValueError):
+        found = socket.getaddrinfo(urlsplit(uri).hostname, None)
+    return {_plain(str(one[4][0])) for one in found}
+
+
+def _plain(address: str) -> str:
+    """Return an address as IPv4 has it, where a socket of IPv6 shows one of these."""
+    return address.removeprefix("::ffff:")
 
 
 def _text(value: object, what: str) -> str:

@@ -1,0 +1,113 @@
+"""Thousands of connections to a node, and who may end it."""
+
+from __future__ import annotations
+
+import http.client
+import socket
+import threading
+import xmlrpc.client
+
+import pytest
+
+from rosglass.comm import ConnectionState
+from rosglass.ros1 import node as ros1_node
+
+FLOOD = 1000
+HEADER = b"\x14\0\0\0\x10\0\0\0callerid=/nobody"
+
+
+class From(xmlrpc.client.Transport):
+    """Calls from an address of this machine's own choice."""
+
+    def __init__(self, address):
+        super().__init__()
+        self._address = address
+
+    def make_connection(self, host):
+        return http.client.HTTPConnection(host, timeout=20, source_address=(self._address, 0))
+
+
+def flood(port, payload=b""):
+    """Connect a thousand times, the last 200 staying; return these."""
+    kept = []
+    for _ in range(FLOOD):
+        sock = socket.create_connection(("127.0.0.1", port), 20)
+        if payload:
+            sock.sendall(payload)
+        kept.append(sock)
+        if len(kept) > 200:
+            kept.pop(0).close()
+    return kept
+
+
+@pytest.fixture
+def node(connect, eventually):
+    made = connect("panel", own_services=False)
+    made.create_publisher("/speed", "std_msgs/Float64")
+    eventually(lambda: made.publishers("/speed"))
+    return made
+
+
+def place(node):
+    """Return the ports of a node: of its API, and of its topics."""
+    api = node.publishers("/speed")[0]
+    assert api.node.full == "/panel"
+    return node._core.uri, node._core.address[1]
+
+
+@pytest.mark.parametrize("payload", [b"", b"\xff\xff\xff\xff", b"POST / HTTP/1.1\r\n", HEADER])
+def test_floods_leave_threads_and_files_and_the_node_answers(node, connect, eventually, payload):
+    uri, port = place(node)
+    for target in (port, int(uri.rsplit(":", 1)[1].strip("/"))):
+        kept = flood(target, payload)
+        try:
+            assert len(node._guests) <= 300
+            assert threading.active_count() < 250
+            assert xmlrpc.client.ServerProxy(uri).getPid("/t")[0] == 1
+            reader = connect(f"reader{target}", own_services=False).create_subscription("/speed")
+            eventually(reader.publisher_count)
+            reader.close()
+        finally:
+            for sock in kept:
+                sock.close()
+    eventually(lambda: len(node._guests) < 5)
+
+
+def test_there_are_fewer_connections_than_files(node, eventually, monkeypatch):
+    _, port = place(node)
+    node._most_guests = 50
+    header = b"".join(
+        len(field).to_bytes(4, "little") + field
+        for field in (b"callerid=/greedy", b"topic=/speed", b"type=*", b"md5sum=*")
+    )
+    hello = len(header).to_bytes(4, "little") + header
+    socks = []
+    for _ in range(80):
+        socks.append(socket.create_connection(("127.0.0.1", port), 20))
+        socks[-1].sendall(hello)
+    try:
+        eventually(lambda: len(node._guests) == 50)
+        ended = 0
+        for sock in socks:
+            sock.settimeout(20)
+            try:
+                ended += not sock.recv(1)
+            except ConnectionResetError:
+                ended += 1
+        assert ended == 30
+    finally:
+        for sock in socks:
+            sock.close()
+    eventually(lambda: not node._guests)
+    assert 100 <= ros1_node._most_guests() <= 10_000
+
+
+def test_only_this_and_the_masters_host_may_end_the_node(node, eventually):
+    uri, _ = place(node)
+    stranger = xmlrpc.client.ServerProxy(uri, transport=From("127.0.0.9"))
+    code, told, _ = stranger.shutdown("/evil", "because")
+    assert code == -1
+    assert "taken from this node's own and the master's host, not from 127.0.0.9" in told
+    assert node.status().state is not ConnectionState.CLOSED
+    assert xmlrpc.client.ServerProxy(uri).shutdown("/rosnode", "user request")[0] == 1
+    eventually(lambda: node.status().state is ConnectionState.CLOSED)
