@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from rosglass.messages import layout
 from rosglass.messages.layout import Cursor, Knowledge
-from rosglass.messages.runtime import MAX_EMPTY, too_short
+from rosglass.messages.runtime import MAX_EMPTY, read_wide, too_short
 from rosglass.messages.schema import Kind
 from rosglass.messages.source import Source, unpacker
 
@@ -275,7 +275,14 @@ class Skipper:
         var = self.var
         width = self.wire.wide if member.wide else 1
         times = f" * {width}" if width != 1 else ""
-        self.source.line(f"{var} = n{times} + {self.cursor.at()}")
+        if width == 4:
+            # Not any four bytes are a character: reading would refuse them.
+            self.source.line(f"s = {self.cursor.at()}")
+            self.source.line(f"{var} = s + n{times}")
+            check = self.source.bind(read_wide, "wide")
+            self.source.line(f"{check}(b, s, {var}, {width}, {self.wire.big})")
+        else:
+            self.source.line(f"{var} = n{times} + {self.cursor.at()}")
         self.cursor.move(var, self.cursor.known.many(width))
         self.unproved = True
 

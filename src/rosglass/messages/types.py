@@ -285,6 +285,8 @@ class MessageType:
     ) -> Message:
         """Return the message in `buffer` with every field decoded; arguments as :meth:`decode`.
 
+        Bytes left over are no error, as other versions of a type may have more fields.
+
         Raises:
             DecodeError: The buffer is no such message.
         """
@@ -296,9 +298,11 @@ class MessageType:
     ) -> None:
         """Check that `buffer` is one message and nothing else, without decoding it.
 
+        :meth:`decode_all` takes the same buffers, and those with bytes left over.
+
         Raises:
-            DecodeError: A length does not fit the buffer, or bytes are left over (up to three
-                bytes of padding are normal in CDR).
+            DecodeError: A length does not fit the buffer, a unit of a wstring is no character, or
+                bytes are left over (up to three bytes of padding are normal in CDR).
         """
         data = self._bytes(buffer)
         codec = self._codec_for(data, wire, wstring_width)
