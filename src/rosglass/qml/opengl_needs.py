@@ -27,9 +27,10 @@ _CLASSES = {
     "QQuickFramebufferObject": "QQuickFramebufferObject",
 }
 #: Cameras of robots are painted where video is not drawn; nothing else that a VideoOutput shows is.
+#: ImagePublisher takes pictures of items, which have no transparency with the software renderer.
 _WRITTEN = re.compile(
     r"\b(ShaderEffect|ShaderEffectSource|MultiEffect|RectangularShadow|View3D|WebEngineView|layer"
-    r"|MediaPlayer|Video|Camera|CaptureSession)\s*\{"
+    r"|MediaPlayer|Video|Camera|CaptureSession|ImagePublisher)\s*\{"
     r"|\b(layer\.enabled)\b"
     r"|^[ \t]*import\s+(QtGraphicalEffects|Qt5Compat\.GraphicalEffects|QtQuick\.Effects"
     r"|QtQuick\.Particles|QtQuick3D|QtQuick\.Scene3D|Qt3D|QtWebEngine|QtWebView|QtLocation"
