@@ -5,7 +5,7 @@ SHELL := /bin/bash
 BIN := .venv/bin
 export PYTHON
 
-.PHONY: help demo rviz-demo test setup lint types docs wheel bench clean
+.PHONY: help demo rviz-demo test setup dev lint types docs wheel bench clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
@@ -25,16 +25,19 @@ test: ## run lint, types, docs and all tests in both environments
 setup: ## prepare both environments without running anything
 	@scripts/setup.sh test
 
-lint: ## check style and format
+dev:
+	@scripts/setup.sh dev
+
+lint: dev ## check style and format
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check .
 
-types: ## check types strictly
+types: dev ## check types strictly
 	@$(BIN)/mypy
 
-docs: ## build the documentation into site/
+docs: dev ## build the documentation into site/
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet && echo "open site/index.html"
 
-wheel: ## build the wheel into dist/
+wheel: dev ## build the wheel into dist/
 	@$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist . && ls dist/*.whl
 
 bench: ## run every benchmark (an hour, half of it watching memory)

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Prepares a clean checkout: scripts/setup.sh demo | rviz-demo | test
+# Prepares a clean checkout: scripts/setup.sh demo | rviz-demo | dev | test
 #   demo  what `make demo` needs: .venv with rosglass and its cockpit
 #   rviz-demo  what `make rviz-demo` needs: RViz and ROS's master, .venv-system on Debian's own Python
+#   dev   what `make lint`, `make types`, `make docs` and `make wheel` need: .venv with everything
 #   test  what `make test` needs: .venv with everything, .venv-system on Debian's own Python,
 #         .venv-rclpy with real ROS 2 nodes to talk to
 # Repeatable: what is already there is left alone, so a second run needs no network and no root.
@@ -13,7 +14,7 @@ mkdir -p .stamps
 say()  { printf '==> %s\n' "$*"; }
 fail() { printf '\nrosglass set-up stopped: %s\n' "$1" >&2; shift; printf '  %s\n' "$@" >&2; exit 1; }
 
-case $purpose in demo|rviz-demo|test) ;; *) fail "unknown purpose '$purpose'" "use: scripts/setup.sh demo|rviz-demo|test" ;; esac
+case $purpose in demo|rviz-demo|dev|test) ;; *) fail "unknown purpose '$purpose'" "use: scripts/setup.sh demo|rviz-demo|dev|test" ;; esac
 
 # What Qt's wheels expect from the system, a virtual screen, and a font.
 apt_demo=(xvfb xauth libegl1 libgl1 libopengl0 libxkbcommon-x11-0 libdbus-1-3 libfontconfig1 libglib2.0-0
@@ -131,9 +132,10 @@ case $purpose in
     # Once it was made for the tests, keep it complete.
     if [ -f .venv/.rosglass-dev ]; then make_venv .venv-system /usr/bin/python3 "$system_extras" --system-site-packages
     else make_venv .venv-system /usr/bin/python3 images --system-site-packages; fi ;;
-  test)
+  dev|test)
     make_venv .venv "$python" dev
-    touch .venv/.rosglass-dev
+    touch .venv/.rosglass-dev ;;&
+  test)
     [ -x /usr/bin/python3 ] || fail "/usr/bin/python3 is missing" "the RViz environment needs Debian's own Python 3"
     make_venv .venv-system /usr/bin/python3 "$system_extras" --system-site-packages
     make_rclpy_venv ;;

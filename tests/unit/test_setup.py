@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -44,20 +45,46 @@ def test_no_such_python(checkout: Path) -> None:
 def test_unknown_purpose(checkout: Path) -> None:
     done = set_up(checkout, "fly")
     assert done.returncode == 1
-    assert "use: scripts/setup.sh demo|rviz-demo|test" in done.stderr
+    assert "use: scripts/setup.sh demo|rviz-demo|dev|test" in done.stderr
+
+
+NO_NETWORK = {
+    "PYTHON": "/usr/bin/python3",
+    "PIP_INDEX_URL": "http://127.0.0.1:9/simple",
+    "PIP_RETRIES": "0",
+    "PIP_CONFIG_FILE": os.devnull,
+    "PIP_EXTRA_INDEX_URL": "",
+    "PIP_FIND_LINKS": "",
+}
 
 
 def test_no_network(checkout: Path) -> None:
-    env = {
-        "PYTHON": "/usr/bin/python3",
-        "PIP_INDEX_URL": "http://127.0.0.1:9/simple",
-        "PIP_RETRIES": "0",
-        "PIP_CONFIG_FILE": os.devnull,
-        "PIP_EXTRA_INDEX_URL": "",
-        "PIP_FIND_LINKS": "",
-    }
-    done = set_up(checkout, "demo", **env)
+    done = set_up(checkout, "demo", **NO_NETWORK)
     assert done.returncode == 1
     assert "PyPI could not be reached" in done.stderr
     assert "run this again" in done.stderr
     assert not (checkout / ".venv/.rosglass").exists()
+
+
+@pytest.mark.parametrize("target", ["lint", "types", "docs", "wheel"])
+def test_make_sets_up_what_it_needs(checkout: Path, target: str) -> None:
+    shutil.copy(ROOT / "Makefile", checkout)
+    done = subprocess.run(
+        ["make", target],
+        check=False,
+        cwd=checkout,
+        env=os.environ | NO_NETWORK,
+        capture_output=True,
+        text=True,
+        timeout=100,
+    )
+    assert "installing Python packages into .venv (rosglass[dev]" in done.stdout
+    assert "rosglass set-up stopped" in done.stderr
+    assert "not found" not in done.stderr
+    assert "No such file" not in done.stderr
+
+
+def test_what_the_readme_installs_is_enough_for_the_commands_that_it_shows() -> None:
+    project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    (cockpit,) = re.findall(r'^cockpit = \["rosglass\[(.*)\]"\]', project, re.MULTILINE)
+    assert {"zenoh", "dds", "qml", "camera", "bags"} <= set(cockpit.split(","))

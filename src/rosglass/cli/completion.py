@@ -91,8 +91,9 @@ class _Completer:
     def _ask(self, args: argparse.Namespace) -> Iterable[str]:
         import rosglass
         from rosglass.cli.connecting import wait
+        from rosglass.cli.network import nearby_url
 
-        url = getattr(args, "url", "") or None
+        url = getattr(args, "url", "") or nearby_url() or None
         with rosglass.connect(url, own_services=False) as node:
 
             def others() -> list[str]:

@@ -63,7 +63,8 @@ def add_connection_options(
         "--url",
         default="",
         help="address of the robot, e.g. zenoh://192.168.1.5:7447, dds://?domain=5 or "
-        "ros1://192.168.1.5:11311; default: ROSGLASS_URL, or what ROS's own variables say",
+        "ros1://192.168.1.5:11311; default: ROSGLASS_URL, or what ROS's own variables say, or the "
+        "Zenoh router or ROS 1 master of this machine",
     )
     group.add_argument(
         "--node-name", default="", metavar="NAME", help="default: one that nobody else has"
@@ -82,7 +83,7 @@ def add_connection_options(
             else f"(default: {TIMEOUT:g}), and for each message (default: for ever)"
         ),
     )
-    parser.set_defaults(ros_arguments=[])
+    parser.set_defaults(ros_arguments=[], looks_nearby=True)
 
 
 def add_definitions_option(parser: argparse._ActionsContainer) -> None:

@@ -70,6 +70,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     add_output_options(parser)
     add_connection_options(parser, timeout=5.0)
+    parser.set_defaults(looks_nearby=False)  # it says what is there
 
 
 def run(args: argparse.Namespace) -> int:

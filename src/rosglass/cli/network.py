@@ -6,10 +6,14 @@ import os
 import socket
 import struct
 import sys
+from contextlib import suppress
+from importlib.util import find_spec
 from typing import NamedTuple
 from urllib.parse import urlsplit
 
-__all__ = ["Interface", "ask", "interfaces", "is_loopback", "refused", "roscore"]
+from rosglass.errors import Error
+
+__all__ = ["Interface", "ask", "interfaces", "is_loopback", "nearby_url", "refused", "roscore"]
 
 #: Seconds that somebody who refuses may take to do so.
 _KNOCK = 1.0
@@ -51,6 +55,27 @@ def is_loopback(url: str) -> bool:
     """Return whether an URL names this machine, if only by leaving the host out."""
     host = urlsplit(url).hostname or ""
     return host in ("", "localhost", "::1") or host.startswith("127.")
+
+
+def nearby_url() -> str:
+    """Return where a Zenoh router or ROS 1 master of this machine listens; empty for nowhere.
+
+    It is for commands that nothing says to where the robot is; also empty where something does.
+    """
+    from rosglass.connection import default_url
+
+    with suppress(Error):
+        default_url(os.environ)
+        return ""
+    if os.environ.get("RMW_IMPLEMENTATION"):  # one that is not known
+        return ""
+    for port, url in ((_PORT, "zenoh://127.0.0.1:7447"), (11311, "ros1://127.0.0.1:11311")):
+        if url.startswith("zenoh:") and find_spec("zenoh") is None:
+            continue
+        with suppress(OSError):
+            socket.create_connection(("127.0.0.1", port), _KNOCK).close()
+            return url
+    return ""
 
 
 def roscore(host: str, port: int) -> str:

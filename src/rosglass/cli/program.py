@@ -151,6 +151,8 @@ def _run(arguments: list[str]) -> int:
     args.arguments, args.ros_arguments = rest, told
     level = {0: logging.WARNING, 1: logging.INFO}.get(args.verbose, logging.DEBUG)
     logging.basicConfig(level=level, format="%(levelname)s %(name)s: %(message)s")
+    if getattr(args, "looks_nearby", False) and not args.url:
+        args.url = _nearby_url()
     for folder in getattr(args, "definitions", ()):
         import_module("rosglass.messages").default_library().add_path(folder)
     try:
@@ -161,6 +163,16 @@ def _run(arguments: list[str]) -> int:
 
             return _fail(spelled_ros1(str(error)))
         raise
+
+
+def _nearby_url() -> str:
+    from rosglass.cli.network import nearby_url
+    from rosglass.cli.output import note
+
+    url = nearby_url()
+    if url:
+        note(f"nothing says where the robot is: using {url} (export ROSGLASS_URL={url} says so)")
+    return url
 
 
 def _prepare_output() -> None:

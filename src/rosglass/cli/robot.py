@@ -10,6 +10,7 @@ import time
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from rosglass.cli.output import note
 from rosglass.comm import ConnectionState
 
 if TYPE_CHECKING:
@@ -72,6 +73,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the robot until it is told to end."""
     import rosglass
+    from rosglass.cli.network import refused
     from rosglass.demo.robot import Robot, RobotOptions
 
     options = RobotOptions(
@@ -94,6 +96,9 @@ def run(args: argparse.Namespace) -> int:
             full = f"{node.namespace.rstrip('/')}/{node.name}"
             print(f"robot: simulated, node {full} on {args.url}; Ctrl-C ends it", flush=True)
             _tell(node.status())
+            refusal = refused(args.url)
+            if refusal is not None:
+                note(f"{args.url}: {refusal[0]}; {refusal[1]}. Waiting for it")
             duplicate = threading.Event()
             # One that was killed may still be seen, but sends nothing.
             watch = node.create_subscription(

@@ -46,7 +46,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--url",
         default="",
         help="address of the robot, e.g. zenoh://192.168.1.5:7447, or replay:FILE for a "
-        "recording; default: ROSGLASS_URL",
+        "recording; default: ROSGLASS_URL, or what ROS's own variables say, or the Zenoh router "
+        "or ROS 1 master of this machine",
     )
     parser.add_argument("--name", default="", help="node name, instead of the one in the file")
     parser.add_argument(
@@ -70,7 +71,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     add_longest_script(parser)
     add_screenshot(parser, "the window", after=2.0)
     add_definitions_option(parser)
-    parser.set_defaults(arguments=[], ros_arguments=[])
+    parser.set_defaults(arguments=[], ros_arguments=[], looks_nearby=True)
     parser.epilog = (
         "What follows --ros-args is for ROS, as with ros2 run: -r chatter:=talk, -p speed:=1.5 and "
         "the like. Arguments after -- are the interface's own, in Qt.application.arguments."

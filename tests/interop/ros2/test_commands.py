@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import json
 import signal
+import socket
+import subprocess
+import sys
 import threading
 import time
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
+import rosglass
 from rosglass.comm import QoS
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from rosglass.comm import Node, ServerGoal
 
 FIBONACCI = "example_interfaces/action/Fibonacci"
@@ -27,8 +30,6 @@ BOTH = pytest.mark.parametrize("robot", ["zenoh", "dds"], indirect=True)
 @pytest.fixture(scope="module")
 def robot(request: pytest.FixtureRequest) -> Any:
     """A node with one of everything; yields it."""
-    import rosglass
-
     if getattr(request, "param", "zenoh") == "zenoh":
         url = request.getfixturevalue("router").url
     else:
@@ -325,3 +326,64 @@ def test_as_users_of_ros2_write_it(run: Any) -> None:
     assert count > 5
     assert json.loads(run("topic", "list", "--count-topics", "--json")[1]) == {"count": count}
     assert run("param", "set", "/lab/robot", "speed", "-2.5")[0] == 0
+
+
+# -- where nothing says where the robot is ---------------------------------------------------------
+
+
+@pytest.fixture
+def nothing_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("ROSGLASS_URL", "RMW_IMPLEMENTATION", "ROS_DISTRO", "ROS_DOMAIN_ID",
+                 "ROS_MASTER_URI", "CYCLONEDDS_URI", "ZENOH_SESSION_CONFIG_URI"):  # fmt: skip
+        monkeypatch.delenv(name, raising=False)
+
+
+#: In a network of its own: others' commands must not find this router.
+NEARBY = """
+import rosglass
+from rosglass.cli import main
+from rosglass.ros2.zenoh.router import Router
+
+with Router("tcp/127.0.0.1:7447"), rosglass.connect("zenoh://127.0.0.1:7447", "robot") as node:
+    node.create_publisher("/nearby", "std_msgs/msg/String")
+    node.parameters.declare("speed", 1.5)
+    assert main(["topic", "list"]) == main(["param", "get", "/robot", "speed"]) == 0
+"""
+
+
+@pytest.mark.usefixtures("nothing_said")
+def test_the_router_of_this_machine_is_used() -> None:
+    private = Path(__file__).parents[3] / "scripts/private_network.sh"
+    done = subprocess.run(
+        [str(private), sys.executable, "-c", NEARBY],
+        check=True,
+        capture_output=True,
+        text=True,
+        timeout=100,
+    )
+    assert "/nearby" in done.stdout.splitlines()
+    assert done.stdout.endswith("1.5\n")
+    told = "rosglass: nothing says where the robot is: using zenoh://127.0.0.1:7447 (export"
+    assert done.stderr.count(told) == 2
+
+
+@pytest.mark.usefixtures("nothing_said")
+def test_what_the_environment_says_is_not_overruled(
+    run_command: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_email_cpp")
+    code, _, err = run_command("topic", "list")
+    assert code == 1
+    assert "RMW_IMPLEMENTATION=rmw_email_cpp is not known" in err
+
+
+def test_a_robot_alone_names_what_it_waits_for(start_command_at: Any) -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    url = f"zenoh://127.0.0.1:{port}"
+    robot = start_command_at(url, "robot", "--url", url, "--fps", "1")
+    line = robot.stderr.readline()
+    assert line.startswith(f"rosglass: {url}: 127.0.0.1 is there, but nothing listens on its port")
+    assert f"rosglass router --listen tcp/127.0.0.1:{port}" in line
+    assert "Waiting for it" in line
