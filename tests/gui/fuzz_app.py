@@ -97,7 +97,6 @@ ENUMS = {
     "ActionCommStates",
     "ActionGoalStatus",
     "ActionTerminalStates",
-    "Ros2ClockTypes",
     "Ros2LoggerLevel",
     "RosConsoleLevels",
     "RosInitOptions",

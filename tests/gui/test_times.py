@@ -33,7 +33,11 @@ def header(bench: Any, script: str, module: int = 2, ros: int = 2) -> Any:
         (2, "'t = ' + m.stamp.seconds", "t = 12.345678901"),
         (2, "[m.stamp.seconds < 13, m.stamp.seconds > 13]", [True, False]),
         (2, "m.stamp.seconds", 12.345678901),
-        (2, "[m.stamp.clockType() === 1, m.stamp.clockType == 1]", [True, True]),
+        (
+            2,
+            "[m.stamp.clockType() == 1, m.stamp.clockType == 1, m.stamp.clockType]",
+            [True, True, 1],
+        ),
         (1, "[m.stamp.isZero(), m.stamp.toJSDate().getTime()]", [False, 12345]),
         (1, "m.stamp.getTime()", 12345),
         (1, "[m.stamp.getMilliseconds(), m.stamp.getSeconds()]", [345, 12]),
@@ -166,6 +170,24 @@ def test_arithmetic_with_anything_else_throws(bench: Any, script: str) -> None:
         ("Ros2.duration(-0.5)", {"sec": -1, "nanosec": 500_000_000}),
         ("Ros2.duration(90).seconds()", 90),
         ("Ros2.time(1).clockType() === Ros2ClockTypes.Ros", True),
+        ("Ros2.time(1).clockType === Ros2ClockTypes.Ros", True),
+        ("Ros2.now().clockType === Ros2ClockTypes.System", False),
+        ("Ros2.now().clockType() === Ros2ClockTypes.Uninitialized", False),
+        (
+            (
+                "[Ros2ClockTypes.Uninitialized, Ros2ClockTypes.Ros, Ros2ClockTypes.System,"
+                " Ros2ClockTypes.Steady]"
+            ),
+            [0, 1, 2, 3],
+        ),
+        ("Ros2ClockTypes.Ros == 1 && 'type ' + Ros2ClockTypes.Steady", "type 3"),
+        (
+            (
+                "(function (t) { switch (t.clockType) { case Ros2ClockTypes.System: return 2;"
+                " case Ros2ClockTypes.Ros: return 'ros' } })(Ros2.now())"
+            ),
+            "ros",
+        ),
     ],
 )
 def test_times_can_be_made(bench: Any, script: str, expected: Any) -> None:

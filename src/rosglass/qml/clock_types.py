@@ -1,22 +1,23 @@
-"""The enumeration ``Ros2ClockTypes``."""
+"""The singleton ``Ros2ClockTypes``."""
 
 from __future__ import annotations
 
-from enum import IntEnum
-
-from rosglass.qt import QtCore
+from rosglass.qml.runtime import own_runtime
+from rosglass.qt import Property, QJSValue, QtCore
 
 __all__ = ["ClockTypes"]
 
 
 class ClockTypes(QtCore.QObject):
-    """Kinds of clocks; their numbers are rcl's (``rcl_clock_type_t``)."""
+    """Kinds of clocks; their numbers are rcl's (``rcl_clock_type_t``).
 
-    @QtCore.QEnum
-    class Type(IntEnum):
-        """Where a time comes from."""
+    They are what ``clockType`` of a time is, as property (Qt 5's plugin) and as function (Qt 6's).
+    """
 
-        Uninitialized = 0
-        Ros = 1
-        System = 2
-        Steady = 3
+    def _get(self, number: int) -> QJSValue:
+        return own_runtime(self).clock(number)
+
+    Uninitialized = Property(QJSValue, lambda self: self._get(0), constant=True)
+    Ros = Property(QJSValue, lambda self: self._get(1), constant=True)
+    System = Property(QJSValue, lambda self: self._get(2), constant=True)
+    Steady = Property(QJSValue, lambda self: self._get(3), constant=True)

@@ -166,7 +166,7 @@
 
     return {
         build: build, buildWithNan: buildWithNan, shape: shape,
-        makeTime: times.make, createTime: times.create, timeParts: times.parts,
+        makeTime: times.make, clock: times.clock, createTime: times.create, timeParts: times.parts,
         makeQos: makeQos, makeOptions: makeOptions, forgetAbsent: forgetAbsent
     }
 })

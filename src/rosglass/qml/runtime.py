@@ -45,6 +45,7 @@ _HELPERS = (
     "makeTime",
     "createTime",
     "timeParts",
+    "clock",
     "makeQos",
     "makeOptions",
     "forgetAbsent",
@@ -213,6 +214,10 @@ class Runtime(QtCore.QObject):
         arguments = [self.value(dialect.ros), self.value(kind), first, second]
         result: QJSValue = self._helper["createTime"].call(arguments)
         return result
+
+    def clock(self, number: int) -> QJSValue:
+        """Return the kind of clock that times of JavaScript have, by rcl's number."""
+        return self._call("clock", [self.value(number)])
 
     def options(self) -> QJSValue:
         """Return an empty set of init options."""

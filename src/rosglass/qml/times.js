@@ -18,6 +18,18 @@
         return Object.setPrototypeOf(function () { return value }, number)
     }
 
+    // A kind of clock: one object for each, the same whether `t.clockType` is called or not, so that
+    // === with Ros2ClockTypes holds for both.
+    function clock(value) {
+        const made = function () { return made }
+        return Object.setPrototypeOf(made, prototype(Function.prototype, {
+            valueOf: function () { return value },
+            toString: function () { return String(value) },
+            toJSON: function () { return value }
+        }))
+    }
+    const clocks = [clock(0), clock(1), clock(2), clock(3)]
+
     // What is within an object that is shown may have no end.
     function flat(key, inner) {
         return key !== "" && inner !== null && typeof inner === "object" ? "..." : inner
@@ -155,10 +167,10 @@
     for (const name of ["getDate", "getDay", "getFullYear", "getHours", "getMilliseconds", "getMinutes",
                         "getMonth", "getSeconds", "getTime", "getYear"])
         ros1[name] = function () { return toDate.call(this)[name]() }
-    const CLOCK = 1  // Ros2ClockTypes.Ros
+    const ROS_CLOCK = clocks[1]
     const kinds = {
         time2: getters(prototype(common, { "#kind": "time", "#make": make2, toJSDate: toDate }),
-            Object.assign({ clockType: function () { return both(CLOCK) } }, ros2)),
+            Object.assign({ clockType: function () { return ROS_CLOCK } }, ros2)),
         duration2: getters(prototype(common, {
             "#kind": "duration", "#make": make2, multiply: times,
             toJSDuration: function () { return milliseconds(this) }
@@ -213,5 +225,5 @@
     }
 
     return { kinds: kinds, make: function (d, k, s, n) { return maker(d)(k, s, n) }, create: create,
-             parts: parts }
+             parts: parts, clock: function (type) { return clocks[type] } }
 })

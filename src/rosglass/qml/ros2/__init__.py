@@ -26,6 +26,7 @@ __all__ = ["NATIVE", "TYPES"]
 NATIVE = {
     "TfTransformListenerNative": TfTransformListener,
     "AmentIndexNative": AmentIndex,
+    "Ros2ClockTypesNative": ClockTypes,
     "Ros2Native": Ros2,
     "ImageTransportManagerNative": ImageTransportManager,
 }
@@ -44,7 +45,6 @@ TYPES = {
     "ImageItem": ImageItem,
     "MessageItemModel": MessageItemModel,
     "Ros2LoggerLevel": LoggerLevel,
-    "Ros2ClockTypes": ClockTypes,
     "ActionGoalStatus": ActionGoalStatus,
     "ActionServer": ActionServer,
 }

@@ -1,0 +1,4 @@
+pragma Singleton
+import Ros2.Native 1.0
+
+Ros2ClockTypesNative {}
