@@ -166,6 +166,34 @@ def test_big_messages_both_ways(peer, node, wait_for, size):
     assert bytes(got[0].data) == data
 
 
+@pytest.mark.parametrize(
+    ("width", "height", "rate", "count"), [(640, 480, 30, 120), (1920, 1080, 15, 45)]
+)
+def test_rclpy_receives_every_picture(peer, node, wait_for, width, height, rate, count):
+    """Its socket holds 208 kB by default; bursts of ours overran that again and again."""
+    topic = f"/camera{width}"
+    do(peer, "subscribe", topic=topic, type=IMAGE, quiet=True)
+    picture = rosglass.load(IMAGE).create(
+        height=height, width=width, encoding="rgb8", step=3 * width, data=bytes(3 * width * height)
+    )
+    with node.create_publisher(topic, IMAGE) as publisher:
+        wait_for(publisher.subscription_count)
+        ended = threading.Event()
+        sent: list[int] = []
+
+        def publish() -> None:
+            publisher.publish(picture)
+            sent.append(1)
+            if len(sent) == count:
+                timer.close()
+                ended.set()
+
+        timer = node.create_timer(1 / rate, publish)
+        assert ended.wait(120)
+        arrived = [peer.event(f"received {topic}", 20, otherwise=None) for _ in range(count)]
+    assert sum(one is not None for one in arrived) == count
+
+
 # -- services --------------------------------------------------------------------------------------
 
 

@@ -23,8 +23,8 @@ def ours(url="dds://", **env):
 
 def test_big_messages_get_big_datagrams_and_room():
     domain = ours()
-    assert domain.findtext("General/MaxMessageSize") == "65500B"
-    assert domain.findtext("General/FragmentSize") == "65000B"
+    assert domain.findtext("General/MaxMessageSize") == "31000B"
+    assert domain.findtext("General/FragmentSize") == "30700B"
     assert domain.find("Internal/SocketReceiveBufferSize").attrib == {
         "min": "default",
         "max": "10MB",
