@@ -45,6 +45,13 @@ class RosbagsBag(Bag):
                 "(.mcap), ROS 2 bags (a folder with metadata.yaml, .db3) and ROS 1 bags (.bag)"
             ) from error
         self._open = True
+        try:
+            self._index()
+        except Exception as error:  # metadata of other kinds than the format has
+            self.close()
+            raise BagError(f"{path} is damaged: {_words(error)}") from error
+
+    def _index(self) -> None:
         wire = "ros1" if isinstance(self._reader, Reader) or not self._reader.is2 else "cdr"
         grouped: dict[Channel, list[Any]] = {}
         for connection in self._reader.connections:
