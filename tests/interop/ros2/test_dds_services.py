@@ -376,6 +376,16 @@ def test_rubbish_is_named_once_and_disturbs_nobody(
     rubbish.end()
 
 
+def test_replies_to_what_nobody_asked_are_taken_by_nobody(node, types, start, dds_domain):
+    plan = {"domain": dds_domain, "service": "/foreign", "foreign": 50}
+    peer = start(str(PEERS / "dds_foreign_replies_peer.py"), json.dumps(plan))
+    client = ready(node.create_service_client("/foreign", types[ADD]))
+    for number in range(20):
+        assert client.call({"a": number, "b": 1}, timeout=30).sum == number + 1
+    assert max(peer.event("sent") for _ in range(20)) == 20 * 50
+    peer.end()
+
+
 def test_a_reply_from_the_main_thread_goes_out(node, types, peer, wait_for):
     """Where a signal's exception must not end up in Cyclone DDS."""
     waiting: list[Any] = []
