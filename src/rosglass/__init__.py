@@ -6,9 +6,8 @@ in QML. Start with :func:`connect` and :func:`load`, or with ``rosglass --help``
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING
-
+# Nothing is imported before the command can answer Ctrl-C; type checkers know this name.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from rosglass.comm import Duration, Node, QoS, Time
     from rosglass.connection import connect
@@ -123,6 +122,8 @@ _PACKAGES = (
 
 def __getattr__(name: str) -> object:
     # Imported on first use, so that `import rosglass` and `rosglass --help` stay quick.
+    from importlib import import_module  # noqa: PLC0415
+
     if name in _PACKAGES:
         return import_module(f"rosglass.{name}")
     module = _HOME_OF.get(name, "rosglass.errors" if name in __all__ else "")

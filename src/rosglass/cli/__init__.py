@@ -5,7 +5,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-__all__ = ["is_interrupt", "main"]
+__all__ = ["end_at_once", "is_interrupt", "main"]
 
 
 def main(argv: "Sequence[str] | None" = None) -> int:
@@ -13,9 +13,22 @@ def main(argv: "Sequence[str] | None" = None) -> int:
 
     Returns:
         The exit code: 0 done, 1 failed, 2 wrong usage, 130 ended by Ctrl-C, 143 by SIGTERM, 141
-        when whoever read the output went away.
+        when whoever read the output went away. Ctrl-C while a command is still being loaded ends
+        the process at once.
     """
     try:
+        import signal
+
+        # Modules in C swallow the KeyboardInterrupt that is raised in them, or abort the process.
+        # `run` gives it back to commands that load none of Qt.
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler and _is_main_thread():
+            signal.signal(signal.SIGINT, end_at_once)
+            try:
+                from rosglass.cli.program import run
+
+                return run(argv)
+            finally:
+                signal.signal(signal.SIGINT, signal.default_int_handler)
         from rosglass.cli.program import run
 
         return run(argv)
@@ -27,6 +40,19 @@ def main(argv: "Sequence[str] | None" = None) -> int:
         # Whatever still ends now can be cut short by pressing it again.
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         return 130
+
+
+def end_at_once(*_: object) -> None:
+    """End the process as by Ctrl-C; a signal handler."""
+    import os
+
+    os._exit(130)
+
+
+def _is_main_thread() -> bool:
+    import threading
+
+    return threading.current_thread() is threading.main_thread()
 
 
 def is_interrupt(error: "BaseException | None") -> bool:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import io
 import logging
 import os
+import signal
 import sys
 from contextlib import suppress
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 import rosglass
-from rosglass.cli import is_interrupt
+from rosglass.cli import end_at_once, is_interrupt
 from rosglass.cli.completion import is_completing, offer
 from rosglass.cli.output import EscapingStream
 from rosglass.cli.subcommands import Parser, add_verbose
@@ -45,6 +46,8 @@ COMMANDS = {
 }
 
 
+#: Commands that load Qt: Ctrl-C ends the process until they handle it themselves.
+_WITH_QT = ("run", "rviz", "demo")
 #: What users of ``ros2`` type -> what it is here.
 _AS_IN_ROS2: dict[tuple[str, ...], list[str]] = {
     ("bag", "record"): ["record"],
@@ -155,8 +158,11 @@ def _run(arguments: list[str]) -> int:
         args.url = _nearby_url()
     for folder in getattr(args, "definitions", ()):
         import_module("rosglass.messages").default_library().add_path(folder)
+    command_run = import_module(COMMANDS[args.command][0]).run
+    if args.command not in _WITH_QT and signal.getsignal(signal.SIGINT) is end_at_once:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        return int(import_module(COMMANDS[args.command][0]).run(args))
+        return int(command_run(args))
     except rosglass.Error as error:
         if getattr(args, "ros1", hasattr(args, "url") and names_ros1(args)):
             from rosglass.interfaces.names import spelled_ros1

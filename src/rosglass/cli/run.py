@@ -223,6 +223,11 @@ def show(
     gc.disable()
     try:
         return _show(file, screenshot, after, verbose, end_process, longest_script, options)
+    except SystemExit as end:
+        # Of a signal before anything was shown: what there is would be taken down in any order.
+        if end_process and isinstance(end.code, int):
+            os._exit(end.code)
+        raise
     finally:
         gc.enable()
         # PySide takes down what is left in any order at the end of the program, and may crash.

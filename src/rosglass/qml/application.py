@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import Handle
@@ -20,7 +21,7 @@ from rosglass.qml.session import Session
 from rosglass.qt import QtCore, QtGui, QtQml, QtQuick, optional, run_event_loop
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
 __all__ = ["Application"]
@@ -64,6 +65,7 @@ class Application(Handle):
         Error: This is not the main thread, or the Qt application is one without windows; `session`
             is given together with what describes one; a name in `context` is none that QML can
             write; there is no such `renderer`, or another window has chosen another one.
+        SystemExit: Ctrl-C was pressed meanwhile (130), or SIGTERM came (143).
     """
 
     def __init__(
@@ -91,36 +93,40 @@ class Application(Handle):
             if not word.isidentifier() or word[0].isupper():
                 raise Error(f"context: QML cannot use the name {word!r}: expected e.g. {'arm'!r}")
         path = interface_file(file)
-        warn_on_terminal(LocationFormatter())
-        #: The Qt application.
-        self.qt: Any = QtCore.QCoreApplication.instance() or _qt_application(path, arguments)
-        if not isinstance(self.qt, QtGui.QGuiApplication):
-            raise Error("the program's Qt application can open no window: make a QGuiApplication")
-        self._owns_session = session is None
-        #: The node that QML talks through.
-        self.session = session or Session(
-            url or os.environ.get("ROSGLASS_URL", ""), name, arguments=ros_arguments
-        )
-        try:
-            choice.prefer(renderer)
-            if not allow_network:
-                close_network()
-            self._runner = Runner(
-                path,
-                self.session,
-                watch=watch,
-                fullscreen=fullscreen,
-                kiosk=kiosk,
-                import_paths=import_paths,
+        # KeyboardInterrupt, raised in what Qt calls, would be swallowed there.
+        with _signals_put_off():
+            warn_on_terminal(LocationFormatter())
+            #: The Qt application.
+            self.qt: Any = QtCore.QCoreApplication.instance() or _qt_application(path, arguments)
+            if not isinstance(self.qt, QtGui.QGuiApplication):
+                raise Error(
+                    "the program's Qt application can open no window: make a QGuiApplication"
+                )
+            self._owns_session = session is None
+            #: The node that QML talks through.
+            self.session = session or Session(
+                url or os.environ.get("ROSGLASS_URL", ""), name, arguments=ros_arguments
             )
-        except Error:
-            self._close_session()
-            raise
-        # QML does not keep them.
-        self._context = dict(context or {})
-        for word, value in self._context.items():
-            self.engine.rootContext().setContextProperty(word, value)
-        self._loaded = self._closed = False
+            try:
+                choice.prefer(renderer)
+                if not allow_network:
+                    close_network()
+                self._runner = Runner(
+                    path,
+                    self.session,
+                    watch=watch,
+                    fullscreen=fullscreen,
+                    kiosk=kiosk,
+                    import_paths=import_paths,
+                )
+            except Error:
+                self._close_session()
+                raise
+            # QML does not keep them.
+            self._context = dict(context or {})
+            for word, value in self._context.items():
+                self.engine.rootContext().setContextProperty(word, value)
+            self._loaded = self._closed = False
 
     @property
     def engine(self) -> QtQml.QQmlEngine:
@@ -145,6 +151,10 @@ class Application(Handle):
         Raises:
             QmlError: The file has errors; the message lists them as ``file:line:column: text``.
         """
+        with _signals_put_off():
+            self._load()
+
+    def _load(self) -> None:
         if not self._loaded:
             self._loaded = True
             self._runner.load()
@@ -189,7 +199,7 @@ class Application(Handle):
 
         with QuitOnSignal(interrupted, _PATIENCE):
             try:
-                self.load()
+                self._load()
                 code = self._runner.exit_code
                 # A call that waits may have been told to end before there was a loop to do so.
                 if code is None:
@@ -213,6 +223,20 @@ class Application(Handle):
     def _close_session(self) -> None:
         if self._owns_session:
             self.session.close()
+
+
+@contextmanager
+def _signals_put_off() -> Iterator[None]:
+    """Put Ctrl-C and SIGTERM off until the end, but for no more than :data:`_PATIENCE`.
+
+    Raises:
+        SystemExit: One came; with its exit code, as :meth:`Application.run` returns it.
+    """
+    received: list[int] = []
+    with QuitOnSignal(received.append, _PATIENCE):
+        yield
+    if received:
+        raise SystemExit(128 + received[0])
 
 
 def _qt_application(file: Path, arguments: Sequence[str]) -> QtGui.QGuiApplication:

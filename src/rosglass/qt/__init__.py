@@ -13,6 +13,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import UnsupportedError
+from rosglass.qt.interrupts import defer_interrupts
 
 __all__ = [
     "BINDING",
@@ -104,6 +105,7 @@ def _load(module: str = "") -> Any:
         raise UnsupportedError(f"{error}; {_INSTALL_QT5}") from None
 
 
+defer_interrupts()
 _refuse_broken_binding(BINDING, tuple(_load().__version_info__[:3]))
 
 if TYPE_CHECKING:

@@ -1,0 +1,72 @@
+"""Ctrl-C while a program is being started: Qt's bindings must neither swallow it nor abort."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+#: How a shell tells it: by the exit code, or the signal that ended the process.
+INTERRUPTED = {130, -signal.SIGINT}
+STARTS = 12
+FILE = """import QtQuick 2.15
+import QtQuick.Controls 2.15
+import Ros2 1.0
+Item {
+    Component.onCompleted: Ros2.init("ui")
+    Subscription { id: sub; topic: "/chatter" }
+    Button { text: "Stop" }
+}
+"""
+SCRIPT = """import sys
+print("started", flush=True)
+from rosglass.qml import Application
+sys.exit(Application({file!r}, url="dds://?domain=97").run())
+"""
+#: Says when it is `rosglass` that is to answer: what comes before is Python's own.
+COMMAND = """import sys
+from rosglass.cli import main
+print("started", flush=True)
+sys.exit(main(["run", {file!r}, "--url", "dds://?domain=97"]))
+"""
+
+
+@pytest.mark.parametrize("program", [COMMAND, SCRIPT], ids=["command", "script"])
+def test_ctrl_c_at_any_moment_of_the_start_ends_it(
+    program: str, tmp_path: Path, platform: dict[str, str]
+) -> None:
+    file, script = tmp_path / "Main.qml", tmp_path / "program.py"
+    file.write_text(FILE)
+    script.write_text(program.format(file=str(file)))
+    environment = os.environ | platform
+    moments = random.Random(7)
+    for start in range(STARTS):
+        process = subprocess.Popen(
+            [sys.executable, str(script)],
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        assert process.stdout is not None
+        assert process.stdout.readline() == "started\n"
+        time.sleep(moments.uniform(0, 1.2 * start / STARTS))
+        process.send_signal(signal.SIGINT)
+        try:
+            _, said = process.communicate(timeout=30)
+        finally:
+            process.kill()
+        assert process.returncode in INTERRUPTED, said
+        assert "ImportError" not in said
+        assert "Fatal" not in said
+        if program is COMMAND:
+            assert "Traceback" not in said
