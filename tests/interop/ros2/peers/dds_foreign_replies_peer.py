@@ -59,7 +59,7 @@ while True:
         client, number = request.client, request.number
         for turn in range(plan["foreign"]):
             other = chance.getrandbits(64) if turn % 2 else client
-            near = chance.choice((-(2**63), -1, 0, number - 1, number + 1, number + 2, 2**63 - 1))
+            near = chance.choice((-(2**63), -1, 0, number - 1, number + 1000, 2**63 - 1))
             replies.write(Response(other, number if other != client else near, -1))
             sent += 1
         for _ in range(2):
