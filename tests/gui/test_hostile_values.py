@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import pytest
 from values import convert, show
 
 from rosglass.errors import ConversionError
+from rosglass.messages import MessageType
+from rosglass.qml.dialect import Dialect
+from rosglass.qml.from_js import fields_from_js
+from rosglass.qml.runtime import runtime_of
 
 SCAN, HEADER = "sensor_msgs/msg/LaserScan", "std_msgs/msg/Header"
 #: A few values, each in the next one twice: who follows them all never comes to the end.
@@ -135,3 +140,30 @@ def test_what_is_used_twice_is_written_twice(bench: Any, tmp_path: Any) -> None:
     file = tmp_path / "twice.yaml"
     assert bench.run(f"const a = {{x: [1]}}; return Ros2.io.writeYaml('{file}', [a, {{b: a}}])")
     assert bench.run(f"return Ros2.io.readYaml('{file}')") == [{"x": [1]}, {"b": {"x": [1]}}]
+
+
+LARGE = {
+    "two in the next, 8 levels": "T1 a\nT1 b"
+    + "".join(f"\n===\nMSG: t/T{at}\nT{at + 1} a\nT{at + 1} b" for at in range(1, 9))
+    + "\n===\nMSG: t/T9\nuint8 x",
+    "two sequences in the next, 8 levels": "T1[] a\nT1[] b"
+    + "".join(f"\n===\nMSG: t/T{at}\nT{at + 1}[] a\nT{at + 1}[] b" for at in range(1, 9))
+    + "\n===\nMSG: t/T9\nuint8 x",
+    "2999 texts": "\n".join(f"string s{at}" for at in range(2999)),
+    "2999 sequences": "\n".join(f"float64[] s{at}" for at in range(2999)),
+    "990 messages": "\n".join(f"T m{at}" for at in range(990))
+    + "\n===\nMSG: t/T\nstring x\nuint8 y",
+    "49999 messages": "T[49999] m\n===\nMSG: t/T\nuint8 y",
+}
+
+
+@pytest.mark.parametrize("shape", LARGE)
+def test_the_largest_types_go_to_javascript_and_back(bench: Any, shape: str) -> None:
+    kind = MessageType.from_text("t/msg/Root", LARGE[shape])
+    message = kind.create()
+    begun = time.process_time()
+    shown = runtime_of(bench.engine).message(message)
+    there = fields_from_js(shown, message._schema__, dialect=Dialect.ROS2)
+    assert kind.encode(there) == kind.encode(message)
+    # A second is the aim, on a machine that has nothing else to do.
+    assert time.process_time() - begun < 10
