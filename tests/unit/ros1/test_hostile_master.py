@@ -276,3 +276,18 @@ def test_every_answer_that_is_used_has_its_form():
     known = set(client._ANSWERS)
     assert {name for name in used if name.startswith(("get", "has", "lookup", "search"))} <= known
     assert {"subscribeParam", "registerSubscriber", "requestTopic"} <= known
+
+
+def test_ten_thousand_topics_of_a_master_are_listed(master, connect, eventually, run_command):
+    for number in range(10_000):
+        master.publishers[f"/t{number}"] = {"/flood": "http://127.0.0.1:1/"}
+        master.types[f"/t{number}"] = "std_msgs/String"
+    node = connect("panel", own_services=False)
+    began = time.process_time()
+    eventually(lambda: len(node.topics()) == 10_000)
+    seen = master.calls.count("getSystemState")
+    eventually(lambda: master.calls.count("getSystemState") >= seen + 3)
+    # Of this process, which is the master, too; three looks more.
+    assert time.process_time() - began < 30
+    code, out, err = run_command("topic", "list", "--url", master.url)
+    assert (code, out.count("\n")) == (0, 10_000), err
