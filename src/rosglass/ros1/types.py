@@ -33,7 +33,7 @@ class Types:
         self._library, self._url = library, url
         self._lock = threading.Lock()
         self._learned: dict[tuple[str, str], MessageType] = {}
-        self._texts: dict[int, str] = {}
+        self._texts: dict[MessageType | ServiceType, str] = {}
 
     @property
     def library(self) -> Library:
@@ -132,9 +132,9 @@ class Types:
 
     def text(self, kind: MessageType | ServiceType) -> str:
         """Return a type's definition with all that it needs, as connection headers carry it."""
-        known = self._texts.get(id(kind.definition))
+        known = self._texts.get(kind)
         if known is None:
-            known = self._texts[id(kind.definition)] = full_text(kind.definition)
+            known = self._texts[kind] = full_text(kind.definition)
         return known
 
     def _known(self, full: str, md5: str) -> MessageType | None:
