@@ -191,10 +191,12 @@ class _Server:
             raise MasterError(f"{self.uri} refuses {method}: {message}")
         expected, fits = _ANSWERS.get(method, _ANYTHING)
         if not fits(value):
-            raise ConnectionLostError(
+            text = (
                 f"{self.uri} answers {method}, but not as ROS 1 does: {expected} was expected, got "
                 f"{reprlib.repr(value)}"
             )
+            # A parameter is what some node has set: the master itself answers as it should.
+            raise MasterError(text) if expected is _PARAMETER[0] else ConnectionLostError(text)
         return value
 
     def _answer(self, connection: _Connection, body: bytes, timeout: float) -> Any:

@@ -15,7 +15,7 @@ import pytest
 
 import rosglass
 from rosglass.comm import ConnectionState
-from rosglass.errors import ConnectionLostError
+from rosglass.errors import ConnectionLostError, MasterError
 from rosglass.ros1 import master as client
 from rosglass.ros1.master import Master, call_node
 
@@ -89,8 +89,20 @@ def test_parameters_of_any_depth_are_refused_or_returned(master, connect):
         )
         body = text.replace("<int>0</int>", inner)
         port = serve(lambda sock, body=body: reply(sock, body.encode()))
-        with pytest.raises(ConnectionLostError, match="at most 100 levels"):
+        with pytest.raises(MasterError, match="at most 100 levels"):
             call_node(f"http://127.0.0.1:{port}", "getParam", "/x", "/deep")
+
+
+def test_a_deep_parameter_is_refused_and_the_rest_of_the_node_goes_on(master, connect, eventually):
+    """Some node has set it: the master is not at fault, and must not count as lost."""
+    master.tree["deep"] = deep(120)
+    node = connect("panel", own_services=False)
+    asked = master.calls.count("subscribeParam")
+    node.parameter_server.subscribe("/deep")
+    eventually(lambda: master.calls.count("subscribeParam") > asked)
+    node.create_publisher("/cmd_vel", "geometry_msgs/Twist")
+    eventually(lambda: "/cmd_vel" in master.publishers)
+    assert node.status().state is ConnectionState.CONNECTED
 
 
 @pytest.mark.parametrize("method", ["getSystemState", "getTopicTypes", "getPid", "lookupNode"])
