@@ -23,8 +23,8 @@ __all__ = ["HOLD_S", "LIMIT", "STALL_S", "ReplyPacer", "RequestWindow"]
 
 #: Requests that are open at a time, or replies in a burst: two less than the peer's queue holds.
 LIMIT = 8
-#: Seconds without any answer after which open requests count as taken: their server holds them
-#: until later, or they are lost.
+#: Seconds without an answer after which an open request counts as taken: its server holds it until
+#: later, or it is lost.
 STALL_S = 30.0
 #: The same for requests that a server is known to hold, such as those for an action's result.
 HOLD_S = 0.1
@@ -39,14 +39,14 @@ class RequestWindow:
     """The open requests of a node to one service, :data:`LIMIT` at most.
 
     Args:
-        stall_s: Seconds without any answer after which all that are open count as taken.
+        stall_s: Seconds without an answer after which an open request counts as taken.
     """
 
     def __init__(self, stall_s: float) -> None:
         self._stall_s = stall_s
         self._lock = threading.Lock()
-        self._open: set[Hashable] = set()
-        self._moved = 0.0
+        #: When each that is open was sent, monotonic; the oldest first.
+        self._open: dict[Hashable, float] = {}
         #: What to call when there is room, for those that found none.
         self._waiting: dict[Callable[[], None], None] = {}
 
@@ -59,22 +59,19 @@ class RequestWindow:
         """
         now = time.monotonic()
         with self._lock:
+            while self._open and now - next(iter(self._open.values())) >= self._stall_s:
+                del self._open[next(iter(self._open))]
             if len(self._open) >= LIMIT:
-                if now - self._moved < self._stall_s:
-                    self._waiting[retry] = None
-                    return False
-                self._open.clear()
-            self._open.add(request)
-            self._moved = now
+                self._waiting[retry] = None
+                return False
+            self._open[request] = now
         return True
 
     def leave(self, request: Hashable) -> list[Callable[[], None]]:
         """Take note that a request is not open any more; return what to call, without a lock."""
         with self._lock:
-            if request not in self._open:
+            if self._open.pop(request, None) is None:
                 return []
-            self._open.discard(request)
-            self._moved = time.monotonic()
             waiting = list(self._waiting)
             self._waiting.clear()
         return waiting
@@ -165,7 +162,7 @@ class ReplyPacer:
                     return
                 now = time.monotonic()
                 if now - known.since >= _BURST_S:
-                    known.burst, known.since = 0, now
+                    known.burst, known.since, known.paced = 0, now, known.open > LIMIT
                 if known.paced and known.burst >= LIMIT and len(known.waiting) <= _MAX_WAITING:
                     later = known.since + _BURST_S - now
                     break

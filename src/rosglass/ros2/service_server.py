@@ -117,8 +117,8 @@ class Ros2ServiceServer(AnsweringServer[RequestId], Member):
         self._pacer.on_request(request.client)
         try:
             self._take(request, data)
-        except Exception:
-            _log.exception("%s: a request of %s is lost", self.name, self._origin(request))
+        except Exception as error:  # its executor may raise
+            self._failed(request, error)
 
     def _decode(self, data: bytes | memoryview) -> Message:
         kind = self.type.request

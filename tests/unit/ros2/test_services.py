@@ -251,6 +251,24 @@ def test_requests_that_a_server_holds_for_long_do_not_hold_up_others(eventually)
     assert window.leave(8) == [print]
 
 
+def test_requests_that_are_held_do_not_keep_their_places_while_others_move(eventually):
+    window = RequestWindow(stall_s=0.2)
+    assert all(window.enter(f"held {n}", print) for n in range(7))
+    numbers = iter(range(10**9))
+
+    def places():
+        """Return how many places are free, as requests come and go."""
+        entered = []
+        while window.enter(number := next(numbers), print):
+            entered.append(number)
+        for number in entered:
+            window.leave(number)
+        return len(entered)
+
+    assert places() == 1
+    eventually(lambda: places() == 8)
+
+
 def test_replies_to_one_client_come_in_bursts_that_it_can_keep(node, middleware, eventually):
     promises = []
     service = node.create_service_server("/add", ADD, lambda _: promises.append(Future()) or promises[-1])  # fmt: skip  # noqa: E501
@@ -830,6 +848,16 @@ def test_executors_of_servers(robot, client, eventually):
     assert not call.done()
     jobs.pop()()
     assert call.result(30).sum == 1
+
+
+def test_a_server_whose_executor_raises_fails_the_request(robot, client, caplog):
+    class Broken(Executor):
+        def post(self, job):
+            raise RuntimeError("the pool was shut down")
+
+    robot.create_service_server("/add", ADD, add, executor=Broken())
+    with pytest.raises(rosglass.Error, match="the pool was shut down"):
+        client.call({"a": 1}, timeout=30)
 
 
 def test_coroutine_functions_serve_in_their_loop(node, connect):
