@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
+import time
 from collections import deque
 from queue import SimpleQueue
 from typing import TYPE_CHECKING
@@ -112,17 +114,20 @@ class Dispatcher(Executor):
 class RetryingExecutor(Executor):
     """Posts jobs to an executor that may raise, as a full queue or a pool that was shut down does.
 
-    What it did not take is posted again, in order, until it takes it: a job may carry a stop
-    command, and must neither be lost nor end the thread that posts it. Jobs must not raise: an
-    executor may run them at once.
+    What it did not take is posted again, in the order of refusal, until it takes it: a job may
+    carry a stop command, and must neither be lost nor end the thread that posts it. Jobs must not
+    raise: an executor may run them at once.
 
     Args:
         executor: The executor, often the user's own.
         name: What posts, for the log.
+        give_up_s: Seconds after which a job that was not taken is given up, with an error in the
+            log; for jobs that have no owner who closes this.
     """
 
-    def __init__(self, executor: Executor, name: str) -> None:
+    def __init__(self, executor: Executor, name: str, give_up_s: float = math.inf) -> None:
         self._executor, self._name = executor, name
+        self._give_up_s, self._refused_at = give_up_s, 0.0
         self._lock = threading.Lock()
         self._refused: deque[Callable[[], None]] = deque()
         self._closed = False
@@ -141,6 +146,7 @@ class RetryingExecutor(Executor):
             self._refused.append(job)
             first = len(self._refused) == 1
         if first:
+            self._refused_at = time.monotonic()
             self._retry_after(_FIRST_RETRY_S)
 
     def close(self) -> None:
@@ -155,6 +161,9 @@ class RetryingExecutor(Executor):
             try:
                 self._executor.post(self._refused[0])
             except Exception:
+                if time.monotonic() - self._refused_at >= self._give_up_s:
+                    self._give_up()
+                    return
                 self._log_failure()
                 self._retry_after(min(2 * delay_s, _LONGEST_RETRY_S))
                 return
@@ -162,6 +171,15 @@ class RetryingExecutor(Executor):
                 del self._refused[0]
                 if not self._refused:
                     return
+
+    def _give_up(self) -> None:
+        with self._lock:
+            count = len(self._refused)
+            self._refused.clear()
+        _log.error(
+            "%s: the executor %r took nothing for %.0f s: %d callbacks are given up",
+            self._name, self._executor, self._give_up_s, count, exc_info=True,
+        )  # fmt: skip
 
     def _log_failure(self) -> None:
         self._failures.exception(

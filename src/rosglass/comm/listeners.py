@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 __all__ = ["Listener", "Listeners"]
 
 _T = TypeVar("_T")
+#: Values that wait for a callback at most: its executor may never run it.
+_MAX_WAITING = 1000
 
 
 class Listeners(Generic[_T]):
@@ -24,7 +26,7 @@ class Listeners(Generic[_T]):
     Args:
         merge: Whether a callback that has not run yet is only told the newest value, so that a
             burst of changes costs one call.
-        depth: How many values wait for a callback that is slow, the newest ones; None for all.
+        depth: How many values wait for a callback that is slow, the newest ones; None for 1000.
         where: What they listen to, e.g. a topic; for errors.
     """
 
@@ -92,7 +94,7 @@ class Listener(Handle, Generic[_T]):
     ) -> None:
         self._owner, self._callback = owner, callback
         self._executor = RetryingExecutor(executor, where or getattr(callback, "__qualname__", ""))
-        self._depth = depth
+        self._depth = _MAX_WAITING if depth is None else depth
         self._lock = threading.Lock()
         self._waiting: list[_T] = []
         self.closed = False
@@ -101,7 +103,7 @@ class Listener(Handle, Generic[_T]):
         """Call back with `value` soon; returns whether no other value made room for it."""
         with self._lock:
             self._waiting.append(value)
-            if self._depth is not None and len(self._waiting) > self._depth:
+            if len(self._waiting) > self._depth:
                 # Its run is asked for already; it will find what is left.
                 del self._waiting[0]
                 return False

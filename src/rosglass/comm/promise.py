@@ -22,6 +22,8 @@ __all__ = ["Promise", "check_timeout"]
 _T = TypeVar("_T")
 #: Longest uninterrupted wait in seconds: on Windows a lock that is waited for holds up Ctrl-C.
 _SLICE = 0.2
+#: Seconds after which a callback is given up whose executor raises each time.
+_GIVE_UP_S = 30.0
 
 
 def check_timeout(timeout: float | None, where: str) -> float | None:
@@ -98,7 +100,7 @@ class Promise(Future[_T]):
         if chosen is None:
             self.add_done_callback(callback)
         else:
-            poster = RetryingExecutor(chosen, "on_done")
+            poster = RetryingExecutor(chosen, f"on_done() of {self._what}", _GIVE_UP_S)
             self.add_done_callback(lambda _: poster.post(lambda: run_job(lambda: callback(self))))
 
     def fulfil(self, value: _T) -> bool:

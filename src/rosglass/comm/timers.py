@@ -95,7 +95,7 @@ class Timers:
                         self._called_off = max(0, self._called_off - 1)
             try:
                 job()
-            except Exception:
+            except BaseException:  # sys.exit() in one job must not end all others
                 _log.exception("%s: a job failed", self._name)
 
 

@@ -6,6 +6,7 @@ import asyncio
 import logging
 import queue
 import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
@@ -210,3 +211,14 @@ def test_jobs_that_were_refused_keep_their_order_and_are_forgotten_at_the_end():
     assert asked.wait(LIMIT)
     assert 10**9 - never.left <= 2
     assert seen
+
+
+def test_a_job_without_owner_is_given_up_and_counted(caplog):
+    executor = RetryingExecutor(Refusing(10**9), "on_done() of a call", give_up_s=0.1)
+    executor.post(lambda: None)
+    executor.post(lambda: None)
+    deadline = time.monotonic() + LIMIT
+    while "2 callbacks are given up" not in caplog.text:
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    assert "on_done() of a call" in caplog.text

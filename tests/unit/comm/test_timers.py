@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import queue
+import sys
 import threading
 
 import pytest
@@ -74,3 +75,10 @@ def test_closing_forgets_jobs_and_may_be_done_by_one(timers):
 
 def test_without_jobs_there_is_no_thread(timers):
     assert timers._thread is None
+
+
+def test_a_job_that_calls_exit_ends_no_other(timers):
+    done = threading.Event()
+    timers.after(0, lambda: sys.exit(1))
+    timers.after(0, done.set)
+    assert done.wait(30)
