@@ -108,15 +108,14 @@ class Clock(Unique):
         """
         length = duration if isinstance(duration, Duration) else _seconds("duration", duration)
         with self._changed:
-            end = self._tick() + length.nanoseconds
-            return self._sleep(end, self._tick)
+            end, switches = self._tick() + length.nanoseconds, self._switches
+        return self._sleep(end, self._tick, switches)
 
     def sleep_until(self, when: Time) -> bool:
         """Wait until the clock shows `when`; results and errors as for :meth:`sleep`."""
         if not isinstance(when, Time):
             raise ConversionError("when", when, "a rosglass.Time")
-        with self._changed:
-            return self._sleep(when.nanoseconds, lambda: self.now().nanoseconds)
+        return self._sleep(when.nanoseconds, lambda: self.now().nanoseconds, self._switches)
 
     def on_jump(
         self,
@@ -228,29 +227,32 @@ class Clock(Unique):
         """Return what intervals are measured with: a system clock that is set does not count."""
         return self._time if self._simulated else time.monotonic_ns()
 
-    def _sleep(self, end: int, read: Callable[[], int]) -> bool:
-        switches, shown, warned = self._switches, self._time, False
+    def _sleep(self, end: int, read: Callable[[], int], switches: int) -> bool:
+        shown, warned = self._time, False
         still_at = time.monotonic() + _STILL_S
         while True:
-            if self._closed:
-                raise NodeClosedError(
-                    f"node {self._name} was closed while its clock was waited for"
-                )
-            if self._switches != switches:
-                return False
-            rest = end - read()
-            if rest <= 0:
-                return True
-            if self._time != shown:
-                shown, still_at = self._time, time.monotonic() + _STILL_S
-            elif self._simulated and not warned and time.monotonic() > still_at:
+            with self._changed:
+                if self._closed:
+                    raise NodeClosedError(
+                        f"node {self._name} was closed while its clock was waited for"
+                    )
+                if self._switches != switches:
+                    return False
+                rest = end - read()
+                if rest <= 0:
+                    return True
+                if self._time != shown:
+                    shown, still_at = self._time, time.monotonic() + _STILL_S
+                still = self._simulated and not warned and time.monotonic() > still_at
+                if not still:
+                    self._changed.wait(_SLICE_S if self._simulated else min(rest / 1e9, _SLICE_S))
+            if still:  # handlers of the log are the user's, and may use the clock
                 warned = True
                 _log.warning(
                     "%s sleeps by simulated time, which stands at %.3f s: is /clock published?",
                     self._name,
                     shown / 1e9,
                 )
-            self._changed.wait(_SLICE_S if self._simulated else min(rest / 1e9, _SLICE_S))
 
     def _restart(self) -> None:
         """Count the timers' periods from now on: the old times mean nothing any more."""
