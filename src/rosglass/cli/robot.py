@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import argparse
     from collections.abc import Mapping
 
-    from rosglass.comm import Status
+    from rosglass.comm import Sample, Status
 
 __all__ = ["DUPLICATE_EXIT", "configure", "run"]
 
@@ -26,6 +26,8 @@ DUPLICATE_EXIT = 3
 #: Seconds after the start in which another robot, whose odometry comes 30 times a second, ends
 #: this one.
 _DUPLICATE_WATCH_S = 5.0
+#: Seconds within which the one of two robots that should leave has left.
+_YIELD_S = 2.0
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -100,17 +102,27 @@ def run(args: argparse.Namespace) -> int:
             if refusal is not None:
                 note(f"{args.url}: {refusal[0]}; {refusal[1]}. Waiting for it")
             duplicate = threading.Event()
-            # One that was killed may still be seen, but sends nothing.
+            heard: dict[bytes, float] = {}
+
+            def on_odometry(sample: Sample) -> None:
+                # One that was killed may still be seen, but sends nothing.
+                if full not in node.duplicate_nodes():
+                    return
+                now, other = time.monotonic(), sample.publisher
+                since = heard.setdefault(other, now)
+                own = {end.gid for end in node.publishers("/odom") if end.node.full == full}
+                # Of two that start together one stays: the other leaves at once.
+                if min(own - heard.keys(), default=b"") < other and now - since < _YIELD_S:
+                    return
+                duplicate.set()
+
             watch = node.create_subscription(
-                "/odom",
-                "nav_msgs/msg/Odometry",
-                raw_callback=lambda _: duplicate.set() if full in node.duplicate_nodes() else None,
-                ignore_local=True,
+                "/odom", "nav_msgs/msg/Odometry", raw_callback=on_odometry, ignore_local=True
             )
             watched_until = time.monotonic() + _DUPLICATE_WATCH_S
             robot.start()
             while not end.is_set() and not duplicate.is_set() and not robot.wait(0.1):
-                if time.monotonic() > watched_until:
+                if time.monotonic() > watched_until + _YIELD_S * bool(heard):
                     watch.close()
             if duplicate.is_set():
                 print(f"rosglass: {_duplicate(full, args.url)}", file=sys.stderr, flush=True)

@@ -96,3 +96,27 @@ def test_a_second_robot_leaves_and_says_why(url: str) -> None:
     finally:
         first.kill()
         first.communicate()
+
+
+def test_of_two_robots_that_start_together_one_stays(url: str) -> None:
+    robots = [
+        subprocess.Popen(
+            [*COMMAND, "robot", "--url", url, "--fps", "5", "--leash"],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+        )
+        for _ in range(2)
+    ]  # fmt: skip
+    try:
+        wait_for(lambda: any(robot.poll() is not None for robot in robots), 60)
+        with rosglass.connect(url, "me") as me:
+            came: list[float] = []
+            me.create_subscription(
+                "/odom", "nav_msgs/msg/Odometry", lambda _: came.append(time.monotonic())
+            )
+            # Longer than either watches for the other.
+            wait_for(lambda: came and came[-1] - came[0] > 9, 60)
+        assert sorted(robot.poll() or 0 for robot in robots) == [0, 3]
+    finally:
+        for robot in robots:
+            robot.kill()
+            robot.communicate()
