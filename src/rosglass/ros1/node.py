@@ -53,8 +53,9 @@ if TYPE_CHECKING:
 __all__ = ["Ros1Node"]
 
 _log = logging.getLogger("rosglass.ros1")
-#: Connections at a time whose other end has not said what it wants.
-_MOST_STRANGERS = 100
+#: Connections at a time whose other end has not sent its header. More than wait to be accepted
+#: (``_BACKLOG``): after a pause, as many honest ones come at once.
+_MAX_SILENT_CONNECTIONS = 300
 
 
 class Ros1Node(CoreNode):
@@ -95,9 +96,9 @@ class Ros1Node(CoreNode):
         self._core = Core(NodeName(namespace, name), url, options, library)
         self._topics = Topics(self._core)
         #: Connections that others have made; those without a header, the oldest first.
-        self._guests: set[Connection] = set()
-        self._strangers: dict[Connection, None] = {}
-        self._most_guests, self._complaints = _most_guests(), Complaints()
+        self._connections: set[Connection] = set()
+        self._silent: dict[Connection, None] = {}
+        self._max_connections, self._complaints = _max_connections(), Complaints()
         self._services = Services(self._core)
         self._furniture = Furniture(self, self._core, self._topic_names, parameters or {})
         self._core.start(
@@ -385,10 +386,10 @@ class Ros1Node(CoreNode):
     def _accept(self, sock: socket.socket, address: str) -> None:
         """Take a connection in; its header says what it is for."""
         link: Connection
-        if len(self._guests) >= self._most_guests:
+        if len(self._connections) >= self._max_connections:
             if self._complaints.fresh("crowded"):
                 told = "%s: refused, for this node has %d connections; others are not named"
-                _log.warning(told, address, len(self._guests))
+                _log.warning(told, address, len(self._connections))
             sock.close()
             return
 
@@ -397,7 +398,7 @@ class Ros1Node(CoreNode):
             link.finish(1.0)
 
         def on_header(header: dict[str, str]) -> None:
-            self._strangers.pop(link, None)
+            self._silent.pop(link, None)
             if "topic" in header:
                 outlast(sock)
                 reason = self._topics.accept(link, header)
@@ -416,15 +417,15 @@ class Ros1Node(CoreNode):
             lambda _: self._drop(link),
             peer=address,
         )
-        if len(self._strangers) >= _MOST_STRANGERS:
-            next(iter(self._strangers)).end("others want to connect, and it has sent no header")
-        self._guests.add(link)
-        self._strangers[link] = None
+        if len(self._silent) >= _MAX_SILENT_CONNECTIONS:
+            next(iter(self._silent)).end("others want to connect, and it has sent no header")
+        self._connections.add(link)
+        self._silent[link] = None
         link.accept()
 
     def _drop(self, link: Connection) -> None:
-        self._guests.discard(link)
-        self._strangers.pop(link, None)
+        self._connections.discard(link)
+        self._silent.pop(link, None)
         self._topics.drop(link)
         self._services.drop(link)
 
@@ -436,7 +437,7 @@ class Ros1Node(CoreNode):
         return sorted({*self._topics.published(), *self._topics.subscribed()})
 
 
-def _most_guests() -> int:
+def _max_connections() -> int:
     """Return how many connections of others to hold: half of the files that may be open."""
     try:
         import resource  # noqa: PLC0415 - not on Windows

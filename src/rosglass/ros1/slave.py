@@ -186,7 +186,9 @@ class Slave(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCDispatcher):
 
     def _shutdown(self, caller: object, reason: object = "") -> int:
         peer, own = self._ends.addresses
-        if peer != own and peer not in _addresses(self._api.master_uri()):
+        # Debian names a machine 127.0.1.1, to which it connects from 127.0.0.1.
+        here = (own, "127.0.0.1", "::1")
+        if peer not in here and peer not in _addresses(self._api.master_uri()):
             if self._complaints.fresh(("shutdown", peer)):
                 told = "%s at %s wanted to end this node: only its own and the master's host may"
                 _log.warning(told, caller, peer)

