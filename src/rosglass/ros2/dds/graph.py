@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import time
+from collections import Counter
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -51,6 +52,8 @@ class _Participant:
     unknown: NodeName
     ours: bool
     info: ParticipantEntities | None = None
+    #: Its nodes by their keys in the graph.
+    nodes: dict[tuple[bytes, NodeName, int], NodeName] = field(default_factory=dict)
     #: When the first of these came, monotonic.
     introduced: float = 0.0
     owners: dict[bytes, NodeName] = field(default_factory=dict)
@@ -266,11 +269,16 @@ class DdsGraph:
     def _set_nodes(
         self, prefix: bytes, participant: _Participant, nodes: tuple[NodeName, ...]
     ) -> None:
-        before = () if participant.info is None else participant.info.nodes
-        for index, node in enumerate(nodes):
-            self._graph.put_node((prefix, index), node)
-        for index in range(len(nodes), len(before)):
-            self._graph.remove((prefix, index))
+        keys = {}
+        counts: Counter[NodeName] = Counter()
+        for node in nodes:
+            keys[prefix, node, counts[node]] = node
+            counts[node] += 1
+        for key in participant.nodes.keys() - keys.keys():
+            self._graph.remove(key)
+        for key in keys.keys() - participant.nodes.keys():
+            self._graph.put_node(key, keys[key])
+        participant.nodes = keys
 
 
 def _name(found: Discovered) -> NodeName:
