@@ -6,12 +6,16 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import pytest
+
 import rosglass.demo
+from rosglass.qt import QT6
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
 COCKPIT = Path(rosglass.demo.__file__).with_name("cockpit")
+pytestmark = pytest.mark.skipif(not QT6, reason="the demo's cockpit is for Qt 6")
 HOSTILE = "<img src='http://0.0.0.0:9/a.png'><b>all good</b>"
 
 
