@@ -6,15 +6,14 @@ from their start and for as far as they go.
 
 from __future__ import annotations
 
-import bz2
 import io
 import logging
 import struct
 from dataclasses import replace
-from importlib import import_module
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.bags.bag import Bag, BagMessage, Channel
+from rosglass.bags.chunks import LeftOut, decompress
 from rosglass.bags.nearly_sorted import by_time
 from rosglass.comm import QoS
 from rosglass.errors import BagError, InvalidNameError
@@ -40,6 +39,8 @@ class _Record(NamedTuple):
     kind: int
     fields: dict[bytes, bytes]
     data: bytes
+    #: Where in the file it begins.
+    offset: int
 
 
 class _EndError(Exception):
@@ -59,6 +60,7 @@ class Ros1CutBag(Bag):
     def __init__(self, path: Path) -> None:
         self.path = path
         self._known: dict[int, Channel] = {}
+        self._left_out = LeftOut(path, "chunk")
         counts: dict[int, int] = {}
         first = last = -1
         for number, time, _ in self._scan():
@@ -66,7 +68,10 @@ class Ros1CutBag(Bag):
             first = time if first < 0 else min(first, time)
             last = max(last, time)
         if not self._known:
-            raise BagError(f"{path} is a ROS 1 bag that ends, or is damaged, before its messages")
+            why = f": {self._left_out.words()}" if self._left_out.words() else ""
+            raise BagError(
+                f"{path} is a ROS 1 bag that ends, or is damaged, before its messages{why}"
+            )
         groups: dict[Channel, list[int]] = {}
         for number, channel in self._known.items():
             groups.setdefault(channel, []).append(number)
@@ -76,7 +81,8 @@ class Ros1CutBag(Bag):
         found = set(self._known.values())
         self.channels = tuple(sorted(found, key=lambda c: (c.topic, c.type_name, c.offered != ())))
         self.start, self.end = max(first, 0), max(last, 0)
-        self.problem = "it was not closed properly: its index is missing or damaged"
+        cut = "it was not closed properly: its index is missing or damaged"
+        self.problem = "; ".join(filter(None, (cut, self._left_out.words())))
         _log.warning("%s: %s", path, self.problem)
 
     def messages(
@@ -108,9 +114,11 @@ class Ros1CutBag(Bag):
 
     def _messages(self, chunk: _Record) -> Iterator[tuple[int, int, bytes]]:
         try:
-            data = _decompressed(chunk)
-        except Exception as error:  # whatever the damage leads to, in whichever library
-            _log.warning("%s: a part of it cannot be read: %s", self.path, error)
+            compression = chunk.fields.get(b"compression", b"none").decode(errors="replace")
+            size = max(0, _number(chunk.fields.get(b"size", b"")))
+            data = decompress(compression, chunk.data, size)
+        except BagError as error:
+            self._left_out.add(f"at byte {chunk.offset}", error)
             return
         for record in _records(io.BytesIO(data)):
             if record.kind == _CONNECTION:
@@ -151,9 +159,10 @@ def _records(file: BinaryIO) -> Iterator[_Record]:
     """Yield records up to the first one that is damaged or not there in full."""
     try:
         while True:
+            offset = file.tell()
             fields = _fields(_block(file))
             kind = fields.get(b"op", b"")
-            yield _Record(kind[0] if kind else 0, fields, _block(file))
+            yield _Record(kind[0] if kind else 0, fields, _block(file), offset)
     except _EndError:
         return
 
@@ -181,13 +190,3 @@ def _fields(data: bytes) -> dict[bytes, bytes]:
 
 def _number(data: bytes) -> int:
     return int(_length.unpack(data)[0]) if len(data) == _length.size else -1
-
-
-def _decompressed(chunk: _Record) -> bytes:
-    kind = chunk.fields.get(b"compression", b"none")
-    if kind == b"bz2":
-        return bz2.decompress(chunk.data)
-    if kind == b"lz4":
-        found: Any = import_module("lz4.frame")  # it comes with rosbags, and has no types
-        return bytes(found.decompress(chunk.data))
-    return chunk.data

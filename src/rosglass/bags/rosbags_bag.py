@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import sqlite3
+from contextlib import closing, suppress
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag1 import Reader
+from rosbags.rosbag1.reader import decompressors
+from rosbags.rosbag2 import storage_mcap
 
 from rosglass.bags.bag import Bag, BagMessage, Channel
+from rosglass.bags.chunks import LeftOut, decompress
 from rosglass.bags.qos_text import profile
 from rosglass.comm import QoS
 from rosglass.comm.text_files import check_yaml, read_text
@@ -23,6 +29,9 @@ __all__ = ["RosbagsBag"]
 
 #: Bytes of a metadata.yaml.
 _MOST_METADATA = 64 * 2**20
+# The package decompresses MCAP in a folder without a limit; it compares the sizes afterwards.
+for _kind in ("lz4", "zstd"):
+    storage_mcap.DECOMPRESSORS[_kind] = partial(decompress, _kind)
 
 
 class RosbagsBag(Bag):
@@ -36,6 +45,7 @@ class RosbagsBag(Bag):
         self.path = path
         try:
             _check_metadata(path / "metadata.yaml")
+            _check_databases(path)
             # AnyReader refuses whole bags for one definition that is missing or wrong.
             self._reader: Any = Reader(path) if path.suffix == ".bag" else AnyReader([path])
             self._reader.open()
@@ -45,11 +55,28 @@ class RosbagsBag(Bag):
                 "(.mcap), ROS 2 bags (a folder with metadata.yaml, .db3) and ROS 1 bags (.bag)"
             ) from error
         self._open = True
+        self._left_out = LeftOut(path, "message")
         try:
+            self._limit()
             self._index()
         except Exception as error:  # metadata of other kinds than the format has
             self.close()
             raise BagError(f"{path} is damaged: {_words(error)}") from error
+
+    def _limit(self) -> None:
+        """Have nothing decompressed beyond the limit."""
+        self._by_message = False
+        if isinstance(self._reader, Reader):
+            self._reader.chunks = {
+                offset: chunk._replace(decompressor=partial(_chunk, offset, chunk.decompressor))
+                for offset, chunk in self._reader.chunks.items()
+            }
+            return
+        for reader in self._reader.readers:
+            metadata = reader.storage.metadata
+            if metadata.compression_mode == "message":
+                self._by_message = True
+                reader.storage.metadata = metadata._replace(compression_mode=None)
 
     def _index(self) -> None:
         wire = "ros1" if isinstance(self._reader, Reader) or not self._reader.is2 else "cdr"
@@ -83,7 +110,15 @@ class RosbagsBag(Bag):
             return
         try:
             for connection, time, data in self._reader.messages(wanted, start, end):
-                yield BagMessage(owner[connection.id, id(connection.owner)], time, bytes(data))
+                channel, content = owner[connection.id, id(connection.owner)], bytes(data)
+                if self._by_message:
+                    try:
+                        content = decompress("zstd", content, None)
+                    except BagError as error:
+                        self._left_out.add(f"of {channel.topic} at {time} ns", error)
+                        self.problem = self._left_out.words()
+                        continue
+                yield BagMessage(channel, time, content)
         except Exception as error:  # whatever the damage leads to
             raise BagError(f"{self.path} is damaged: {_words(error)}") from error
 
@@ -105,6 +140,26 @@ def _check_metadata(path: Path) -> None:
             # Profiles are YAML in a text of YAML.
             if isinstance(event, yaml.ScalarEvent) and "*" in event.value:
                 check_yaml(event.value)
+
+
+def _check_databases(path: Path) -> None:
+    """Raise YAMLError where profiles in a bag's SQLite files stand for more than they may."""
+    for file in path.iterdir() if path.is_dir() else [path]:
+        # What is no database, or has no such column, is the package's to refuse or to read.
+        with suppress(sqlite3.Error):
+            uri = f"{file.resolve().as_uri()}?immutable=1"
+            with closing(sqlite3.connect(uri, uri=True)) as database:
+                for (text,) in database.execute("SELECT offered_qos_profiles FROM topics"):
+                    check_yaml(str(text))
+
+
+def _chunk(offset: int, decompressor: Any, data: bytes) -> bytes:
+    """Decompress a chunk of a ROS 1 bag, of which the package keeps no size."""
+    kinds = {known: kind for kind, known in decompressors.items()}
+    try:
+        return decompress(kinds[decompressor], data, None)
+    except BagError as error:
+        raise BagError(f"the chunk at byte {offset}: {error}") from error
 
 
 def _words(error: Exception) -> str:
