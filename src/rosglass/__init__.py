@@ -128,11 +128,11 @@ def __getattr__(name: str) -> object:
         return import_module(f"rosglass.{name}")
     module = _HOME_OF.get(name, "rosglass.errors" if name in __all__ else "")
     if not module:
-        told = f"module 'rosglass' has no attribute {name!r}"
+        text = f"module 'rosglass' has no attribute {name!r}"
         instead = import_module("rosglass.comm.rclpy_names").hint_at_function(name)
         if instead:
-            raise AttributeError(f"{told}: use {instead}")
-        raise AttributeError(told, name=name, obj=import_module(__name__))
+            raise AttributeError(f"{text}: use {instead}")
+        raise AttributeError(text, name=name, obj=import_module(__name__))
     value: object = getattr(import_module(module), name)
     globals()[name] = value
     return value

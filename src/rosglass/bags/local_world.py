@@ -360,7 +360,7 @@ class LocalNode(Node):
 
     @property
     def logger(self) -> NodeLogger:
-        """The node's logger; its messages go to nobody else."""
+        """The node's logger; its messages stay in this process."""
         return self._logger
 
     def now(self) -> Time:

@@ -13,7 +13,7 @@ def main(argv: "Sequence[str] | None" = None) -> int:
 
     Returns:
         The exit code: 0 done, 1 failed, 2 wrong usage, 130 ended by Ctrl-C, 143 by SIGTERM, 141
-        when whoever read the output went away. Ctrl-C while a command is still being loaded ends
+        when the reader of the output went away. Ctrl-C while a command is still being loaded ends
         the process at once.
     """
     try:

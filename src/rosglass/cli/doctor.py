@@ -228,8 +228,8 @@ def _robot(url: str, timeout: float) -> Iterator[Finding]:
     try:
         node = rosglass.connect(url, name=f"rosglass_doctor_{os.getpid()}", own_services=False)
     except ModuleNotFoundError as error:
-        told, _, fix = explain_missing(error).partition("; ")
-        yield Finding("error", url, told or str(error), fix)
+        text, _, fix = explain_missing(error).partition("; ")
+        yield Finding("error", url, text or str(error), fix)
         return
     except Error as error:
         no_network = url.startswith("dds:") and interfaces() == []

@@ -128,9 +128,9 @@ def _explain(error: Exception) -> int:
     if isinstance(error, ModuleNotFoundError):
         from rosglass.connection import explain_missing
 
-        told = explain_missing(error)
-        if told:
-            return _fail(f"this command needs a package: {told}")
+        missing = explain_missing(error)
+        if missing:
+            return _fail(f"this command needs a package: {missing}")
     if isinstance(error, BrokenPipeError):
         _drop_output()
         return 141  # as programs end that SIGPIPE ends

@@ -300,5 +300,5 @@ def _announced(node: Node, topic: str, timeout: float) -> str:
 
 
 def _unknown(node: Node, topic: str) -> int:
-    note(f"nobody publishes or subscribes to {topic}{similar(topic, node.topics())}")
+    note(f"nothing publishes or subscribes to {topic}{similar(topic, node.topics())}")
     return 1

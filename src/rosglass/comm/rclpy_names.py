@@ -178,7 +178,7 @@ FUNCTIONS = {
 def raise_missing(self: object, name: str) -> NoReturn:
     """Raise AttributeError for a member that is not there; a class's ``__getattr__``.
 
-    One that rclpy or rospy has is told with what takes its place; other errors are Python's own.
+    For one that rclpy or rospy has, the error names what takes its place.
     """
     for kind in type(self).__mro__:
         instead = MEMBERS.get(kind.__name__, {}).get(name)
@@ -208,8 +208,8 @@ def check_order(method: str, name: object, type: object) -> None:
     named = _type_name(name)
     if isinstance(type, str) and isinstance(named, str):
         if named is not name or (_is_type(named, strictly=True) and not _is_type(type)):
-            told = f"{method}({type!r}, {named!r}, ...)"
-            raise InvalidNameError(f"{method}() takes the name first, then the type: {told}")
+            call = f"{method}({type!r}, {named!r}, ...)"
+            raise InvalidNameError(f"{method}() takes the name first, then the type: {call}")
     elif inspect.isclass(type):
         raise TypeNotFoundError(
             f"{method}({name!r}): {type!r} is no type of rosglass; give the type's name, e.g. "

@@ -191,7 +191,7 @@ class Schema:
 
 
 _interned: weakref.WeakValueDictionary[Hashable, Schema] = weakref.WeakValueDictionary()
-#: Held for a look at `_interned` only: whoever resolves a large type holds up no other.
+#: Held for a look at `_interned` only: resolving a large type holds up no other thread.
 _intern_lock = threading.Lock()
 
 

@@ -65,7 +65,7 @@ class Application(Handle):
         Error: This is not the main thread, or the Qt application is one without windows; `session`
             is given together with what describes one; a name in `context` is none that QML can
             write; there is no such `renderer`, or another window has chosen another one.
-        SystemExit: Ctrl-C was pressed meanwhile (130), or SIGTERM came (143).
+        SystemExit: Ctrl-C was pressed while it was made (130), or SIGTERM came (143).
     """
 
     def __init__(

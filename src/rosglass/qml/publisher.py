@@ -171,7 +171,7 @@ class Publisher(Element):
         return self._settled
 
     def _is_matched(self, sender: Sender) -> bool:
-        """Return whether somebody is connected, and all that the graph shows."""
+        """Return whether a subscriber is connected, and all that the graph shows."""
         if self._have is None:
             return False
         try:

@@ -325,7 +325,7 @@ class Runner(QtCore.QObject):
 
     @Slot()
     def _on_killed(self) -> None:
-        # It may have called Qt.quit() when it was told of the shutdown.
+        # It may have called Qt.quit() at the signal of the shutdown.
         if self.exit_code is None:
             _log.error("the interface ends with its node: %s", self.session.detail)
             self.exit(1)

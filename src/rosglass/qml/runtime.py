@@ -131,7 +131,7 @@ class Runtime(QtCore.QObject):
 
     def forget_warnings(self) -> None:
         """Say again what was said before: the files may have changed."""
-        self._host.told.clear()
+        self._host.named.clear()
         if "_helper" in self.__dict__:
             self._call("forgetAbsent", [])
 

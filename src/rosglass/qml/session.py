@@ -429,10 +429,10 @@ class Session(QtCore.QObject):
             try:
                 return connect(url, name, namespace)
             except ModuleNotFoundError as error:
-                told = explain_missing(error)
-                if not told:
+                missing = explain_missing(error)
+                if not missing:
                     raise
-                raise Error(told) from None
+                raise Error(missing) from None
 
         def done(result: Node | Error) -> None:
             if generation != self._generation:

@@ -79,7 +79,7 @@ class Host(QtCore.QObject):
         self._runtime = runtime
         self._types: list[tuple[Schema, Dialect]] = []
         #: Places and names of which was said that no such field is there.
-        self.told: set[tuple[str, int, str]] = set()
+        self.named: set[tuple[str, int, str]] = set()
 
     @Slot(str, str, "QStringList")
     def missing(self, type: str, name: str, known: list[str]) -> None:
@@ -95,8 +95,8 @@ class Host(QtCore.QObject):
         text = f"{type} has no field {name!r:.80}{hint or '; it has ' + ', '.join(known[:20])}"
         explain(caller, text)
         place = (caller.file, caller.line, name)
-        if place not in self.told:
-            self.told.add(place)
+        if place not in self.named:
+            self.named.add(place)
             level, end = (logging.WARNING, "") if hint else (logging.INFO, ".")
             log_from_qml("", level, f"{text}{end} It is undefined here.", caller)
 

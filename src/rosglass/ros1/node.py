@@ -388,8 +388,8 @@ class Ros1Node(CoreNode):
         link: Connection
         if len(self._connections) >= self._max_connections:
             if self._complaints.fresh("crowded"):
-                told = "%s: refused, for this node has %d connections; others are not named"
-                _log.warning(told, address, len(self._connections))
+                text = "%s: refused, for this node has %d connections; others are not named"
+                _log.warning(text, address, len(self._connections))
             sock.close()
             return
 

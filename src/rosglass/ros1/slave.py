@@ -137,8 +137,8 @@ class Slave(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCDispatcher):
                     oldest.shutdown(socket.SHUT_RDWR)  # its thread ends
             self._connections[sock] = None
         if crowded and self._complaints.fresh("crowded"):
-            told = "%s: the node's API has more than %d connections, the oldest are cut"
-            _log.warning(told, address, _MOST_CONNECTIONS)
+            text = "%s: the node's API has more than %d connections, the oldest are cut"
+            _log.warning(text, address, _MOST_CONNECTIONS)
         try:
             self.process_request(sock, address)
         except RuntimeError:  # no more threads
@@ -190,8 +190,8 @@ class Slave(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCDispatcher):
         here = (own, "127.0.0.1", "::1")
         if peer not in here and peer not in _addresses(self._api.master_uri()):
             if self._complaints.fresh(("shutdown", peer)):
-                told = "%s at %s wanted to end this node: only its own and the master's host may"
-                _log.warning(told, caller, peer)
+                text = "%s at %s wanted to end this node: only its own and the master's host may"
+                _log.warning(text, caller, peer)
             raise ValueError(f"taken from this node's own and the master's host, not from {peer}")
         self._api.shut_down(_text(caller, "caller_id"), _text(reason, "msg"))
         return 0

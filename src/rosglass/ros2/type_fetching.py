@@ -66,7 +66,7 @@ _TIMEOUT, _HEDGE = 5.0, 1.0
 #: Seconds that the graph has to become complete: a node's service may show after its publishers.
 _GRACE = 1.0
 #: The same while programs are there that have not said which nodes they have: Fast DDS takes 1 to
-#: 4 s, and until then its services belong to nobody who could be asked.
+#: 4 s, and until then its services belong to no node that could be asked.
 _INTRODUCTION_S = 8.0
 #: Seconds until a node that did not answer is asked again: at first, and at most (it doubles).
 _AGAIN, _RARELY = 5.0, 60.0

@@ -70,7 +70,7 @@ def test_topic_list_and_info(run, master, monkeypatch):
     ]  # fmt: skip
     code, _, err = run("topic", "info", "/posse")
     assert code == 1
-    assert "nobody publishes or subscribes to /posse; did you mean /pose?" in err
+    assert "nothing publishes or subscribes to /posse; did you mean /pose?" in err
     monkeypatch.delenv("ROS_MASTER_URI")
     code, out, _ = run("topic", "list", "--url", master.url)
     assert code == 0

@@ -63,5 +63,5 @@ class RosPublisher(Publisher):
             if is_alive(self):
                 (self.connected if event.change > 0 else self.disconnected).emit()
 
-        with suppress(UnsupportedError):  # a recording, which nobody subscribes to
+        with suppress(UnsupportedError):  # a recording, which has no subscribers
             sender.on_matched(on_matched, session.executor)
