@@ -318,7 +318,8 @@ class Node(Handle):
         """Return how many programs were found that have not said yet which nodes they have.
 
         Over DDS, nodes on Fast DDS do so up to four seconds after they were found; until then the
-        graph is not complete. Always 0 elsewhere.
+        graph is not complete. Over Zenoh it is 1 until the router has sent what it knows, which
+        takes seconds with thousands of topics. Always 0 elsewhere.
         """
         return 0
 

@@ -79,6 +79,18 @@ def test_a_question_whose_time_is_over_is_asked_again_and_the_router_stays_silen
     assert not pulse.silent
 
 
+def test_a_router_that_sends_tokens_is_not_silent_though_its_answer_queues():
+    pulse, session = Pulse("key"), FakeSession()
+    for now in range(10):
+        pulse.on_news(float(now))
+        pulse.beat(session, float(now))
+        assert not pulse.silent
+    pulse.beat(session, 11.0)
+    assert not pulse.silent
+    pulse.beat(session, 13.0)
+    assert pulse.silent
+
+
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="a setting of Linux")
 @pytest.mark.parametrize(
     ("peer", "locator", "limited"),

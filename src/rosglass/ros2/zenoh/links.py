@@ -42,7 +42,7 @@ class Pulse:
 
     def __init__(self, key: str) -> None:
         self._key = key
-        self._asked = 0.0
+        self._asked = self._news = 0.0
         self._answer: Any = None
         self.silent = False
 
@@ -58,7 +58,7 @@ class Pulse:
                     self.silent = False
             if over:
                 self._answer = None
-            elif now - self._asked > _SILENCE:
+            elif now - max(self._asked, self._news) > _SILENCE:
                 self.silent = True
         if self._answer is None:
             with suppress(zenoh.ZError):  # the session is closed
@@ -66,8 +66,12 @@ class Pulse:
                 self._answer = session.liveliness().get(self._key, channel, timeout=_FORGET)
                 self._asked = now
 
+    def on_news(self, now: float) -> None:
+        """Take note that the router has sent something, with the time; the answer may queue."""
+        self._news = now
+
     def rest(self) -> None:
-        """Take note that there is no router to ask."""
+        """Take note that there is no router to ask, or that it is busy with the graph."""
         self._answer, self.silent = None, False
 
 

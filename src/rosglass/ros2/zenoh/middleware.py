@@ -8,8 +8,9 @@ import logging
 import threading
 import time
 from collections import deque
+from contextlib import suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import zenoh
 
@@ -70,6 +71,8 @@ _log = logging.getLogger("rosglass.ros2")
 _RESERVE = 8
 #: Seconds between questions whether the router is there.
 _BEAT = 0.9
+#: Seconds that a router has to send the tokens that there are: for 10,000, Zenoh needs 4 to 13.
+_HISTORY_S = 20.0
 #: Tokens that are not understood are logged up to so many.
 _MAX_STRANGE = 100
 #: Seconds without a new link before a peer's session is closed: a link that another peer, or this
@@ -102,7 +105,10 @@ class ZenohMiddleware(Middleware):
         self._settled = 0.0
         self._was_connected = self._closed = False
         self._refused = self._linked = False
-        self._pulse = Pulse(f"@ros2_lv/{options.domain}/{self._id}/pulse")
+        self._nothing = f"@ros2_lv/{options.domain}/{self._id}/pulse"
+        self._pulse = Pulse(self._nothing)
+        #: Ends after the tokens that were there when the router was linked.
+        self._history: Any = None
         self._next_beat = 0.0
         self._pumps: list[Pump] = []
         self._shared: SharedMemory | None = None
@@ -152,6 +158,18 @@ class ZenohMiddleware(Middleware):
             detail = f"connection to {self._address} lost, {again}"
             return Status(ConnectionState.LOST, detail)
         return Status(ConnectionState.CONNECTING, f"no answer from {self._address}, {again}")
+
+    def unnamed(self) -> int:
+        """Return 1 while the router has not sent all tokens that there are, else 0."""
+        with self._lock:
+            if self._history is not None:
+                try:
+                    over = self._history.try_recv() is not None  # an error: not in time
+                except zenoh.ZError:  # the end of the answer
+                    over = True
+                if over:
+                    self._history = None
+            return int(self._history is not None)
 
     def announce(self, node: NodeName) -> Handle:
         """Declare the node's token."""
@@ -280,6 +298,8 @@ class ZenohMiddleware(Middleware):
             Pump(events, self._on_transport, f"{self._address} links"),
             Pump(tokens, self._on_token, f"{self._address} tokens"),
         ]
+        if not self._is_peer:
+            self._await_history(session)
         with self._lock:
             if not self._closed:
                 self._session = session
@@ -298,13 +318,24 @@ class ZenohMiddleware(Middleware):
             return
         if fresh:
             limit_silence(session)
-        if not routers:
+            if routers:
+                self._await_history(session)
+        # Answers queue behind the tokens that there are.
+        if not routers or self.unnamed():
             self._pulse.rest()
         elif (now := time.monotonic()) >= self._next_beat:
             self._next_beat = now + _BEAT
             self._pulse.beat(session, now)
             if self._pulse.silent:
                 self._renew()
+
+    def _await_history(self, session: zenoh.Session) -> None:
+        """Ask a router what has no answer: the question ends when all before it has been sent."""
+        with suppress(zenoh.ZError):  # the session is closed
+            channel = zenoh.handlers.FifoChannel(4)
+            history = session.liveliness().get(self._nothing, channel, timeout=_HISTORY_S)
+            with self._lock:
+                self._history = history
 
     def _renew(self) -> None:
         # A number never used before, whichever thread comes last.
@@ -329,6 +360,7 @@ class ZenohMiddleware(Middleware):
         if sample.kind == zenoh.SampleKind.DELETE:
             self._hide(key)
         else:
+            self._pulse.on_news(time.monotonic())
             self._show(key)
 
     def _show(self, key: str) -> None:

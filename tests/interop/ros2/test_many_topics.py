@@ -1,0 +1,72 @@
+"""Ten thousand topics that a peer announces."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from pathlib import Path
+
+import pytest
+import zenoh
+
+from rosglass.comm import ConnectionState
+
+TOPICS = 10_000
+#: Bytes of memory for each, and seconds of this process's CPU in all.
+MEMORY, CPU = 10_000, 120.0
+#: Seconds; Zenoh alone takes four for a program that joins, on an idle machine.
+LONG = 120.0
+
+
+def memory():
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGESIZE")
+
+
+def count(node):
+    time.sleep(0.5)  # counting is work itself
+    return len(node.topics())
+
+
+def test_ten_thousand_announced_topics_cost_their_share(router, connect, wait_for, run_command):
+    node = connect("panel", "?domain=0")
+    states = []
+    node.on_status_change(lambda status: states.append(status.state))
+    publisher = connect("robot", "?domain=0").create_publisher("/beat", "std_msgs/msg/String")
+    beats = node.create_subscription("/beat", "std_msgs/msg/String")
+    wait_for(publisher.subscription_count)
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", json.dumps([router.listen]))
+    before, began = memory(), time.process_time()
+    with zenoh.open(config) as session:
+        head = "@ros2_lv/0/0badc0de/0"
+        kind, qos = "geometry_msgs::msg::dds_::Twist_/TypeHashNotSupported", "::,10:,:,:,,"
+        announced = [
+            session.liveliness().declare_token(f"{head}/{n}/MP/%/%/flood/%t{n}/{kind}/{qos}")
+            for n in range(TOPICS)
+        ]
+        wait_for(lambda: count(node) >= TOPICS, LONG)
+        assert memory() - before < 3 * MEMORY * TOPICS  # three see them, the router among these
+        publisher.publish(data="alive")
+        assert beats.wait(30).message().data == "alive"
+
+        late = connect("late", "?domain=0")
+        late.on_status_change(lambda status: states.append(status.state))
+        wait_for(lambda: count(late) >= TOPICS, LONG)
+
+        code, out, said = run_command("topic", "list", "--url", router.url + "?domain=0")
+        assert code == 0
+        assert out.count("\n/t") >= TOPICS - 1
+        assert "the router has not sent the whole graph yet" in said
+        del announced
+    assert ConnectionState.LOST not in states
+    wait_for(lambda: count(node) < 10, LONG)
+    assert late.status().state is ConnectionState.CONNECTED
+    assert time.process_time() - began < CPU
+
+
+@pytest.fixture
+def run_command(run_command, monkeypatch):
+    monkeypatch.setenv("ROS_DOMAIN_ID", "0")
+    return run_command
