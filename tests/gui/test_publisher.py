@@ -110,6 +110,54 @@ def test_what_cannot_be_advertised_in_time_is_told(
     assert [message.linear.x for message in received] == [2.0]
 
 
+def test_nothing_is_held_for_longer_than_the_robot_may_take(
+    running: Any, received: list, wait: Any, caplog: Any
+) -> None:
+    """A stop that went nowhere must be known to have."""
+    running.session.node.set_status(ConnectionState.CONNECTING, "no router yet")
+    wait(lambda: running.session.state == "connecting")
+    root = load(running)
+    send(root, 1.0)
+    assert root.property("sent") is True, "it is held for a moment"
+    wait(lambda: "not connected in time: no router yet" in caplog.text)
+    send(root, 2.0)
+    assert root.property("sent") is False
+    running.session.node.set_status(ConnectionState.CONNECTED, "")
+    wait(lambda: running.session.state == "connected")
+    send(root, 3.0)
+    assert root.property("sent") is True
+    wait(lambda: 3.0 in [message.linear.x for message in received])
+    assert 1.0 not in [message.linear.x for message in received]
+
+
+def test_a_publisher_that_is_let_go_sends_what_it_holds(
+    running: Any, received: list, wait: Any, monkeypatch: Any
+) -> None:
+    go = threading.Event()
+    create = running.session.node.create_publisher
+    monkeypatch.setattr(
+        running.session.node,
+        "create_publisher",
+        lambda *given: go.wait(30) and create(*given),
+    )
+    root = running.load(
+        """QtObject {
+            function once() {
+                Ros2.createPublisher("cmd_vel", "geometry_msgs/msg/Twist", 1)
+                    .publish({linear: {x: 7}})
+            }
+            function collect() { gc() }
+        }""",
+    )
+    root.once()
+    for _ in range(5):
+        root.collect()
+        wait(20)
+    go.set()
+    wait(lambda: received)
+    assert received[0].linear.x == 7
+
+
 def test_what_is_held_at_shutdown_is_told(
     running: Any, received: list, wait: Any, caplog: Any, monkeypatch: Any
 ) -> None:

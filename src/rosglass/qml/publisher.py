@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Publisher"]
 
-#: Seconds that a message is held at most until its topic is advertised.
-_ADVERTISE_TIMEOUT_S = 2.0
-#: Seconds after advertising in which messages are held until known subscribers are connected.
+#: Seconds that a message is held at most until its topic is advertised and the node connected.
+_HOLD_TIMEOUT_S = 2.0
+#: Seconds after that in which messages are held until known subscribers are connected.
 _MATCH_TIMEOUT_S = 1.0
 #: Messages that are held at most with keep-all history.
 _MOST_HELD = 1000
@@ -39,8 +39,8 @@ _MOST_HELD = 1000
 class Publisher(Element):
     """Sends messages of one type on one topic; advertises as soon as there is a node.
 
-    What is published right after it was made is held until the topic is advertised and its
-    subscribers are connected, and goes out in order then.
+    What is published right after it was made is held until the topic is advertised, the node
+    connected to the robot and its subscribers to the topic, and goes out in order then.
 
     Args:
         runtime: The engine's runtime.
@@ -63,7 +63,12 @@ class Publisher(Element):
         self._have: Node | None = None
         #: What waits, each until a time by :func:`time.monotonic`.
         self._held: deque[tuple[Message, float]] = deque()
-        self._advertised_at = 0.0
+        #: Keeps JavaScript from collecting this while something waits.
+        self._reference: QJSValue | None = None
+        #: Whether a held message was given up, and the node has not been connected since.
+        self._unreachable = False
+        #: When the node was connected and the topic advertised, monotonic.
+        self._ready_at: float | None = None
         self._settled = False
         self._retry = QtCore.QTimer(self)
         self._retry.setSingleShot(True)
@@ -92,9 +97,9 @@ class Publisher(Element):
         A value that does not fit throws a JavaScript Error that names the field; nothing is sent.
 
         Returns:
-            Whether it was handed to a connected node, or is held for a moment until the topic is
-            advertised: false while there is no node and none is connecting, while the topic cannot
-            be advertised, and while the connection is lost.
+            Whether it was handed to a connected node, or is held for a moment until that is there:
+            false while there is no node and none is connecting, while the topic cannot be
+            advertised, and while the connection is lost, or was not made in time.
         """
         sender, schema = self._sender, self._schema
         kind = self._early_type() if sender is None else sender.type
@@ -111,7 +116,9 @@ class Publisher(Element):
             schema = schema_of(kind.definition)
         try:
             fields = fields_from_js(message, schema, dialect=self.DIALECT)
-            if sender is None or self._held or not self._is_settled(sender):
+            if self._held:
+                self._send_held()
+            if sender is None or self._held or not self._may_send(sender):
                 # As bytes: what JavaScript does with the object later is nothing to it.
                 self._hold(kind.decode(kind.encode(fields)))
                 return True
@@ -125,7 +132,7 @@ class Publisher(Element):
         except Error as error:
             self._complain(f"nothing was published on {self._resolved}: {error}", logging.ERROR)
             return False
-        if self._session is None or self._session.state != "connected":
+        if not self._is_connected():
             detail = self._session.detail if self._session is not None else ""
             text = f"published on {self._resolved} while the connection is lost: {detail}"
             self._complain(text, logging.WARNING)
@@ -133,8 +140,9 @@ class Publisher(Element):
         return True
 
     def _send(self, sender: Sender, message: dict[str, object] | Message) -> None:
-        if self._qos.history is History.KEEP_ALL and self._session is not None:
-            # Who must not lose anything waits for a network that is stuck: not here.
+        waits = self._have is not None and self._have.wire != "ros1"  # ROS 1 queues without limit
+        if waits and self._qos.history is History.KEEP_ALL and self._session is not None:
+            # A publisher that must not lose anything waits for a network that is stuck: not here.
             data = sender.type.encode(message)
             self._session.background(lambda: sender.publish_serialized(data), self._sent_late)
         else:
@@ -147,6 +155,8 @@ class Publisher(Element):
         """
         session = self._session or (self._runtime.session if self._runtime is not None else None)
         if session is None or self._problem or session.state not in ("connecting", "connected"):
+            return None
+        if self._unreachable and session.state != "connected":
             return None
         from rosglass.connection import default_url  # noqa: PLC0415 - few publish this early
         from rosglass.messages import MessageType, load  # noqa: PLC0415 - brings in definitions
@@ -162,12 +172,25 @@ class Publisher(Element):
             return None
         return found if isinstance(found, MessageType) else None
 
+    def _is_connected(self) -> bool:
+        return self._session is not None and self._session.state == "connected"
+
+    def _may_send(self, sender: Sender) -> bool:
+        """Return whether a message is sent now instead of held."""
+        return self._unreachable or self._is_settled(sender)
+
     def _is_settled(self, sender: Sender) -> bool:
-        """Return whether those who subscribe get what is sent now, as far as is known."""
+        """Return whether the subscribers get what is sent now, as far as is known."""
+        if self._is_connected():
+            self._unreachable = False
+            if self._ready_at is None:
+                self._ready_at = time.monotonic()
         if not self._settled:
-            late = time.monotonic() - self._advertised_at > _MATCH_TIMEOUT_S
-            latched = self._qos.durability is Durability.TRANSIENT_LOCAL
-            self._settled = late or latched or self._is_matched(sender)
+            latched = self._qos.durability is Durability.TRANSIENT_LOCAL  # it is kept for them
+            late = self._ready_at is not None and (
+                time.monotonic() - self._ready_at > _MATCH_TIMEOUT_S or self._is_matched(sender)
+            )
+            self._settled = latched or late
         return self._settled
 
     def _is_matched(self, sender: Sender) -> bool:
@@ -184,9 +207,14 @@ class Publisher(Element):
         most = _MOST_HELD if self._qos.history is History.KEEP_ALL else self._qos.depth
         if len(self._held) >= most:
             self._held.popleft()
-            text = f"{self._topic}: messages are dropped, the oldest first: more than {most} were "
-            self._complain(text + "published before it was advertised", logging.WARNING)
-        self._held.append((message, time.monotonic() + _ADVERTISE_TIMEOUT_S))
+            if self._sender is None or self._qos.history is History.KEEP_ALL:
+                text = f"{self._topic}: messages are dropped, the oldest first: more than {most} "
+                self._complain(text + "wait for it to be advertised", logging.WARNING)
+        # JavaScript may let go of it, as in createPublisher(...).publish({}).
+        engine = self._runtime.engine if self._runtime is not None else None
+        if self._reference is None and engine is not None:
+            self._reference = engine.newQObject(self)
+        self._held.append((message, time.monotonic() + _HOLD_TIMEOUT_S))
 
     def _send_held(self) -> None:
         """Send what was held, once that makes sense; give up what is too old."""
@@ -198,11 +226,16 @@ class Publisher(Element):
                     self._send(sender, message)
                 except Error as error:
                     self._sent_late(error)
-        elif sender is None:
+        elif sender is None or not self._is_connected():
             while held and time.monotonic() > held[0][1]:
                 held.popleft()
-                why = self._problem or "it could not be advertised in time"
-                self._sent_late(Error(why))
+                self._unreachable = sender is not None or not self._is_connected()
+                late = "it could not be advertised in time"
+                if sender is not None and self._session is not None:
+                    late = f"not connected in time: {self._session.detail}"
+                self._sent_late(Error(self._problem or late))
+        if not held:
+            self._reference = None
 
     def _sent_late(self, result: Error | None) -> None:
         """Tell that what waited for the network was not sent in the end."""
@@ -228,6 +261,7 @@ class Publisher(Element):
             self._advertise()
         elif self._held:
             self._held.clear()
+            self._reference = None
             self._sent_late(Error("the node was shut down"))
 
     @Slot()
@@ -253,7 +287,7 @@ class Publisher(Element):
         assert session is not None
         self._sender, self._resolved = result, result.topic
         self._schema = schema_of(result.type.definition)
-        self._advertised_at, self._settled = time.monotonic(), False
+        self._ready_at, self._settled = None, False
         self._at_end["sender"] = lambda: session.background(result.close)
         self._watch(result, session)
         self._say("")
@@ -270,6 +304,7 @@ class Publisher(Element):
         if self._held:
             self._send_held()
         if self._sender is not None:
+            self._is_settled(self._sender)  # for what is published next
             self._say(self._sender.problem)
 
     def _withdraw(self) -> None:

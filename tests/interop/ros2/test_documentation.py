@@ -9,6 +9,7 @@ import inspect
 import logging
 import os
 import re
+import threading
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -245,6 +246,8 @@ class Reader:
         if isinstance(statement, ast.Expr):
             tree = ast.Expression(statement.value)
         mode = "eval" if isinstance(tree, ast.Expression) else "exec"
+        if ast.unparse(statement) == "node.spin()":  # until Ctrl-C, or the node is closed
+            threading.Timer(0.2, self.names["node"].close).start()
         code = compile(tree, self.page, mode, flags, dont_inherit=True)
         value = eval(code, self.names)  # the pages are ours
         if inspect.iscoroutine(value):
