@@ -185,6 +185,23 @@ def test_ends_when_another_node_takes_its_name(
     assert "/rviz_named was shut down" in program.output
 
 
+def test_ends_when_the_node_of_overlays_is_killed(
+    start: Callable[..., Program], tmp_path: Path, master: str
+) -> None:
+    from rosglass.ros1.master import call_node
+
+    file = interface(tmp_path, 'console.warn(Ros.ok() ? "up" : "down")')
+    file.write_text("import Ros 1.0\n" + file.read_text())
+    text = 'Item {\n    Component.onCompleted: Ros.init("overlay")'
+    file.write_text(file.read_text().replace("Item {", text, 1))
+    program = start("--overlay", file)
+    program.wait_for("up")
+    api = call_node(master, "lookupNode", "/test", "/overlay")
+    call_node(api, "shutdown", "/rosnode", "user request")
+    assert program.process.wait(PATIENCE) == 1, program.output
+    assert "RViz ends with the overlays' node: closed by /rosnode" in program.output
+
+
 def test_tells_when_the_master_is_gone_and_when_another_one_came(
     start: Callable[..., Program], tmp_path: Path
 ) -> None:

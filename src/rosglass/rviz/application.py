@@ -174,6 +174,7 @@ class Application(Handle):
             connect=connect_beside_rviz,
             arguments=shared_arguments(options),
         )
+        self.session.killed.connect(self._on_killed)
         self._screen = LostScreen(self.window.ids, [roscpp.shut_down, self._close_node])
         self.window.before_frame.connect(self._screen.look)
         #: RViz's tools, displays, views and camera.
@@ -323,6 +324,7 @@ class Application(Handle):
         self._closed = True
         steps: list[Callable[[], object]] = [
             self._timer.stop,
+            lambda: self.session.killed.disconnect(self._on_killed),
             self.master.close,
             self.window.close,
             self.view_entry.close,
@@ -361,6 +363,10 @@ class Application(Handle):
             self.node_name,
         )
         self.quit()
+
+    def _on_killed(self) -> None:
+        _log.error("RViz ends with the overlays' node: %s", self.session.detail)
+        self.quit(1)
 
     def _show_problem(self, problem: str) -> None:
         if self._problem is None:
