@@ -56,6 +56,26 @@ def test_what_comes_to_need_opengl_later_is_told(start: Any, screen: str, tmp_pa
     assert "start with --renderer opengl" in program.until("is not drawn")
 
 
+@pytest.mark.parametrize(
+    ("what", "imports"),
+    [("MediaPlayer", "import QtMultimedia 5.15"), ("ImagePublisher", "import Ros2 1.0")],
+)
+def test_what_is_no_item_and_needs_opengl_is_told(
+    what: str, imports: str, start: Any, screen: str, tmp_path: Path
+) -> None:
+    from rosglass.qt import QT6
+
+    if QT6 and what == "MediaPlayer":
+        pytest.importorskip("PySide6.QtMultimedia", reason="needs the extra `camera`")
+        imports = "import QtMultimedia"
+    file = tmp_path / "Main.qml"
+    file.write_text(
+        f"import QtQuick 2.15\n{imports}\nItem {{ width: 200; height: 100\n{what} {{ }} }}\n"
+    )
+    program, _ = shown(start, screen, file, "--renderer", "software")
+    assert f"{file}:4: {what} is not drawn" in program.until("is not drawn")
+
+
 def test_a_thread_of_qt_is_not_made_to_wait_for_python(
     start: Any, screen: str, tmp_path: Path
 ) -> None:

@@ -113,6 +113,14 @@ def test_what_is_not_drawn_is_told_with_its_place_and_what_to_do(
     assert "--renderer opengl" in said
 
 
+def test_films_that_are_not_drawn_are_told(qml: Any, chosen: Callable[..., str]) -> None:
+    film = "Item { MediaPlayer { id: film } VideoOutput { source: film } }"
+    file = qml("Film", film, "import QtMultimedia 5.15")
+    said = chosen("--overlay", file, "--renderer", "software")
+    assert f"overlay Film: {file}:3: MediaPlayer is not drawn" in said
+    assert said.count("is not drawn") == 1
+
+
 @pytest.mark.parametrize(("wanted", "name"), [("opengl", "OpenGL"), ("software", "Qt's software")])
 def test_what_the_user_asks_for_counts_for_more_than_anything_else(
     wanted: str, name: str, qml: Any, chosen: Callable[..., str]

@@ -18,7 +18,7 @@ from rosglass.qml.error_view import (
     ErrorView,
 )
 from rosglass.qml.live_file import LiveFile
-from rosglass.qml.opengl_needs import need_in_items
+from rosglass.qml.opengl_needs import need_in_file, need_in_items
 from rosglass.qml.renderer_choice import choice
 from rosglass.qml.runtime import runtime_of
 from rosglass.qt import QtCore, QtGui, QtQuick, Slot, is_alive, send_deferred_deletes
@@ -247,10 +247,10 @@ class Runner(QtCore.QObject):
             if self._kiosk is not None:
                 self._kiosk.keep(window)
         if isinstance(root, QtQuick.QQuickItem):
-            self._tell_not_drawn(root)
+            self._tell_not_drawn([root])
         else:
-            for window in {id(w): w for w in (*wanted, *others)}.values():
-                self._tell_not_drawn(window.contentItem())
+            windows = {id(w): w for w in (*wanted, *others)}.values()
+            self._tell_not_drawn([window.contentItem() for window in windows])
         for window in wanted:
             if self._fullscreen:
                 window.showFullScreen()
@@ -301,11 +301,15 @@ class Runner(QtCore.QObject):
     def _tell_script_ended(self, text: str) -> None:
         self._notice.show(text, self.windows(), SCRIPT_ENDED)
 
-    def _tell_not_drawn(self, item: QtQuick.QQuickItem) -> None:
+    def _tell_not_drawn(self, items: Sequence[QtQuick.QQuickItem]) -> None:
         """Warn of what only OpenGL draws, as a file that is shown anew may come to need it."""
-        need = need_in_items(item, self.file) if choice.renderer == "software" else ""
-        if need:
-            _log.warning("%s", choice.tell_missing(need))
+        if choice.renderer != "software":
+            return
+        needs = [need for item in items if (need := need_in_items(item, self.file))]
+        # Films, and pictures of items, are no items that could be found.
+        for need in needs or [need_in_file(self.file, self.engine.importPathList())]:
+            if need:
+                _log.warning("%s", choice.tell_missing(need))
 
     def _no_graphics(self, error: Any, message: str) -> None:  # noqa: ARG002 - Qt's signature
         _log.error("the window cannot be drawn: %s; try --renderer software", message)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.errors import QmlError
 from rosglass.qml.error_view import ERRORS, ERRORS_BELOW, PANEL, SCRIPT_ENDED, ErrorView
 from rosglass.qml.live_file import LiveFile
-from rosglass.qml.opengl_needs import need_in_items
+from rosglass.qml.opengl_needs import need_in_file, need_in_items
 from rosglass.qml.places import interface_file
 from rosglass.qt import is_alive
 from rosglass.rviz.overlay import Overlay
@@ -22,7 +22,7 @@ from rosglass.rviz.scene import Scene
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     import numpy as np
     from numpy.typing import NDArray
@@ -194,7 +194,8 @@ class QmlOverlay(QmlInput, Overlay):
         self._scene.show_item(root)
         self._not_drawn = ""
         self.tell_problem("")
-        self._tell_not_drawn(root)
+        # Films, and pictures of items, are no items that could be found.
+        self._tell_not_drawn(root, lambda: need_in_file(self.file, self.engine.importPathList()))
 
     def _rest(self) -> None:
         """Hold no picture, and tell of what is not drawn that was made since; popups, too."""
@@ -202,8 +203,10 @@ class QmlOverlay(QmlInput, Overlay):
         if not self._not_drawn and is_alive(self._window):
             self._tell_not_drawn(self._window.contentItem())
 
-    def _tell_not_drawn(self, item: Any) -> None:
-        need = need_in_items(item, self.file) if choice.renderer == "software" else ""
+    def _tell_not_drawn(self, item: Any, otherwise: Callable[[], str] = str) -> None:
+        if choice.renderer != "software":
+            return
+        need = need_in_items(item, self.file) or otherwise()
         if need:
             self._not_drawn = choice.tell_missing(need)
             _log.warning("overlay %s: %s", self.name, self._not_drawn)
