@@ -208,8 +208,9 @@ class Publisher(Element):
         if len(self._held) >= most:
             self._held.popleft()
             if self._sender is None or self._qos.history is History.KEEP_ALL:
-                text = f"{self._topic}: messages are dropped, the oldest first: more than {most} "
-                self._complain(text + "wait for it to be advertised", logging.WARNING)
+                text = f"{self._topic}: messages are dropped, the oldest first: more than "
+                text += f"{most} were published before it was advertised"
+                self._complain(text, logging.WARNING)
         # JavaScript may let go of it, as in createPublisher(...).publish({}).
         engine = self._runtime.engine if self._runtime is not None else None
         if self._reference is None and engine is not None:
