@@ -584,24 +584,38 @@ def test_two_robots_of_one_name_are_a_problem(live: Any, wait: Any, caplog: Any)
             property Subscription s: Subscription { topic: "/twins"; onNewMessage: received++ }
             property ImageTransportSubscription i: ImageTransportSubscription { topic: "/eyes" }
             property VideoOutput v: VideoOutput { source: i }
-            function problems() { return s.problem + "|" + i.problem }
+            property SynchronizedSubscription y: SynchronizedSubscription {
+                topics: ["/twins", "/eyes"]
+                allowHeaderless: true
+            }
+            property TfTransform t: TfTransform { sourceFrame: "base"; targetFrame: "map" }
+            property TfBuffer b: TfBuffer {}
+            property TfTransform u: TfTransform { sourceFrame: "a"; targetFrame: "b"; buffer: b }
+            function problems() {
+                const all = [s, i, y, TfTransformListener, t, b, u]
+                return all.map((one) => one.problem).join("|")
+            }
         }
     """)
     twin = live.world.connect(None, "robot")
     publishers = [
         node.create_publisher(topic, kind)
         for node in (live.robot, twin)
-        for topic, kind in (("/twins", "std_msgs/msg/Int32"), ("/eyes", "sensor_msgs/msg/Image"))
+        for topic, kind in (
+            ("/twins", "std_msgs/msg/Int32"),
+            ("/eyes", "sensor_msgs/msg/Image"),
+            ("/tf", "tf2_msgs/msg/TFMessage"),
+        )
     ]
+    text = "{}: 2 publishers of nodes called /robot, a name of 2 nodes, are mixed".format
+    twins, eyes, tf = text("/twins"), text("/eyes"), text("/tf")
 
     def is_told() -> bool:
         publishers[0].publish({"data": 1})
-        return bool(root.property("received")) and root.problems() == (
-            "/twins: 2 nodes called /robot publish this topic, and are shown mixed|"
-            "/eyes: 2 nodes called /robot publish this topic, and are shown mixed"
-        )
+        told = [twins, eyes, twins, tf, tf, tf, tf]
+        return bool(root.property("received")) and root.problems() == "|".join(told)
 
     wait(is_told)
     assert "2 nodes are called /robot" in caplog.text
     twin.close()
-    wait(lambda: root.problems() == "|")
+    wait(lambda: root.problems() == "||||||")

@@ -289,25 +289,11 @@ class TopicElement(Element):
 
     @Slot()
     def _on_tick(self) -> None:
-        mixed = self._mixing()
+        mixed = self._session.mixing(self._resolved) if self._session is not None else ""
         if mixed != self._mixed:
             self._mixed = mixed
             self._problem_changed()
         self._judge()
-
-    def _mixing(self) -> str:
-        """Return what to say when several nodes of one name publish the topic; empty otherwise."""
-        node = self.node
-        names = self._session.duplicate_nodes if self._session is not None else {}
-        if node is None or not names or not self._resolved:
-            return ""
-        with suppress(Error):
-            senders = [one.node.full for one in node.publishers(self._resolved)]
-            for name, count in names.items():
-                if senders.count(name) > 1:
-                    what = f"{count} nodes called {name} publish this topic"
-                    return f"{self._resolved}: {what}, and are shown mixed"
-        return ""
 
     def _judge(self) -> None:
         """Find out whether what is shown is live, and tell when that changed."""

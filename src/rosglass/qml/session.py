@@ -490,6 +490,23 @@ class Session(QtCore.QObject):
             if self._owns_node:
                 self.background(node.close)
 
+    def mixing(self, topic: str) -> str:
+        """Return what to say when nodes of one name publish a topic; empty otherwise.
+
+        Args:
+            topic: Absolute; nothing is said of an empty one.
+        """
+        if self.node is None or not self.duplicate_nodes or not topic:
+            return ""
+        with suppress(Error):  # a node that has just been closed
+            senders = [one.node.full for one in self.node.publishers(topic)]
+            for name, count in self.duplicate_nodes.items():
+                if senders.count(name) > 1:
+                    # Which of the nodes has which publisher is not known.
+                    what = f"{senders.count(name)} publishers of nodes called {name}, a name of"
+                    return f"{topic}: {what} {count} nodes, are mixed"
+        return ""
+
     @Slot()
     def _find_duplicates(self) -> None:
         found: dict[str, int] = {}

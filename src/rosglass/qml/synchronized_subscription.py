@@ -389,14 +389,15 @@ class SynchronizedSubscription(Element):
             # Their topics, types and profiles may have changed.
             self._update()
         self._judge()
-        matcher = self._matcher
+        matcher, session = self._matcher, self._session
         frequency = rate_of(self._times, time.monotonic())
         if changed_enough(self._frequency, frequency):
             self._frequency = frequency
             self.frequencyChanged.emit()
-        if matcher is None:
+        if matcher is None or session is None:
             return
-        self._say(matcher.problem)
+        mixing = (session.mixing(one.topic) for one in matcher.subscriptions)
+        self._say(matcher.problem or next(filter(None, mixing), ""))
         if matcher.dropped != self._dropped:
             self._dropped = matcher.dropped
             self.droppedChanged.emit()

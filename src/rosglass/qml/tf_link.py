@@ -23,7 +23,6 @@ class TfLink:
 
     Attributes:
         buffer: The transforms.
-        problem: Why they are not received; empty when they are.
     """
 
     def __init__(self, session: Session, node: Node, namespace: str) -> None:
@@ -32,7 +31,7 @@ class TfLink:
         self._listener: TransformListener | None = None
         self._closed = False
         self.buffer = TransformBuffer()
-        self.problem = ""
+        self._topic, self._failure = "", ""
 
         def work() -> None:
             from rosglass.tf import TransformListener  # noqa: PLC0415 - loaded with the buffer
@@ -41,6 +40,11 @@ class TfLink:
             self._listener = TransformListener(node, self.buffer, namespace)
 
         session.background(work, self._opened)
+
+    @property
+    def problem(self) -> str:
+        """Why they are not received, or mixed with another robot's; empty when all is well."""
+        return self._failure or self._session.mixing(self._topic)
 
     @classmethod
     def join(cls, session: Session, node: Node, namespace: str, user: Any) -> TfLink:
@@ -63,8 +67,11 @@ class TfLink:
 
     def _opened(self, result: Error | None) -> None:
         if result is not None:
-            self.problem = str(result)
+            self._failure = str(result)
             _log.warning("transforms are not received: %s", result)
+        elif self._listener is not None:
+            # Not the static ones: nodes of one name may well send each its own.
+            self._topic = self._listener.subscriptions[0].topic
 
     def _shut(self) -> None:
         if self._listener is not None:

@@ -58,6 +58,8 @@ class TfTransform(Element):
         self._own_buffer: TfBuffer | None = None
         self._link: TfLink | None = None
         self._watch: Handle | None = None
+        #: What is wrong with the names of the frames; empty when they are good.
+        self._bad_frames = ""
         self._have: tuple[TransformBuffer, str, str] | None = None
         self._transform: Transform | None = None
         self._exception, self._why = "Uninitialized", "nothing was looked up yet"
@@ -199,7 +201,7 @@ class TfTransform(Element):
             want = (buffer, self._target, self._source)
         if want != self._have:
             self._unwatch()
-            self._have, self._arrived = want, None
+            self._have, self._arrived, self._bad_frames = want, None, ""
             if want is not None and self._session is not None:
                 try:
                     watch = self._watch = want[0].on_change(
@@ -207,7 +209,8 @@ class TfTransform(Element):
                     )
                     self._at_end["watch"] = watch.close
                 except TransformException as error:
-                    self._say(f"TfTransform: {error}")
+                    self._bad_frames = f"TfTransform: {error}"
+                    self._say(self._bad_frames)
         if want is not None:
             # What the buffer has already may be of a robot that is gone: it has to move first.
             self._look(moved=False)
@@ -305,6 +308,9 @@ class TfTransform(Element):
         if missing and not self._timer.isActive() and time.monotonic() - self._updated > _AGAIN:
             # The reason may be another one by now: frames that are not asked for tell nobody.
             self._refresh()
+        own = self._own_buffer
+        source = self._link if own is None or not is_alive(own) else own
+        self._say(self._bad_frames or (str(source.problem) if source is not None else ""))
         self._judge()
 
     def _problem_changed(self) -> None:
