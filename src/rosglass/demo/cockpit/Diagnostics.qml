@@ -15,6 +15,8 @@ Panel {
     property var parts: ({})
     property var states: []
     property int uncounted: 0
+    // The time in seconds, which setting the clock does not change.
+    property int seconds: 0
     readonly property int hidden: Math.max(0, states.length - list.shown)
     readonly property var counts: {
         const found = [0, 0, 0, 0]
@@ -43,7 +45,7 @@ Panel {
             parts[key] = {
                 level: [0, 1, 2, 3].includes(status.level) ? status.level : 2,
                 name: status.name, text: status.message,
-                value: status.values.length ? status.values[0].value : "", at: Date.now()
+                value: status.values.length ? status.values[0].value : "", at: seconds
             }
         }
         sort()
@@ -51,16 +53,20 @@ Panel {
 
     // The worst first.
     function sort() {
-        const now = Date.now()
-        const list = Object.values(parts).map(function (part) {
-            const silent = now - part.at > limit * 1000
+        const found = Object.values(parts).map(function (part) {
+            const silent = seconds - part.at > limit
             return { level: silent ? 3 : part.level, name: part.name, value: silent ? "" : part.value,
                      text: silent ? "silent, said: " + part.text : part.text }
         })
-        list.sort((a, b) => rank(b.level) - rank(a.level) || (a.name < b.name ? -1 : a.name > b.name ? 1 : 0))
+        found.sort((a, b) => rank(b.level) - rank(a.level) || (a.name < b.name ? -1 : a.name > b.name ? 1 : 0))
         // Assigned only when it differs: the rows would be rebuilt each time.
-        if (JSON.stringify(list) !== JSON.stringify(states))
-            states = list
+        if (JSON.stringify(found) === JSON.stringify(states))
+            return
+        // A new model takes the view back to its top, away from what is being read.
+        const y = list.contentY
+        states = found
+        list.forceLayout()
+        list.contentY = Math.max(0, Math.min(y, list.contentHeight - list.height))
     }
 
     property Feed feed: Feed {
@@ -79,7 +85,10 @@ Panel {
         interval: 1000
         repeat: true
         running: true
-        onTriggered: panel.sort()
+        onTriggered: {
+            panel.seconds += 1
+            panel.sort()
+        }
     }
 
     ListView {

@@ -1,0 +1,94 @@
+"""The list of a robot's parts in the demo's cockpit: it stays where it is read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+import rosglass.demo
+from rosglass.qt import QT6, QtCore, Slot
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+COCKPIT = Path(rosglass.demo.__file__).with_name("cockpit")
+pytestmark = pytest.mark.skipif(not QT6, reason="the demo's cockpit is for Qt 6")
+
+PANEL = """Item {
+    Diagnostics { id: panel; width: 300; height: 120 }
+    function list(item) {
+        for (const child of item.children) {
+            const found = child.objectName === "list" ? child : list(child)
+            if (found)
+                return found
+        }
+    }
+    function values() { return panel.states.map((state) => state.value).join() }
+    function levels() { return panel.states.map((state) => state.level).join() }
+    function scroll(y) { list(panel).contentY = y }
+    function place() { return list(panel).contentY }
+    function end() { return list(panel).contentHeight - list(panel).height }
+    function sort() { panel.sort() }
+}"""
+
+
+class Parts:
+    """The panel, and a robot whose parts say a number each."""
+
+    def __init__(self, running: Any, wait: Callable[..., None]) -> None:
+        self.root = running.load(PANEL, f'import QtQuick 2.15\nimport "{COCKPIT.as_uri()}"')
+        self._wait = wait
+        self._publisher = running.robot.create_publisher(
+            "/diagnostics", "diagnostic_msgs/msg/DiagnosticArray"
+        )
+
+    def say(self, *values: int) -> None:
+        """Send the parts' numbers, until they are shown."""
+        status = [
+            {"name": f"part {n:02}", "values": [{"key": "n", "value": str(value)}]}
+            for n, value in enumerate(values)
+        ]
+        shown = ",".join(map(str, values))
+
+        def arrived() -> bool:
+            self._publisher.publish({"status": status})
+            return bool(self.root.values() == shown)
+
+        self._wait(arrived)
+
+
+def test_the_list_stays_where_it_is_read(running: Any, wait: Callable[..., None]) -> None:
+    parts = Parts(running, wait)
+    parts.say(*range(12))
+    end = parts.root.end()
+    assert end > 60
+    for place in (0, 60, end):
+        parts.root.scroll(place)
+        for changed in (100, 101):
+            parts.say(changed + place, *range(1, 12))
+            assert parts.root.place() == place
+
+
+class Clock(QtCore.QObject):
+    """Stands for JavaScript's Date."""
+
+    milliseconds = 1e12
+
+    @Slot(result=float)
+    def now(self) -> float:
+        return self.milliseconds
+
+
+def test_setting_the_clock_silences_no_part(running: Any, wait: Callable[..., None]) -> None:
+    clock = Clock(running.engine)
+    running.engine.rootContext().setContextProperty("Date", clock)
+    parts = Parts(running, wait)
+    parts.say(1, 2)
+    clock.milliseconds += 3_600_000
+    parts.root.sort()
+    assert parts.root.levels() == "0,0"
+    # A part that says no more is silent all the same.
+    clock.milliseconds -= 7_200_000
+    wait(lambda: parts.root.levels() == "3,3", 30)
