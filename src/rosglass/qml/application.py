@@ -65,7 +65,8 @@ class Application(Handle):
         Error: This is not the main thread, or the Qt application is one without windows; `session`
             is given together with what describes one; a name in `context` is none that QML can
             write; there is no such `renderer`, or another window has chosen another one.
-        SystemExit: Ctrl-C was pressed while it was made (130), or SIGTERM came (143).
+        SystemExit: Ctrl-C was pressed while it was made (130), or SIGTERM came (143); not where the
+            program has a handler of its own for it, which is called.
     """
 
     def __init__(
@@ -229,11 +230,13 @@ class Application(Handle):
 def _signals_put_off() -> Iterator[None]:
     """Put Ctrl-C and SIGTERM off until the end, but for no more than :data:`_PATIENCE`.
 
+    Handlers of the program's own stay, and answer at once.
+
     Raises:
         SystemExit: One came; with its exit code, as :meth:`Application.run` returns it.
     """
     received: list[int] = []
-    with QuitOnSignal(received.append, _PATIENCE):
+    with QuitOnSignal(received.append, _PATIENCE, keep_handlers=True):
         yield
     if received:
         raise SystemExit(128 + received[0])

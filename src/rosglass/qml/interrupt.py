@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import threading
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -16,6 +17,11 @@ __all__ = ["QuitOnSignal", "end_process_within"]
 
 #: Seconds that the program has to end in good order.
 _PATIENCE = 4.0
+#: The signals that end a program, with Python's own handlers.
+_DEFAULTS: dict[int, Any] = {
+    signal.SIGINT: signal.default_int_handler,
+    signal.SIGTERM: signal.SIG_DFL,
+}
 
 
 def end_process_within(seconds: float, code: int) -> None:
@@ -40,10 +46,18 @@ class QuitOnSignal:
     Args:
         quit: Called in that thread with the signal's number.
         patience: Seconds that the program has to end in good order.
+        keep_handlers: Leave signals alone that the program ignores or has a handler of its own for.
     """
 
-    def __init__(self, quit: Callable[[int], None], patience: float = _PATIENCE) -> None:
+    def __init__(
+        self,
+        quit: Callable[[int], None],
+        patience: float = _PATIENCE,
+        *,
+        keep_handlers: bool = False,
+    ) -> None:
         self._quit, self._patience = quit, patience
+        self._signals = [n for n in _DEFAULTS if not (keep_handlers and _is_programs_own(n))]
         self._reader, self._writer = os.pipe()
         self._ended = threading.Event()
         self._before: dict[int, Any] = {}
@@ -54,8 +68,8 @@ class QuitOnSignal:
         if sys.platform != "win32":
             os.set_blocking(self._writer, False)
         self._wakeup = signal.set_wakeup_fd(self._writer, warn_on_full_buffer=False)
-        for number in (signal.SIGINT, signal.SIGTERM):
-            self._before[number] = signal.signal(number, lambda *_: None)
+        for number in self._signals:
+            self._before[number] = signal.signal(number, _note)
         self._thread.start()
         return self
 
@@ -67,19 +81,36 @@ class QuitOnSignal:
     ) -> None:
         self._ended.set()
         for number, handler in self._before.items():
-            signal.signal(number, handler)
+            # One that was installed from C cannot be put back from Python.
+            signal.signal(number, _DEFAULTS[number] if handler is None else handler)
         signal.set_wakeup_fd(self._wakeup)
         os.close(self._writer)
         # What `quit` refers to must not outlive this in a thread.
         self._thread.join()
 
     def _watch(self) -> None:
-        ending = {int(number) for number in self._before}
+        ending = {int(number) for number in self._signals}
         while received := os.read(self._reader, 1):
-            if received[0] in ending:
+            if received[0] not in ending:
+                # As asyncio's, which learns of its signals by it.
+                with suppress(OSError):
+                    os.write(self._wakeup, received)
+            else:
                 self._quit(received[0])
                 if not self._ended.wait(self._patience):
                     sys.stderr.write("rosglass: the interface does not react; ending it\n")
                     sys.stderr.flush()
                     os._exit(128 + received[0])
         os.close(self._reader)
+
+
+def _note(*_: object) -> None:
+    """Take a signal that :class:`QuitOnSignal` answers in its thread."""
+
+
+def _is_programs_own(number: int) -> bool:
+    """Return whether a signal's handler is neither Python's own nor one of this package."""
+    handler = signal.getsignal(number)
+    if handler in (signal.SIG_DFL, _DEFAULTS[number]):
+        return False
+    return str(getattr(handler, "__module__", "")).partition(".")[0] != "rosglass"

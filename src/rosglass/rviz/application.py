@@ -153,7 +153,7 @@ class Application(Handle):
         self._closed = self._running = self._fullscreen = False
         self._fullscreen = fullscreen
         received: list[int] = []
-        with QuitOnSignal(received.append, _PATIENCE):
+        with QuitOnSignal(received.append, _PATIENCE, keep_handlers=True):
             answers = wait_for_master(options.master, timeout, lambda: bool(received))
             if answers:
                 name_node(name or told.name, options)
