@@ -57,7 +57,8 @@ Item {
         interval: 100
         running: view.received
         repeat: true
-        onTriggered: view.age = (Date.now() - view.stamp) / 1000
+        // It grows even when the clock is set back, so that no picture that stands still is live.
+        onTriggered: view.age = Math.max(view.age + interval / 1000, (Date.now() - view.stamp) / 1000)
     }
 
     VideoOutput {

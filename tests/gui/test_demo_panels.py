@@ -1,4 +1,4 @@
-"""The list of a robot's parts in the demo's cockpit: it stays where it is read."""
+"""Parts of the demo's cockpit: what they show stays where it is read, and knows its age."""
 
 from __future__ import annotations
 
@@ -92,3 +92,23 @@ def test_setting_the_clock_silences_no_part(running: Any, wait: Callable[..., No
     # A part that says no more is silent all the same.
     clock.milliseconds -= 7_200_000
     wait(lambda: parts.root.levels() == "3,3", 30)
+
+
+def test_a_picture_that_stands_still_ages_when_the_clock_is_set_back(
+    running: Any, wait: Callable[..., None]
+) -> None:
+    pytest.importorskip("PySide6.QtMultimedia", reason="the cockpit needs the extra `camera`")
+    clock = Clock(running.engine)
+    running.engine.rootContext().setContextProperty("Date", clock)
+    root = running.load(
+        """CameraView {
+            stamp: 1e12
+            age: 0
+            received: true
+            function isOld() { return age > limit }
+        }""",
+        f'import QtQuick 2.15\nimport "{COCKPIT.as_uri()}"',
+    )
+    assert not root.isOld()
+    clock.milliseconds -= 3_600_000
+    wait(root.isOld)
