@@ -226,7 +226,7 @@ class _Describer:
 
     def _unaliased(self, type_id: Any, where: str) -> Any:
         """Return what a type identifier stands for in the end."""
-        for _ in range(_MAX_ALIASES):
+        for _ in range(_MAX_ALIASES + 1):
             if type_id.discriminator != _COMPLETE or self._object(type_id, where) is not None:
                 return type_id
             alias = self._objects[bytes(type_id.equivalence_hash)].alias_type
