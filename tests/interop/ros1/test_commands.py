@@ -5,8 +5,11 @@ from __future__ import annotations
 import json
 import re
 import signal
+import subprocess
+import sys
 import time
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -357,3 +360,62 @@ def test_record_and_play_commands(run, robot, start_command, tmp_path, tool, mas
     out, err = process.communicate(timeout=60)
     assert process.returncode == 0, err
     assert "1 messages sent" in out
+
+
+# -- where nothing says where the robot is ---------------------------------------------------------
+
+#: In a network of its own, with nothing of ROS 2: others' commands must not find this master.
+NEARBY = """
+import os, subprocess, sys, time, xmlrpc.client
+import rosglass
+from rosglass.cli import main
+from rosglass.comm import QoS
+
+home = {"HOME": sys.argv[1], "ROS_HOME": sys.argv[1], "PATH": "/usr/bin:/bin"}
+command = ["/usr/bin/rosmaster", "--core", "-p", "11311"]
+master = subprocess.Popen(command, env=home, stdout=subprocess.DEVNULL)
+try:
+    with xmlrpc.client.ServerProxy("http://127.0.0.1:11311") as server:
+        for _ in range(600):
+            try:
+                server.setParam("/test", "/speed", 1.5)
+                break
+            except OSError:
+                assert master.poll() is None
+                time.sleep(0.1)
+    with rosglass.connect("ros1://127.0.0.1:11311?ip=127.0.0.1", "robot") as node:
+        node.create_publisher("/nearby", "std_msgs/String", QoS.latched()).publish(data="hello")
+        node.create_service_server("/stop", "std_srvs/Trigger", lambda request: {"success": True})
+        os.environ["ROS_IP"] = "127.0.0.1"
+        for line in ("topic list", "topic echo --once /nearby", "node list", "service list",
+                     "service call /stop std_srvs/Trigger", "param get /speed"):
+            print(f"-- {line}", flush=True)
+            assert main(line.split()) == 0, line
+finally:
+    master.kill()
+    master.wait()
+"""
+
+
+def test_the_master_of_this_machine_is_used(master, tmp_path, monkeypatch):
+    for name in ("ROSGLASS_URL", "RMW_IMPLEMENTATION", "ROS_DISTRO", "ROS_DOMAIN_ID", "ROS_IP",
+                 "ROS_MASTER_URI", "CYCLONEDDS_URI", "ZENOH_SESSION_CONFIG_URI"):  # fmt: skip
+        monkeypatch.delenv(name, raising=False)
+    private = Path(__file__).parents[3] / "scripts/private_network.sh"
+    done = subprocess.run(
+        [str(private), sys.executable, "-c", NEARBY, str(tmp_path)],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=100,
+    )
+    assert done.returncode == 0, done.stderr
+    shown = dict(part.split("\n", 1) for part in done.stdout.split("-- ")[1:])
+    assert "/nearby" in shown["topic list"].splitlines()
+    assert "hello" in shown["topic echo --once /nearby"]
+    assert "/robot" in shown["node list"].splitlines()
+    assert "/stop" in shown["service list"].splitlines()
+    assert "success: true" in shown["service call /stop std_srvs/Trigger"].lower()
+    assert shown["param get /speed"] == "1.5\n"
+    said = "rosglass: nothing says where the robot is: using ros1://127.0.0.1:11311 (export"
+    assert done.stderr.count(said) == len(shown)
