@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from urllib.parse import urlsplit
 
 from rosglass.comm.complaints import Complaints
+from rosglass.ros1.address import is_loopback
 from rosglass.ros1.master import parse_xml
 
 if TYPE_CHECKING:
@@ -186,9 +187,9 @@ class Slave(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCDispatcher):
 
     def _shutdown(self, caller: object, reason: object = "") -> int:
         peer, own = self._ends.addresses
-        # Debian names a machine 127.0.1.1, to which it connects from 127.0.0.1.
-        here = (own, "127.0.0.1", "::1")
-        if peer not in here and peer not in _addresses(self._api.master_uri()):
+        # Debian names a machine 127.0.1.1, to which others connect from 127.0.0.1.
+        here = peer == own or is_loopback(peer)
+        if not here and peer not in _addresses(self._api.master_uri()):
             if self._complaints.fresh(("shutdown", peer)):
                 text = "%s at %s wanted to end this node: only its own and the master's host may"
                 _log.warning(text, caller, peer)

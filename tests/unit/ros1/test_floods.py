@@ -1,30 +1,17 @@
-"""Thousands of connections to a node, and who may end it."""
+"""Thousands of connections to a node."""
 
 from __future__ import annotations
 
-import http.client
 import socket
 import threading
 import xmlrpc.client
 
 import pytest
 
-from rosglass.comm import ConnectionState
 from rosglass.ros1 import node as ros1_node
 
 FLOOD = 1000
 HEADER = b"\x14\0\0\0\x10\0\0\0callerid=/nobody"
-
-
-class From(xmlrpc.client.Transport):
-    """Calls from an address of this machine's own choice."""
-
-    def __init__(self, address):
-        super().__init__()
-        self._address = address
-
-    def make_connection(self, host):
-        return http.client.HTTPConnection(host, timeout=20, source_address=(self._address, 0))
 
 
 def flood(port, payload=b""):
@@ -100,14 +87,3 @@ def test_there_are_fewer_connections_than_files(node, eventually, monkeypatch):
             sock.close()
     eventually(lambda: not node._connections)
     assert 100 <= ros1_node._max_connections() <= 10_000
-
-
-def test_only_this_and_the_masters_host_may_end_the_node(node, eventually):
-    uri, _ = place(node)
-    stranger = xmlrpc.client.ServerProxy(uri, transport=From("127.0.0.9"))
-    code, told, _ = stranger.shutdown("/evil", "because")
-    assert code == -1
-    assert "taken from this node's own and the master's host, not from 127.0.0.9" in told
-    assert node.status().state is not ConnectionState.CLOSED
-    assert xmlrpc.client.ServerProxy(uri).shutdown("/rosnode", "user request")[0] == 1
-    eventually(lambda: node.status().state is ConnectionState.CLOSED)
