@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from rosglass.qt import BINDING
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -31,6 +33,30 @@ SCRIPT = """import sys
 print("started", flush=True)
 from rosglass.qml import Application
 sys.exit(Application({file!r}, url="dds://?domain=97").run())
+"""
+#: Ctrl-C is pressed when a module is about to be imported.
+IMPORT = """import os, signal, sys
+class Press:
+    def find_spec(self, name, *_):
+        if name == {module!r}:
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Press())
+from rosglass.qml import Application
+print("still there")
+"""
+ASYNCIO = """import asyncio, os, signal
+import rosglass.qml
+async def main():
+    os.kill(os.getpid(), signal.SIGINT)
+    try:
+        await asyncio.sleep(60)
+    except asyncio.CancelledError:
+        print("cancelled")
+        raise
+try:
+    asyncio.run(main())
+except KeyboardInterrupt:
+    print("ended")
 """
 #: Says when it is `rosglass` that is to answer: what comes before is Python's own.
 COMMAND = """import sys
@@ -70,3 +96,33 @@ def test_ctrl_c_at_any_moment_of_the_start_ends_it(
         assert "Fatal" not in said
         if program is COMMAND:
             assert "Traceback" not in said
+
+
+@pytest.mark.parametrize(
+    "module", ["rosglass.qml.executor", "QtCore", "rosglass.qml.session", "rosglass.qml.runner"]
+)
+def test_ctrl_c_while_modules_are_imported_ends_the_script_afterwards(
+    module: str, platform: dict[str, str]
+) -> None:
+    module = f"{BINDING}.QtCore" if module == "QtCore" else module
+    done = run(IMPORT.format(module=module), platform)
+    assert done.returncode == 130, done.stderr
+    assert done.stdout == ""
+    assert done.stderr == ""
+
+
+@pytest.mark.skipif(sys.version_info < (3, 11), reason="asyncio answers Ctrl-C from 3.11 on")
+def test_asyncio_answers_ctrl_c_after_the_import(platform: dict[str, str]) -> None:
+    done = run(ASYNCIO, platform)
+    assert done.stdout.split() == ["cancelled", "ended"], done.stderr
+
+
+def run(program: str, platform: dict[str, str]) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", program],
+        env=os.environ | platform,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )

@@ -15,6 +15,7 @@ import rosglass
 ROOT = Path(rosglass.__file__).parent
 RANK = {
     "errors": 0,
+    "interrupts": 0,
     "interfaces": 1,
     "messages": 2,
     "comm": 3,

@@ -4,12 +4,16 @@
 has a QML engine of its own calls :func:`install`.
 """
 
-from typing import TYPE_CHECKING
+# Before anything that takes its time to import.
+from rosglass.interrupts import InterruptsDeferred
 
-from rosglass.qml.executor import GuiExecutor
-from rosglass.qml.modules import IMPORT_PATHS, install
-from rosglass.qml.session import Session
+with InterruptsDeferred():
+    from rosglass.qml.executor import GuiExecutor
+    from rosglass.qml.modules import IMPORT_PATHS, install
+    from rosglass.qml.session import Session
 
+# Without `typing`; type checkers know this name.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from rosglass.qml.application import Application
 
@@ -19,7 +23,8 @@ __all__ = ["IMPORT_PATHS", "Application", "GuiExecutor", "Session", "install"]
 def __getattr__(name: str) -> object:
     # Programs with an engine of their own need none of it.
     if name == "Application":
-        from rosglass.qml.application import Application  # noqa: PLC0415
+        with InterruptsDeferred():
+            from rosglass.qml.application import Application  # noqa: PLC0415
 
         return Application
     raise AttributeError(f"module 'rosglass.qml' has no attribute {name!r}")

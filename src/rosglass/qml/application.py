@@ -93,9 +93,9 @@ class Application(Handle):
         for word in context or ():
             if not word.isidentifier() or word[0].isupper():
                 raise Error(f"context: QML cannot use the name {word!r}: expected e.g. {'arm'!r}")
-        path = interface_file(file)
         # KeyboardInterrupt, raised in what Qt calls, would be swallowed there.
         with _signals_put_off():
+            path = interface_file(file)
             warn_on_terminal(LocationFormatter())
             #: The Qt application.
             self.qt: Any = QtCore.QCoreApplication.instance() or _qt_application(path, arguments)

@@ -13,7 +13,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import UnsupportedError
-from rosglass.qt.interrupts import defer_interrupts
+from rosglass.interrupts import InterruptsDeferred
 
 __all__ = [
     "BINDING",
@@ -105,16 +105,15 @@ def _load(module: str = "") -> Any:
         raise UnsupportedError(f"{error}; {_INSTALL_QT5}") from None
 
 
-defer_interrupts()
-_refuse_broken_binding(BINDING, tuple(_load().__version_info__[:3]))
-
 if TYPE_CHECKING:
     import shiboken6 as _shiboken
     from PySide6 import QtCore, QtGui, QtQml, QtQuick
 else:
-    QtCore, QtGui = _load("QtCore"), _load("QtGui")
-    QtQml, QtQuick = _load("QtQml"), _load("QtQuick")
-    _shiboken = import_module("shiboken6" if QT6 else "shiboken2")
+    with InterruptsDeferred():
+        _refuse_broken_binding(BINDING, tuple(_load().__version_info__[:3]))
+        QtCore, QtGui = _load("QtCore"), _load("QtGui")
+        QtQml, QtQuick = _load("QtQml"), _load("QtQuick")
+        _shiboken = import_module("shiboken6" if QT6 else "shiboken2")
 
 Signal, Slot, Property = QtCore.Signal, QtCore.Slot, QtCore.Property
 QJSValue = QtQml.QJSValue

@@ -12,6 +12,8 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
+from rosglass.interrupts import InterruptsDeferred
+
 if TYPE_CHECKING:
     from rosglass.rviz.application import Application
     from rosglass.rviz.dialog import Button, Dialog, message
@@ -55,7 +57,8 @@ def __getattr__(name: str) -> object:
     if "rosglass.qt" not in sys.modules and find_spec("rviz") is not None:
         # RViz's Qt; where there is no RViz, its absence is told, not that of Qt 5.
         os.environ.setdefault("ROSGLASS_QT", "pyside2")
-    value: object = getattr(import_module(f"rosglass.rviz.{_HOMES[name]}"), name)
+    with InterruptsDeferred():
+        value: object = getattr(import_module(f"rosglass.rviz.{_HOMES[name]}"), name)
     globals()[name] = value
     return value
 

@@ -1,0 +1,52 @@
+"""Ctrl-C while Qt's bindings are imported, which swallow it or abort the process."""
+
+from __future__ import annotations
+
+# Python has it from its start; `signal` takes milliseconds in which Ctrl-C would be lost already.
+import _signal as signal  # type: ignore[import-not-found]
+import sys
+
+# For the same reason; type checkers know this name.
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from types import FrameType, TracebackType
+
+__all__ = ["InterruptsDeferred"]
+
+
+class InterruptsDeferred:
+    """Context in which Ctrl-C waits for the end, and then ends the program; for imports.
+
+    Only in the main thread of programs without a handler of their own, which have Python's again
+    afterwards. Pressed twice, it is raised at once.
+
+    Raises:
+        SystemExit: It was pressed (130); KeyboardInterrupt in an interactive session.
+    """
+
+    def __init__(self) -> None:
+        self._received = False
+
+    def __enter__(self) -> None:
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+            try:
+                signal.signal(signal.SIGINT, self._on_interrupt)
+            except ValueError:
+                # In another thread than the main one, where nothing is raised.
+                return
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if signal.getsignal(signal.SIGINT) == self._on_interrupt:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+        if self._received:
+            raise KeyboardInterrupt if hasattr(sys, "ps1") else SystemExit(130)
+
+    def _on_interrupt(self, number: int, frame: FrameType | None) -> None:
+        if self._received:
+            signal.default_int_handler(number, frame)
+        self._received = True
