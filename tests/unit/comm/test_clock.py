@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from typing import TYPE_CHECKING
@@ -80,6 +81,28 @@ def test_sleeping_while_simulated_time_stands_still_says_so_once(clock: Clock, c
     eventually(lambda: caplog.messages)
     (told,) = caplog.messages
     assert told == "tester sleeps by simulated time, which stands at 10.000 s: is /clock published?"
+    clock.advance(seconds(12))
+    thread.join(10)
+    assert results == [True]
+
+
+def test_handlers_of_the_log_may_use_the_clock_that_stands_still(clock: Clock) -> None:
+    class Handler(logging.Handler):
+        def emit(self, _: logging.LogRecord) -> None:
+            made = threading.Thread(target=lambda: clock.create_timer(1.0, print), daemon=True)
+            made.start()
+            made.join(10)
+            results.append(not made.is_alive())
+
+    results: list[bool] = []
+    handler, log = Handler(), logging.getLogger("rosglass.comm")
+    clock.simulate(True)
+    log.addHandler(handler)
+    try:
+        thread, _ = in_background(lambda: clock.sleep(2.0))
+        eventually(lambda: results)
+    finally:
+        log.removeHandler(handler)
     clock.advance(seconds(12))
     thread.join(10)
     assert results == [True]

@@ -26,6 +26,8 @@ class Domain:
 
     def __init__(self) -> None:
         self.changes = 0
+        #: The nodes after each change, and which of them there were twice.
+        self.seen: list[tuple[list[NodeName], dict[str, int]]] = []
         self.graph = Graph(self._changed)
         self.dds = DdsGraph(self.graph, OWN)
         self.dds.put_participants([Discovered(True, OWN, 0, OWN, PARTICIPANT_USER_DATA)])
@@ -33,6 +35,7 @@ class Domain:
 
     def _changed(self) -> None:
         self.changes += 1
+        self.seen.append((self.graph.nodes(), self.graph.duplicate_nodes()))
 
     def join(self, user_data=b"enclave=/;", **properties):
         prefix = b"\x01\x0f" + next(self._numbers).to_bytes(10, "big")
@@ -96,6 +99,29 @@ def test_endpoints_and_nodes_find_each_other_whoever_comes_first(domain, order):
             PUBLISHER, "/chatter", "std_msgs/msg/String", TALKER, QoS.latched(3), "RIHS01_ab", guid
         )
     ]
+
+
+def test_components_that_come_and_go_leave_the_others_where_they_are(domain):
+    base, front, lidar = (NodeName("/", name) for name in ("base", "front", "lidar"))
+    container = domain.join()
+    domain.tell(container, writers(base), writers(front), writers(lidar))
+    domain.seen.clear()
+    domain.tell(container, writers(base), writers(lidar))
+    assert domain.seen == [([base, lidar], {})]
+    domain.seen.clear()
+    domain.tell(container, writers(front), writers(base), writers(lidar))
+    assert domain.seen == [([base, front, lidar], {})]
+    domain.leave(container)
+    assert domain.graph.nodes() == []
+
+
+def test_two_nodes_of_one_name_in_a_participant_are_counted(domain):
+    container = domain.join()
+    domain.tell(container, writers(TALKER), writers(TALKER))
+    assert domain.graph.duplicate_nodes() == {"/talker": 2}
+    domain.tell(container, writers(TALKER))
+    assert domain.graph.nodes() == [TALKER]
+    assert domain.graph.duplicate_nodes() == {}
 
 
 def test_an_endpoint_that_is_not_told_of_yet_belongs_to_the_only_node(domain):
