@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -15,8 +16,7 @@ import pytest
 from rosglass.demo.processes import VirtualScreen
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
+    from collections.abc import Callable, Iterator, Sequence
 
 PATIENCE = 30
 #: What the program may take to end, on a machine that does other things, too.
@@ -61,7 +61,9 @@ def start(screen: str, master: str, tmp_path: Path) -> Iterator[Callable[..., Pr
     home = tmp_path / "home"
     home.mkdir(mode=0o700)
 
-    def start(*arguments: Any, **env: str) -> Program:
+    def start(
+        *arguments: Any, program: Sequence[str] = ("-m", "rosglass.cli", "rviz"), **env: str
+    ) -> Program:
         log = tmp_path / f"log{len(running)}"
         # Another client of the screen keeps it open after this one; see conftest.
         given = {
@@ -73,7 +75,7 @@ def start(screen: str, master: str, tmp_path: Path) -> Iterator[Callable[..., Pr
             "ROS_IP": "127.0.0.1",
             **env,
         }
-        command = [sys.executable, "-m", "rosglass.cli", "rviz", *map(str, arguments)]
+        command = [sys.executable, *program, *map(str, arguments)]
         with log.open("w") as file:
             process = subprocess.Popen(command, env=given, stdout=file, stderr=file, text=True)
         running.append(Program(process, log))
@@ -352,3 +354,14 @@ def test_ends_when_its_screen_or_window_is_gone(
         told = {message.format(display=screen.display) for message in messages}
     assert any(message in program.output for message in told), program.output
     assert not nodes(master) & {"/rviz_lost", "/its_overlay"}
+
+
+@pytest.mark.parametrize("window", ["RViz's", "a floating panel's"])
+def test_ends_when_a_window_is_gone_while_its_frame_is_drawn(
+    start: Callable[..., Program], master: str, window: str
+) -> None:
+    file = str(Path(__file__).with_name("lost_window_program.py"))
+    program = start("rviz_lost", window, program=[file])
+    assert program.process.wait(2 * PATIENCE) == 1, program.output
+    assert NO_WINDOW in program.output
+    assert "/rviz_lost" not in nodes(master)

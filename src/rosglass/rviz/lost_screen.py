@@ -1,7 +1,8 @@
 """An X server that ends, and windows that others destroy: the program says so, and ends.
 
 Qt and Xlib call ``exit()`` where the connection to the X server breaks, which destroys what other
-threads still use; Ogre crashes where its window is gone. Neither can go on without, so the program
+threads still use. Where a window is gone, Mesa's software renderer ignores the error and draws in
+an uninitialised size, over any memory of the process. Neither can go on without, so the program
 ends before they do.
 """
 
@@ -32,7 +33,8 @@ _LAST_BREATH = 0.3
 _EXIT_CODE = 1
 #: xproto.h: XCB_CW_EVENT_MASK, XCB_EVENT_MASK_STRUCTURE_NOTIFY, XCB_DESTROY_NOTIFY.
 _EVENT_MASK, _STRUCTURE, _DESTROYED = 1 << 11, 1 << 17, 17
-_IoErrorHandler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
+#: X.h, Xproto.h: BadDrawable, X_GetGeometry.
+_NO_DRAWABLE, _GET_GEOMETRY = 9, 14
 _BROKEN = "the connection to the X server (DISPLAY {display}) is broken: RViz ends"
 _WINDOW = (
     "RViz's window was destroyed by another program (xdotool windowclose, xkill), or by this one, "
@@ -44,6 +46,24 @@ class _Time(ctypes.Structure):
     """A ``struct timespec``."""
 
     _fields_ = (("seconds", ctypes.c_long), ("nanoseconds", ctypes.c_long))
+
+
+class _ErrorEvent(ctypes.Structure):
+    """Xlib's ``XErrorEvent``."""
+
+    _fields_ = (
+        ("type", ctypes.c_int),
+        ("display", ctypes.c_void_p),
+        ("resource_id", ctypes.c_ulong),
+        ("serial", ctypes.c_ulong),
+        ("error_code", ctypes.c_ubyte),
+        ("request_code", ctypes.c_ubyte),
+        ("minor_code", ctypes.c_ubyte),
+    )
+
+
+_ErrorHandler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.POINTER(_ErrorEvent))
+_IoErrorHandler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
 
 
 class _Connection:
@@ -107,9 +127,12 @@ class LostScreen(Handle):
         before_exit(libc.nanosleep, ctypes.byref(self._pause), None)
         before_exit(libc.close, ctypes.c_void_p(self._writer), None)
         _KEPT.append(self._pause)
+        xlib = ctypes.CDLL("libX11.so.6")
+        self._set_error, self._set_io_error = xlib.XSetErrorHandler, xlib.XSetIOErrorHandler
+        self._set_error.restype = self._set_io_error.restype = ctypes.c_void_p
+        self._error_handler = _ErrorHandler(self._on_error)
         self._io_error_handler = _IoErrorHandler(self._on_io_error)
-        self._set_io_error = ctypes.CDLL("libX11.so.6").XSetIOErrorHandler
-        self._set_io_error.restype = ctypes.c_void_p
+        self._error_before = _ErrorHandler(self._set_error(self._error_handler))
         self._io_error_before = self._set_io_error(self._io_error_handler)
         self._thread = threading.Thread(target=self._run, name="screen", daemon=True)
         self._thread.start()
@@ -131,6 +154,7 @@ class LostScreen(Handle):
         if closed:
             return
         atexit.unregister(self.close)
+        self._set_error(self._error_before)
         self._set_io_error(ctypes.c_void_p(self._io_error_before))
         self._pause.seconds = 0
         os.write(self._writer, b".")
@@ -149,6 +173,13 @@ class LostScreen(Handle):
                 broken = not self._closed and self._connection.is_broken
             if broken or exiting:
                 self._end(broken=True)
+
+    def _on_error(self, display: int, event: Any) -> int:
+        error = event.contents
+        # Mesa asks for the size before each frame; its window was destroyed after the last look.
+        if (error.error_code, error.request_code) == (_NO_DRAWABLE, _GET_GEOMETRY):
+            self._end()
+        return int(self._error_before(display, event))
 
     def _on_io_error(self, *_: Any) -> int:
         self._end(broken=True)
