@@ -5,7 +5,7 @@ SHELL := /bin/bash
 BIN := .venv/bin
 export PYTHON
 
-.PHONY: help demo rviz-demo test setup dev lint types docs wheel bench clean
+.PHONY: help demo rviz-demo test setup dev lint types docs wheel coverage bench clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
@@ -39,6 +39,11 @@ docs: dev ## build the documentation into site/
 
 wheel: dev ## build the wheel into dist/
 	@$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist . && ls dist/*.whl
+
+coverage: ## run the tests of the standalone environment, and write what they reach into htmlcov/
+	@scripts/setup.sh test
+	@scripts/private_network.sh $(BIN)/python -m pytest -q -n 3 --dist loadfile --ignore=tests/rviz \
+	  -m "not exhaustive" --cov --cov-report=term --cov-report=html
 
 bench: ## run every benchmark (an hour, half of it watching memory)
 	@scripts/bench.sh

@@ -35,13 +35,17 @@ cat "$types"
 # those that wait longest for others, and the end would be spent on waiting for one of them.
 side_by_side=(-n 3 --dist loadfile --no-loadscope-reorder --max-worker-restart=0 --reruns 1
   --rerun-show-tracebacks)
-say "tests on Debian's own Python and Qt 5 ($(.venv-system/bin/python -V))"
-scripts/private_network.sh .venv-system/bin/python -m pytest -q "${side_by_side[@]}" \
-  tests/gui tests/unit "$@"
+version() { "$1/bin/python" -c 'import sys; print("%d.%d" % sys.version_info[:2])'; }
+# Unit tests need no Qt: once for each Python is enough. Debian's has genpy to compare with.
+say "unit tests ($(.venv-system/bin/python -V), Debian's own)"
+scripts/private_network.sh .venv-system/bin/python -m pytest -q "${side_by_side[@]}" tests/unit "$@"
+say "tests of interfaces in Qt 5 ($(.venv-system/bin/python -V), PySide2)"
+scripts/private_network.sh .venv-system/bin/python -m pytest -q "${side_by_side[@]}" tests/gui "$@"
 say "tests in RViz ($(.venv-system/bin/python -V))"
 # Apart from tests/gui: a process has one Qt application, and RViz needs one of its own kind.
 scripts/private_network.sh .venv-system/bin/python -m pytest -q "${side_by_side[@]}" tests/rviz "$@"
-say "tests, standalone ($(.venv/bin/python -V))"
-# Coverage slows tight loops tenfold: what compares every type ran above, without it.
-scripts/private_network.sh .venv/bin/python -m pytest -q "${side_by_side[@]}" -m "not exhaustive" --ignore=tests/rviz \
-  --cov --cov-report=term --cov-report=html "$@"
+say "tests of interfaces in Qt 6, and with other programs ($(.venv/bin/python -V), PySide6)"
+folders=(tests/gui tests/interop)
+[ "$(version .venv)" = "$(version .venv-system)" ] || folders+=(tests/unit)
+scripts/private_network.sh .venv/bin/python -m pytest -q "${side_by_side[@]}" -m "not exhaustive" \
+  "${folders[@]}" "$@"
