@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import signal
 import subprocess
@@ -89,11 +90,14 @@ def test_it_takes_a_picture_and_ends(demo: Any, tmp_path: Path) -> None:
     assert stop.blue() < 60
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-def test_nothing_outlives_it(demo: Any, number: signal.Signals) -> None:
+@pytest.mark.parametrize(
+    ("number", "programs"),
+    # One of them is the screen; all are screen, master, robot, RViz.
+    [*itertools.product([signal.SIGINT, signal.SIGTERM], [1, 4]), (signal.SIGKILL, 4)],
+)
+def test_nothing_outlives_it(demo: Any, number: signal.Signals, programs: int) -> None:
     process = demo(600)
-    # Screen, master, robot, RViz.
-    wait_until(lambda: len(children(process.pid)) >= 4, "it starts four programs")
+    wait_until(lambda: len(children(process.pid)) >= programs, f"it starts {programs} programs")
     started = children(process.pid)
     process.send_signal(number)
     expected = -number if number is signal.SIGKILL else 128 + number

@@ -40,6 +40,7 @@ def main(seconds: float | None = None, picture: Path | None = None) -> int:
     if headless:
         seconds, picture = seconds or 20.0, picture or Path("rviz-demo.png")
     with ExitStack() as stack:
+        received = _note_signals(stack)
         if headless:
             screen = VirtualScreen(*_SIZE)
             stack.callback(screen.close)
@@ -57,10 +58,19 @@ def main(seconds: float | None = None, picture: Path | None = None) -> int:
         rviz = Child([*LEASH, sys.executable, *command], "RViz")
         # Both at a time: whoever has ended RViz waits.
         stack.callback(_close, rviz, robot)
-        code = _wait(rviz)
+        code = _wait(rviz, received)
         if ending and code == 0:  # RViz fails where it took none
             print(f"picture of RViz: {Path(ending[1]).resolve()}")
         return code
+
+
+def _note_signals(stack: ExitStack) -> list[int]:
+    """Return the signals to end that come from now on; KeyboardInterrupt would lose a program."""
+    received: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        before = signal.signal(number, lambda got, _: received.append(got))
+        stack.callback(signal.signal, number, before)
+    return received
 
 
 def _start_master(stack: ExitStack) -> str:
@@ -103,19 +113,10 @@ def _end(process: subprocess.Popen[bytes]) -> None:
     process.wait()
 
 
-def _wait(rviz: Child) -> int:
-    """Wait for RViz; a signal to end is one to it."""
-    received: list[int] = []
-    before = {
-        number: signal.signal(number, lambda got, _: received.append(got))
-        for number in (signal.SIGINT, signal.SIGTERM)
-    }
-    try:
-        while (code := rviz.poll()) is None and not received:
-            time.sleep(0.05)
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+def _wait(rviz: Child, received: list[int]) -> int:
+    """Wait for RViz, or for a signal to end."""
+    while (code := rviz.poll()) is None and not received:
+        time.sleep(0.05)
     return 128 + received[0] if received else int(code or 0)
 
 
