@@ -29,8 +29,9 @@ if TYPE_CHECKING:
 __all__ = ["Recorder", "RecordingStatus"]
 
 _log = logging.getLogger("rosglass.bags")
-#: Seconds of recording that a power failure may cost.
-_FLUSH = 1.0
+#: Seconds between two writes of the chunk in progress: half of what a crash may cost, as a busy
+#: machine comes late.
+_FLUSH_INTERVAL_S = 0.5
 #: Samples that a subscription keeps while the writer is busy.
 _DEPTH = 1000
 #: Seconds that the robot may take to tell a definition, and that closing still waits for it.
@@ -69,7 +70,7 @@ class Recorder(Handle):
     Messages are stored as received, with the definitions of their types, so that the file can be
     played anywhere; types that nobody can describe are stored by name and hash. Messages of a type
     that the robot has to be asked for wait for its answer. What the file holds is complete up to a
-    second before a crash; rosbag wants a ROS 1 bag reindexed then.
+    second before the program is killed; rosbag wants a ROS 1 bag reindexed then.
 
     Args:
         node: Where to listen.
@@ -260,11 +261,14 @@ class Recorder(Handle):
             self._lock.notify_all()
 
     def _work(self) -> None:
-        flushed = time.monotonic()
+        flush_at = time.monotonic() + _FLUSH_INTERVAL_S
         try:
             while True:
                 with self._lock:
-                    self._lock.wait_for(lambda: self._queue or self._closed or self._told(), _FLUSH)
+                    self._lock.wait_for(
+                        lambda: self._queue or self._closed or self._told(),
+                        flush_at - time.monotonic(),
+                    )
                     batch, closed = list(self._queue), self._closed
                     self._queue.clear()
                     held = [len(sample.data) for each in self._held.values() for _, sample in each]
@@ -280,9 +284,9 @@ class Recorder(Handle):
                 if lost:
                     told = ", ".join(f"{count} of {topic}" for topic, count in lost.items())
                     _log.warning("%s: too much for the disk, lost %s", self.path, told)
-                if time.monotonic() - flushed > _FLUSH:
+                if time.monotonic() >= flush_at:
                     self._file.flush()
-                    flushed = time.monotonic()
+                    flush_at = time.monotonic() + _FLUSH_INTERVAL_S
                 self._size = self._file.size()
                 if closed and not batch:
                     break

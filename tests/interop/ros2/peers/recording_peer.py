@@ -1,6 +1,7 @@
 """Publishes and records numbered messages until it is ended: URL PATH BYTES [LIMIT].
 
-Prints a line of JSON for what it has sent each 50 ms, and for the error that ends the recording.
+Prints a line of JSON each 50 ms, with the number of the newest message that has come by then, and
+for the error that ends the recording.
 Of random bytes, which no compression makes smaller. LIMIT is the size in bytes beyond which the
 system refuses to write the file, as a full disk does.
 """
@@ -15,6 +16,10 @@ import time
 
 import rosglass
 from rosglass.bags import Recorder
+from rosglass.comm import IMMEDIATE
+
+#: Where a message's number is: after the header and an empty layout.
+NUMBER = slice(16, 24)
 
 
 def tell(**event: object) -> None:
@@ -30,6 +35,13 @@ with rosglass.connect(url, "robot") as robot, rosglass.connect(url, "panel") as 
     while not recorder.status().topics.get("/numbers"):
         numbers.publish(data=(0).to_bytes(8, "little") + os.urandom(size))
         time.sleep(0.01)
+    came = [0]
+    panel.create_subscription(
+        "/numbers",
+        qos=1000,
+        raw_callback=lambda sample: came.append(int.from_bytes(sample.data[NUMBER], "little")),
+        executor=IMMEDIATE,
+    )
     sent, told = 0, 0.0
     while True:
         sent += 1
@@ -41,7 +53,7 @@ with rosglass.connect(url, "robot") as robot, rosglass.connect(url, "panel") as 
             break
         if time.monotonic() - told > 0.05:
             told = time.monotonic()
-            tell(state={"at": time.time(), "recorded": status.messages})
+            tell(state={"at": told, "came": came[-1], "recorded": status.messages})
         time.sleep(0.005)
     try:
         recorder.close()
