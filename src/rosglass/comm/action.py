@@ -7,6 +7,7 @@ from enum import Enum
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.node import Handle
+from rosglass.comm.rclpy_names import hint_at_members
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -75,6 +76,7 @@ class CancelAnswer(NamedTuple):
     reason: str = ""
 
 
+@hint_at_members
 class ClientGoal(Handle):
     """A goal that was sent; the same object in every callback, for as long as it lives.
 
@@ -170,6 +172,7 @@ class ClientGoal(Handle):
         """Call `callback` with each new status from now on; arguments as :meth:`on_feedback`."""
 
 
+@hint_at_members
 class ActionClient(Handle):
     """Sends goals to an action; made by :meth:`Node.create_action_client`.
 
@@ -271,6 +274,7 @@ class ActionClient(Handle):
         """Call `callback` with :attr:`ready` whenever it changes, to and fro."""
 
 
+@hint_at_members
 class ServerGoal(Handle):
     """A goal that a server accepted.
 
@@ -354,6 +358,7 @@ class ServerGoal(Handle):
         """
 
 
+@hint_at_members
 class ActionServer(Handle):
     """Offers an action; made by :meth:`Node.create_action_server`.
 

@@ -20,7 +20,7 @@ from rosglass.comm.executor import RetryingExecutor
 from rosglass.comm.listeners import Listeners
 from rosglass.comm.loop import check_plain
 from rosglass.comm.node import Executor, Handle
-from rosglass.comm.rclpy_names import raise_missing
+from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.comm.time import Duration, Time
 from rosglass.comm.unique import Unique
 from rosglass.errors import ConversionError, NodeClosedError
@@ -59,6 +59,7 @@ class Jump(NamedTuple):
     change: ClockChange
 
 
+@hint_at_members
 class Clock(Unique):
     """What time it is for a node.
 
@@ -66,9 +67,6 @@ class Clock(Unique):
         name: Of the node, for threads and messages.
         executor: Where callbacks run that bring no executor of their own.
     """
-
-    if not TYPE_CHECKING:
-        __getattr__ = raise_missing
 
     def __init__(self, name: str, executor: Executor) -> None:
         self._name, self._executor = name, executor
@@ -306,6 +304,7 @@ class _Watcher(Handle):
         self.listeners.clear()
 
 
+@hint_at_members
 class Timer(Handle):
     """Calls back again and again; made by :meth:`Node.create_timer`.
 

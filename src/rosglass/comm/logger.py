@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING
 
-from rosglass.comm.rclpy_names import raise_missing
+from rosglass.comm.rclpy_names import hint_at_members
 
 __all__ = ["NodeLogger"]
 
 
+@hint_at_members
 class NodeLogger(logging.Logger):
     """A node's logger, or a child of it.
 
@@ -22,9 +22,6 @@ class NodeLogger(logging.Logger):
         parent: Where its messages go, too.
         levels: Least severe levels of it and its children, by name.
     """
-
-    if not TYPE_CHECKING:
-        __getattr__ = raise_missing
 
     def __init__(
         self, name: str, parent: logging.Logger, levels: dict[str, int] | None = None

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from rosglass.comm.graph import ConnectionState
 from rosglass.comm.qos import QoS
-from rosglass.comm.rclpy_names import raise_missing
+from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.comm.receiving import check_may_wait
 from rosglass.comm.unique import Unique
 from rosglass.errors import (
@@ -64,9 +64,6 @@ class Executor(ABC):
 class Handle(Unique, ABC):
     """Something started or registered that can be ended; ends by itself as a context manager."""
 
-    if not TYPE_CHECKING:  # for type checkers, what is not there is an error
-        __getattr__ = raise_missing
-
     @abstractmethod
     def close(self) -> None:
         """End it; safe to call twice."""
@@ -83,6 +80,7 @@ class Handle(Unique, ABC):
         self.close()
 
 
+@hint_at_members
 class Node(Handle):
     """A participant of a ROS graph; made by :func:`rosglass.connect`.
 

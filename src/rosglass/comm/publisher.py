@@ -6,6 +6,7 @@ from abc import abstractmethod
 from typing import TYPE_CHECKING, Any, overload
 
 from rosglass.comm.node import Handle
+from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.errors import UnsupportedError
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["Publisher"]
 
 
+@hint_at_members
 class Publisher(Handle):
     """Sends messages of one type on one topic.
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.node import Executor, Handle
 from rosglass.comm.promise import Promise
+from rosglass.comm.rclpy_names import hint_at_members
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,6 +27,7 @@ class Call(Promise["Message"]):
     """
 
 
+@hint_at_members
 class ServiceClient(Handle):
     """Calls a service; made by :meth:`Node.create_service_client`.
 
@@ -115,6 +117,7 @@ class ServiceClient(Handle):
         """
 
 
+@hint_at_members
 class ServiceServer(Handle):
     """Offers a service; made by :meth:`Node.create_service_server`.
 

@@ -17,6 +17,7 @@ from rosglass.comm.inbox import ImmediateInbox, Inbox
 from rosglass.comm.loop import check_plain
 from rosglass.comm.node import Executor, Handle
 from rosglass.comm.promise import check_timeout
+from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.comm.receiving import check_may_wait
 from rosglass.comm.sample import Sample
 from rosglass.comm.source import Source
@@ -46,6 +47,7 @@ _MEMORY = 1.0
 _SLICE = 0.2
 
 
+@hint_at_members
 class Subscription(Handle):
     """Receives the messages of one topic.
 

@@ -6,7 +6,7 @@ import time as _time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, overload
 
-from rosglass.comm.rclpy_names import raise_missing
+from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.errors import ConversionError
 
 if TYPE_CHECKING:
@@ -22,6 +22,7 @@ def _check(kind: str, nanoseconds: object, instead: str) -> None:
         raise ConversionError("nanoseconds", nanoseconds, f"an integer; {instead}", kind)
 
 
+@hint_at_members
 @dataclass(frozen=True, slots=True, order=True)
 class Duration:
     """A span of time.
@@ -31,9 +32,6 @@ class Duration:
     """
 
     nanoseconds: int = 0
-
-    if not TYPE_CHECKING:
-        __getattr__ = raise_missing
 
     def __post_init__(self) -> None:
         _check("Duration", self.nanoseconds, "Duration.from_seconds() takes fractions")
@@ -66,6 +64,7 @@ class Duration:
         return Duration(-self.nanoseconds)
 
 
+@hint_at_members
 @dataclass(frozen=True, slots=True, order=True)
 class Time:
     """A point in time.
@@ -76,9 +75,6 @@ class Time:
     """
 
     nanoseconds: int = 0
-
-    if not TYPE_CHECKING:
-        __getattr__ = raise_missing
 
     def __post_init__(self) -> None:
         _check("Time", self.nanoseconds, "Time.from_parts() takes seconds and nanoseconds")

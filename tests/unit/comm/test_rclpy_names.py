@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
 import re
 import signal
 import subprocess
@@ -27,15 +29,33 @@ def node(request):
         yield made
 
 
+def class_of(kind):
+    return NodeLogger if kind == "NodeLogger" else getattr(rosglass.comm, kind)
+
+
+def with_subclasses(kind):
+    return [kind, *(found for child in kind.__subclasses__() for found in with_subclasses(child))]
+
+
 @pytest.mark.parametrize("kind", rclpy_names.MEMBERS)
 def test_what_takes_the_place_of_a_member_is_there(kind):
-    if kind == "NodeLogger":
-        found = NodeLogger
-    else:
-        found = getattr(rosglass.comm, kind)
+    found = class_of(kind)
     for name, instead in rclpy_names.MEMBERS[kind].items():
         assert not hasattr(found, name)
         check(instead, found)
+
+
+@pytest.mark.parametrize("kind", rclpy_names.MEMBERS)
+def test_errors_about_members_cover_up_no_member_and_make_no_attribute_slow(kind):
+    importlib.import_module("rosglass.bags.local_world")
+    for wire in (rosglass.ros1, rosglass.ros2):
+        for module in pkgutil.iter_modules(wire.__path__, f"{wire.__name__}."):
+            importlib.import_module(module.name)
+    for found in with_subclasses(class_of(kind)):
+        covered = [name for name in rclpy_names.MEMBERS[kind] if not hasattr(found, name)]
+        assert all(sum(name in vars(base) for base in found.__mro__) <= 1 for name in covered)
+        # With __getattr__ Python looks up each attribute of each object the long way.
+        assert not hasattr(found, "__getattr__")
 
 
 @pytest.mark.parametrize("name", rclpy_names.FUNCTIONS)
@@ -70,6 +90,8 @@ def test_each_kind_of_object_says_it(node):
     with pytest.raises(AttributeError, match=r"has no attribute 'create_publsher'$"):
         node.create_publsher("/chat")
     assert not hasattr(node, "create_client")
+    assert "create_client" not in dir(node)
+    assert {"create_service_client", "name"} <= set(dir(node))
 
 
 def test_an_error_in_a_property_is_not_covered_up(node):
