@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from rosglass.qt import QT6
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
@@ -27,6 +29,37 @@ Item {
         request.open("GET", "http://ADDRESS/request")
         request.send()
         console.log("all are asked for")
+    }
+}
+"""
+
+FILES = """import QtQuick 2.15
+Item {
+    Component.onCompleted: {
+        for (const [method, url] of [["GET", "READ"], ["PUT", "WRITTEN"]]) {
+            const request = new XMLHttpRequest()
+            request.onreadystatechange = () => {
+                if (request.readyState === XMLHttpRequest.DONE)
+                    console.log("got", JSON.stringify(request.responseText))
+            }
+            try {
+                request.open(method, url)
+                request.send("text")
+            } catch (error) {
+                console.log("got", error)
+            }
+        }
+        console.log("all are asked for")
+    }
+}
+"""
+FILM = """import QtQuick 2.15
+import QtMultimedia
+Item {
+    MediaPlayer {
+        source: "ADDRESS"
+        onErrorOccurred: console.log("no film")
+        Component.onCompleted: play()
     }
 }
 """
@@ -130,3 +163,34 @@ app.close()
     program.until("still going", 120)
     program.kill(9)
     assert server.requests == 0
+
+
+def test_javascript_reads_and_writes_no_files(start: Any, tmp_path: Path) -> None:
+    read, written, file = (tmp_path / name for name in ("read.txt", "written.txt", "Main.qml"))
+    read.write_text("secret")
+    file.write_text(FILES.replace("READ", read.as_uri()).replace("WRITTEN", written.as_uri()))
+    program = start("run", file)
+    for method in ("READ", "WRITE"):
+        program.until(f"Set QML_XHR_ALLOW_FILE_{method} to 1")
+    program.until("all are asked for")
+    program.kill(15)
+    program.end()
+    assert "secret" not in program.text
+    assert not written.exists()
+
+
+@pytest.mark.skipif(not QT6, reason="Debian's Qt 5 leaves films to GStreamer")
+@pytest.mark.parametrize("scheme", ["http", "rtsp"])
+def test_films_are_fetched_only_where_that_is_allowed(
+    scheme: str, start: Any, tmp_path: Path, server: Server
+) -> None:
+    pytest.importorskip("PySide6.QtMultimedia", reason="needs the extra `camera`")
+    file = tmp_path / "Main.qml"
+    file.write_text(FILM.replace("ADDRESS", f"{scheme}://{server.address}/film.mp4"))
+    program = start("run", file)
+    assert "--allow-network" in program.until("not on whitelist 'file,")
+    program.until("no film")
+    assert server.requests == 0
+    program = start("run", file, "--allow-network")
+    program.until("no film")
+    assert server.requests > 0

@@ -124,7 +124,13 @@ _TYPES = {
     QtCore.QtMsgType.QtFatalMsg: logging.CRITICAL,
 }
 _HINTS = {
-    "ReferenceError: rviz is not defined": "; it is over RViz alone: rosglass rviz --overlay FILE"
+    "ReferenceError: rviz is not defined": "; it is over RViz alone: rosglass rviz --overlay FILE",
+    "XMLHttpRequest: Tried to use GET on a local file despite being disabled.": (
+        " Set QML_XHR_ALLOW_FILE_READ to 1 to enable this feature."
+    ),
+    "XMLHttpRequest: Tried to use PUT on a local file despite being disabled.": (
+        " Set QML_XHR_ALLOW_FILE_WRITE to 1 to enable this feature."
+    ),
 }
 #: How Qt words that the proxy is not there through which all is refused.
 _REFUSED = re.compile(r"\b[Pp]roxy\b")
@@ -195,15 +201,15 @@ def _handle(mode: Any, context: Any, message: str) -> None:
         level = _TYPES.get(mode, logging.WARNING)
         category = context.category or "default"
         file = context.file or ""
+        text = message.removeprefix(f"{file}:{context.line}: ") if file else message
+        text += NETWORK_HINT if _REFUSED.search(text) else _HINTS.get(text, "")
         if not file:
-            logging.getLogger(f"rosglass.qt.{category}").log(level, "%s", message)
+            logging.getLogger(f"rosglass.qt.{category}").log(level, "%s", text)
             return
         # console.log() is what an author wants to see; Qt calls it a debug message.
         if category in {"qml", "js"} and level == logging.DEBUG:
             level = logging.INFO
         caller = Caller(plain_path(file), max(context.line, 0), context.function or "")
-        text = message.removeprefix(f"{file}:{context.line}: ")
-        text += NETWORK_HINT if _REFUSED.search(text) else _HINTS.get(text, "")
         if category == "default" and level == logging.WARNING:
             cause = _repeats.cause(caller) if text.startswith("TypeError") else ""
             text = _repeats.counted(caller, f"{text}; {cause}" if cause else text)
