@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import shutil
 import sqlite3
 from contextlib import closing, suppress
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag1 import Reader
 from rosbags.rosbag1.reader import decompressors
+from rosbags.rosbag2 import reader as rosbag2_reader
 from rosbags.rosbag2 import storage_mcap
 
 from rosglass.bags.bag import Bag, BagMessage, Channel
@@ -23,15 +27,15 @@ from rosglass.interfaces.names import join_name
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
-    from pathlib import Path
 
 __all__ = ["RosbagsBag"]
 
 #: Bytes of a metadata.yaml.
 _MOST_METADATA = 64 * 2**20
-# The package decompresses MCAP in a folder without a limit; it compares the sizes afterwards.
-for _kind in ("lz4", "zstd"):
-    storage_mcap.DECOMPRESSORS[_kind] = partial(decompress, _kind)
+#: Bytes that stay free where files that are compressed as a whole are unpacked.
+_FREE = 2**30
+#: Bytes of these that are unpacked at a time.
+_PIECE = 4 * 2**20
 
 
 class RosbagsBag(Bag):
@@ -49,6 +53,8 @@ class RosbagsBag(Bag):
             # AnyReader refuses whole bags for one definition that is missing or wrong.
             self._reader: Any = Reader(path) if path.suffix == ".bag" else AnyReader([path])
             self._reader.open()
+        except BagError:
+            raise
         except Exception as error:  # whatever the damage leads to, in whichever library below
             raise BagError(
                 f"{path} cannot be read as a recording: {_words(error)}; there are MCAP files "
@@ -151,6 +157,28 @@ def _check_databases(path: Path) -> None:
             with closing(sqlite3.connect(uri, uri=True)) as database:
                 for (text,) in database.execute("SELECT offered_qos_profiles FROM topics"):
                     check_yaml(str(text))
+
+
+def _unpack(packed: Any, file: Any) -> None:
+    """Unpack a file of a ROS 2 bag into the folder for temporary files, as far as there is room."""
+    folder = Path(file.name).parent
+    while piece := packed.read(_PIECE):
+        if shutil.disk_usage(folder).free < _FREE + len(piece):
+            raise BagError(
+                f"{packed.name} holds more than {file.tell()} bytes, for which there is no room in "
+                f"{folder.parent}: {_FREE} bytes stay free there; if it can be trusted to be that "
+                "large, let TMPDIR name a folder on a larger disk"
+            )
+        file.write(piece)
+    file.flush()
+    _check_databases(Path(file.name))
+
+
+# The package decompresses MCAP in a folder without a limit; it compares the sizes afterwards.
+for _kind in ("lz4", "zstd"):
+    storage_mcap.DECOMPRESSORS[_kind] = partial(decompress, _kind)
+# So it does with files that are compressed as a whole, which it unpacks before anything is read.
+rosbag2_reader.shutil = SimpleNamespace(copyfileobj=_unpack)  # type: ignore[assignment,attr-defined]
 
 
 def _chunk(offset: int, decompressor: Any, data: bytes) -> bytes:

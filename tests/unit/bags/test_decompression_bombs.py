@@ -9,6 +9,8 @@ import sqlite3
 import struct
 import subprocess
 import sys
+from contextlib import closing
+from types import SimpleNamespace
 
 import lz4.frame
 import pytest
@@ -306,6 +308,77 @@ def test_messages_of_a_ros2_bag_that_expand_too_far_are_left_out(tmp_path):
     count, problem = read(folder)
     assert count == MESSAGES - 2
     assert "2 messages are damaged or too large and left out, the first of /a at 1 ns" in problem
+
+
+def packed_bag(folder, pack):
+    """Write a bag whose file is compressed as a whole, by `pack`; returns the file."""
+    kinds = get_typestore(Stores.ROS2_HUMBLE)
+    with Ros2Writer(folder, version=8, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        connection = writer.add_connection("/a", STRING, typestore=kinds)
+        for time in range(MESSAGES):
+            writer.write(connection, time, b"\0\1\0\0\1\0\0\0\0")
+    (file,) = folder.glob("*.db3")
+    packed = file.with_name(f"{file.name}.zstd")
+    packed.write_bytes(pack(file))
+    file.unlink()
+    metadata = folder / "metadata.yaml"
+    found = yaml.safe_load(metadata.read_text())
+    found["rosbag2_bagfile_information"] |= {
+        "compression_mode": "FILE",
+        "compression_format": "zstd",
+        "relative_file_paths": [packed.name],
+    }
+    metadata.write_text(yaml.safe_dump(found))
+    return packed
+
+
+@pytest.fixture
+def small_disk(tmp_path, monkeypatch):
+    """Say that the folder for temporary files has room for 20 MiB beyond what stays free."""
+    place = tmp_path / "tmp"
+    place.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(place))
+
+    def usage(_):
+        used = sum(file.stat().st_size for file in place.rglob("*") if file.is_file())
+        return SimpleNamespace(free=2**30 + 20 * 2**20 - used)
+
+    monkeypatch.setattr("shutil.disk_usage", usage)
+    return place
+
+
+def test_a_bag_that_is_compressed_as_a_whole_is_read(small_disk, tmp_path):
+    packed_bag(tmp_path / "bag", lambda file: zstandard.compress(file.read_bytes()))
+    with open_bag(tmp_path / "bag") as bag:
+        assert len(list(bag.messages())) == MESSAGES
+        assert list(small_disk.iterdir())
+    assert not list(small_disk.iterdir())
+
+
+@pytest.mark.parametrize("bomb", [zstd_bomb, sized_zstd_bomb])
+def test_a_bag_that_is_compressed_as_a_whole_does_not_fill_the_disk(bomb, small_disk, tmp_path):
+    file = packed_bag(tmp_path / "bag", lambda _: bomb(256 * 2**20))
+    with pytest.raises(BagError) as caught:
+        open_bag(tmp_path / "bag")
+    assert f"{file} holds more than {20 * 2**20} bytes" in str(caught.value)
+    assert f"no room in {small_disk}: {2**30} bytes stay free there" in str(caught.value)
+    assert "TMPDIR" in str(caught.value)
+    assert not list(small_disk.iterdir())
+
+
+def test_profiles_in_a_compressed_database_that_stand_for_too_much_are_refused(tmp_path):
+    lines = ["- &a0 {history: 1}"]
+    lines += [f"- &a{n} {{<<: [{', '.join([f'*a{n - 1}'] * 9)}]}}" for n in range(1, 12)]
+
+    def pack(file):
+        with closing(sqlite3.connect(file)) as database, database:
+            database.execute("UPDATE topics SET offered_qos_profiles = ?", ("\n".join(lines),))
+        return zstandard.compress(file.read_bytes())
+
+    packed_bag(tmp_path / "bag", pack)
+    count, problem = read(tmp_path / "bag")
+    assert count is None
+    assert "million" in problem or "stands for" in problem
 
 
 @pytest.mark.parametrize("bomb", ["zstd that says so", "zstd that lies", "lz4 that lies"])
