@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import threading
 import time
-from collections import OrderedDict, deque
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -59,30 +58,31 @@ class RequestWindow:
         """
         now = time.monotonic()
         with self._lock:
-            while self._open and now - next(iter(self._open.values())) >= self._stall_s:
-                del self._open[next(iter(self._open))]
             if len(self._open) >= LIMIT:
-                self._waiting[retry] = None
-                return False
+                while self._open and now - next(iter(self._open.values())) >= self._stall_s:
+                    del self._open[next(iter(self._open))]
+                if len(self._open) >= LIMIT:
+                    self._waiting[retry] = None
+                    return False
             self._open[request] = now
         return True
 
     def leave(self, request: Hashable) -> list[Callable[[], None]]:
         """Take note that a request is not open any more; return what to call, without a lock."""
         with self._lock:
-            if self._open.pop(request, None) is None:
+            if self._open.pop(request, None) is None or not self._waiting:
                 return []
             waiting = list(self._waiting)
             self._waiting.clear()
         return waiting
 
 
-@dataclass
+@dataclass(slots=True)
 class _Client:
-    """A client with open requests.
+    """A client that has sent requests.
 
     Attributes:
-        open: How many it has.
+        open: How many of them are open.
         paced: Whether they were more than it can take the replies of at once.
         burst: Replies sent since `since`, monotonic.
         waiting: Replies to be sent, in order.
@@ -93,7 +93,7 @@ class _Client:
     paced: bool = False
     burst: int = 0
     since: float = 0.0
-    waiting: deque[Callable[[], None]] = field(default_factory=deque)
+    waiting: list[Callable[[], None]] = field(default_factory=list)
     sending: bool = False
 
 
@@ -109,7 +109,7 @@ class ReplyPacer:
     def __init__(self, timers: Timers) -> None:
         self._timers = timers
         self._lock = threading.Lock()
-        self._clients: OrderedDict[bytes, _Client] = OrderedDict()
+        self._clients: dict[bytes, _Client] = {}
 
     def on_request(self, client: bytes) -> None:
         """Count a request."""
@@ -117,13 +117,24 @@ class ReplyPacer:
             known = self._clients.get(client)
             if known is None:
                 if len(self._clients) >= _MAX_CLIENTS:
-                    self._drop_oldest()
+                    self._drop_one()
                 known = self._clients[client] = _Client()
             known.open += 1
-            known.paced = known.paced or known.open > LIMIT
+            if known.open > LIMIT:
+                known.paced = True
 
-    def reply(self, client: bytes, send: Callable[[], None]) -> None:
-        """Send a reply to one of its requests now, or soon; `send` raises nothing."""
+    def on_reply(self, client: bytes) -> bool:
+        """Count a request that is answered; return False if its reply is for :meth:`send_later`."""
+        with self._lock:
+            known = self._clients.get(client)
+            if known is not None:
+                if known.paced or known.sending:
+                    return False
+                self._count_reply(known, time.monotonic())
+        return True
+
+    def send_later(self, client: bytes, send: Callable[[], None]) -> None:
+        """Send a reply as soon as its client can take it; `send` raises nothing."""
         with self._lock:
             known = self._clients.get(client)
             if known is not None:
@@ -134,14 +145,14 @@ class ReplyPacer:
         if known is None:
             send()
         else:
-            self._send_waiting(client, known)
+            self._send_waiting(known)
 
     def on_failure(self, client: bytes) -> None:
         """Count a request that gets no reply."""
         with self._lock:
             known = self._clients.get(client)
             if known is not None:
-                self._close_one(client, known)
+                known.open -= 1
 
     def flush(self) -> None:
         """Send all that waits at once, before the server goes."""
@@ -151,9 +162,9 @@ class ReplyPacer:
         for known in clients:
             while known.waiting:
                 with suppress(IndexError):  # another thread sent the last one
-                    known.waiting.popleft()()
+                    known.waiting.pop(0)()
 
-    def _send_waiting(self, client: bytes, known: _Client) -> None:
+    def _send_waiting(self, known: _Client) -> None:
         """Send as much as the client can take now, and the rest later."""
         while True:
             with self._lock:
@@ -161,26 +172,25 @@ class ReplyPacer:
                     known.sending = False
                     return
                 now = time.monotonic()
-                if now - known.since >= _BURST_S:
-                    known.burst, known.since, known.paced = 0, now, known.open > LIMIT
-                if known.paced and known.burst >= LIMIT and len(known.waiting) <= _MAX_WAITING:
-                    later = known.since + _BURST_S - now
+                later = known.since + _BURST_S - now
+                if later > 0 and known.burst >= LIMIT and len(known.waiting) <= _MAX_WAITING:
                     break
-                send = known.waiting.popleft()
-                known.burst += 1
-                self._close_one(client, known)
+                send = known.waiting.pop(0)
+                self._count_reply(known, now)
             send()
-        self._timers.after(later, lambda: self._send_waiting(client, known))
+        self._timers.after(later, lambda: self._send_waiting(known))
 
-    def _close_one(self, client: bytes, known: _Client) -> None:
-        """Count one open request less; the lock is held."""
+    def _count_reply(self, known: _Client, now: float) -> None:
+        """Count a reply that is about to be sent; the lock is held."""
+        if now - known.since >= _BURST_S:
+            known.burst, known.since, known.paced = 0, now, known.open > LIMIT
+        known.burst += 1
         known.open -= 1
-        if known.open <= 0 and self._clients.get(client) is known:
-            del self._clients[client]
 
-    def _drop_oldest(self) -> None:
-        """Forget a client whose requests were not answered; the lock is held."""
-        for client, known in self._clients.items():
-            if not known.waiting:
-                del self._clients[client]
-                return
+    def _drop_one(self) -> None:
+        """Forget a client, one without open requests if there is one; the lock is held."""
+        idle = (client for client, known in self._clients.items() if known.open <= 0)
+        unanswered = (client for client, known in self._clients.items() if not known.waiting)
+        client = next(idle, None) or next(unanswered, None)
+        if client is not None:
+            del self._clients[client]

@@ -139,8 +139,11 @@ class Ros2ServiceServer(AnsweringServer[RequestId], Member):
                 self._consequence,
             )
             self._fail(request, f"the server made no valid response: {error}")
+            return
+        if self._pacer.on_reply(request.client):
+            self._reply(request, data)
         else:
-            self._pacer.reply(request.client, lambda: self._reply(request, data))
+            self._pacer.send_later(request.client, lambda: self._reply(request, data))
 
     def _reply(self, request: RequestId, data: bytes) -> None:
         try:

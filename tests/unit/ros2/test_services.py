@@ -23,7 +23,7 @@ from rosglass.comm import (
 from rosglass.interfaces import Library
 from rosglass.ros2 import Ros2Node
 from rosglass.ros2.middleware import CALL_DROPPED, SERVER_LEFT, RequestId
-from rosglass.ros2.pacing import RequestWindow
+from rosglass.ros2.pacing import ReplyPacer, RequestWindow
 from rosglass.ros2.service_client import Ros2ServiceClient
 
 pytestmark = pytest.mark.usefixtures("quick")
@@ -287,6 +287,34 @@ def test_replies_to_one_client_come_in_bursts_that_it_can_keep(node, middleware,
     eventually(lambda: len(replier.replies) == 31)
     assert sorted(r.sequence for r, _ in replier.replies) == [*range(30), 99]
     service.close()
+
+
+def test_no_reply_overtakes_one_that_waited(monkeypatch):
+    class LaterByHand:
+        def after(self, _, job):
+            self.job = job
+
+    later, sent = LaterByHand(), []
+    pacer = ReplyPacer(later)
+    monkeypatch.setattr("rosglass.ros2.pacing._BURST_S", 3600)
+    for _ in range(10):
+        pacer.on_request(b"w")
+    for number in range(8):
+        assert not pacer.on_reply(b"w")
+        pacer.send_later(b"w", lambda number=number: sent.append(number))
+
+    def send_ninth():
+        assert not pacer.on_reply(b"w")
+        pacer.send_later(b"w", lambda: sent.append(9))
+        sent.append(8)
+
+    pacer.send_later(b"w", send_ninth)
+    assert sent == list(range(8))
+    monkeypatch.setattr("rosglass.ros2.pacing._BURST_S", 0)
+    later.job()
+    assert sent == list(range(10))
+    pacer.on_request(b"w")
+    assert pacer.on_reply(b"w")
 
 
 def test_the_middleware_is_told_how_long_a_reply_is_of_use(client, requester):
