@@ -58,7 +58,8 @@ class Types:
     def __init__(self, library: Library | None, url: str) -> None:
         self._library, self._url = library, url
         self.fetcher: Fetcher | None = None
-        self._used: dict[int, InterfaceDefinition] = {}
+        #: Each once: those of an action are derived anew for each server and client.
+        self._used: list[InterfaceDefinition] = []
         self._by_hash: dict[str, InterfaceDefinition] = {}
 
     @property
@@ -145,10 +146,13 @@ class Types:
         """Return the definition, among those in use here, that is announced by a hash."""
         found = self._by_hash.get(hash)
         if found is None:
-            for definition in list(self._used.values()):
+            while True:
+                try:
+                    definition = self._used.pop()
+                except IndexError:
+                    break
                 for announced in announced_hashes(definition):
                     self._by_hash.setdefault(announced, definition)
-            self._used.clear()
             found = self._by_hash.get(hash)
         return found
 
@@ -173,5 +177,6 @@ class Types:
                 f"load it with rosglass.load({found.name!r}, ros=2)"
             )
         with suppress(TypeNotFoundError):  # opaque types have none
-            self._used[id(found.definition)] = found.definition
+            if found.definition not in self._used:
+                self._used.append(found.definition)
         return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import re
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,7 @@ from rosglass.interfaces import (
     ActionDefinition,
     Library,
     MemoryProvider,
+    ServiceDefinition,
     add_type_sources,
     announced_hashes,
     parse_message,
@@ -21,6 +23,7 @@ from rosglass.interfaces import (
     type_description,
 )
 from rosglass.messages import MessageType
+from rosglass.ros2.action_types import ActionTypes
 from rosglass.ros2.type_descriptions import TypeDescriptionServer, compose_action, describe
 from rosglass.ros2.types import Types
 
@@ -98,6 +101,25 @@ def test_types_in_use_need_no_name(ask: Callable[..., Any]) -> None:
         answer = ask(name, kind.rihs01)
         assert answer.successful
         assert answer.type_description.type_description.type_name == "my_msgs/msg/Secret"
+
+
+def test_types_of_actions_that_come_and_go_are_kept_once(library: Library, types: Types) -> None:
+    def use(count: int) -> int:
+        """Look an action's types up as its servers and clients do; return how many are kept."""
+        for _ in range(count):
+            made = ActionTypes.of(types.action(GO), types)
+            types.service(made.send_goal)
+            types.message(made.feedback)
+        del made
+        gc.collect()
+        found = (one for one in gc.get_objects() if isinstance(one, ServiceDefinition))
+        return sum(one.name == f"{GO}_SendGoal" for one in found)
+
+    before = use(5)
+    assert use(20) <= before + 1
+    for suffix in SUFFIXES[::2]:
+        definition = library.definition(f"{GO}{suffix}")
+        assert types.in_use(rihs01(definition)) is not None
 
 
 @pytest.mark.parametrize(
