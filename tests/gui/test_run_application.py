@@ -218,3 +218,74 @@ def test_the_documented_programs_run(python: Any, tmp_path: Path) -> None:
         program.until("shown", 40)
         assert program.end(40) == 0, program.text
         assert "Traceback" not in program.text
+
+
+TYPO = """import QtQuick 2.15
+import Ros2 1.0
+Item {
+    Component.onCompleted: { Ros2.init("ui"); console.log("from JavaScript") }
+    Subscription { id: odometry; topic: "/odom"; onNewMessage: counted.add() }
+    property var shown: odometry.message ? odometry.message.pose.pose.positon.x : 0
+}"""
+FED = (
+    HEAD
+    + """
+import rosglass
+from rosglass.qt import QtCore, Slot
+BEFORE
+
+class Counted(QtCore.QObject):
+    messages = 0
+    @Slot()
+    def add(self):
+        self.messages += 1
+        if self.messages == 30:
+            app.quit()
+
+app = Application("FILE", url="dds://?domain=DOMAIN", context={"counted": Counted()})
+robot = rosglass.connect("dds://?domain=DOMAIN", "robot")
+publisher = robot.create_publisher("/odom", "nav_msgs/msg/Odometry")
+timer = QtCore.QTimer()
+timer.timeout.connect(lambda: publisher.publish({"pose": {"pose": {"position": {"x": 1}}}}))
+timer.start(20)
+sys.exit(app.run())
+"""
+)
+
+
+@pytest.mark.parametrize(
+    ("before", "place"),
+    [
+        ("", "{file}:6: WARNING: TypeError"),
+        ("import logging; logging.basicConfig()", "WARNING:rosglass.qml:{file}:6: TypeError"),
+    ],
+)
+def test_a_warning_of_every_message_is_logged_with_its_cause_and_counted(
+    before: str, place: str, python: Any, tmp_path: Path, ros_domains: list[int]
+) -> None:
+    file = tmp_path / "Main.qml"
+    file.write_text(TYPO)
+    text = FED.replace("BEFORE", before).replace("FILE", str(file))
+    program = python(text.replace("DOMAIN", str(ros_domains[0])))
+    assert program.end(120) == 0, program.text
+    told = [line for line in program.lines if "TypeError" in line]
+    assert len(told) == 2, program.text
+    assert told[0].startswith(place.format(file=file))
+    assert "geometry_msgs/msg/Pose has no field 'positon'; did you mean position?" in told[0]
+    assert "(9 more times)" in told[1]
+    assert "qml: from JavaScript" in program.lines
+
+
+def test_a_message_handler_of_the_program_gets_what_the_engine_warns_of(
+    python: Any, tmp_path: Path, ros_domains: list[int]
+) -> None:
+    file = tmp_path / "Main.qml"
+    file.write_text(TYPO)
+    own = "QtCore.qInstallMessageHandler(lambda kind, where, text: print('own', text))"
+    text = FED.replace("BEFORE", own).replace("FILE", str(file))
+    program = python(text.replace("DOMAIN", str(ros_domains[0])))
+    assert program.end(120) == 0, program.text
+    told = [line for line in program.lines if "TypeError" in line]
+    assert len(told) > 10, program.text
+    assert all(line.startswith("own") for line in told)
+    assert "own from JavaScript" in program.lines

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from rosglass.errors import QmlError
 from rosglass.qml.creation import create
 from rosglass.qml.load_errors import error_list
-from rosglass.qml.log import forget_repeats
+from rosglass.qml.log import forget_repeats, log_engine_warnings
 from rosglass.qml.modules import install
 from rosglass.qml.places import import_folder, interface_file
 from rosglass.qml.runtime import runtime_of
@@ -69,6 +69,7 @@ class LiveFile(QtCore.QObject):
         self._put_off = False
         self._closed = False
         self.engine = QtQml.QQmlEngine()
+        log_engine_warnings(self.engine)
         # The last one is looked into first, and nothing hides our own modules.
         for path in [*_environment_paths(), *map(str, reversed(self._folders))]:
             self.engine.addImportPath(path)

@@ -10,11 +10,10 @@ import time
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.qml.network_access import NETWORK_HINT
-from rosglass.qt import QtCore
+from rosglass.qt import QtCore, QtQml
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable
-
+    from collections.abc import Hashable, Sequence
 
 __all__ = [
     "ROOT",
@@ -24,6 +23,7 @@ __all__ = [
     "explain",
     "forget_repeats",
     "install_message_handler",
+    "log_engine_warnings",
     "log_from_qml",
     "logger_name",
     "plain_path",
@@ -113,7 +113,8 @@ class LocationFormatter(logging.Formatter):
         name = record.name.removeprefix(ROOT).lstrip(".")
         logger = f" {name}" if name else ""
         place = f"{record.pathname}:{record.lineno}" if record.lineno else record.pathname
-        return f"{place}: {record.levelname}{logger}: {record.getMessage()}"
+        message = record.getMessage().removeprefix(f"{place}: ")
+        return f"{place}: {record.levelname}{logger}: {message}"
 
 
 _TYPES = {
@@ -202,7 +203,7 @@ def _handle(mode: Any, context: Any, message: str) -> None:
         category = context.category or "default"
         file = context.file or ""
         text = message.removeprefix(f"{file}:{context.line}: ") if file else message
-        text += NETWORK_HINT if _REFUSED.search(text) else _HINTS.get(text, "")
+        text = _with_hint(text)
         if not file:
             logging.getLogger(f"rosglass.qt.{category}").log(level, "%s", text)
             return
@@ -211,14 +212,46 @@ def _handle(mode: Any, context: Any, message: str) -> None:
             level = logging.INFO
         caller = Caller(plain_path(file), max(context.line, 0), context.function or "")
         if category == "default" and level == logging.WARNING:
-            cause = _repeats.cause(caller) if text.startswith("TypeError") else ""
-            text = _repeats.counted(caller, f"{text}; {cause}" if cause else text)
-        if text:
+            _log_warning(text, caller)
+        else:
             log_from_qml("", level, text, caller)
     finally:
         _handling.busy = False
 
 
+def _with_hint(text: str) -> str:
+    return text + (NETWORK_HINT if _REFUSED.search(text) else _HINTS.get(text, ""))
+
+
+def _log_warning(text: str, caller: Caller, prefix: str = "") -> None:
+    """Log what QML's engine warns of, where it has not been logged just now."""
+    cause = _repeats.cause(caller) if text.startswith("TypeError") else ""
+    text = _repeats.counted(caller, f"{text}; {cause}" if cause else text)
+    if text:
+        log_from_qml("", logging.WARNING, prefix + text, caller)
+
+
 def install_message_handler() -> None:
     """Send Qt's own messages, QML warnings and ``console.log()`` through Python's logging."""
     QtCore.qInstallMessageHandler(_handle)
+
+
+def log_engine_warnings(engine: QtQml.QQmlEngine) -> None:
+    """Send an engine's warnings through Python's logging, each with its cause and counted.
+
+    Not where a handler of Qt's messages is installed, the program's own or ours, which gets them.
+    """
+    # Qt tells in no other way which one there is.
+    handler = QtCore.qInstallMessageHandler(None)
+    if handler is not None:
+        QtCore.qInstallMessageHandler(handler)
+        return
+    engine.setOutputWarningsToStandardError(False)
+    engine.warnings.connect(_on_warnings)
+
+
+def _on_warnings(warnings: Sequence[QtQml.QQmlError]) -> None:
+    for warning in warnings:
+        caller = Caller(plain_path(warning.url().toString()), max(warning.line(), 0), "")
+        # The program's own format may show no place.
+        _log_warning(_with_hint(warning.description()), caller, f"{caller.place}: ")
