@@ -117,6 +117,22 @@ def test_a_reply_in_the_memory_of_another_is_not_taken_for_that(node, server):
     assert client.call({"a": 1, "b": 2}, timeout=30).sum == 2
 
 
+def test_a_request_that_comes_again_is_carried_out_once(server, eventually):
+    request = rosglass.load(ADD).request
+
+    def receive(client: bytes, number: int, value: int) -> None:
+        origin = Origin(b"\x00\x00\x12\x03", number, None, client)
+        server._replier._on_requests([(request.encode({"a": value}), 0, 0, origin)])
+
+    one, other = (b"\x01\x0f" + bytes(9) + last for last in (b"1", b"2"))  # Fast DDS's
+    for number, value in ((1, 10), (2, 20), (1, 10), (2, 20)):
+        receive(one, number, value)
+    receive(other, 1, 11)
+    receive(one, 3, 30)
+    eventually(lambda: 30 in server.got)
+    assert server.got == [10, 20, 11, 30]
+
+
 def test_what_is_known_of_a_readers_samples_goes_with_it():
     one, two = Origins(), Origins()
     one.follow(0x1000)
