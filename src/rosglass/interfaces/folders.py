@@ -21,8 +21,10 @@ if TYPE_CHECKING:
 
     from rosglass.interfaces.definition import InterfaceDefinition
 
-__all__ = ["Folders", "find_in_package", "list_package", "workspace"]
+__all__ = ["Folders", "find_in_package", "list_package", "workspace", "workspace_variables"]
 
+#: Environment variables that name the folders of a workspace.
+_VARIABLES = ("AMENT_PREFIX_PATH", "CMAKE_PREFIX_PATH", "ROS_PACKAGE_PATH")
 _MAX_DEPTH = 12
 _MAX_FOLDERS = 20_000
 _IGNORE_FILES = ("CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE", "NOBUILD")
@@ -165,6 +167,11 @@ def workspace(environment: Mapping[str, str]) -> Folders:
     for path in _paths(environment, "ROS_PACKAGE_PATH"):
         folders.add(path, _ROS1)
     return folders
+
+
+def workspace_variables(environment: Mapping[str, str]) -> tuple[str | None, ...]:
+    """Return what :func:`workspace` depends on."""
+    return tuple(map(environment.get, _VARIABLES))
 
 
 def _paths(environment: Mapping[str, str], variable: str) -> Iterator[str]:

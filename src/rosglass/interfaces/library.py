@@ -19,7 +19,7 @@ from rosglass.errors import (
 from rosglass.interfaces.definition import Definition, parts_of
 from rosglass.interfaces.derived import compose, derive, derived_from
 from rosglass.interfaces.distributions import Distributions
-from rosglass.interfaces.folders import Folders, workspace
+from rosglass.interfaces.folders import Folders, workspace, workspace_variables
 from rosglass.interfaces.hashes import announced_hashes, check_definition, md5
 from rosglass.interfaces.idl import parse_idl
 from rosglass.interfaces.names import (
@@ -56,7 +56,8 @@ class Library:
     """Definitions of types, wherever they come from; safe to use from several threads.
 
     A type is looked for in definitions received from peers, the sourced workspace, folders added by
-    the user, and the distributions' standard sets, in this order. When two of them define a type
+    the user, and the distributions' standard sets, in this order. For a type that is not found, the
+    environment is read again: it may name another workspace by now. When two of them define a type
     differently neither is used, unless one is preferred. Versions that peers sent on request come
     last, and where their hash is asked for.
 
@@ -76,7 +77,8 @@ class Library:
     ) -> None:
         self._wire = MemoryProvider()
         self._folders = Folders()
-        standard = [workspace(os.environ), self._folders, Distributions(distribution)]
+        self._workspace, self._sourced = workspace(os.environ), workspace_variables(os.environ)
+        standard = [self._workspace, self._folders, Distributions(distribution)]
         known = [self._wire.name, *(provider.name for provider in standard)]
         self._chain: list[Provider] = [self._wire, *(providers or standard)]
         self._lock = threading.RLock()
@@ -124,19 +126,42 @@ class Library:
         if loaded is None:
             _check_world(ros)
             with self._lock:
-                if hash not in ("", ANY_HASH):
-                    loaded = self._matching(name, ros, hash)
-                else:
-                    loaded = self._search(name, ros, self._resolver(ros), self._chain)
-                    if loaded is None:
-                        sent = self._version(name, ros)
-                        if sent is None:
-                            raise self._unknown(name, ros)
-                        return sent  # not kept: another one may come
-                    # All spellings of a name share one object.
-                    loaded = self._loaded.setdefault((ros, loaded.name, ""), loaded)
-                self._loaded[ros, name, hash] = loaded
+                try:
+                    loaded = self._look_up(name, ros, hash)
+                except (TypeNotFoundError, DefinitionError, DefinitionConflictError):
+                    if not self._read_workspace_again():
+                        raise
+                    loaded = self._look_up(name, ros, hash)
         return loaded
+
+    def _look_up(self, name: str, ros: int, hash: str) -> InterfaceDefinition:
+        if hash not in ("", ANY_HASH):
+            loaded = self._matching(name, ros, hash)
+        else:
+            found = self._search(name, ros, self._resolver(ros), self._chain)
+            if found is None:
+                sent = self._version(name, ros)
+                if sent is None:
+                    raise self._unknown(name, ros)
+                return sent  # not kept: another one may come
+            # All spellings of a name share one object.
+            loaded = self._loaded.setdefault((ros, found.name, ""), found)
+        self._loaded[ros, name, hash] = loaded
+        return loaded
+
+    def _read_workspace_again(self) -> bool:
+        """Replace the workspace where the environment names another one; return whether it does."""
+        sourced = workspace_variables(os.environ)
+        if sourced == self._sourced or self._workspace not in self._chain:
+            return False
+        found, self._sourced = workspace(os.environ), sourced
+        self._chain[self._chain.index(self._workspace)] = found
+        self._workspace = found
+        # No type is made of parts of both.
+        self._loaded.clear()
+        self._resolvers.clear()
+        self._explained.clear()
+        return True
 
     def source(self, name: str, ros: int = 2) -> Source:
         """Return where the definition of a type came from; errors as in :meth:`definition`."""

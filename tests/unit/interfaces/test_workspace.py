@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from rosglass.errors import DefinitionError, TypeNotFoundError
+from rosglass.errors import DefinitionConflictError, DefinitionError, TypeNotFoundError
 from rosglass.interfaces import Definition, Library, ServiceDefinition, folders, md5
 
 if TYPE_CHECKING:
@@ -107,6 +107,39 @@ def test_catkin_install_space(write: Write, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.delenv("CMAKE_PREFIX_PATH")
     monkeypatch.setenv("ROS_PACKAGE_PATH", f"{root}/opt/share")
     assert first_field(Library(), "my_msgs/A", 1) == "x"
+
+
+def test_workspace_that_is_sourced_while_the_program_runs(
+    write: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old = write({"old/my_msgs/msg/A.msg": "int32 old"}) / "old"
+    new = write({"new/my_msgs/msg/A.msg": "int32 new", "new/my_msgs/msg/B.msg": "A a"}) / "new"
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(old))
+    library = Library()
+    assert first_field(library, "my_msgs/A", 1) == "old"
+    with pytest.raises(TypeNotFoundError, match=str(old)):
+        library.definition("my_msgs/B", ros=1)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(new))
+    found = library.definition("my_msgs/B", ros=1)
+    assert isinstance(found, Definition)
+    assert found.nested["my_msgs/msg/A"].fields[0].name == "new"
+    assert first_field(library, "my_msgs/A", 1) == "new"
+    with pytest.raises(TypeNotFoundError, match=str(new)):
+        library.definition("my_msgs/C", ros=1)
+
+
+def test_workspace_that_has_the_hash_a_peer_announces(
+    write: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root = write({"old/my_msgs/msg/A.msg": "int32 old", "new/my_msgs/msg/A.msg": "int32 new"})
+    monkeypatch.setenv("ROS_PACKAGE_PATH", f"{root}/new")
+    wanted = md5(Library().definition("my_msgs/A", ros=1))
+    monkeypatch.setenv("ROS_PACKAGE_PATH", f"{root}/old")
+    library = Library()
+    with pytest.raises(DefinitionConflictError):
+        library.definition("my_msgs/A", ros=1, hash=wanted)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", f"{root}/new")
+    assert md5(library.definition("my_msgs/A", ros=1, hash=wanted)) == wanted
 
 
 def test_cmake_prefix_of_ros2(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:

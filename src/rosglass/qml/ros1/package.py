@@ -25,8 +25,6 @@ __all__ = ["Package"]
 
 _T = TypeVar("_T")
 
-#: Environment variables that name the folders of packages.
-_VARIABLES = ("AMENT_PREFIX_PATH", "CMAKE_PREFIX_PATH", "ROS_PACKAGE_PATH")
 #: Seconds that the program ``rospack`` is given.
 _PATIENCE = 10
 
@@ -47,12 +45,15 @@ class Package(QtCore.QObject):
 
     def _look(self, search: Callable[[Folders], _T], otherwise: _T, *, again: bool = False) -> _T:
         """Return what is found in the folders, searched once for each state of the environment."""
-        paths = tuple(map(os.environ.get, _VARIABLES))
+        from rosglass.interfaces.folders import (  # noqa: PLC0415 - few need it
+            workspace,
+            workspace_variables,
+        )
+
+        paths = workspace_variables(os.environ)
 
         def look() -> _T:
             if self._found is None or paths != self._searched or again:
-                from rosglass.interfaces.folders import workspace  # noqa: PLC0415 - few need it
-
                 self._found, self._searched = workspace(os.environ), paths
             return search(self._found)
 
