@@ -7,6 +7,7 @@ import logging
 import struct
 import threading
 import time
+from collections import deque
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointInfo, EndpointKind, History, NodeName
@@ -40,6 +41,8 @@ _SUBSCRIPTION = EndpointKind.SUBSCRIPTION
 _SLOW = 10.0
 #: Seconds that what waits may still be sent when nobody publishes any more.
 _FAREWELL = 1.0
+#: Subscribers between two looks, come and gone, that listeners are informed of at most.
+_MAX_BRIEF = 100
 #: Seconds until the master's list shows a subscriber for certain.
 _SETTLED = 5.0
 _length = struct.Struct("<I")
@@ -65,6 +68,10 @@ class Publication(Member):
         self.numbers = itertools.count(1)
         self.publishers: list[Ros1Publisher] = []
         self._links: list[Connection] = []
+        #: Those of them that the last look has found.
+        self._found: set[Connection] = set()
+        #: What `_links` was when one left that no look had found.
+        self._brief: deque[list[Connection]] = deque(maxlen=_MAX_BRIEF)
         #: The last message of each latched publisher.
         self._latched: dict[Ros1Publisher, Frame] = {}
         self._closed = False
@@ -79,7 +86,7 @@ class Publication(Member):
 
     def connected(self) -> list[EndpointInfo]:
         """Return who is connected."""
-        return [self._endpoint(link) for link in self.links()]
+        return self._endpoints(self.links())
 
     def lost(self) -> int:
         """Return how many messages made room for newer ones because somebody is slow."""
@@ -181,6 +188,8 @@ class Publication(Member):
         """Forget a subscriber that has gone."""
         with self._lock:
             if link in self._links:
+                if link not in self._found:
+                    self._brief.append(self._links.copy())
                 self._links.remove(link)
                 self._lost_before += link.lost
         self._core.wake()
@@ -242,9 +251,14 @@ class Publication(Member):
     def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - connections come by themselves
         """Tell the publishers who is connected, and who is in trouble."""
         problem = "; ".join([*self._refusals(), *self._losses()])
-        connected = self.connected()
-        for publisher in self.publishers:
-            publisher.follow(connected, problem)
+        with self._lock:
+            looks = [*self._brief, self._links.copy()]
+            self._brief.clear()
+            self._found = set(self._links)
+        for links in looks:
+            connected = self._endpoints(links)
+            for publisher in self.publishers:
+                publisher.follow(connected, problem)
 
     def _refusals(self) -> list[str]:
         """Return why some are refused that still want to subscribe."""
@@ -288,6 +302,9 @@ class Publication(Member):
         for link in links:
             self._core.loop.call(lambda link=link: link.finish(_FAREWELL))  # type: ignore[misc]
         self._core.remove(self)
+
+    def _endpoints(self, links: Sequence[Connection]) -> list[EndpointInfo]:
+        return [self._endpoint(link) for link in links]
 
     def _endpoint(self, link: Connection) -> EndpointInfo:
         return EndpointInfo(

@@ -85,6 +85,30 @@ def test_messages_flow_on_while_the_master_is_killed_and_restarted(
     assert subscription.publisher_count() == 2
 
 
+def test_subscribers_that_come_and_go_between_two_looks_are_not_missed(connect, wait_for):
+    node = connect("busy")
+    publisher = node.create_publisher("/brief", STRING)
+    changes, held, go_on = [], threading.Event(), threading.Event()
+    publisher.on_matched(lambda event: changes.append((event.change, event.count)))
+
+    def hold_up(_):
+        held.set()
+        go_on.wait(30)
+
+    # In the thread that looks.
+    publisher.on_matched(hold_up, IMMEDIATE)
+    with dial(node, "/brief", md5sum="*", type="*"):
+        assert held.wait(30)
+        for _ in range(3):
+            with dial(node, "/brief", md5sum="*", type="*"):
+                wait_for(lambda: publisher.subscription_count() == 2)
+            wait_for(lambda: publisher.subscription_count() == 1)
+        go_on.set()
+        wait_for(lambda: len(changes) == 7, what=lambda: changes)
+    wait_for(lambda: len(changes) == 8, what=lambda: changes)
+    assert changes == [(1, 1), *3 * [(1, 2), (-1, 1)], (-1, 0)]
+
+
 def test_a_slow_subscriber_is_told_of_and_holds_up_nobody(connect, wait_for):
     node, other = connect("fast"), connect("listener")
     publisher = node.create_publisher("/fast", "std_msgs/UInt8MultiArray", 5)
