@@ -16,7 +16,7 @@ from enum import Enum
 from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.comm.complaints import FailureLog
-from rosglass.comm.executor import RetryingExecutor
+from rosglass.comm.executor import RetryingExecutor, let_exit
 from rosglass.comm.listeners import Listeners
 from rosglass.comm.loop import check_plain
 from rosglass.comm.node import Executor, Handle
@@ -342,7 +342,8 @@ class Timer(Handle):
         try:
             if not self._closed:
                 self._callback()
-        except Exception:
+        except (Exception, SystemExit) as error:
+            let_exit(error)
             self._failures.exception("the callback of %s failed", self)
         finally:
             self._waiting = False

@@ -17,7 +17,14 @@ from rosglass.comm.timers import Timers
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-__all__ = ["IMMEDIATE", "Dispatcher", "ImmediateExecutor", "RetryingExecutor", "run_job"]
+__all__ = [
+    "IMMEDIATE",
+    "Dispatcher",
+    "ImmediateExecutor",
+    "RetryingExecutor",
+    "let_exit",
+    "run_job",
+]
 
 _log = logging.getLogger("rosglass.comm")
 #: Seconds that closing waits for a callback that is still running.
@@ -32,8 +39,15 @@ def run_job(job: Callable[[], None]) -> None:
     """Run `job`, and log an exception that it raises."""
     try:
         job()
-    except Exception:
+    except (Exception, SystemExit) as error:
+        let_exit(error)
         _log.exception("a callback failed")
+
+
+def let_exit(error: BaseException) -> None:
+    """Raise `error` if it is of `sys.exit()` in the main thread; none of ours ends by that."""
+    if isinstance(error, SystemExit) and threading.current_thread() is threading.main_thread():
+        raise error
 
 
 class ImmediateExecutor(Executor):
@@ -44,8 +58,11 @@ class ImmediateExecutor(Executor):
     """
 
     def post(self, job: Callable[[], None]) -> None:
-        """Run `job` now; an exception it raises is logged."""
-        run_job(job)
+        """Run `job` now; an exception it raises is logged, and `sys.exit()` ends nothing."""
+        try:
+            run_job(job)
+        except SystemExit:  # in the main thread, in the midst of what the node does
+            _log.exception("a callback failed")
 
 
 #: The one immediate executor; it has no state.

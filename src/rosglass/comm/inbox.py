@@ -15,7 +15,7 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.complaints import FailureLog
-from rosglass.comm.executor import IMMEDIATE, RetryingExecutor
+from rosglass.comm.executor import IMMEDIATE, RetryingExecutor, let_exit
 from rosglass.comm.qos import History
 from rosglass.comm.statistics import MARK_PERIOD, Meter
 from rosglass.errors import ConversionError
@@ -278,7 +278,8 @@ class Inbox:
                         break
                     try:
                         call(one)
-                    except Exception:
+                    except (Exception, SystemExit) as error:
+                        let_exit(error)
                         self._log_failure()
                 now = time.monotonic()
                 # What a slow callback has not begun with stays where newer samples take its place.
@@ -389,7 +390,7 @@ class ImmediateInbox(Inbox):
                 break
             try:
                 call(one)
-            except Exception:
+            except (Exception, SystemExit):
                 self._log_failure()
         self._received += len(done)
         self._bytes += sum(map(len, map(_data, done)))
@@ -407,7 +408,7 @@ class ImmediateInbox(Inbox):
         self._bytes += len(sample[0])
         try:
             self._call_back(sample)
-        except Exception:
+        except (Exception, SystemExit):
             self._log_failure()
 
     def _store(self, sample: Sample) -> None:

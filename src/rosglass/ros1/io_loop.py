@@ -152,7 +152,7 @@ class IoLoop:
                     continue
                 try:  # as _run() does, a step sooner
                     handler.ready(events)
-                except Exception as error:
+                except BaseException as error:  # nothing may end this thread
                     self._fail(handler, error)
             if self._leisurely:
                 self._look()
@@ -213,10 +213,10 @@ class IoLoop:
     def _run(self, handler: Ready, events: int) -> None:
         try:
             handler.ready(events)
-        except Exception as error:
+        except BaseException as error:
             self._fail(handler, error)
 
-    def _fail(self, handler: Ready, error: Exception) -> None:
+    def _fail(self, handler: Ready, error: BaseException) -> None:
         _log.exception("%s failed", handler)
         reason = f"an error of ours, {error!r}"
         # Whatever it did not take would make it fail again, at once and for ever.
@@ -225,7 +225,7 @@ class IoLoop:
     def _run_job(self, job: Callable[[], None]) -> None:
         try:
             job()
-        except Exception:
+        except BaseException:
             _log.exception("%s: a job failed", self._thread.name)
 
 

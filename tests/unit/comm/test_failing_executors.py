@@ -8,6 +8,7 @@ import queue
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 
 import pytest
 
@@ -103,6 +104,47 @@ def test_sys_exit_in_a_callback_ends_neither_its_subscription_nor_the_dispatcher
         assert came.acquire(timeout=LIMIT)
     dispatcher.close()
     assert "SystemExit" in caplog.text
+
+
+@pytest.mark.parametrize("immediate", [False, True])
+def test_sys_exit_in_a_callback_loses_nothing_that_came_together(immediate, caplog):
+    dispatcher, seen, came = Dispatcher("test"), [], threading.Semaphore(0)
+
+    def callback(given):
+        seen.append(given.sequence)
+        came.release()
+        if given.sequence in {1, 3}:
+            raise SystemExit
+
+    executor, qos = IMMEDIATE if immediate else dispatcher, QoS(depth=10)
+    sub = Subscription("/t", None, qos, executor, raw_callback=callback)
+    given = [sample(number) for number in range(1, 6)]
+    thread = threading.Thread(target=sub.deliver_many, args=(given,))
+    thread.start()
+    for _ in given:
+        assert came.acquire(timeout=LIMIT)
+    thread.join(LIMIT)
+    dispatcher.close()
+    assert seen == [1, 2, 3, 4, 5]
+    assert "SystemExit" in caplog.text
+
+
+def test_sys_exit_in_the_main_thread_ends_the_program_but_nothing_halfway(caplog):
+    def leave(_):
+        raise SystemExit
+
+    class Here(Executor):
+        def post(self, job):
+            job()
+
+    for executor, leaves in ((Here(), True), (IMMEDIATE, False)):
+        sub = Subscription("/t", None, QoS(), executor, raw_callback=leave)
+        listeners = Listeners(where="/t")
+        listeners.add(leave, executor)
+        for give in (lambda sub=sub: sub.deliver(sample(1)), lambda ls=listeners: ls.notify(1)):
+            with pytest.raises(SystemExit) if leaves else nullcontext():
+                give()
+    assert len(caplog.records) == 2
 
 
 @pytest.mark.parametrize("kind", ["refuses", "exits"])
