@@ -335,7 +335,7 @@ def test_pictures_that_a_silent_link_kept_back_are_not_live(
 def test_a_camera_that_nobody_publishes_is_told(
     running: Any, camera: Any, wait: Any, caplog: Any, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr("rosglass.qml.element._LONELY", 20)
+    monkeypatch.setattr("rosglass.qml.element.LONELY_MS", 20)
     caplog.set_level("INFO", "rosglass.qml")
     root = load(running, 'topic: "/camm"')
     wait(lambda: "/camm: nobody publishes this topic; did you mean /cam?" in caplog.text)

@@ -310,3 +310,40 @@ def test_what_keep_all_could_not_send_is_told(running: Any, wait: Any, caplog: A
     running.world.publishers[0].closed = True
     root.send()
     wait(lambda: "nothing was published on /x: closed" in caplog.text)
+
+
+@pytest.mark.parametrize(("topic", "warned"), [("/cmd_vell", True), ("/cmd_vel", False)])
+def test_a_topic_without_subscribers_is_named_with_the_near_name(
+    running: Any, received: list, wait: Any, caplog: Any, monkeypatch: Any, topic: str, warned: bool
+) -> None:
+    monkeypatch.setattr("rosglass.qml.publisher.LONELY_MS", 20)
+    caplog.set_level("INFO", "rosglass.qml")
+    running.robot.create_publisher("/cmd_vel", TWIST)  # topics() of this graph shows published ones
+    code = 'QtObject { property var pub: Ros2.createPublisher("TOPIC", "geometry_msgs/Twist") }'
+    root = running.load(code.replace("TOPIC", topic))
+    wait(lambda: root.property("pub").property("isAdvertised"))
+    if warned:
+        wait(lambda: "nobody subscribes to this topic" in caplog.text)
+        (told,) = [one for one in caplog.records if "nobody subscribes" in one.message]
+        assert told.levelno == logging.WARNING
+        assert "/cmd_vell: nobody subscribes to this topic; did you mean /cmd_vel?" in told.message
+    else:
+        wait(200)
+        assert "nobody subscribes" not in caplog.text
+
+
+def test_publishing_at_the_end_of_the_program_is_no_mistake(
+    running: Any, wait: Any, caplog: Any
+) -> None:
+    root = load(running)
+    wait(lambda: root.property("advertised") == 1)
+    running.session.shutdown()
+    send(root, 0.5)
+    assert root.property("sent") is False
+    assert "nothing was published on cmd_vel: the node was shut down" in caplog.text
+    assert "no node was asked for" not in caplog.text
+    caplog.clear()
+    running.session.close()
+    send(root, 0.5)
+    assert root.property("sent") is False
+    assert caplog.text == ""

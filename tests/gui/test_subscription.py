@@ -541,7 +541,7 @@ def test_a_successor_that_has_said_nothing_is_not_trusted(live: Any, wait: Any) 
 def test_a_topic_that_nobody_publishes_is_told(
     running: Any, wait: Any, caplog: Any, monkeypatch: Any, topic: str, told: bool
 ) -> None:
-    monkeypatch.setattr("rosglass.qml.element._LONELY", 20)
+    monkeypatch.setattr("rosglass.qml.element.LONELY_MS", 20)
     caplog.set_level("INFO", "rosglass.qml")
     running.robot.create_publisher("/odom", "std_msgs/msg/String")
     root = running.load('Subscription { topic: "TOPIC" }'.replace("TOPIC", topic))

@@ -149,5 +149,5 @@ def adding_definitions(name: str, ros: int) -> str:
     return (
         f"copy the folder of its package {package} from the robot ({_FIND[ros]} {package} says "
         f"where it is there) and add it: --definitions {package} on the command line, "
-        f"Library.add_path({package!r}) in Python"
+        f"in Python Library.add_path({package!r}) of the library given to connect(library=...)"
     )

@@ -29,8 +29,8 @@ class _Closable(Protocol):
 
 
 _T = TypeVar("_T", bound=_Closable)
-#: Milliseconds without a publisher after which the name may be a mistake.
-_LONELY = 5000
+#: Milliseconds without anyone at the other end after which a topic's name may be a mistake.
+LONELY_MS = 5000
 #: Milliseconds until something that is missing is looked for again.
 RETRY = 1000
 #: Milliseconds without data after which it counts as stale.
@@ -232,7 +232,7 @@ class TopicElement(Element):
 
     def _expect_publishers(self) -> None:
         """Tell it after a while if nobody publishes the topic."""
-        self._lonely.start(_LONELY)
+        self._lonely.start(LONELY_MS)
 
     @Slot()
     def _wonder(self) -> None:
@@ -244,7 +244,8 @@ class TopicElement(Element):
         # A node that has just been closed answers nothing.
         with suppress(Error):
             hint = similar(self._resolved, node.topics())
-            self._tell(f"{self._resolved}: nobody publishes this topic{hint}", logging.INFO)
+            level = logging.WARNING if hint else logging.INFO
+            self._tell(f"{self._resolved}: nobody publishes this topic{hint}", level)
 
     def _resolve(self, topic: str) -> str:
         """Return the absolute name of a topic; empty, with a problem said, when it is invalid."""

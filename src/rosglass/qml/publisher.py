@@ -7,11 +7,13 @@ import logging
 import os
 import time
 from collections import deque
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rosglass.comm.qos import Durability, History
+from rosglass.comm.similar import similar
 from rosglass.errors import ConversionError, Error, TypeNotFoundError
-from rosglass.qml.element import RETRY, Element
+from rosglass.qml.element import LONELY_MS, RETRY, Element
 from rosglass.qml.from_js import fields_from_js
 from rosglass.qml.log import log_from_qml
 from rosglass.qml.session import NOT_INITIALIZED
@@ -73,6 +75,9 @@ class Publisher(Element):
         self._retry = QtCore.QTimer(self)
         self._retry.setSingleShot(True)
         self._retry.timeout.connect(self._advertise)
+        self._lonely = QtCore.QTimer(self)
+        self._lonely.setSingleShot(True)
+        self._lonely.timeout.connect(self._warn_no_subscribers)
 
     topic = Property(str, lambda self: self._resolved or self._topic, notify=topicChanged)
     type = Property(str, lambda self: self._type, constant=True)
@@ -107,7 +112,10 @@ class Publisher(Element):
             told = self._problem.removeprefix(f"{self._topic}: ")
             reason = told or "it is not advertised yet"
             if self._session is not None and not self._session.is_initialized:
-                reason += f"; {NOT_INITIALIZED}"
+                if self._session.closed:
+                    return False  # the program ends
+                ended = bool(self._resolved)  # it was advertised
+                reason = "the node was shut down" if ended else f"{reason}; {NOT_INITIALIZED}"
             self._complain(f"nothing was published on {self._topic}: {reason}", logging.WARNING)
             return False
         if schema is None:
@@ -289,6 +297,7 @@ class Publisher(Element):
         self._sender, self._resolved = result, result.topic
         self._schema = schema_of(result.type.definition)
         self._ready_at, self._settled = None, False
+        self._lonely.start(LONELY_MS)
         self._at_end["sender"] = lambda: session.background(result.close)
         self._watch(result, session)
         self._say("")
@@ -301,6 +310,21 @@ class Publisher(Element):
         """Listen to what a new publisher tells."""
 
     @Slot()
+    def _warn_no_subscribers(self) -> None:
+        """Log that nobody subscribes to the topic, for who looks for a mistake in its name."""
+        node, sender = self._have, self._sender
+        if node is None or sender is None or not self._is_connected():
+            return
+        # A node that has just been closed answers nothing.
+        with suppress(Error):
+            if sender.subscription_count() or node.subscriptions(self._resolved):
+                return
+            subscribed = [name for name in node.topics() if node.subscriptions(name)]
+            hint = similar(self._resolved, subscribed)
+            level = logging.WARNING if hint else logging.INFO
+            self._tell(f"{self._resolved}: nobody subscribes to this topic{hint}", level)
+
+    @Slot()
     def _on_tick(self) -> None:
         if self._held:
             self._send_held()
@@ -310,6 +334,7 @@ class Publisher(Element):
 
     def _withdraw(self) -> None:
         self._retry.stop()
+        self._lonely.stop()
         sender, self._sender = self._sender, None
         if sender is None or self._session is None:
             return

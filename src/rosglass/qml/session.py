@@ -168,6 +168,11 @@ class Session(QtCore.QObject):
         return cls._default
 
     @property
+    def closed(self) -> bool:
+        """Whether it was closed, as at the end of the program."""
+        return self._closed
+
+    @property
     def is_initialized(self) -> bool:
         """Whether a node was asked for and not shut down again."""
         return bool(self.name)
