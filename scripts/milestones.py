@@ -1,0 +1,344 @@
+"""Counts what parts 7 and 8 want to reach, and prints it as a table.
+
+    .venv/bin/python scripts/milestones.py [--checkout DIR] [--trace]
+
+The first figures are read off the sources, of any checkout. ``--trace`` also runs this one: a
+publisher in another process sends, and the files are counted that each message passes through,
+from the socket to a subscription's callback. Over ROS 1 that needs Debian's rosmaster; Zenoh calls
+from threads that are not Python's, which no profile sees.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import contextlib
+import os
+import re
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections import Counter, defaultdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+#: Where the clients of ROS 1 and ROS 2, and what they talk over, live: today's folders and part 7's.
+_CLIENT_LAYER = ("comm", "ros1", "ros2", "node", "wires")
+_LOCKS = {"Lock", "RLock", "Event", "Condition", "Semaphore", "BoundedSemaphore", "Barrier"}
+#: What a class that stands for a whole ROS graph derives from, and the real ones among them.
+_WORLDS = {"Node", "CoreNode", "Middleware", "Wire"}
+_REAL_WORLDS = {"CoreNode", "Ros1Node", "Ros2Node", "DdsMiddleware", "ZenohMiddleware", "Bare"}
+#: Names of the glossary's left column (house.md, section 3) that stand for nothing else.
+_GLOSSARY = re.compile(
+    r"\b(told|nobody|somebody|whoever|farewells?|furniture|errands?|see_off|let_up|meanwhile)\b"
+    r"|_(?:PATIENCE|LEISURE|HURRY)\b|\bput_off\b",
+    re.IGNORECASE,
+)
+_MESSAGES = 300
+
+
+class Source:
+    """One file of Python.
+
+    Attributes:
+        path: Where it is.
+        text: What is in it.
+        tree: The same, parsed.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.text = path.read_text(encoding="utf-8")
+        self.tree = ast.parse(self.text)
+
+    @property
+    def lines(self) -> int:
+        """How many lines it has."""
+        return len(self.text.splitlines())
+
+    def calls(self) -> Iterator[tuple[str, str, ast.Call]]:
+        """Yield each call with the name of what is called, and of what that is taken from."""
+        for node in ast.walk(self.tree):
+            if isinstance(node, ast.Call):
+                called = node.func
+                if isinstance(called, ast.Attribute):
+                    yield called.attr, getattr(called.value, "id", ""), node
+                elif isinstance(called, ast.Name):
+                    yield called.id, "", node
+
+
+def read(folder: Path) -> list[Source]:
+    return [Source(path) for path in sorted(folder.rglob("*.py"))]
+
+
+def total_lines(sources: list[Source]) -> int:
+    return sum(source.lines for source in sources)
+
+
+def twins(package: Path) -> int:
+    """Count module names that both ROS worlds have."""
+    worlds = [{path.stem for path in (package / ros).glob("*.py")} for ros in ("ros1", "ros2")]
+    return len((worlds[0] & worlds[1]) - {"__init__"})
+
+
+def locks(sources: list[Source]) -> int:
+    return sum(
+        name in _LOCKS and owner in {"", "threading"}
+        for source in sources
+        for name, owner, _ in source.calls()
+    )
+
+
+def worlds(sources: list[Source]) -> int:
+    """Count classes that stand for a ROS graph in memory."""
+    found = set()
+    for source in sources:
+        for node in ast.walk(source.tree):
+            if isinstance(node, ast.ClassDef) and node.name not in _REAL_WORLDS:
+                bases = {getattr(base, "id", getattr(base, "attr", "")) for base in node.bases}
+                if bases & _WORLDS:
+                    found.add(node.name)
+    return len(found)
+
+
+def sleeps(sources: list[Source]) -> tuple[int, int]:
+    """Count calls of ``time.sleep``, and waits of a GUI test for a number of milliseconds."""
+    fixed = waits = 0
+    for source in sources:
+        for name, owner, call in source.calls():
+            fixed += name == "sleep" and owner == "time"
+            first = call.args[0] if call.args else None
+            is_number = isinstance(first, ast.Constant) and type(first.value) is int
+            waits += (
+                name == "wait" and is_number and {"gui", "rviz"} & set(source.path.parts) != set()
+            )
+    return fixed, waits
+
+
+def private_reaches(sources: list[Source]) -> int:
+    """Count attributes with a leading underscore of something else than the object itself."""
+    return sum(
+        node.attr.startswith("_")
+        and not node.attr.startswith("__")
+        and getattr(node.value, "id", "") not in {"self", "cls", "os", "sys", "ctypes"}
+        for source in sources
+        for node in ast.walk(source.tree)
+        if isinstance(node, ast.Attribute)
+    )
+
+
+def late_imports(sources: list[Source]) -> int:
+    return sum(
+        isinstance(inner, ast.Import | ast.ImportFrom)
+        for source in sources
+        for node in ast.walk(source.tree)
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+        for inner in ast.walk(node)
+    )
+
+
+def import_graph(package: Path, sources: list[Source]) -> dict[str, set[str]]:
+    """Return which module imports which, imports for type checkers only and late ones counted."""
+    names = {}
+    for source in sources:
+        parts = source.path.relative_to(package.parent).with_suffix("").parts
+        names[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = source
+    graph: dict[str, set[str]] = {}
+    for name, source in names.items():
+        wanted = graph[name] = set()
+        for node in ast.walk(source.tree):
+            if isinstance(node, ast.Import):
+                wanted |= {alias.name for alias in node.names} & names.keys()
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                inner = {f"{node.module}.{alias.name}" for alias in node.names}
+                wanted |= (inner & names.keys()) or ({node.module} & names.keys())
+        wanted.discard(name)
+    return graph
+
+
+def lone_modules(graph: dict[str, set[str]]) -> int:
+    """Count modules that one module of the same folder imports, and none besides."""
+    importers = defaultdict(set)
+    packages = {name.rpartition(".")[0] for name in graph}
+    for name, wanted in graph.items():
+        for other in wanted if name not in packages else ():  # what __init__ shows to users apart
+            importers[other].add(name)
+    return sum(
+        len(by) == 1 and next(iter(by)).rpartition(".")[0] == name.rpartition(".")[0]
+        for name, by in importers.items()
+    )
+
+
+def cycles(graph: dict[str, set[str]]) -> tuple[int, int]:
+    """Return how many groups of more than two modules import each other, and their modules.
+
+    The groups are the strongly connected components, by Tarjan's algorithm.
+    """
+    index: dict[str, int] = {}
+    low: dict[str, int] = {}
+    stack: list[str] = []
+    groups = []
+
+    def visit(name: str) -> None:
+        index[name] = low[name] = len(index)
+        stack.append(name)
+        for other in graph[name]:
+            if other not in index:
+                visit(other)
+                low[name] = min(low[name], low[other])
+            elif other in stack:
+                low[name] = min(low[name], index[other])
+        if low[name] == index[name]:
+            at = stack.index(name)
+            groups.append(stack[at:])
+            del stack[at:]
+
+    sys.setrecursionlimit(10_000)
+    for name in graph:
+        if name not in index:
+            visit(name)
+    large = [group for group in groups if len(group) > 2]
+    return len(large), sum(map(len, large))
+
+
+def glossary_words(folders: list[Path]) -> int:
+    """Count words of the glossary's left column in the code and in what is written about it."""
+    texts = [
+        path for folder in folders for path in folder.rglob("*") if path.suffix in {".py", ".md"}
+    ]
+    return sum(len(_GLOSSARY.findall(path.read_text(encoding="utf-8"))) for path in texts)
+
+
+# -- the way of a message ----------------------------------------------------------------------------
+
+_PUBLISHER = """
+import sys, time, rosglass
+with rosglass.connect(sys.argv[1], name="milestones_talker") as node:
+    publisher = node.create_publisher("/milestones", "std_msgs/msg/String", qos=1000)
+    while True:
+        publisher.publish({"data": "x"})
+        time.sleep(0.01)
+"""
+
+
+def trace(url: str) -> list[str]:
+    """Return the files of rosglass that every message runs through, in the order of their names."""
+    import rosglass  # noqa: PLC0415 - of this checkout, not the one that is counted
+
+    package = str(Path(rosglass.__file__).parent) + os.sep
+    calls: Counter[str] = Counter()
+    came = 0
+    enough = threading.Event()
+    counting = False
+
+    def profile(frame: Any, event: str, _: object) -> None:
+        if counting and event == "call" and frame.f_code.co_filename.startswith(package):
+            calls[frame.f_code.co_filename.removeprefix(package)] += 1
+
+    def on_message(message: rosglass.Message) -> None:
+        nonlocal came, counting
+        came += 1
+        if came == 50:  # types, links and buffers are settled
+            counting = True
+        elif came == 50 + _MESSAGES:
+            counting = False
+            enough.set()
+        message.data  # noqa: B018 - what a user does
+
+    threading.setprofile(profile)
+    command = [sys.executable, "-c", _PUBLISHER, url]
+    with rosglass.connect(url, name="milestones_listener") as node:
+        threading.setprofile(None)
+        talker = subprocess.Popen(command)
+        try:
+            node.create_subscription("/milestones", "std_msgs/msg/String", on_message, qos=1000)
+            if not enough.wait(60):
+                raise SystemExit(f"{url}: {came} messages came in 60 s")
+        finally:
+            talker.kill()
+            talker.wait()
+    return sorted(file for file, count in calls.items() if count >= 0.9 * _MESSAGES)
+
+
+@contextlib.contextmanager
+def ros1_master() -> Iterator[str]:
+    """Start Debian's rosmaster; yields its URL."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    with tempfile.TemporaryDirectory() as home:
+        env = {"PATH": "/usr/bin:/bin", "HOME": home, "ROS_HOME": home, "ROS_IP": "127.0.0.1"}
+        null = subprocess.DEVNULL
+        command = ["/usr/bin/rosmaster", "--core", "-p", str(port)]
+        server = subprocess.Popen(command, env=env, stdout=null, stderr=null)
+        try:
+            time.sleep(2)
+            yield f"ros1://127.0.0.1:{port}"
+        finally:
+            server.kill()
+            server.wait()
+
+
+def traces() -> Iterator[tuple[str, list[str]]]:
+    yield "DDS", trace("dds://?domain=77")
+    if shutil.which("/usr/bin/rosmaster"):
+        with ros1_master() as url:
+            yield "TCPROS", trace(url)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--checkout", type=Path, default=Path(__file__).parents[1], metavar="DIR")
+    parser.add_argument("--trace", action="store_true", help="run messages through, too")
+    options = parser.parse_args()
+    root = options.checkout.resolve()
+    package = root / "src" / "rosglass"
+    if not package.is_dir():
+        parser.error(f"{root} is no checkout of rosglass: {package} is missing")
+    source, tests = read(package), read(root / "tests")
+    clients = [one for one in source if one.path.relative_to(package).parts[0] in _CLIENT_LAYER]
+    graph = import_graph(package, source)
+
+    def of(folder: str) -> int:
+        return total_lines(
+            [one for one in source if folder in one.path.relative_to(package).parts[:1]]
+        )
+
+    fixed, waits = sleeps(tests)
+    groups, inside = cycles(graph)
+    rows = [
+        ("module names in both ROS worlds", twins(package), "0"),
+        ("client layer + wires, lines", total_lines(clients), "26,000"),
+        ("locks, events, conditions in them", locks(clients), "25"),
+        ("in-memory worlds (product and tests)", worlds(source + tests), "1"),
+        ("tests, lines", total_lines(tests), "50,000; then 45,000"),
+        ("tests: fixed sleeps + Qt waits", f"{fixed} + {waits}", "20"),
+        ("tests: reaches into privates", private_reaches(tests), "60"),
+        ("files in src", len(source), "320"),
+        ("modules imported by one sibling only", lone_modules(graph), "60"),
+        ("all of src, lines", total_lines(source), "72,000"),
+        ("qml, lines", of("qml"), "12,500"),
+        ("rviz, lines", of("rviz"), "11,000"),
+        ("import cycles of more than two modules", f"{groups} ({inside} modules)", "0"),
+        ("late imports", late_imports(source), "150"),
+        ("words of the glossary's left column", glossary_words([package, root / "docs"]), "0"),
+    ]
+    if options.trace:
+        for wire, files in traces():
+            rows.append((f"files from socket to callback, {wire}", len(files), "8"))
+            print(f"{wire}: {', '.join(files)}", file=sys.stderr)
+    width = max(len(row[0]) for row in rows)
+    print(f"{'':{width}}  {'now':>16}  reach")
+    for what, now, reach in rows:
+        print(f"{what:{width}}  {f'{now:,}' if isinstance(now, int) else now:>16}  {reach}")
+
+
+if __name__ == "__main__":
+    main()
