@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-#: Where the clients of ROS 1 and ROS 2, and what they talk over, live: today's folders and part 7's.
+#: Where the clients of ROS 1 and ROS 2 and their wires live: today's folders and part 7's.
 _CLIENT_LAYER = ("comm", "ros1", "ros2", "node", "wires")
 _LOCKS = {"Lock", "RLock", "Event", "Condition", "Semaphore", "BoundedSemaphore", "Barrier"}
 #: What a class that stands for a whole ROS graph derives from, and the real ones among them.
@@ -216,7 +216,7 @@ def glossary_words(folders: list[Path]) -> int:
     return sum(len(_GLOSSARY.findall(path.read_text(encoding="utf-8"))) for path in texts)
 
 
-# -- the way of a message ----------------------------------------------------------------------------
+# -- the way of a message ------------------------------------------------------------------
 
 _PUBLISHER = """
 import sys, time, rosglass

@@ -23,7 +23,7 @@ _EXAMPLE = "zenoh://127.0.0.1:7447"
 _EXAMPLES = "zenoh://127.0.0.1:7447, dds://?domain=0 or ros1://robot:11311"
 _KNOWN = (
     "dds:// (ROS 2 with any DDS), zenoh:// (ROS 2 with rmw_zenoh), ros1:// (ROS 1, its master), "
-    "replay:FILE (a recording)"
+    "replay:FILE (a recording), local://NAME (a graph inside this process)"
 )
 #: Values of RMW_IMPLEMENTATION and what they mean; dynamic and vendor variants speak plain DDS.
 _MIDDLEWARES = {
@@ -95,6 +95,10 @@ def connect(
             ``%3F``, ``%23`` and ``%25`` stand for ``?``, ``#`` and ``%``. See
             :class:`rosglass.bags.ReplayNode`.
 
+            ``local://NAME`` is a graph inside this process, without a network, for tests and for
+            interfaces without a robot: nodes that give the same name see each other, and nobody
+            else does. Topics, services, actions and parameters are those of ROS 2.
+
             None asks the environment: ROSGLASS_URL, then RMW_IMPLEMENTATION,
             ZENOH_SESSION_CONFIG_URI, ROS_DISTRO, ROS_DOMAIN_ID and ROS_MASTER_URI.
         name: Base name of the node; None for one that nobody else has, ``rosglass_<process id>``;
@@ -139,7 +143,7 @@ def connect(
         from rosglass.bags.replay_node import connect_replay  # noqa: PLC0415
 
         return connect_replay(url, *_named(name, namespace, arguments))
-    if scheme not in ("dds", "zenoh", "ros1") or not separator:
+    if scheme not in ("dds", "zenoh", "ros1", "local") or not separator:
         reason = f"unknown scheme {scheme!r}" if separator else "no scheme"
         raise UnsupportedError(
             f"cannot connect to {url!r}: {reason}; known: {_KNOWN}, e.g. {_EXAMPLES}"
@@ -163,7 +167,7 @@ def connect(
 
     told = Arguments.parse(arguments)
     name, namespace = _named(name, namespace, arguments)
-    middleware = _dds(url) if scheme == "dds" else _zenoh(url)
+    middleware = {"dds": _dds, "zenoh": _zenoh, "local": _local}[scheme](url)
     from rosglass.ros2.node import Ros2Node  # noqa: PLC0415
 
     return Ros2Node(middleware, url, name, namespace, library, told, own_services=own_services)
@@ -241,6 +245,12 @@ def _dds(url: str) -> Middleware:
     from rosglass.ros2.dds.middleware import DdsMiddleware  # noqa: PLC0415
 
     return DdsMiddleware(options)
+
+
+def _local(url: str) -> Middleware:
+    from rosglass.wires.local import LocalMiddleware  # noqa: PLC0415 - few need it
+
+    return LocalMiddleware(url)
 
 
 def explain_missing(error: ModuleNotFoundError) -> str:

@@ -21,6 +21,7 @@ RANK = {
     "comm": 3,
     "ros1": 4,
     "ros2": 4,
+    "wires": 5,
     "connection": 6,
     "bags": 5,
     "bridge": 5,

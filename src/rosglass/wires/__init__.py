@@ -1,0 +1,1 @@
+"""What nodes talk over: each wire announces endpoints and moves bytes."""
