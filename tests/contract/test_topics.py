@@ -1,0 +1,254 @@
+"""Publishing and subscribing, on every wire."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+
+import pytest
+
+import rosglass
+from rosglass import QoS
+from rosglass.comm import IMMEDIATE, Sample
+
+TEXT, TWIST, IMAGE = "std_msgs/msg/String", "geometry_msgs/msg/Twist", "sensor_msgs/msg/Image"
+HEADER = "std_msgs/msg/Header"
+
+
+@pytest.fixture
+def link(robot, console, topic, eventually):
+    """Make a publisher of the robot and a subscription of the console that are connected."""
+
+    def link(kind=TEXT, callback=None, qos=10, **options):
+        subscription = console.create_subscription(topic, kind, callback, qos, **options)
+        publisher = robot.create_publisher(topic, kind or TEXT, qos)
+        eventually(
+            lambda: publisher.subscription_count() and subscription.publisher_count(),
+            lambda: (publisher.problem, subscription.problem, subscription.hint),
+        )
+        return publisher, subscription
+
+    return link
+
+
+def test_messages_come_once_and_in_order(link, eventually):
+    received = []
+    publisher, _ = link(callback=lambda message: received.append(message.data), qos=200)
+    for number in range(100):
+        publisher.publish(data=str(number))
+    eventually(lambda: len(received) >= 100, lambda: received)
+    assert received == [str(number) for number in range(100)]
+
+
+@pytest.mark.parametrize("given", ["fields", "dict", "message", "bytes", "sample"])
+def test_what_can_be_published(link, wire, given):
+    publisher, subscription = link(TWIST)
+    message = publisher.type.create(linear={"x": 1.5})
+    if given == "fields":
+        publisher.publish(linear={"x": 1.5})
+    elif given == "dict":
+        publisher.publish({"linear": {"x": 1.5}})
+    elif given == "message":
+        publisher.publish(message)
+    else:
+        publisher.publish_serialized(publisher.type.encode(message, wire=publisher_wire(wire)))
+    sample = subscription.wait(30)
+    if given == "sample":
+        publisher.publish_serialized(sample)
+        sample = subscription.wait(30)
+    assert sample.message().linear.x == 1.5
+    assert sample.type.name == TWIST
+
+
+def publisher_wire(wire):
+    return "ros1" if wire.is_ros1 else "cdr"
+
+
+def test_none_is_not_published(link):
+    publisher, subscription = link(TWIST)
+    with pytest.raises(rosglass.ConversionError, match="a message, a dict or keyword fields"):
+        publisher.publish(None)
+    with pytest.raises(rosglass.ConversionError, match="linear"):
+        publisher.publish({"linear": 3})
+    assert subscription.wait(0.1) is None
+
+
+def test_a_subscription_without_type_takes_the_publishers(link, eventually):
+    received = []
+    publisher, subscription = link(None, received.append)
+    publisher.publish(data="hello")
+    eventually(lambda: received)
+    assert subscription.type.name == TEXT
+    assert received[0].data == "hello"
+
+
+def test_a_subscription_without_type_waits_for_the_first_publisher(
+    robot, console, topic, eventually
+):
+    subscription = console.create_subscription(topic)
+    assert subscription.type is None
+    assert "nobody publishes" in eventually(lambda: subscription.hint)
+    robot.create_publisher(topic, TEXT, QoS.latched()).publish(data="first")
+    eventually(lambda: subscription.type is not None)
+    assert subscription.type.name == TEXT
+
+
+def test_a_latched_message_comes_to_whoever_is_late(robot, console, topic):
+    publisher = robot.create_publisher(topic, TEXT, QoS.latched())
+    publisher.publish(data="old")
+    publisher.publish(data="latest")
+    for _ in range(2):
+        with console.create_subscription(topic, TEXT, qos=QoS.latched()) as subscription:
+            assert subscription.wait(30).message().data == "latest"
+    assert console.wait_for_message(topic, timeout=30).data == "latest"
+
+
+def test_big_messages_come_whole(link):
+    publisher, subscription = link(IMAGE)
+    data = bytes(range(256)) * 12000
+    publisher.publish(width=1000, height=1024, step=3000, encoding="rgb8", data=data)
+    message = subscription.wait(30).message()
+    assert (message.width, len(message.data)) == (1000, len(data))
+    assert bytes(message.data) == data
+
+
+def test_a_raw_callback_gets_bytes_and_stamps(link, eventually, wire):
+    received = []
+    publisher, _ = link(raw_callback=received.append)
+    publisher.publish(data="x")
+    eventually(lambda: received)
+    sample = received[0]
+    assert isinstance(sample, Sample)
+    assert sample.wire == publisher_wire(wire)
+    assert bytes(sample.data) == bytes(publisher.type.encode({"data": "x"}, wire=sample.wire))
+    assert sample.received_ns > 1_600_000_000_000_000_000
+
+
+def test_callbacks_run_where_they_are_asked_to(link, eventually):
+    threads = []
+    publisher, _ = link(callback=lambda _: threads.append(threading.current_thread().name))
+    publisher.publish(data="x")
+    eventually(lambda: threads)
+    assert threads == ["console callbacks"]
+
+
+def test_a_callback_that_fails_ends_nothing(link, eventually, caplog):
+    received = []
+
+    def fail(message):
+        received.append(message.data)
+        raise ValueError("of the user's")
+
+    publisher, _ = link(callback=fail)
+    for text in ("a", "b"):
+        publisher.publish(data=text)
+        eventually(lambda text=text: text in received)
+    assert "of the user's" in caplog.text
+
+
+def test_immediate_callbacks_come_without_another_thread(link, eventually):
+    received = []
+    publisher, _ = link(callback=lambda m: received.append(m.data), executor=IMMEDIATE)
+    publisher.publish(data="x")
+    eventually(lambda: received == ["x"])
+
+
+def test_messages_are_taken_one_by_one_or_the_latest(link, eventually):
+    publisher, subscription = link(qos=5)
+    for number in range(8):
+        publisher.publish(data=str(number))
+    eventually(lambda: subscription.statistics().received == 8, subscription.statistics)
+    assert subscription.take().message().data == "3"
+    assert subscription.take_latest().message().data == "7"
+    assert subscription.take() is None
+    assert subscription.statistics().dropped == 6
+
+
+def test_async_iteration(link):
+    publisher, subscription = link()
+
+    async def receive():
+        found = []
+        publisher.publish(data="a")
+        async for sample in subscription:
+            found.append(sample.message().data)
+            if len(found) == 2:
+                return found
+            publisher.publish(data="b")
+        return found
+
+    assert asyncio.run(asyncio.wait_for(receive(), 30)) == ["a", "b"]
+
+
+def test_ignore_local_leaves_out_what_this_node_publishes(robot, console, topic, eventually):
+    received = []
+    robot.create_subscription(
+        topic, TEXT, lambda m: received.append(m.data), QoS.latched(5), ignore_local=True
+    )
+    own = robot.create_publisher(topic, TEXT, QoS.latched(5))
+    other = console.create_publisher(topic, TEXT, QoS.latched(5))
+    eventually(other.subscription_count)
+    own.publish(data="own")
+    other.publish(data="other")
+    eventually(lambda: received)
+    assert received == ["other"]
+
+
+def test_publishers_and_subscriptions_that_come_and_go_are_reported(
+    robot, console, topic, eventually
+):
+    counts = []
+    subscription = console.create_subscription(topic, TEXT)
+    subscription.on_matched(lambda event: counts.append(event.count))
+    publisher = robot.create_publisher(topic, TEXT)
+    eventually(lambda: counts == [1], lambda: counts)
+    publisher.close()
+    eventually(lambda: counts == [1, 0], lambda: counts)
+    assert subscription.publisher_count() == 0
+
+
+def test_two_types_on_a_topic_are_a_problem_that_names_both(robot, console, topic, eventually):
+    robot.create_publisher(topic, TWIST)
+    subscription = console.create_subscription(topic, TEXT)
+    problem = eventually(lambda: subscription.problem)
+    assert "geometry_msgs" in problem
+    assert "std_msgs" in problem
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "error"),
+    [
+        ("a b", TEXT, rosglass.InvalidNameError),
+        ("", TEXT, rosglass.InvalidNameError),
+        ("/x", "nowhere_msgs/msg/Nothing", rosglass.TypeNotFoundError),
+    ],
+)
+def test_bad_arguments_are_refused(robot, name, kind, error):
+    with pytest.raises(error):
+        robot.create_publisher(name, kind)
+    with pytest.raises(error):
+        robot.create_subscription(name, kind)
+
+
+def test_names_are_resolved(connect):
+    node = connect("wheel", "/left")
+    assert node.create_publisher("speed", TEXT).topic == "/left/speed"
+    assert node.create_publisher("~speed" if node.wire == "ros1" else "~/speed", TEXT).topic == (
+        "/left/wheel/speed"
+    )
+    assert node.create_subscription("/speed", TEXT).topic == "/speed"
+
+
+def test_nothing_comes_after_closing(link, eventually):
+    received = []
+    publisher, subscription = link(callback=lambda message: received.append(message.data))
+    subscription.close()
+    subscription.close()
+    eventually(lambda: not publisher.subscription_count())
+    publisher.publish(data="late")
+    assert subscription.closed
+    assert subscription.wait(0.05) is None
+    assert received == []
+    publisher.close()
+    with pytest.raises(rosglass.NodeClosedError, match="closed"):
+        publisher.publish(data="later")
