@@ -78,7 +78,7 @@ def wire(
         with Router("tcp/127.0.0.1:0") as router:
             yield Wire("zenoh", router.url)
     else:
-        with _rosmaster(tmp_path_factory.mktemp("master")) as url:
+        with _RosMaster(tmp_path_factory.mktemp("master")) as url:
             yield Wire("tcpros", url)
 
 
@@ -87,7 +87,7 @@ def _need(module: str, extra: str) -> None:
         pytest.skip(f'needs pip install "rosglass[{extra}]"')
 
 
-class _rosmaster:
+class _RosMaster:
     """A ROS 1 master, as Debian has it, on a free port."""
 
     def __init__(self, home: Path) -> None:

@@ -1,0 +1,203 @@
+"""Who is there, what they offer, and the end of it, on every wire."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+
+import pytest
+
+import rosglass
+from rosglass import QoS
+from rosglass.comm import ConnectionState
+
+TEXT = "std_msgs/msg/String"
+
+
+def test_a_node_is_connected_and_says_so(robot, console, eventually):
+    assert robot.status().state is not ConnectionState.CLOSED
+    eventually(lambda: console.status().state is ConnectionState.CONNECTED, console.status)
+
+
+def test_nodes_see_each_other_come_and_go(connect, eventually):
+    one = connect("one")
+    names = [node.full for node in eventually(one.nodes)]
+    assert "/one" in names
+    other = connect("other", "/arm")
+    eventually(lambda: "/arm/other" in [node.full for node in one.nodes()], one.nodes)
+    other.close()
+    eventually(lambda: "/arm/other" not in [node.full for node in one.nodes()], one.nodes)
+
+
+def test_topics_and_their_ends_are_shown(robot, console, topic, eventually):
+    publisher = robot.create_publisher(topic, TEXT)
+    subscription = robot.create_subscription(topic, TEXT)
+    eventually(lambda: console.topics().get(topic) == [TEXT], console.topics)
+    eventually(lambda: console.publishers(topic) and console.subscriptions(topic))
+    (end,) = console.publishers(topic)
+    assert (end.name, end.type, end.node.full) == (topic, TEXT, "/robot")
+    assert [end.node.full for end in console.subscriptions(topic)] == ["/robot"]
+    publisher.close()
+    subscription.close()
+    eventually(lambda: topic not in console.topics(), console.topics)
+
+
+def test_services_are_shown(robot, console, topic, wire, eventually):
+    server = robot.create_service_server(topic, wire.add, lambda _: {})
+    eventually(lambda: console.services().get(topic) == [wire_type(wire)], console.services)
+    assert [end.node.full for end in console.service_servers(topic)] == ["/robot"]
+    server.close()
+    eventually(lambda: not console.service_servers(topic))
+
+
+def wire_type(wire):
+    package, name = wire.add.split("/")[0], wire.add.split("/")[-1]
+    return f"{package}/srv/{name}"
+
+
+def test_what_a_node_has_is_listed(robot, console, topic, eventually):
+    robot.create_publisher(topic, TEXT)
+    eventually(
+        lambda: topic in [end.name for end in console.endpoints("/robot")],
+        lambda: console.endpoints("/robot"),
+    )
+    assert console.endpoints("/no_such_node") == []
+
+
+def test_changes_of_the_graph_are_reported(robot, console, topic):
+    changed = threading.Event()
+    console.on_graph_change(changed.set)
+    changed.clear()
+    robot.create_publisher(topic, TEXT)
+    assert changed.wait(30)
+
+
+def test_a_type_is_fetched_by_its_name(robot, console, topic, wire):
+    robot.create_publisher(topic, TEXT, QoS.latched())
+    assert console.fetch_type(TEXT, timeout=30).name == TEXT
+
+
+def test_a_near_name_is_offered_for_a_wrong_one(robot, console, topic, eventually):
+    robot.create_publisher(topic + "_pose", TEXT)
+    subscription = console.create_subscription(topic + "_posse", TEXT)
+    eventually(lambda: topic + "_pose" in subscription.hint, lambda: subscription.hint)
+
+
+def test_a_closed_node_does_nothing_more(connect, topic):
+    node = connect("gone")
+    subscription = node.create_subscription(topic, TEXT)
+    publisher = node.create_publisher(topic, TEXT)
+    node.close()
+    node.close()
+    assert node.status().state is ConnectionState.CLOSED
+    assert subscription.closed
+    for create in (node.create_publisher, node.create_subscription):
+        with pytest.raises(rosglass.NodeClosedError, match="closed"):
+            create(topic, TEXT)
+    with pytest.raises(rosglass.NodeClosedError):
+        publisher.publish(data="x")
+
+
+def test_closing_ends_waiting(connect, topic):
+    node = connect("waiting")
+    subscription = node.create_subscription(topic, TEXT)
+    threading.Timer(0.2, node.close).start()
+    assert subscription.wait(30) is None
+    with pytest.raises(rosglass.NodeClosedError):
+        node.wait_for_message(topic, TEXT, 1)
+
+
+def test_a_node_can_be_closed_in_its_own_callback(connect, robot, topic, eventually):
+    node = connect("closing")
+    done = threading.Event()
+
+    def close(_):
+        node.close()
+        done.set()
+
+    node.create_subscription(topic, TEXT, close, QoS.latched())
+    robot.create_publisher(topic, TEXT, QoS.latched()).publish(data="x")
+    assert done.wait(30)
+
+
+def test_closing_ends_the_threads(connect, topic, eventually):
+    before = set(threading.enumerate())
+    node = connect("threads")
+    node.create_subscription(topic, TEXT, lambda _: None)
+    node.close()
+
+    def left():
+        return [t for t in set(threading.enumerate()) - before if "threads" in t.name]
+
+    eventually(lambda: not left(), left)
+
+
+def test_a_program_ends_by_itself_without_closing_its_node(wire):
+    code = f"""
+import rosglass
+node = rosglass.connect({wire.url!r}, "forgotten")
+node.create_subscription("/forgotten", {TEXT!r}, print)
+node.create_publisher("/forgotten", {TEXT!r}).publish(data="x")
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], timeout=60, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_parameters_of_another_node_are_read_set_and_watched(robot, console, eventually):
+    robot.parameters.declare("speed", 1.5)
+    client = console.create_parameter_client("/robot")
+    assert client.wait_for_server(30)
+    assert "speed" in eventually(client.names)
+    assert client.get(["speed"]) == {"speed": 1.5}
+    changes, values = [], iter(range(2, 10_000))
+
+    def set_another():
+        value = float(next(values))
+        assert client.set({"speed": value})["speed"].successful
+        assert robot.parameters.get("speed") == value
+        return changes
+
+    # What changes before the link is made is not reported: a change is made until one is.
+    with client.watch(lambda event: changes.append({**event.new, **event.changed})):
+        eventually(set_another)
+    assert "speed" in changes[0]
+    with pytest.raises(rosglass.ParameterError):
+        robot.parameters.get("sped")
+
+
+def test_the_log_goes_to_rosout(robot, console, wire, eventually):
+    found = []
+    console.create_subscription(
+        "/rosout", None, lambda message: found.append((message.name, message.msg)), QoS(100)
+    )
+    eventually(lambda: console.publishers("/rosout"))
+
+    def logged():
+        robot.logger.warning("low battery")
+        return [name for name, text in found if text == "low battery"]
+
+    assert eventually(logged)[0].strip("/") == "robot"
+
+
+def test_timers_and_time(console):
+    ticks, enough = [], threading.Event()
+
+    def tick():
+        ticks.append(console.now())
+        if len(ticks) >= 3:
+            enough.set()
+
+    with console.create_timer(0.02, tick):
+        assert enough.wait(30)
+    assert ticks == sorted(ticks)
+    with pytest.raises(rosglass.ConversionError):
+        console.create_timer(0, tick)
+
+
+@pytest.mark.parametrize("name", ["a b", "", "1st", "x-y"])
+def test_bad_node_names_are_refused(wire, name):
+    with pytest.raises(rosglass.InvalidNameError):
+        rosglass.connect(wire.url, name)
