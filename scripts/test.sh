@@ -37,8 +37,8 @@ side_by_side=(-n 3 --dist loadfile --no-loadscope-reorder --max-worker-restart=0
   --rerun-show-tracebacks)
 version() { "$1/bin/python" -c 'import sys; print("%d.%d" % sys.version_info[:2])'; }
 # Unit tests need no Qt: once for each Python is enough. Debian's has genpy to compare with.
-say "unit tests ($(.venv-system/bin/python -V), Debian's own)"
-scripts/private_network.sh .venv-system/bin/python -m pytest -q "${side_by_side[@]}" tests/unit "$@"
+say "unit tests, and what holds on every wire ($(.venv-system/bin/python -V), Debian's own)"
+scripts/private_network.sh .venv-system/bin/python -m pytest -q "${side_by_side[@]}" tests/unit tests/contract "$@"
 say "tests of interfaces in Qt 5 ($(.venv-system/bin/python -V), PySide2)"
 scripts/private_network.sh .venv-system/bin/python -m pytest -q "${side_by_side[@]}" tests/gui "$@"
 say "tests in RViz ($(.venv-system/bin/python -V))"
@@ -46,6 +46,6 @@ say "tests in RViz ($(.venv-system/bin/python -V))"
 scripts/private_network.sh .venv-system/bin/python -m pytest -q "${side_by_side[@]}" tests/rviz "$@"
 say "tests of interfaces in Qt 6, and with other programs ($(.venv/bin/python -V), PySide6)"
 folders=(tests/gui tests/interop)
-[ "$(version .venv)" = "$(version .venv-system)" ] || folders+=(tests/unit)
+[ "$(version .venv)" = "$(version .venv-system)" ] || folders+=(tests/unit tests/contract)
 scripts/private_network.sh .venv/bin/python -m pytest -q "${side_by_side[@]}" -m "not exhaustive" \
   "${folders[@]}" "$@"
