@@ -209,7 +209,7 @@ def main() -> int:
         roles = {"publish": publish, "subscribe": subscribe, "bridge": bridge}
         roles[args.role[0]](json.loads(args.role[1]))
         return 0
-    from rosglass.ros2.zenoh.router import Router
+    from rosglass.wires.zenoh.router import Router
 
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))

@@ -46,7 +46,7 @@ from camera_peers import TOPIC, code_place
 from rosglass.demo import framecode
 from rosglass.demo.camera import CODE_POSITION, HEIGHT, WIDTH
 from rosglass.demo.processes import VirtualScreen
-from rosglass.ros2.zenoh.router import Router
+from rosglass.wires.zenoh.router import Router
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

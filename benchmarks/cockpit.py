@@ -35,7 +35,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from camera_latency import Pixels, master
 from first_frame import PLAIN
 from rosglass.demo.processes import VirtualScreen
-from rosglass.ros2.zenoh.router import Router
+from rosglass.wires.zenoh.router import Router
 
 #: Seconds until the first frame.
 TARGET = 1.0

@@ -279,8 +279,8 @@ def dora_interfaces(folder: str) -> bool:
 
 def run(quick: bool, only: str) -> tuple[dict[str, Any], list[str]]:
     """Run the cases; returns the figures and the targets missed."""
-    from rosglass.ros2.dds.config import domain_config
-    from rosglass.ros2.dds.options import DdsOptions
+    from rosglass.wires.dds.config import domain_config
+    from rosglass.wires.dds.options import DdsOptions
 
     results: dict[str, Any] = {}
     missed: list[str] = []

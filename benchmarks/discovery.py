@@ -113,9 +113,9 @@ def zenoh_robot(plan: dict[str, Any]) -> list[Any]:
 
     import rosglass
     from rosglass.comm import EndpointInfo, EndpointKind, NodeName
-    from rosglass.ros2.zenoh.config import session_config
-    from rosglass.ros2.zenoh.keys import Token
-    from rosglass.ros2.zenoh.options import ZenohOptions
+    from rosglass.wires.zenoh.config import session_config
+    from rosglass.wires.zenoh.keys import Token
+    from rosglass.wires.zenoh.options import ZenohOptions
 
     config, _ = session_config(ZenohOptions(port=plan["port"]))
     session = zenoh.open(config)
@@ -206,8 +206,8 @@ def bare_dds(plan: dict[str, Any], seen: threading.Event) -> Any:
 def bare_zenoh(plan: dict[str, Any], seen: threading.Event) -> Any:
     import zenoh
 
-    from rosglass.ros2.zenoh.config import session_config
-    from rosglass.ros2.zenoh.options import ZenohOptions
+    from rosglass.wires.zenoh.config import session_config
+    from rosglass.wires.zenoh.options import ZenohOptions
 
     config, _ = session_config(ZenohOptions(port=plan["port"]))
     session = zenoh.open(config)
@@ -317,7 +317,7 @@ def main() -> int:
     if arguments.role:
         {"robot": robot, "observer": observer}[arguments.role](json.loads(arguments.plan))
         return 0
-    from rosglass.ros2.zenoh.router import Router
+    from rosglass.wires.zenoh.router import Router
 
     results = []
     missed = False

@@ -35,7 +35,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from camera_latency import PEERS, PLAIN, SCREEN
 from rosglass.demo.processes import VirtualScreen
-from rosglass.ros2.zenoh.router import is_router_reachable
+from rosglass.wires.zenoh.router import is_router_reachable
 
 #: KiB per minute; a hundredth of the cockpit's memory in an hour would be about 30.
 TARGET = 30.0

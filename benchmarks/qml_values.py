@@ -235,7 +235,7 @@ def main() -> int:
     parser.add_argument("--rounds", type=int, default=3, help="default: 3")
     args = parser.parse_args()
     seconds = args.seconds
-    from rosglass.ros2.zenoh.router import Router
+    from rosglass.wires.zenoh.router import Router
 
     found: dict[str, list[dict[str, float]]] = {"native": [], "plain": [], "ours": []}
     environment = os.environ | {"QT_QPA_PLATFORM": "offscreen"}

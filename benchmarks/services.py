@@ -252,7 +252,7 @@ def main() -> int:
             print(f"{world}: {package} is not installed")
             continue
         if world == "zenoh":
-            from rosglass.ros2.zenoh.router import Router
+            from rosglass.wires.zenoh.router import Router
 
             with Router("tcp/127.0.0.1:0") as router:
                 found = measure(router.url, turns, calls)

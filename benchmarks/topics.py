@@ -333,7 +333,7 @@ def judge(case: Case, found: dict[str, Any]) -> list[str]:
 
 def run(cases: list[Case], seconds: float, turns: int) -> tuple[dict[str, Any], list[str]]:
     """Run all cases; returns the figures and the targets missed."""
-    from rosglass.ros2.zenoh.router import Router
+    from rosglass.wires.zenoh.router import Router
 
     results: dict[str, Any] = {}
     missed: list[str] = []

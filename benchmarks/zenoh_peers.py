@@ -22,7 +22,7 @@ Plan = dict[str, Any]
 
 def key(plan: Plan) -> str:
     import rosglass
-    from rosglass.ros2.zenoh.keys import topic_key
+    from rosglass.wires.zenoh.keys import topic_key
 
     return topic_key(0, TOPIC, plan["type"], rosglass.load(plan["type"]).rihs01)
 
@@ -31,8 +31,8 @@ def session(plan: Plan) -> Any:
     """Open a session with the settings that ours has."""
     import zenoh
 
-    from rosglass.ros2.zenoh.config import session_config
-    from rosglass.ros2.zenoh.options import ZenohOptions
+    from rosglass.wires.zenoh.config import session_config
+    from rosglass.wires.zenoh.options import ZenohOptions
 
     options = ZenohOptions("127.0.0.1", plan["port"], shared_memory=plan["shm"])
     return zenoh.open(session_config(options)[0])

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from PIL import Image, ImageChops
 
-from rosglass.ros2.zenoh.router import Router
+from rosglass.wires.zenoh.router import Router
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES, TARGET = ROOT / "examples", ROOT / "docs" / "images" / "examples"

@@ -117,6 +117,7 @@ _PACKAGES = (
     "ros2",
     "rviz",
     "tf",
+    "wires",
 )
 
 

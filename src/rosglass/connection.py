@@ -224,10 +224,10 @@ def _zenoh(url: str) -> Middleware:
             'install it with: pip install "rosglass[zenoh]"; '
             "without it, there are dds:// (other ROS 2 robots) and ros1://host:11311 (ROS 1)"
         )
-    from rosglass.ros2.zenoh.options import ZenohOptions  # noqa: PLC0415
+    from rosglass.wires.zenoh.options import ZenohOptions  # noqa: PLC0415
 
     options = ZenohOptions.parse(url, os.environ)
-    from rosglass.ros2.zenoh.middleware import ZenohMiddleware  # noqa: PLC0415
+    from rosglass.wires.zenoh.middleware import ZenohMiddleware  # noqa: PLC0415
 
     return ZenohMiddleware(options)
 
@@ -239,10 +239,10 @@ def _dds(url: str) -> Middleware:
             'install it with: pip install "rosglass[dds]"; '
             "without it, there are zenoh:// (ROS 2 with rmw_zenoh) and ros1://host:11311 (ROS 1)"
         )
-    from rosglass.ros2.dds.options import DdsOptions  # noqa: PLC0415
+    from rosglass.wires.dds.options import DdsOptions  # noqa: PLC0415
 
     options = DdsOptions.parse(url, os.environ)
-    from rosglass.ros2.dds.middleware import DdsMiddleware  # noqa: PLC0415
+    from rosglass.wires.dds.middleware import DdsMiddleware  # noqa: PLC0415
 
     return DdsMiddleware(options)
 

@@ -73,7 +73,7 @@ def wire(
         yield Wire("dds", f"dds://?domain={random.SystemRandom().choice(ros_domains)}")
     elif request.param == "zenoh":
         _need("zenoh", "zenoh")
-        from rosglass.ros2.zenoh.router import Router
+        from rosglass.wires.zenoh.router import Router
 
         with Router("tcp/127.0.0.1:0") as router:
             yield Wire("zenoh", router.url)

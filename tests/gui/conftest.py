@@ -185,7 +185,7 @@ class RealWorld:
 def url(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """Where a robot and its operator meet: a Zenoh router, or a ROS 1 master."""
     if request.param == "zenoh":
-        from rosglass.ros2.zenoh.router import Router
+        from rosglass.wires.zenoh.router import Router
 
         with Router("tcp/127.0.0.1:0") as router:
             yield router.url

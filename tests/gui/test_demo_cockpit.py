@@ -78,7 +78,7 @@ class RobotSide:
 
 @pytest.fixture(scope="module")
 def robot() -> Iterator[RobotSide]:
-    from rosglass.ros2.zenoh.router import Router
+    from rosglass.wires.zenoh.router import Router
 
     with Router("tcp/127.0.0.1:0") as router:
         side = RobotSide(router.url)

@@ -182,7 +182,7 @@ def test_bad_options_are_explained(tmp_path: Path, arguments: list[str], named: 
 
 
 def test_it_uses_a_router_that_is_there(tmp_path: Path) -> None:
-    from rosglass.ros2.zenoh.router import Router
+    from rosglass.wires.zenoh.router import Router
 
     with Router("tcp/127.0.0.1:0") as router:
         process = start(tmp_path, "demo", "--url", router.url, "--seconds", "4")
@@ -194,7 +194,7 @@ def test_it_uses_a_router_that_is_there(tmp_path: Path) -> None:
 def test_a_robot_alone_waits_for_its_router_and_ends_with_its_leash(
     tmp_path: Path, url: str
 ) -> None:
-    from rosglass.ros2.zenoh.router import Router
+    from rosglass.wires.zenoh.router import Router
 
     process = subprocess.Popen(
         [sys.executable, "-m", "rosglass", "robot", "--url", url, "--leash", "--no-raw"],

@@ -27,7 +27,7 @@ FILES = [
 @pytest.fixture(scope="module")
 def world() -> Iterator[str]:
     """A router and the simulated robot; gives the URL."""
-    from rosglass.ros2.zenoh.router import Router
+    from rosglass.wires.zenoh.router import Router
 
     with Router("tcp/127.0.0.1:0") as router:
         command = [sys.executable, "-m", "rosglass.cli", "robot", "--url", router.url, "--leash"]

@@ -24,7 +24,7 @@ CHUNKS = ["singletons", "given", "types", "lifecycle"]
 
 @pytest.fixture(scope="module")
 def router() -> Iterator[str]:
-    from rosglass.ros2.zenoh.router import Router
+    from rosglass.wires.zenoh.router import Router
 
     with Router("tcp/127.0.0.1:0") as router:
         yield router.url

@@ -170,8 +170,8 @@ def _use_virtual_screen(stack: ExitStack, seconds: float | None) -> None:
 
 def _find_router(stack: ExitStack, url: str) -> str:
     """Return the URL to use, after starting a router on this machine when nobody answers."""
-    from rosglass.ros2.zenoh.options import ZenohOptions
-    from rosglass.ros2.zenoh.router import Router, is_router_reachable
+    from rosglass.wires.zenoh.options import ZenohOptions
+    from rosglass.wires.zenoh.router import Router, is_router_reachable
 
     if url.lower().startswith("dds:"):
         return url  # where nodes find each other without one

@@ -33,7 +33,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the router; returns 0 after Ctrl-C or SIGTERM."""
-    from rosglass.ros2.zenoh.router import Router
+    from rosglass.wires.zenoh.router import Router
 
     ended = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 __all__ = ["check_may_wait"]
 
 #: Where the threads begin that receive.
-_RECEIVING = ("rosglass.ros2.dds.", "rosglass.ros2.zenoh.", "rosglass.ros1.io_loop")
+_RECEIVING = ("rosglass.wires.dds.", "rosglass.wires.zenoh.", "rosglass.ros1.io_loop")
 #: Where those begin that follow the graph and keep time; some of their jobs may wait for a moment.
 _FOLLOWING = ("rosglass.comm.worker", "rosglass.comm.timers")
 

@@ -1,7 +1,7 @@
 """ROS 2 on the wire: names, the graph, topics, over one small middleware seam.
 
-Import what you need from the modules: those of :mod:`rosglass.ros2.zenoh` bring in the
-``eclipse-zenoh`` package, those of :mod:`rosglass.ros2.dds` ``cyclonedds``, the others neither.
+Import what you need from the modules: those of :mod:`rosglass.wires.zenoh` bring in the
+``eclipse-zenoh`` package, those of :mod:`rosglass.wires.dds` ``cyclonedds``, the others neither.
 """
 
 from __future__ import annotations

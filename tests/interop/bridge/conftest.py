@@ -11,7 +11,7 @@ import pytest
 
 import rosglass
 from rosglass.bridge import Bridge
-from rosglass.ros2.zenoh.router import Router
+from rosglass.wires.zenoh.router import Router
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

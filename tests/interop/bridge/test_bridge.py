@@ -12,7 +12,7 @@ from rosglass import Library, ServiceError
 from rosglass.bridge import survey
 from rosglass.comm import Durability, QoS
 from rosglass.messages import MessageType
-from rosglass.ros2.zenoh.router import Router
+from rosglass.wires.zenoh.router import Router
 
 STRING, IMAGE = "std_msgs/msg/String", "sensor_msgs/msg/Image"
 

@@ -24,7 +24,7 @@ from rosglass.interfaces import (
     rihs01,
     type_description,
 )
-from rosglass.ros2.zenoh.router import Router
+from rosglass.wires.zenoh.router import Router
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -342,7 +342,7 @@ def nothing_said(monkeypatch: pytest.MonkeyPatch) -> None:
 NEARBY = """
 import rosglass
 from rosglass.cli import main
-from rosglass.ros2.zenoh.router import Router
+from rosglass.wires.zenoh.router import Router
 
 with Router("tcp/127.0.0.1:7447"), rosglass.connect("zenoh://127.0.0.1:7447", "robot") as node:
     node.create_publisher("/nearby", "std_msgs/msg/String")

@@ -19,9 +19,9 @@ from rosglass.interfaces import Library
 
 pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
 
-from rosglass.ros2.dds import cyclone_origins
-from rosglass.ros2.dds.replier import DdsReplier
-from rosglass.ros2.dds.requester import DdsRequester
+from rosglass.wires.dds import cyclone_origins
+from rosglass.wires.dds.replier import DdsReplier
+from rosglass.wires.dds.requester import DdsRequester
 
 PEERS = Path(__file__).parent / "peers"
 ADD, BLOB = "example_interfaces/srv/AddTwoInts", "blob_interfaces/srv/Blob"

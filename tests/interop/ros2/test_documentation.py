@@ -20,8 +20,8 @@ import pytest
 import rosglass
 from rosglass.comm import ParameterDescriptor, Range
 from rosglass.interfaces import Library, type_description
-from rosglass.ros2.dds.options import DdsOptions
-from rosglass.ros2.zenoh.options import ZenohOptions
+from rosglass.wires.dds.options import DdsOptions
+from rosglass.wires.zenoh.options import ZenohOptions
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -16,7 +16,7 @@ import pytest
 
 import rosglass
 from rosglass.comm import IMMEDIATE, ConnectionState, NodeName
-from rosglass.ros2.zenoh.router import Router, is_router_reachable
+from rosglass.wires.zenoh.router import Router, is_router_reachable
 
 CONNECTING, CONNECTED = ConnectionState.CONNECTING, ConnectionState.CONNECTED
 LOST, CLOSED = ConnectionState.LOST, ConnectionState.CLOSED

@@ -14,7 +14,7 @@ import pytest
 
 import rosglass
 from rosglass.comm import IMMEDIATE, CancelAnswer, GoalStatus
-from rosglass.ros2.zenoh.router import Router
+from rosglass.wires.zenoh.router import Router
 
 HERE = Path(__file__).parent
 EXAMPLES = HERE.parents[2] / "examples"

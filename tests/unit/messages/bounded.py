@@ -32,7 +32,7 @@ from rosglass.interfaces import (
 from rosglass.interfaces.type_sources import add_type_sources, type_sources
 from rosglass.messages import Message, MessageType, Translation, load
 from rosglass.ros1.types import Types
-from rosglass.ros2.dds.types import describe_struct
+from rosglass.wires.dds.types import describe_struct
 
 CPU_S, MEMORY = 4, 200 << 20
 _IDL = {

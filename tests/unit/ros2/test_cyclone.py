@@ -15,7 +15,7 @@ from rosglass.errors import (
 )
 
 pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
-from rosglass.ros2.dds import cyclone, cyclone_qos
+from rosglass.wires.dds import cyclone, cyclone_qos
 
 PROFILES = [
     QoS(),

@@ -7,9 +7,9 @@ import xml.etree.ElementTree as ET
 import pytest
 
 import rosglass
-from rosglass.ros2.dds import peers as dds_peers
-from rosglass.ros2.dds.config import domain_config, users_part
-from rosglass.ros2.dds.options import DdsOptions
+from rosglass.wires.dds import peers as dds_peers
+from rosglass.wires.dds.config import domain_config, users_part
+from rosglass.wires.dds.options import DdsOptions
 
 
 def config(url="dds://", **env):

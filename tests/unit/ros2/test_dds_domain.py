@@ -14,10 +14,10 @@ import rosglass
 
 pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
 
-from rosglass.ros2.dds import cyclone, cyclone_inline_qos, cyclone_origins
-from rosglass.ros2.dds import domain as dds_domain
-from rosglass.ros2.dds.domain import Domain
-from rosglass.ros2.dds.options import DdsOptions
+from rosglass.wires.dds import cyclone, cyclone_inline_qos, cyclone_origins
+from rosglass.wires.dds import domain as dds_domain
+from rosglass.wires.dds.domain import Domain
+from rosglass.wires.dds.options import DdsOptions
 
 URL = "dds://?domain=57&range=off"
 

@@ -6,13 +6,13 @@ import pytest
 
 from rosglass.comm import EndpointInfo, EndpointKind, NodeName, QoS
 from rosglass.ros2 import Graph
-from rosglass.ros2.dds.cyclone_builtin import Discovered
-from rosglass.ros2.dds.discovery_info import (
+from rosglass.wires.dds.cyclone_builtin import Discovered
+from rosglass.wires.dds.discovery_info import (
     PARTICIPANT_USER_DATA,
     NodeEntities,
     ParticipantEntities,
 )
-from rosglass.ros2.dds.graph import DdsGraph
+from rosglass.wires.dds.graph import DdsGraph
 
 PUBLISHER, SUBSCRIPTION = EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION
 SERVER, CLIENT = EndpointKind.SERVICE_SERVER, EndpointKind.SERVICE_CLIENT

@@ -16,14 +16,14 @@ from rosglass.errors import NodeClosedError
 
 pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
 
-from rosglass.ros2.dds import cyclone
-from rosglass.ros2.dds.cyclone_events import Event
-from rosglass.ros2.dds.cyclone_origins import Origins
-from rosglass.ros2.dds.cyclone_qos import qos_of
-from rosglass.ros2.dds.identity import Identity, Origin
-from rosglass.ros2.dds.outbox import Outbox
-from rosglass.ros2.dds.replier import DdsReplier
-from rosglass.ros2.dds.service_ends import Matched
+from rosglass.wires.dds import cyclone
+from rosglass.wires.dds.cyclone_events import Event
+from rosglass.wires.dds.cyclone_origins import Origins
+from rosglass.wires.dds.cyclone_qos import qos_of
+from rosglass.wires.dds.identity import Identity, Origin
+from rosglass.wires.dds.outbox import Outbox
+from rosglass.wires.dds.replier import DdsReplier
+from rosglass.wires.dds.service_ends import Matched
 
 ADD = "example_interfaces/srv/AddTwoInts"
 SERVICE = "/add"
@@ -199,7 +199,7 @@ def test_who_looked_first_for_counterparts_has_not_the_last_word():
 
 
 def test_some_who_left_are_remembered(monkeypatch):
-    monkeypatch.setattr("rosglass.ros2.dds.service_ends._MAX_DEPARTED", 2)
+    monkeypatch.setattr("rosglass.wires.dds.service_ends._MAX_DEPARTED", 2)
     here = [1]
     matched = Matched(
         1, lambda _: here, lambda _, h: SimpleNamespace(guid=h) if h in here else None

@@ -4,7 +4,7 @@ import pytest
 
 import rosglass
 from rosglass.connection import default_url
-from rosglass.ros2.zenoh.options import ZenohOptions, locator
+from rosglass.wires.zenoh.options import ZenohOptions, locator
 
 
 @pytest.mark.parametrize(

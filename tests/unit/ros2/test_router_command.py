@@ -5,7 +5,7 @@ import signal
 import pytest
 
 from rosglass.cli import main
-from rosglass.ros2.zenoh import router as module
+from rosglass.wires.zenoh import router as module
 
 
 @pytest.fixture

@@ -9,10 +9,10 @@ import pytest
 zenoh = pytest.importorskip("zenoh")
 
 from rosglass.comm import Durability, Duration, EndpointInfo, EndpointKind, NodeName, QoS  # noqa: E402
-from rosglass.ros2.zenoh.endpoints import ZenohWriter  # noqa: E402
-from rosglass.ros2.zenoh.local import Places  # noqa: E402
-from rosglass.ros2.zenoh.options import ZenohOptions  # noqa: E402
-from rosglass.ros2.zenoh.reader import _Collected  # noqa: E402
+from rosglass.wires.zenoh.endpoints import ZenohWriter  # noqa: E402
+from rosglass.wires.zenoh.local import Places  # noqa: E402
+from rosglass.wires.zenoh.options import ZenohOptions  # noqa: E402
+from rosglass.wires.zenoh.reader import _Collected  # noqa: E402
 
 HOUR = 3_600_000_000_000
 JUMPS = (HOUR, -HOUR)

@@ -10,7 +10,7 @@ from rosglass.comm import (
     Liveliness,
     NodeName,
 )
-from rosglass.ros2.zenoh.keys import (
+from rosglass.wires.zenoh.keys import (
     NO_ATTACHMENT,
     Attachment,
     Token,

@@ -7,8 +7,8 @@ import pytest
 
 zenoh = pytest.importorskip("zenoh")
 
-from rosglass.ros2.zenoh.links import Pulse, limit_silence  # noqa: E402
-from rosglass.ros2.zenoh.local import Places  # noqa: E402
+from rosglass.wires.zenoh.links import Pulse, limit_silence  # noqa: E402
+from rosglass.wires.zenoh.local import Places  # noqa: E402
 
 
 class FakeSession:

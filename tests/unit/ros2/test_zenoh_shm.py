@@ -7,8 +7,8 @@ import pytest
 zenoh = pytest.importorskip("zenoh")
 pytest.importorskip("zenoh.shm")
 
-from rosglass.ros2.zenoh import shm as zenoh_shm  # noqa: E402
-from rosglass.ros2.zenoh.shm import SharedMemory  # noqa: E402
+from rosglass.wires.zenoh import shm as zenoh_shm  # noqa: E402
+from rosglass.wires.zenoh.shm import SharedMemory  # noqa: E402
 
 BIG = 100_000
 

@@ -1,1 +1,1 @@
-"""ROS 2 over Zenoh, as `rmw_zenoh` speaks it."""
+"""The old place of :mod:`rosglass.wires.zenoh`."""

@@ -19,7 +19,7 @@ from rosglass.comm import IMMEDIATE
 ADD, TWIST = "example_interfaces/srv/AddTwoInts", "geometry_msgs/msg/Twist"
 ROBOT = """
 import time, rosglass
-from rosglass.ros2.zenoh.router import Router
+from rosglass.wires.zenoh.router import Router
 router = Router("tcp/0.0.0.0:7447")
 node = rosglass.connect("zenoh://127.0.0.1", "robot")
 node.create_service_server("/add", "example_interfaces/srv/AddTwoInts",

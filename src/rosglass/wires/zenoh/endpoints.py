@@ -17,7 +17,7 @@ import zenoh.ext
 from rosglass.comm import ConnectionState, Durability, Handle, History, Reliability
 from rosglass.errors import ConnectionLostError, NodeClosedError
 from rosglass.ros2.middleware import Writer
-from rosglass.ros2.zenoh.keys import (
+from rosglass.wires.zenoh.keys import (
     ATTACHMENT_FULL,
     HUMBLE_HASH,
     gid_of,
@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rosglass.comm import EndpointInfo, Status
-    from rosglass.ros2.zenoh.local import Places
-    from rosglass.ros2.zenoh.options import ZenohOptions
-    from rosglass.ros2.zenoh.reader import ZenohReader
-    from rosglass.ros2.zenoh.shm import SharedMemory
+    from rosglass.wires.zenoh.local import Places
+    from rosglass.wires.zenoh.options import ZenohOptions
+    from rosglass.wires.zenoh.reader import ZenohReader
+    from rosglass.wires.zenoh.shm import SharedMemory
 
 __all__ = [
     "CHANNEL",

@@ -21,7 +21,7 @@ from typing import Any
 import zenoh
 
 from rosglass.errors import ConversionError, UnsupportedError
-from rosglass.ros2.zenoh.options import ZenohOptions, locator
+from rosglass.wires.zenoh.options import ZenohOptions, locator
 
 __all__ = [
     "check_process",

@@ -9,8 +9,8 @@ from enum import IntEnum
 from typing import Any
 
 from rosglass.comm import QoS
-from rosglass.ros2.dds.cyclone import check, library
-from rosglass.ros2.dds.cyclone_qos import Qos
+from rosglass.wires.dds.cyclone import check, library
+from rosglass.wires.dds.cyclone_qos import Qos
 
 __all__ = ["BuiltinTopic", "Discovered", "matched_publication", "matched_subscription", "take"]
 

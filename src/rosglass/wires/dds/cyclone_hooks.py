@@ -22,8 +22,8 @@ from abc import ABC, abstractmethod
 from ctypes import c_char_p, c_size_t, c_void_p
 from typing import Any
 
-from rosglass.ros2.dds import cyclone
-from rosglass.ros2.dds.cyclone import keeping
+from rosglass.wires.dds import cyclone
+from rosglass.wires.dds.cyclone import keeping
 
 __all__ = ["SDK_DATA", "Hook", "expect", "make_sample"]
 

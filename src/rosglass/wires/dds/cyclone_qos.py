@@ -9,7 +9,7 @@ import ctypes
 from ctypes import byref, c_char_p, c_int16, c_int32, c_int64, c_size_t, c_uint32, c_void_p
 
 from rosglass.comm import Durability, Duration, History, Liveliness, QoS, Reliability
-from rosglass.ros2.dds.cyclone import INFINITY, library
+from rosglass.wires.dds.cyclone import INFINITY, library
 
 __all__ = ["XCDR1", "Qos", "qos_of"]
 

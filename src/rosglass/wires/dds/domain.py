@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING
 
 from rosglass.comm import Handle
 from rosglass.errors import ConnectionLostError, ConversionError, UnsupportedError
-from rosglass.ros2.dds import cyclone
-from rosglass.ros2.dds.config import ANY_PORTS, domain_config, users_part
+from rosglass.wires.dds import cyclone
+from rosglass.wires.dds.config import ANY_PORTS, domain_config, users_part
 
 if TYPE_CHECKING:
-    from rosglass.ros2.dds.options import DdsOptions
+    from rosglass.wires.dds.options import DdsOptions
 
 __all__ = ["Domain"]
 

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rosglass.errors import ConversionError
-from rosglass.ros2.dds.options import DdsOptions, DiscoveryRange
-from rosglass.ros2.dds.peers import addresses
+from rosglass.wires.dds.options import DdsOptions, DiscoveryRange
+from rosglass.wires.dds.peers import addresses
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,7 +8,7 @@ import time
 from collections import deque
 from typing import TYPE_CHECKING
 
-from rosglass.ros2.dds.cyclone_events import Event, Waitset, set_events
+from rosglass.wires.dds.cyclone_events import Event, Waitset, set_events
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 
-from rosglass.ros2.dds.cyclone_samples import COPIED
+from rosglass.wires.dds.cyclone_samples import COPIED
 
 __all__ = ["Parts", "header_of", "pack", "unpack", "with_header", "without_header"]
 

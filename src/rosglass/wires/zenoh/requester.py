@@ -1,7 +1,7 @@
 """The client's end of a service over Zenoh.
 
 Replies come on Zenoh's "rx" threads, straight into Python. Its "net" threads must not (see
-:class:`rosglass.ros2.zenoh.endpoints.Pump`), and they are the ones that tell of a query's time
+:class:`rosglass.wires.zenoh.endpoints.Pump`), and they are the ones that tell of a query's time
 running out, and of the end of a query. So queries are given more time than their caller has, and
 are cancelled when that is over; and their end is noticed by Python letting go of the callback.
 """
@@ -22,15 +22,15 @@ import zenoh
 from rosglass.comm import ConnectionState, EndpointKind
 from rosglass.errors import ConnectionLostError, NodeClosedError
 from rosglass.ros2.middleware import CALL_DROPPED, SERVER_LEFT, OnReply, Requester, RequestId
-from rosglass.ros2.zenoh.endpoints import Declaration, Owner
-from rosglass.ros2.zenoh.keys import HUMBLE_HASH, Attachment, gid_of
-from rosglass.ros2.zenoh.replier import HeldCall
-from rosglass.ros2.zenoh.services import Service, send
+from rosglass.wires.zenoh.endpoints import Declaration, Owner
+from rosglass.wires.zenoh.keys import HUMBLE_HASH, Attachment, gid_of
+from rosglass.wires.zenoh.replier import HeldCall
+from rosglass.wires.zenoh.services import Service, send
 
 if TYPE_CHECKING:
     from rosglass.ros2.graph import Graph
-    from rosglass.ros2.zenoh.local import Places
-    from rosglass.ros2.zenoh.replier import ZenohReplier
+    from rosglass.wires.zenoh.local import Places
+    from rosglass.wires.zenoh.replier import ZenohReplier
 
 __all__ = ["ZenohRequester"]
 

@@ -8,13 +8,13 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING
 
-from rosglass.ros2.zenoh.keys import HUMBLE_HASH, topic_key
+from rosglass.wires.zenoh.keys import HUMBLE_HASH, topic_key
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rosglass.comm import EndpointInfo
-    from rosglass.ros2.zenoh.options import ZenohOptions
+    from rosglass.wires.zenoh.options import ZenohOptions
 
 __all__ = ["Service", "send"]
 

@@ -8,19 +8,19 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from rosglass.errors import NodeClosedError
-from rosglass.ros2.dds import cyclone
-from rosglass.ros2.dds.cyclone_qos import Qos
-from rosglass.ros2.dds.discovery_info import PARTICIPANT_USER_DATA, NodeEntities
-from rosglass.ros2.dds.domain import Domain
-from rosglass.ros2.dds.lingering import Lingering
-from rosglass.ros2.dds.pump import Pump
+from rosglass.wires.dds import cyclone
+from rosglass.wires.dds.cyclone_qos import Qos
+from rosglass.wires.dds.discovery_info import PARTICIPANT_USER_DATA, NodeEntities
+from rosglass.wires.dds.domain import Domain
+from rosglass.wires.dds.lingering import Lingering
+from rosglass.wires.dds.pump import Pump
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from rosglass.comm import NodeName
-    from rosglass.ros2.dds.graph import DdsGraph
-    from rosglass.ros2.dds.options import DdsOptions
+    from rosglass.wires.dds.graph import DdsGraph
+    from rosglass.wires.dds.options import DdsOptions
 
 __all__ = ["Participant"]
 

@@ -13,15 +13,15 @@ import zenoh
 
 from rosglass.comm import EndpointKind
 from rosglass.ros2.middleware import OnRequest, Replier, RequestId
-from rosglass.ros2.zenoh.endpoints import Declaration, Owner, direct
-from rosglass.ros2.zenoh.keys import NO_ATTACHMENT, Attachment, gid_of, without_hash
-from rosglass.ros2.zenoh.services import Service, send
+from rosglass.wires.zenoh.endpoints import Declaration, Owner, direct
+from rosglass.wires.zenoh.keys import NO_ATTACHMENT, Attachment, gid_of, without_hash
+from rosglass.wires.zenoh.services import Service, send
 
 if TYPE_CHECKING:
     from rosglass.comm import EndpointInfo
     from rosglass.ros2.graph import Graph
-    from rosglass.ros2.zenoh.local import Places
-    from rosglass.ros2.zenoh.requester import ZenohRequester
+    from rosglass.wires.zenoh.local import Places
+    from rosglass.wires.zenoh.requester import ZenohRequester
 
 __all__ = ["HeldCall", "ZenohReplier"]
 

@@ -7,8 +7,8 @@ from ctypes import c_bool, c_int32, c_uint32, c_uint64
 from enum import IntFlag
 from typing import TypeVar
 
-from rosglass.ros2.dds import cyclone
-from rosglass.ros2.dds.cyclone import INFINITY, check, check_alive, library
+from rosglass.wires.dds import cyclone
+from rosglass.wires.dds.cyclone import INFINITY, check, check_alive, library
 
 __all__ = [
     "Event",

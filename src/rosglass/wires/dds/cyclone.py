@@ -33,7 +33,7 @@ from rosglass.errors import (
 )
 
 if TYPE_CHECKING:
-    from rosglass.ros2.dds.cyclone_qos import Qos
+    from rosglass.wires.dds.cyclone_qos import Qos
 
 __all__ = [
     "GONE",

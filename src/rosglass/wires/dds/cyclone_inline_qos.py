@@ -4,7 +4,7 @@ A sample that is marked begins with its inline QoS. Of the functions that the li
 with, ``get_size`` is replaced to leave that out; ``to_ser_ref``, asked for the bytes that follow a
 submessage's header, to return the inline QoS with them and to set the header's flag for it;
 ``to_ser_unref`` to take them back. The library does the rest: fragments, retransmissions, several
-networks. See :mod:`rosglass.ros2.dds.cyclone_hooks` for how.
+networks. See :mod:`rosglass.wires.dds.cyclone_hooks` for how.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ import threading
 from ctypes import PYFUNCTYPE, c_size_t, c_ubyte, c_uint32, c_void_p, string_at
 from typing import TYPE_CHECKING, Any
 
-from rosglass.ros2.dds import cyclone
-from rosglass.ros2.dds.cyclone import keeping
-from rosglass.ros2.dds.cyclone_hooks import Hook, expect, make_sample
-from rosglass.ros2.dds.cyclone_samples import COPIED
-from rosglass.ros2.dds.identity import Identity, inline_qos
+from rosglass.wires.dds import cyclone
+from rosglass.wires.dds.cyclone import keeping
+from rosglass.wires.dds.cyclone_hooks import Hook, expect, make_sample
+from rosglass.wires.dds.cyclone_samples import COPIED
+from rosglass.wires.dds.identity import Identity, inline_qos
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rosglass.ros2.dds.endpoints import SampleWriter
+    from rosglass.wires.dds.endpoints import SampleWriter
 
 __all__ = ["create_topic", "prepare", "problem", "write"]
 

@@ -10,26 +10,26 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import History, Reliability
 from rosglass.errors import NodeClosedError, TimeoutError  # noqa: A004 - the field's own word
-from rosglass.ros2.dds import cyclone, cyclone_builtin
-from rosglass.ros2.dds.cyclone_events import (
+from rosglass.ros2.middleware import Reader, Writer
+from rosglass.ros2.names import mangle_type
+from rosglass.wires.dds import cyclone, cyclone_builtin
+from rosglass.wires.dds.cyclone_events import (
     Event,
     liveliness_changed,
     sample_lost,
     set_events,
     subscription_matched,
 )
-from rosglass.ros2.dds.cyclone_qos import qos_of
-from rosglass.ros2.dds.cyclone_samples import Batch, Taken, discard, sample, send
-from rosglass.ros2.dds.discovery_info import format_user_data, hash_of
-from rosglass.ros2.middleware import Reader, Writer
-from rosglass.ros2.names import mangle_type
+from rosglass.wires.dds.cyclone_qos import qos_of
+from rosglass.wires.dds.cyclone_samples import Batch, Taken, discard, sample, send
+from rosglass.wires.dds.discovery_info import format_user_data, hash_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rosglass.comm import EndpointInfo, QoS
-    from rosglass.ros2.dds.participant import Participant
     from rosglass.ros2.middleware import OnSample
+    from rosglass.wires.dds.participant import Participant
 
 __all__ = ["DdsReader", "DdsWriter", "SampleReader", "SampleWriter", "Taken", "topic_name"]
 

@@ -14,7 +14,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import NodeClosedError, UnsupportedError
-from rosglass.ros2.dds.cyclone import TIMEOUT, check_alive, keeping, library
+from rosglass.wires.dds.cyclone import TIMEOUT, check_alive, keeping, library
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -126,7 +126,7 @@ def sample(sertype: int, parts: Sequence[bytes | bytearray | memoryview], place:
     """Return the address of a new serdata with a payload, which is copied.
 
     Args:
-        sertype: Type of the writer it is for, see :func:`rosglass.ros2.dds.cyclone.sertype`; its
+        sertype: Type of the writer it is for, see :func:`rosglass.wires.dds.cyclone.sertype`; its
             topic must not be deleted before the sample is sent.
         parts: The payload in one piece or several; the first begins with the encapsulation header.
         place: What it is for, in errors.

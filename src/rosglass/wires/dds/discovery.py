@@ -7,10 +7,10 @@ import threading
 from typing import TYPE_CHECKING
 
 from rosglass.errors import DecodeError, Error
-from rosglass.ros2.dds import cyclone
-from rosglass.ros2.dds.cyclone_builtin import BuiltinTopic, Discovered, matched_publication, take
-from rosglass.ros2.dds.cyclone_events import Event
-from rosglass.ros2.dds.discovery_info import (
+from rosglass.wires.dds import cyclone
+from rosglass.wires.dds.cyclone_builtin import BuiltinTopic, Discovered, matched_publication, take
+from rosglass.wires.dds.cyclone_events import Event
+from rosglass.wires.dds.discovery_info import (
     PARTICIPANT_USER_DATA,
     READER_QOS,
     TOPIC,
@@ -20,15 +20,15 @@ from rosglass.ros2.dds.discovery_info import (
     NodeEntities,
     ParticipantEntities,
 )
-from rosglass.ros2.dds.endpoints import SampleReader, SampleWriter, Taken
-from rosglass.ros2.dds.graph import DdsGraph
+from rosglass.wires.dds.endpoints import SampleReader, SampleWriter, Taken
+from rosglass.wires.dds.graph import DdsGraph
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.comm import EndpointInfo
-    from rosglass.ros2.dds.participant import Participant
     from rosglass.ros2.graph import Graph
+    from rosglass.wires.dds.participant import Participant
 
 __all__ = ["DdsDiscovery"]
 

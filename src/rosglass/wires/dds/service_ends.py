@@ -20,24 +20,24 @@ from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointKind
 from rosglass.errors import Error, NodeClosedError
-from rosglass.ros2.dds import cyclone, cyclone_builtin, cyclone_inline_qos, cyclone_origins
-from rosglass.ros2.dds.cyclone import keeping
-from rosglass.ros2.dds.cyclone_builtin import Discovered
-from rosglass.ros2.dds.cyclone_events import Event, publication_matched
-from rosglass.ros2.dds.cyclone_origins import Origins
-from rosglass.ros2.dds.cyclone_qos import qos_of
-from rosglass.ros2.dds.discovery_info import format_user_data
-from rosglass.ros2.dds.endpoints import SampleReader, SampleWriter, Taken
-from rosglass.ros2.dds.outbox import Outbox
 from rosglass.ros2.names import mangle_type
+from rosglass.wires.dds import cyclone, cyclone_builtin, cyclone_inline_qos, cyclone_origins
+from rosglass.wires.dds.cyclone import keeping
+from rosglass.wires.dds.cyclone_builtin import Discovered
+from rosglass.wires.dds.cyclone_events import Event, publication_matched
+from rosglass.wires.dds.cyclone_origins import Origins
+from rosglass.wires.dds.cyclone_qos import qos_of
+from rosglass.wires.dds.discovery_info import format_user_data
+from rosglass.wires.dds.endpoints import SampleReader, SampleWriter, Taken
+from rosglass.wires.dds.outbox import Outbox
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from rosglass.comm import EndpointInfo
-    from rosglass.ros2.dds.identity import Origin
-    from rosglass.ros2.dds.participant import Participant
     from rosglass.ros2.graph import Graph
+    from rosglass.wires.dds.identity import Origin
+    from rosglass.wires.dds.participant import Participant
 
 __all__ = [
     "PREFIX",
@@ -103,7 +103,7 @@ class Scheme(Enum):
     #: the client's and one of the request's, which servers return as they are.
     HEADER = "header"
     #: Everyone else's: plain payloads; a reply's inline QoS carries the identity of its request
-    #: (OMG DDS-RPC 1.0), see :mod:`rosglass.ros2.dds.identity`.
+    #: (OMG DDS-RPC 1.0), see :mod:`rosglass.wires.dds.identity`.
     IDENTITY = "identity"
 
 

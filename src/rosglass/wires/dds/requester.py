@@ -1,7 +1,7 @@
 """Service clients over DDS, for servers of every DDS implementation.
 
 A service's replies go to all its clients, who pick their own. How, depends on the server; see
-:class:`rosglass.ros2.dds.service_ends.Scheme`.
+:class:`rosglass.wires.dds.service_ends.Scheme`.
 """
 
 from __future__ import annotations
@@ -20,10 +20,11 @@ from rosglass.errors import (
     TimeoutError,  # noqa: A004 - the field's own word
     UnsupportedError,
 )
-from rosglass.ros2.dds import cyclone_origins
-from rosglass.ros2.dds.discovery_info import parse_user_data
-from rosglass.ros2.dds.headers import Parts, pack, unpack, with_header, without_header
-from rosglass.ros2.dds.service_ends import (
+from rosglass.ros2.middleware import SERVER_LEFT, Requester
+from rosglass.wires.dds import cyclone_origins
+from rosglass.wires.dds.discovery_info import parse_user_data
+from rosglass.wires.dds.headers import Parts, pack, unpack, with_header, without_header
+from rosglass.wires.dds.service_ends import (
     PREFIX,
     REMEDY,
     Ends,
@@ -33,16 +34,15 @@ from rosglass.ros2.dds.service_ends import (
     names_of,
     scheme_of,
 )
-from rosglass.ros2.middleware import SERVER_LEFT, Requester
 
 if TYPE_CHECKING:
     from rosglass.comm import EndpointInfo
-    from rosglass.ros2.dds.cyclone_builtin import Discovered
-    from rosglass.ros2.dds.endpoints import Taken
-    from rosglass.ros2.dds.identity import Identity, Origin
-    from rosglass.ros2.dds.participant import Participant
     from rosglass.ros2.graph import Graph
     from rosglass.ros2.middleware import OnReply
+    from rosglass.wires.dds.cyclone_builtin import Discovered
+    from rosglass.wires.dds.endpoints import Taken
+    from rosglass.wires.dds.identity import Identity, Origin
+    from rosglass.wires.dds.participant import Participant
 
 __all__ = ["DdsRequester"]
 

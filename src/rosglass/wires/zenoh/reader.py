@@ -22,13 +22,13 @@ import zenoh.ext
 from rosglass.comm import Durability, EndpointKind, Reliability
 from rosglass.comm.lateness import Lateness
 from rosglass.ros2.middleware import OnSample, Reader
-from rosglass.ros2.zenoh.endpoints import Declaration, Owner, Pump
-from rosglass.ros2.zenoh.keys import ATTACHMENT, HUMBLE_HASH, NO_ATTACHMENT
+from rosglass.wires.zenoh.endpoints import Declaration, Owner, Pump
+from rosglass.wires.zenoh.keys import ATTACHMENT, HUMBLE_HASH, NO_ATTACHMENT
 
 if TYPE_CHECKING:
     from rosglass.comm import QoS
     from rosglass.ros2.graph import Graph
-    from rosglass.ros2.zenoh.local import Places
+    from rosglass.wires.zenoh.local import Places
 
 __all__ = ["Drain", "ZenohReader"]
 

@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING
 
 from rosglass.comm import ConnectionState, EndpointKind, Handle, Status
 from rosglass.errors import NodeClosedError
-from rosglass.ros2.dds.discovery import DdsDiscovery
-from rosglass.ros2.dds.endpoints import DdsReader, DdsWriter
-from rosglass.ros2.dds.participant import Participant
-from rosglass.ros2.dds.replier import DdsReplier
-from rosglass.ros2.dds.requester import DdsRequester
 from rosglass.ros2.middleware import Middleware, Reader, Replier, Requester, Writer
+from rosglass.wires.dds.discovery import DdsDiscovery
+from rosglass.wires.dds.endpoints import DdsReader, DdsWriter
+from rosglass.wires.dds.participant import Participant
+from rosglass.wires.dds.replier import DdsReplier
+from rosglass.wires.dds.requester import DdsRequester
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from rosglass.comm import EndpointInfo, NodeName
     from rosglass.interfaces import Definition
-    from rosglass.ros2.dds.options import DdsOptions
     from rosglass.ros2.graph import Graph
     from rosglass.ros2.middleware import OnReply, OnRequest, OnSample
+    from rosglass.wires.dds.options import DdsOptions
 
 __all__ = ["DdsMiddleware"]
 
@@ -107,7 +107,7 @@ class DdsMiddleware(Middleware):
 
     def describe_type(self, endpoint: EndpointInfo, timeout: float) -> Definition | None:
         """Return the definition that an endpoint announces by XTypes."""
-        from rosglass.ros2.dds.types import announced_definition  # noqa: PLC0415 - rarely needed
+        from rosglass.wires.dds.types import announced_definition  # noqa: PLC0415 - rarely needed
 
         provider = f"wire {endpoint.node} (TypeLookup)"
         entity = self._joined().entity

@@ -2,7 +2,7 @@
 
 The function that makes a sample from packets (``from_ser``) is replaced by one that notes what the
 first of them says: the sample's number, and the inline QoS that says which request a reply answers
-(:mod:`rosglass.ros2.dds.identity`). See :mod:`rosglass.ros2.dds.cyclone_hooks` for how.
+(:mod:`rosglass.wires.dds.identity`). See :mod:`rosglass.wires.dds.cyclone_hooks` for how.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ import struct
 from ctypes import CFUNCTYPE, PYFUNCTYPE, c_int, c_size_t, c_void_p, string_at
 from typing import TYPE_CHECKING, Any
 
-from rosglass.ros2.dds import cyclone
-from rosglass.ros2.dds.cyclone import keeping
-from rosglass.ros2.dds.cyclone_hooks import SDK_DATA, Hook, expect
-from rosglass.ros2.dds.cyclone_samples import COPIED, payload
-from rosglass.ros2.dds.identity import Identity, Origin, inline_qos, read_origin
+from rosglass.wires.dds import cyclone
+from rosglass.wires.dds.cyclone import keeping
+from rosglass.wires.dds.cyclone_hooks import SDK_DATA, Hook, expect
+from rosglass.wires.dds.cyclone_samples import COPIED, payload
+from rosglass.wires.dds.identity import Identity, Origin, inline_qos, read_origin
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -13,16 +13,16 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointInfo, EndpointKind, NodeName
-from rosglass.ros2.dds.cyclone_qos import XCDR1
-from rosglass.ros2.dds.discovery_info import hash_of, is_rosglass
 from rosglass.ros2.names import demangle_topic, demangle_type
+from rosglass.wires.dds.cyclone_qos import XCDR1
+from rosglass.wires.dds.discovery_info import hash_of, is_rosglass
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from rosglass.ros2.dds.cyclone_builtin import Discovered
-    from rosglass.ros2.dds.discovery_info import ParticipantEntities
     from rosglass.ros2.graph import Graph
+    from rosglass.wires.dds.cyclone_builtin import Discovered
+    from rosglass.wires.dds.discovery_info import ParticipantEntities
 
 __all__ = ["UNKNOWN", "DdsGraph"]
 

@@ -1,7 +1,7 @@
 """Service servers over DDS, for clients of every DDS implementation.
 
 A service's replies go to all its clients, who pick their own. How, depends on the client; see
-:class:`rosglass.ros2.dds.service_ends.Scheme`.
+:class:`rosglass.wires.dds.service_ends.Scheme`.
 """
 
 from __future__ import annotations
@@ -13,11 +13,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rosglass.errors import TimeoutError  # noqa: A004 - the field's own word
-from rosglass.ros2.dds import cyclone_inline_qos, cyclone_origins
-from rosglass.ros2.dds.discovery_info import parse_user_data
-from rosglass.ros2.dds.headers import header_of, unpack, with_header, without_header
-from rosglass.ros2.dds.identity import UNKNOWN_GUID, Identity, Origin
-from rosglass.ros2.dds.service_ends import (
+from rosglass.ros2.middleware import Replier, RequestId
+from rosglass.wires.dds import cyclone_inline_qos, cyclone_origins
+from rosglass.wires.dds.discovery_info import parse_user_data
+from rosglass.wires.dds.headers import header_of, unpack, with_header, without_header
+from rosglass.wires.dds.identity import UNKNOWN_GUID, Identity, Origin
+from rosglass.wires.dds.service_ends import (
     PREFIX,
     REMEDY,
     Ends,
@@ -26,15 +27,14 @@ from rosglass.ros2.dds.service_ends import (
     names_of,
     scheme_of,
 )
-from rosglass.ros2.middleware import Replier, RequestId
 
 if TYPE_CHECKING:
     from rosglass.comm import EndpointInfo
-    from rosglass.ros2.dds.cyclone_builtin import Discovered
-    from rosglass.ros2.dds.endpoints import Taken
-    from rosglass.ros2.dds.participant import Participant
     from rosglass.ros2.graph import Graph
     from rosglass.ros2.middleware import OnRequest
+    from rosglass.wires.dds.cyclone_builtin import Discovered
+    from rosglass.wires.dds.endpoints import Taken
+    from rosglass.wires.dds.participant import Participant
 
 __all__ = ["DdsReplier"]
 

@@ -33,34 +33,34 @@ from rosglass.ros2.middleware import (
     Requester,
     Writer,
 )
-from rosglass.ros2.zenoh.config import (
+from rosglass.wires.zenoh.config import (
     check_process,
     close_session,
     open_session,
     reason,
     session_config,
 )
-from rosglass.ros2.zenoh.endpoints import (
+from rosglass.wires.zenoh.endpoints import (
     CHANNEL,
     Announcement,
     Declaration,
     Pump,
     ZenohWriter,
 )
-from rosglass.ros2.zenoh.keys import Token, gid_of, graph_key, topic_key
-from rosglass.ros2.zenoh.links import Pulse, limit_silence
-from rosglass.ros2.zenoh.local import Places
-from rosglass.ros2.zenoh.reader import Drain, ZenohReader
-from rosglass.ros2.zenoh.replier import ZenohReplier
-from rosglass.ros2.zenoh.requester import ZenohRequester
-from rosglass.ros2.zenoh.services import Service
+from rosglass.wires.zenoh.keys import Token, gid_of, graph_key, topic_key
+from rosglass.wires.zenoh.links import Pulse, limit_silence
+from rosglass.wires.zenoh.local import Places
+from rosglass.wires.zenoh.reader import Drain, ZenohReader
+from rosglass.wires.zenoh.replier import ZenohReplier
+from rosglass.wires.zenoh.requester import ZenohRequester
+from rosglass.wires.zenoh.services import Service
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.ros2.graph import Graph
-    from rosglass.ros2.zenoh.options import ZenohOptions
-    from rosglass.ros2.zenoh.shm import SharedMemory
+    from rosglass.wires.zenoh.options import ZenohOptions
+    from rosglass.wires.zenoh.shm import SharedMemory
 
 __all__ = ["ZenohMiddleware"]
 
@@ -113,7 +113,7 @@ class ZenohMiddleware(Middleware):
         self._pumps: list[Pump] = []
         self._shared: SharedMemory | None = None
         if json.loads(self._config.get_json("transport/shared_memory/enabled")):
-            from rosglass.ros2.zenoh.shm import SharedMemory  # noqa: PLC0415 - not everywhere
+            from rosglass.wires.zenoh.shm import SharedMemory  # noqa: PLC0415 - not everywhere
 
             self._shared = SharedMemory()
         self._readers: Places[ZenohReader] = Places()

@@ -6,13 +6,13 @@ import threading
 import time
 from typing import TYPE_CHECKING
 
-from rosglass.ros2.dds import cyclone
-from rosglass.ros2.dds.cyclone_events import Event, set_events
+from rosglass.wires.dds import cyclone
+from rosglass.wires.dds.cyclone_events import Event, set_events
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rosglass.ros2.dds.pump import Pump
+    from rosglass.wires.dds.pump import Pump
 
 __all__ = ["Lingering"]
 

@@ -1,0 +1,142 @@
+"""A Zenoh router: the place where the nodes of a ROS 2 graph over rmw_zenoh find each other."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import re
+import socket
+import threading
+import time
+
+import zenoh
+
+from rosglass.comm import Handle
+from rosglass.errors import ConnectionLostError, ConversionError
+from rosglass.wires.zenoh.config import (
+    close_session,
+    open_session,
+    reason,
+    router_config,
+    session_config,
+)
+from rosglass.wires.zenoh.endpoints import CHANNEL, Pump
+from rosglass.wires.zenoh.links import limit_silence
+from rosglass.wires.zenoh.options import DEFAULT_PORT, ZenohOptions, locator
+
+__all__ = ["DEFAULT_LISTEN", "Router", "is_router_reachable"]
+
+#: Where a router listens unless told otherwise: this machine only.
+DEFAULT_LISTEN = f"tcp/127.0.0.1:{DEFAULT_PORT}"
+
+_LOCATOR = re.compile(
+    r"tcp/(?:\[(?P<six>[0-9A-Fa-f:.]+)\]|(?P<host>[A-Za-z0-9_.-]+)):(?P<port>\d+)"
+)
+_LOOPBACK = re.compile(r"localhost|127(?:\.\d+){3}|::1")
+
+
+class Router(Handle):
+    """A router in this process, running from creation to :meth:`close`.
+
+    Args:
+        listen: Where to listen, ``tcp/HOST:PORT``; port 0 takes a free one.
+
+    Attributes:
+        listen: Where it listens, with the real port.
+        url: URL to pass to :func:`rosglass.connect`.
+        is_local: Whether only programs on this machine can reach it.
+
+    Raises:
+        ConversionError: `listen` is not an address.
+        ConnectionLostError: The address is taken, or not one of this machine's.
+    """
+
+    def __init__(self, listen: str = DEFAULT_LISTEN) -> None:
+        host, port = _parse(listen)
+        port = port or _free_port(host)
+        self.listen = locator(host, port)
+        reachable = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
+        self.url = "zenoh://" + locator(reachable, port).removeprefix("tcp/")
+        self.is_local = _LOOPBACK.fullmatch(host) is not None
+        self._lock = threading.Lock()
+        self._session: zenoh.Session | None = None
+        try:
+            self._session = open_session(router_config(self.listen))
+        except zenoh.ZError as error:
+            raise ConnectionLostError(self._why(error)) from error
+        self._pump = None if self.is_local else self._watch(self._session)
+        # A thread inside Zenoh must not meet an interpreter that is being taken down.
+        atexit.register(self.close)
+
+    def close(self) -> None:
+        """Stop the router; safe to call twice."""
+        with self._lock:
+            session, self._session = self._session, None
+        if session is None:
+            return
+        atexit.unregister(self.close)
+        if self._pump is not None:
+            self._pump.undeclare()
+        close_session(session)
+
+    def _watch(self, session: zenoh.Session) -> Pump:
+        """Let go of programs whose network is gone, so that they can come back at once."""
+        events = session.info.declare_transport_events_listener(CHANNEL, history=True)
+        return Pump(events, lambda _: limit_silence(session), f"{self.listen} links")
+
+    def _why(self, error: zenoh.ZError) -> str:
+        what = f"cannot run a router at {self.listen}"
+        other = "choose another port with --listen tcp/127.0.0.1:PORT"
+        if "in use" not in str(error):
+            return f"{what}: {reason(error)}; name an address of this machine"
+        if is_router_reachable(self.url):
+            return f"{what}: a Zenoh router runs there already; use that one, or {other}"
+        return f"{what}: another program uses the port; {other}"
+
+
+def is_router_reachable(url: str, timeout: float = 0.5) -> bool:
+    """Return whether a Zenoh router answers at a ``zenoh://`` URL.
+
+    Args:
+        url: As for :func:`rosglass.connect`.
+        timeout: How long to wait for an answer, in seconds.
+
+    Raises:
+        ConversionError: The URL is not valid.
+    """
+    options = ZenohOptions.parse(url, os.environ)
+    host = options.host or "127.0.0.1"
+    deadline = time.monotonic() + timeout
+    try:
+        # Quicker to give up than Zenoh when nobody listens.
+        socket.create_connection((host, options.port), timeout).close()
+    except OSError:
+        return False
+    config, _ = session_config(ZenohOptions(host, options.port, mode="client"))
+    remaining = max(1, int((deadline - time.monotonic()) * 1000))
+    config.insert_json5("transport/unicast/open_timeout", str(remaining))
+    config.insert_json5("connect/timeout_ms", str(remaining))
+    try:
+        session = open_session(config)
+    except zenoh.ZError:
+        return False
+    try:
+        return bool(session.info.routers_zid())
+    finally:
+        close_session(session)
+
+
+def _parse(listen: str) -> tuple[str, int]:
+    match = _LOCATOR.fullmatch(listen) if isinstance(listen, str) else None
+    if match is None or int(match["port"]) > 65535:
+        raise ConversionError(
+            "listen", listen, "an address such as tcp/127.0.0.1:7447, port 0 to 65535"
+        )
+    return match["six"] or match["host"], int(match["port"])
+
+
+def _free_port(host: str) -> int:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family) as probe:
+        probe.bind((host, 0))
+        return int(probe.getsockname()[1])
