@@ -373,6 +373,11 @@ def test_examples_run_as_printed(
 
 
 @pytest.mark.parametrize("page", sorted(ALONE))
-def test_examples_without_a_robot_run_as_printed(page: str) -> None:
+def test_examples_without_a_robot_run_as_printed(
+    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "my_msgs" / "msg").mkdir(parents=True)
+    (tmp_path / "my_msgs" / "msg" / "Oven.msg").write_text("float32[] temperatures\n")
+    monkeypatch.chdir(tmp_path)
     path = rosglass.load("nav_msgs/msg/Path").encode()
     assert Reader(page, {"rosglass": rosglass, "path_bytes": path}).read() > 2
