@@ -50,3 +50,19 @@ def test_a_machine_without_room_is_told_once(monkeypatch, caplog):
         assert [shared.place((b"x" * BIG,)) for _ in range(3)] == [None, None, None]
     assert len(caplog.records) == 1
     assert "no shared memory for messages of 100000 bytes" in caplog.text
+
+
+def test_a_pool_is_no_bigger_than_what_the_user_may_lock(monkeypatch, caplog):
+    monkeypatch.setattr(zenoh_shm, "_lockable", lambda: 6 * 2**20)
+    shared = SharedMemory()
+    assert shared.place((b"x" * 2**20,)) is not None
+    with caplog.at_level(logging.WARNING):
+        assert shared.place((b"x" * 7 * 2**20,)) is None
+    assert "this user may lock 6 MB; 14 MB are needed at least: raise the limit" in caplog.text
+    assert shared.place((b"x" * 2**20,)) is not None
+
+
+def test_users_other_than_root_may_lock_what_their_limit_says(monkeypatch):
+    monkeypatch.setattr(zenoh_shm.os, "geteuid", lambda: 1000)
+    monkeypatch.setattr(zenoh_shm.resource, "getrlimit", lambda _: (8 * 2**20, 8 * 2**20))
+    assert zenoh_shm._lockable() == 6 * 2**20

@@ -10,6 +10,11 @@ from typing import TYPE_CHECKING
 import zenoh
 import zenoh.shm
 
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None  # type: ignore[assignment]
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -64,10 +69,16 @@ class SharedMemory:
         with self._lock:
             if size * 2 <= self._size:
                 return self._provider
-            wanted = max(_POOL, size * _PAYLOADS)
+            wanted = min(max(_POOL, size * _PAYLOADS), _lockable())
             if self._refused and wanted >= self._refused:
                 return self._provider if size <= self._size else None
             try:
+                if wanted < size * 2:
+                    raise MemoryError(
+                        f"Zenoh locks it, and this user may lock {wanted / 2**20:.0f} MB; "
+                        f"{size * 2 / 2**20:.0f} MB are needed at least: raise the limit "
+                        "(ulimit -l, memlock in /etc/security/limits.conf, LimitMEMLOCK in systemd)"
+                    )
                 if wanted > _free() // 2:
                     raise MemoryError(f"{_PLACE} has not {2 * wanted // 2**20} MB left")
                 # What was sent from an old pool keeps that until it is received.
@@ -90,6 +101,18 @@ def _copy(part: bytes | bytearray | memoryview, buffer: zenoh.shm.ZShmMut, start
     for offset in range(0, len(part), _PIECE):
         piece = bytes(part[offset : offset + _PIECE])
         buffer[start + offset : start + offset + len(piece)] = piece
+
+
+def _lockable() -> int:
+    """Return how much of the memory that this user may lock a pool takes at most, in bytes.
+
+    Zenoh locks its pools; Debian allows 8 MB to users other than root.
+    """
+    if resource is None or os.geteuid() == 0:
+        return 1 << 62
+    limit = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0]
+    # Zenoh's own few pages, and what it rounds up to, need room beside it.
+    return 1 << 62 if limit == resource.RLIM_INFINITY else limit * 3 // 4
 
 
 def _free() -> int:
