@@ -190,7 +190,7 @@ def test_the_camera_follows_a_frame(
     view.move_eye((1, 7, 5))
     robot.tf("rover", 2.0, 3.0, 0.0, rotation=LEFT)
     wait(lambda: near(eye(), (2, 7, 5)))
-    assert not view.is_moving
+    wait(lambda: not view.is_moving)
     # Turning the view keeps it, shifting it does not.
     orbit = app.window.manager.getViewManager().getCurrent()
     orbit.subProp("Pitch").setValue(0.3)
