@@ -28,12 +28,12 @@ failed=0
 wait "$checked" || failed=$?
 cat "$types"
 ((failed == 0)) || exit "$failed"
-# Most tests wait for others most of the time: three side by side, each file in one process.
+# Most tests wait for others most of the time: four side by side, each file in one process.
 # Once more what failed: with other programs, machines under load can. Each is listed at the end.
 # A process that crashes fails its test and is not replaced: the others would wait for it for ever.
 # Files in the order of their folders: by default, those of few tests come last, which here are
 # those that wait longest for others, and the end would be spent on waiting for one of them.
-side_by_side=(-n 3 --dist loadfile --no-loadscope-reorder --max-worker-restart=0 --reruns 1
+side_by_side=(-n 4 --dist loadfile --no-loadscope-reorder --max-worker-restart=0 --reruns 1
   --rerun-show-tracebacks)
 version() { "$1/bin/python" -c 'import sys; print("%d.%d" % sys.version_info[:2])'; }
 # Unit tests need no Qt: once for each Python is enough. Debian's has genpy to compare with.
