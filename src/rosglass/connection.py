@@ -96,8 +96,8 @@ def connect(
             :class:`rosglass.bags.ReplayNode`.
 
             ``local://NAME`` is a graph inside this process, without a network, for tests and for
-            interfaces without a robot: nodes that give the same name see each other, and nobody
-            else does. Topics, services, actions and parameters are those of ROS 2.
+            interfaces without a robot: nodes that give the same name see each other, and no
+            others. Topics, services, actions and parameters are those of ROS 2.
 
             None asks the environment: ROSGLASS_URL, then RMW_IMPLEMENTATION,
             ZENOH_SESSION_CONFIG_URI, ROS_DISTRO, ROS_DOMAIN_ID and ROS_MASTER_URI.

@@ -311,7 +311,7 @@ class Publisher(Element):
 
     @Slot()
     def _warn_no_subscribers(self) -> None:
-        """Log that nobody subscribes to the topic, for who looks for a mistake in its name."""
+        """Log that the topic has no subscribers, with a near name: it may be misspelt."""
         node, sender = self._have, self._sender
         if node is None or sender is None or not self._is_connected():
             return

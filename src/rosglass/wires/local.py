@@ -315,7 +315,7 @@ class LocalRequester(_Endpoint["LocalReplier"], Requester):
         if wanted:
             self._on_reply(number, None, reason)
 
-    def link(self, other: LocalReplier) -> None:  # noqa: ARG002 - whoever it is
+    def link(self, other: LocalReplier) -> None:  # noqa: ARG002 - any will do
         """Say that a server is there."""
         if self.changed is not None:
             self.changed()
@@ -396,12 +396,13 @@ class LocalMiddleware(Middleware):
         self._ends: dict[Handle, None] = {}
         self._graph: Graph | None = None
         self._closed = False
-        with _networks_lock:
-            self.network = _networks.setdefault(name, _Network())
-            _members[name] = _members.get(name, 0) + 1
 
     def open(self, graph: Graph, changed: Callable[[], None]) -> None:  # noqa: ARG002 - it never does
         """Join the graph."""
+        # Not sooner: a node whose name is refused is never opened, nor closed.
+        with _networks_lock:
+            self.network = _networks.setdefault(self._name, _Network())
+            _members[self._name] = _members.get(self._name, 0) + 1
         self._graph = graph
         self.network.join(graph)
 
@@ -457,8 +458,9 @@ class LocalMiddleware(Middleware):
             ends = list(self._ends)
         for end in ends:
             end.close()
-        if self._graph is not None:
-            self.network.leave(self._graph)
+        if self._graph is None:
+            return
+        self.network.leave(self._graph)
         with _networks_lock:
             _members[self._name] -= 1
             if not _members[self._name]:
