@@ -24,9 +24,9 @@ from rosglass.comm import (
     Subscription,
     Time,
 )
+from rosglass.comm.names import expand
 from rosglass.comm.qos import Durability
 from rosglass.errors import NodeClosedError, TypeNotFoundError
-from rosglass.ros2.names import expand
 
 if TYPE_CHECKING:
     from collections.abc import Callable

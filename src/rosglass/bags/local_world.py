@@ -28,13 +28,13 @@ from rosglass.comm import (
 )
 from rosglass.comm.logger import NodeLogger
 from rosglass.comm.loop import check_plain
+from rosglass.comm.names import expand
 from rosglass.comm.rclpy_names import check_order
 from rosglass.comm.similar import similar
 from rosglass.comm.terminal import show_on_terminal
 from rosglass.errors import ConversionError, NodeClosedError
 from rosglass.interfaces.names import join_name
 from rosglass.messages import Message, MessageType, OpaqueType, load
-from rosglass.ros2.names import expand
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

@@ -40,7 +40,7 @@ def names_ros1(args: argparse.Namespace) -> bool:
 
 def is_hidden(node: Node, name: str) -> bool:
     """Return whether lists leave a name out; ROS 1 hides none."""
-    from rosglass.ros2.names import hidden
+    from rosglass.comm.names import hidden
 
     return not is_ros1(node) and hidden(name)
 

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import threading
+from collections import Counter
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import TYPE_CHECKING
 
+from rosglass.comm.names import action_of, hidden, is_valid_node, is_valid_topic
 from rosglass.comm.qos import QoS
 
-__all__ = ["ConnectionState", "EndpointInfo", "EndpointKind", "NodeName", "Status"]
+if TYPE_CHECKING:
+    from collections.abc import Callable, Hashable, Iterable
+
+__all__ = ["ConnectionState", "EndpointInfo", "EndpointKind", "Graph", "NodeName", "Status"]
 
 
 class EndpointKind(Enum):
@@ -93,3 +100,178 @@ class Status:
 
     def __str__(self) -> str:
         return f"{self.state.name}: {self.detail}" if self.detail else self.state.name
+
+
+_TOPICS = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
+_SERVICES = (EndpointKind.SERVICE_SERVER, EndpointKind.SERVICE_CLIENT)
+
+
+class Graph:
+    """Nodes and endpoints, each under the key its middleware knows it by.
+
+    Middlewares put and remove entries from their threads; everyone may read from any thread.
+    What has a name that ROS's rules forbid is left out, for nothing could be done with it, and its
+    name is kept apart; see :meth:`invalid_names`.
+
+    Args:
+        changed: Called after each change, in the thread that made it; must return at once.
+    """
+
+    def __init__(self, changed: Callable[[], None]) -> None:
+        self._changed = changed
+        self._lock = threading.Lock()
+        self._nodes: dict[Hashable, NodeName] = {}
+        self._invalid: dict[Hashable, str] = {}
+        self._endpoints: dict[Hashable, EndpointInfo] = {}
+        self._by_name: dict[str, dict[Hashable, EndpointInfo]] = {}
+        self._by_node: dict[NodeName, dict[Hashable, EndpointInfo]] = {}
+
+    def put_node(self, key: Hashable, node: NodeName) -> None:
+        """Add the node known as `key`."""
+        if not is_valid_node(node.full):
+            self._leave_out(key, node.full)
+            return
+        with self._lock:
+            known = self._nodes.get(key) == node
+            self._nodes[key] = node
+            self._invalid.pop(key, None)
+        if not known:
+            self._changed()
+
+    def put_endpoint(self, key: Hashable, endpoint: EndpointInfo) -> None:
+        """Add the endpoint known as `key`, or replace what was known about it."""
+        name, kind, node = endpoint.name, endpoint.type, endpoint.node.full
+        if not (is_valid_topic(name) and kind.isprintable() and is_valid_node(node)):
+            self._leave_out(key, f"{name} [{kind}] of {node}")
+            return
+        with self._lock:
+            self._invalid.pop(key, None)
+            known = self._endpoints.get(key)
+            if known is not None and (known.name, known.node) != (endpoint.name, endpoint.node):
+                self._forget(key, known)
+            self._endpoints[key] = endpoint
+            self._by_name.setdefault(endpoint.name, {})[key] = endpoint
+            self._by_node.setdefault(endpoint.node, {})[key] = endpoint
+        if known != endpoint:
+            self._changed()
+
+    def remove(self, key: Hashable) -> None:
+        """Remove the node or endpoint known as `key`, if there is one."""
+        with self._lock:
+            moved = self._remove(key)
+        if moved:
+            self._changed()
+
+    def nodes(self) -> list[NodeName]:
+        """Return the names of all nodes, sorted; nodes that share a name appear once."""
+        with self._lock:
+            names = {*self._nodes.values(), *self._by_node}
+        return sorted(names)
+
+    def invalid_names(self) -> list[str]:
+        """Return what is left out because ROS's rules forbid its name, sorted."""
+        with self._lock:
+            return sorted(set(self._invalid.values()))
+
+    def duplicate_nodes(self) -> dict[str, int]:
+        """Return the full names that several nodes bear, and how many do."""
+        with self._lock:
+            counts = Counter(self._nodes.values())
+        return {name.full: count for name, count in sorted(counts.items()) if count > 1}
+
+    def topics(self, *, hidden: bool = True) -> dict[str, list[str]]:
+        """Return every topic with the types announced for it, both sorted.
+
+        Args:
+            hidden: Whether to include hidden topics; see :func:`rosglass.comm.names.hidden`.
+        """
+        return self._names(_TOPICS, hidden)
+
+    def services(self, *, hidden: bool = True) -> dict[str, list[str]]:
+        """Return every service that is offered or called; arguments as for :meth:`topics`."""
+        return self._names(_SERVICES, hidden)
+
+    def actions(self) -> dict[str, list[str]]:
+        """Return every action with the types announced for it, both sorted.
+
+        An action shows by the names of its service ``send_goal`` and its topic ``feedback``.
+        """
+        with self._lock:
+            hits = [
+                action_of(endpoint.name, endpoint.type)
+                for name, endpoints in self._by_name.items()
+                if "/_action/" in name
+                for endpoint in endpoints.values()
+            ]
+        return _sorted(hit for hit in hits if hit is not None)
+
+    def endpoints(self, kind: EndpointKind, name: str) -> list[EndpointInfo]:
+        """Return the endpoints of a kind at a topic or service, in order of appearance."""
+        with self._lock:
+            found = self._by_name.get(name, {}).values()
+            return [endpoint for endpoint in found if endpoint.kind is kind]
+
+    def endpoints_of(self, node: NodeName) -> list[EndpointInfo]:
+        """Return all endpoints of a node, in order of appearance."""
+        with self._lock:
+            return list(self._by_node.get(node, {}).values())
+
+    def users(self) -> dict[str, list[EndpointInfo]]:
+        """Return the endpoints of every type, by the type's name, in order of appearance."""
+        found: dict[str, list[EndpointInfo]] = {}
+        with self._lock:
+            for endpoint in self._endpoints.values():
+                found.setdefault(endpoint.type, []).append(endpoint)
+        return found
+
+    def clear(self) -> None:
+        """Forget everything: what cannot be seen any more must not look alive."""
+        with self._lock:
+            self._nodes.clear()
+            self._invalid.clear()
+            self._endpoints.clear()
+            self._by_name.clear()
+            self._by_node.clear()
+        self._changed()
+
+    def _names(self, kinds: tuple[EndpointKind, ...], all_names: bool) -> dict[str, list[str]]:
+        with self._lock:
+            found = [
+                (name, endpoint.type)
+                for name, endpoints in self._by_name.items()
+                if all_names or not hidden(name)
+                for endpoint in endpoints.values()
+                if endpoint.kind in kinds
+            ]
+        return _sorted(found)
+
+    def _leave_out(self, key: Hashable, name: str) -> None:
+        with self._lock:
+            moved = self._remove(key) or self._invalid.get(key) != name
+            self._invalid[key] = name
+        if moved:
+            self._changed()
+
+    def _remove(self, key: Hashable) -> bool:
+        """Remove what is known as `key`; return whether there was anything. The lock is held."""
+        endpoint = self._endpoints.pop(key, None)
+        if endpoint is not None:
+            self._forget(key, endpoint)
+        node, name = self._nodes.pop(key, None), self._invalid.pop(key, None)
+        return not (endpoint is None and node is None and name is None)
+
+    def _forget(self, key: Hashable, endpoint: EndpointInfo) -> None:
+        named, owned = self._by_name[endpoint.name], self._by_node[endpoint.node]
+        del named[key], owned[key]
+        if not named:
+            del self._by_name[endpoint.name]
+        if not owned:
+            del self._by_node[endpoint.node]
+
+
+def _sorted(pairs: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
+    """Return the second items of the pairs under their first ones."""
+    found: dict[str, set[str]] = {}
+    for name, type_name in pairs:
+        found.setdefault(name, set()).add(type_name)
+    return {name: sorted(types) for name, types in sorted(found.items())}

@@ -248,7 +248,7 @@ class Session(QtCore.QObject):
             UnsupportedError: A domain is chosen, and the environment names a middleware that is
                 not known.
         """
-        from rosglass.ros2.names import validate_namespace, validate_node_name  # noqa: PLC0415
+        from rosglass.comm.names import validate_namespace, validate_node_name  # noqa: PLC0415
 
         name = self._forced_name or name
         told = _parse((*self._arguments, *arguments), self._url)

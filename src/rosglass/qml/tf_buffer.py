@@ -119,7 +119,7 @@ class TfBuffer(_Listening):
         return self._ns or "/"
 
     def _set_ns(self, namespace: str) -> None:
-        from rosglass.ros2.names import expand  # noqa: PLC0415 - not needed at start-up
+        from rosglass.comm.names import expand  # noqa: PLC0415 - not needed at start-up
 
         namespace = namespace.rstrip("/")
         if namespace == self._ns:

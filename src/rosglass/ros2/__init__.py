@@ -10,17 +10,17 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rosglass.ros2.graph import Graph
-    from rosglass.ros2.middleware import Middleware, Writer
+    from rosglass.comm.graph import Graph
     from rosglass.ros2.node import Ros2Node
+    from rosglass.wires.base import Middleware, Writer
 
 __all__ = ["Graph", "Middleware", "Ros2Node", "Writer"]
 
 _HOME_OF = {
-    "Graph": "graph",
-    "Middleware": "middleware",
-    "Ros2Node": "node",
-    "Writer": "middleware",
+    "Graph": "rosglass.comm.graph",
+    "Middleware": "rosglass.wires.base",
+    "Ros2Node": "rosglass.ros2.node",
+    "Writer": "rosglass.wires.base",
 }
 
 
@@ -28,6 +28,6 @@ def __getattr__(name: str) -> object:
     # Imported on first use: whoever only asks which names are valid waits for no node.
     if name not in _HOME_OF:
         raise AttributeError(f"module 'rosglass.ros2' has no attribute {name!r}")
-    value: object = getattr(import_module(f"rosglass.ros2.{_HOME_OF[name]}"), name)
+    value: object = getattr(import_module(_HOME_OF[name]), name)
     globals()[name] = value
     return value

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rosglass.messages import Message, MessageType
     from rosglass.ros2.action_types import ActionTypes
     from rosglass.ros2.core import Core
-    from rosglass.ros2.middleware import OnSample, Reader
+    from rosglass.wires.base import OnSample, Reader
 
 __all__ = ["ActionEnds", "GoalNews"]
 

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
+from rosglass.comm.names import expand, validate_namespace, validate_node_name
 from rosglass.errors import InvalidNameError, ParameterError, RosArgumentError
-from rosglass.ros2.names import expand, validate_namespace, validate_node_name
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -9,17 +9,17 @@ from weakref import WeakValueDictionary
 
 from rosglass.comm import ConnectionState, EndpointKind, Status
 from rosglass.comm.core import NodeCore, NodeMember
+from rosglass.comm.graph import Graph
+from rosglass.comm.names import expand
 from rosglass.ros2.arguments import NO_ARGUMENTS
-from rosglass.ros2.graph import Graph
-from rosglass.ros2.names import expand
 from rosglass.ros2.types import Types
 
 if TYPE_CHECKING:
     from rosglass.comm import Executor, NodeName
     from rosglass.interfaces import Library
     from rosglass.ros2.arguments import Arguments
-    from rosglass.ros2.middleware import Middleware
     from rosglass.ros2.pacing import RequestWindow
+    from rosglass.wires.base import Middleware
 
 __all__ = ["Core", "Member"]
 

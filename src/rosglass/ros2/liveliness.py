@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rosglass.comm import EndpointInfo, Handle, Timers
-    from rosglass.ros2.middleware import Reader
     from rosglass.ros2.repeats import Repeats
+    from rosglass.wires.base import Reader
 
 __all__ = ["Liveness"]
 

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from rosglass.comm import EndpointInfo, QoS
-    from rosglass.ros2.middleware import Middleware
+    from rosglass.wires.base import Middleware
 
     Conflicts = Mapping[EndpointInfo, Mapping[str, str]]
 

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 from rosglass.comm import EndpointKind, NodeName, QoS, Subscription
 from rosglass.comm.core_node import CoreNode
 from rosglass.comm.flags import check_flag
+from rosglass.comm.names import validate_namespace, validate_node_name
 from rosglass.comm.rclpy_names import check_order
 from rosglass.errors import UnsupportedError
 from rosglass.ros2.arguments import NO_ARGUMENTS
 from rosglass.ros2.core import Core
 from rosglass.ros2.furniture import Furniture
-from rosglass.ros2.names import validate_namespace, validate_node_name
 from rosglass.ros2.publisher import Ros2Publisher
 from rosglass.ros2.reading import Reading, type_if_known
 from rosglass.ros2.service_client import Ros2ServiceClient
@@ -41,9 +41,9 @@ if TYPE_CHECKING:
     from rosglass.interfaces import Library
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
     from rosglass.ros2.arguments import Arguments
-    from rosglass.ros2.middleware import Middleware
     from rosglass.ros2.parameter_client import Ros2ParameterClient
     from rosglass.ros2.parameters import Ros2Parameters
+    from rosglass.wires.base import Middleware
 
 __all__ = ["Ros2Node"]
 

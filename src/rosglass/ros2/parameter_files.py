@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
+from rosglass.comm.names import validate_node_name
 from rosglass.comm.text_files import read_text, write_text
 from rosglass.errors import InvalidNameError, ParameterError
-from rosglass.ros2.names import validate_node_name
 
 if TYPE_CHECKING:
     import os

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from rosglass.comm import QoS, Subscription
     from rosglass.messages import MessageType
     from rosglass.ros2.core import Core
-    from rosglass.ros2.middleware import OnSample, Reader
+    from rosglass.wires.base import OnSample, Reader
 
 __all__ = ["Reading", "type_if_known"]
 

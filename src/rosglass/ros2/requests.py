@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.messages import ServiceType
-    from rosglass.ros2.middleware import Requester
+    from rosglass.wires.base import Requester
 
 __all__ = ["Link", "Request"]
 

@@ -20,9 +20,9 @@ from rosglass.ros2.announced import (
     rivals,
 )
 from rosglass.ros2.core import Member
-from rosglass.ros2.middleware import CALL_DROPPED, SERVER_LEFT
 from rosglass.ros2.pacing import HOLD_S, LIMIT, STALL_S, RequestWindow
 from rosglass.ros2.requests import Link, Request
+from rosglass.wires.base import CALL_DROPPED, SERVER_LEFT
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -10,8 +10,8 @@ from rosglass.comm.answering import AnsweringServer
 from rosglass.errors import Error, NodeClosedError
 from rosglass.ros2.announced import Announced, mismatches, nodes_of
 from rosglass.ros2.core import Member
-from rosglass.ros2.middleware import RequestId
 from rosglass.ros2.pacing import ReplyPacer
+from rosglass.wires.base import RequestId
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from rosglass.comm import EndpointInfo
     from rosglass.interfaces import Definition
-    from rosglass.ros2.middleware import Middleware
+    from rosglass.wires.base import Middleware
 
 __all__ = ["Lookup"]
 

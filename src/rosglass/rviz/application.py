@@ -9,6 +9,7 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import Handle
+from rosglass.comm.names import validate_node_name
 from rosglass.comm.terminal import warn_on_terminal
 from rosglass.errors import ConnectionLostError, Error, UnsupportedError
 from rosglass.qml.display import require_display
@@ -20,7 +21,6 @@ from rosglass.qml.session import Session
 from rosglass.qt import QtCore, run_event_loop
 from rosglass.ros1.arguments import Arguments
 from rosglass.ros1.options import Ros1Options
-from rosglass.ros2.names import validate_node_name
 from rosglass.rviz import roscpp
 from rosglass.rviz.access import Access
 from rosglass.rviz.cpp import cpp_function

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from rosglass.comm import ConnectionState, Durability, EndpointKind, Handle, History, Status
 from rosglass.errors import ConversionError, NodeClosedError
-from rosglass.ros2.middleware import (
+from rosglass.wires.base import (
     SERVER_LEFT,
     Middleware,
     OnReply,
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Hashable
 
     from rosglass.comm import EndpointInfo, NodeName
-    from rosglass.ros2.graph import Graph
+    from rosglass.comm.graph import Graph
 
 __all__ = ["LocalMiddleware"]
 

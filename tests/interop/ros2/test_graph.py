@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rosglass.comm import EndpointKind, NodeName, QoS
-from rosglass.ros2.names import hidden
+from rosglass.comm.names import hidden
 
 STRING = "std_msgs/msg/String"
 ADD, FIBONACCI = "example_interfaces/srv/AddTwoInts", "example_interfaces/action/Fibonacci"

@@ -14,7 +14,7 @@ import pytest
 from rosglass.comm import ConnectionState, EndpointInfo, EndpointKind, Handle, NodeName, QoS, Status
 from rosglass.errors import NodeClosedError
 from rosglass.ros2 import Graph, Middleware, Ros2Node, Writer
-from rosglass.ros2.middleware import Reader, Replier, Requester, RequestId
+from rosglass.wires.base import Reader, Replier, Requester, RequestId
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -23,7 +23,7 @@ from rosglass.comm import (
 from rosglass.interfaces import Library
 from rosglass.ros2 import Ros2Node
 from rosglass.ros2.action_server import _cancelable
-from rosglass.ros2.middleware import SERVER_LEFT
+from rosglass.wires.base import SERVER_LEFT
 
 pytestmark = pytest.mark.usefixtures("quick")
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from rosglass import InvalidNameError
-from rosglass.ros2.names import (
+from rosglass.comm.names import (
     action_of,
     demangle_topic,
     demangle_type,

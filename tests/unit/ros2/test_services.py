@@ -22,9 +22,9 @@ from rosglass.comm import (
 )
 from rosglass.interfaces import Library
 from rosglass.ros2 import Ros2Node
-from rosglass.ros2.middleware import CALL_DROPPED, SERVER_LEFT, RequestId
 from rosglass.ros2.pacing import ReplyPacer, RequestWindow
 from rosglass.ros2.service_client import Ros2ServiceClient
+from rosglass.wires.base import CALL_DROPPED, SERVER_LEFT, RequestId
 
 pytestmark = pytest.mark.usefixtures("quick")
 

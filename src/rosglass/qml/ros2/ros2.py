@@ -273,7 +273,7 @@ class Ros2(ValueFunctions, GraphSingleton):
 
     def _check_topic(self, topic: str) -> None:
         """Raise InvalidNameError unless ROS 2 takes this for a name."""
-        from rosglass.ros2.names import expand  # noqa: PLC0415 - not needed at start-up
+        from rosglass.comm.names import expand  # noqa: PLC0415 - not needed at start-up
 
         session = self._session
         expand(topic, session.name or "node", session.namespace or "/")

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.comm import EndpointInfo
-    from rosglass.ros2.graph import Graph
+    from rosglass.comm.graph import Graph
     from rosglass.wires.dds.participant import Participant
 
 __all__ = ["DdsDiscovery"]

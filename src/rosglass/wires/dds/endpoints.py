@@ -9,9 +9,9 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import History, Reliability
+from rosglass.comm.names import mangle_type
 from rosglass.errors import NodeClosedError, TimeoutError  # noqa: A004 - the field's own word
-from rosglass.ros2.middleware import Reader, Writer
-from rosglass.ros2.names import mangle_type
+from rosglass.wires.base import Reader, Writer
 from rosglass.wires.dds import cyclone, cyclone_builtin
 from rosglass.wires.dds.cyclone_events import (
     Event,
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rosglass.comm import EndpointInfo, QoS
-    from rosglass.ros2.middleware import OnSample
+    from rosglass.wires.base import OnSample
     from rosglass.wires.dds.participant import Participant
 
 __all__ = ["DdsReader", "DdsWriter", "SampleReader", "SampleWriter", "Taken", "topic_name"]

@@ -13,14 +13,14 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointInfo, EndpointKind, NodeName
-from rosglass.ros2.names import demangle_topic, demangle_type
+from rosglass.comm.names import demangle_topic, demangle_type
 from rosglass.wires.dds.cyclone_qos import XCDR1
 from rosglass.wires.dds.discovery_info import hash_of, is_rosglass
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from rosglass.ros2.graph import Graph
+    from rosglass.comm.graph import Graph
     from rosglass.wires.dds.cyclone_builtin import Discovered
     from rosglass.wires.dds.discovery_info import ParticipantEntities
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rosglass.comm import ConnectionState, EndpointKind, Handle, Status
 from rosglass.errors import NodeClosedError
-from rosglass.ros2.middleware import Middleware, Reader, Replier, Requester, Writer
+from rosglass.wires.base import Middleware, Reader, Replier, Requester, Writer
 from rosglass.wires.dds.discovery import DdsDiscovery
 from rosglass.wires.dds.endpoints import DdsReader, DdsWriter
 from rosglass.wires.dds.participant import Participant
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from rosglass.comm import EndpointInfo, NodeName
+    from rosglass.comm.graph import Graph
     from rosglass.interfaces import Definition
-    from rosglass.ros2.graph import Graph
-    from rosglass.ros2.middleware import OnReply, OnRequest, OnSample
+    from rosglass.wires.base import OnReply, OnRequest, OnSample
     from rosglass.wires.dds.options import DdsOptions
 
 __all__ = ["DdsMiddleware"]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rosglass.errors import TimeoutError  # noqa: A004 - the field's own word
-from rosglass.ros2.middleware import Replier, RequestId
+from rosglass.wires.base import Replier, RequestId
 from rosglass.wires.dds import cyclone_inline_qos, cyclone_origins
 from rosglass.wires.dds.discovery_info import parse_user_data
 from rosglass.wires.dds.headers import header_of, unpack, with_header, without_header
@@ -30,8 +30,8 @@ from rosglass.wires.dds.service_ends import (
 
 if TYPE_CHECKING:
     from rosglass.comm import EndpointInfo
-    from rosglass.ros2.graph import Graph
-    from rosglass.ros2.middleware import OnRequest
+    from rosglass.comm.graph import Graph
+    from rosglass.wires.base import OnRequest
     from rosglass.wires.dds.cyclone_builtin import Discovered
     from rosglass.wires.dds.endpoints import Taken
     from rosglass.wires.dds.participant import Participant

@@ -20,7 +20,7 @@ from rosglass.errors import (
     TimeoutError,  # noqa: A004 - the field's own word
     UnsupportedError,
 )
-from rosglass.ros2.middleware import SERVER_LEFT, Requester
+from rosglass.wires.base import SERVER_LEFT, Requester
 from rosglass.wires.dds import cyclone_origins
 from rosglass.wires.dds.discovery_info import parse_user_data
 from rosglass.wires.dds.headers import Parts, pack, unpack, with_header, without_header
@@ -37,8 +37,8 @@ from rosglass.wires.dds.service_ends import (
 
 if TYPE_CHECKING:
     from rosglass.comm import EndpointInfo
-    from rosglass.ros2.graph import Graph
-    from rosglass.ros2.middleware import OnReply
+    from rosglass.comm.graph import Graph
+    from rosglass.wires.base import OnReply
     from rosglass.wires.dds.cyclone_builtin import Discovered
     from rosglass.wires.dds.endpoints import Taken
     from rosglass.wires.dds.identity import Identity, Origin
@@ -113,7 +113,7 @@ class DdsRequester(Requester):
         return self._scheme is not None and not self._ends.closed
 
     def send(self, data: bytes | bytearray, timeout: float | None) -> int:
-        """Send a request; see :meth:`rosglass.ros2.middleware.Requester.send`."""
+        """Send a request; see :meth:`rosglass.wires.base.Requester.send`."""
         if self._ends.closed:
             raise NodeClosedError(f"the client of {self._service} is closed")
         number = next(self._next)

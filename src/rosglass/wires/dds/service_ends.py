@@ -19,8 +19,8 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointKind
+from rosglass.comm.names import mangle_type
 from rosglass.errors import Error, NodeClosedError
-from rosglass.ros2.names import mangle_type
 from rosglass.wires.dds import cyclone, cyclone_builtin, cyclone_inline_qos, cyclone_origins
 from rosglass.wires.dds.cyclone import keeping
 from rosglass.wires.dds.cyclone_builtin import Discovered
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from rosglass.comm import EndpointInfo
-    from rosglass.ros2.graph import Graph
+    from rosglass.comm.graph import Graph
     from rosglass.wires.dds.identity import Origin
     from rosglass.wires.dds.participant import Participant
 

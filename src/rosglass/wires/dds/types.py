@@ -17,13 +17,13 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 from uuid import UUID
 
+from rosglass.comm.names import demangle_type
 from rosglass.errors import (
     DefinitionError,
     TimeoutError,  # noqa: A004 - the field's own word
 )
 from rosglass.interfaces import Definition, parse_type_description
 from rosglass.interfaces.resolver import MAX_DEPTH, MAX_FIELDS, MAX_TYPES
-from rosglass.ros2.names import demangle_type
 
 if TYPE_CHECKING:
     from collections.abc import Callable

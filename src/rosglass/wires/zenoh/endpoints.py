@@ -16,7 +16,7 @@ import zenoh.ext
 
 from rosglass.comm import ConnectionState, Durability, Handle, History, Reliability
 from rosglass.errors import ConnectionLostError, NodeClosedError
-from rosglass.ros2.middleware import Writer
+from rosglass.wires.base import Writer
 from rosglass.wires.zenoh.keys import (
     ATTACHMENT_FULL,
     HUMBLE_HASH,

@@ -23,7 +23,7 @@ from rosglass.comm import (
     QoS,
     Reliability,
 )
-from rosglass.ros2.names import demangle_type, mangle_type
+from rosglass.comm.names import demangle_type, mangle_type
 
 __all__ = [
     "ATTACHMENT",

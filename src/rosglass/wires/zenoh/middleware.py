@@ -23,7 +23,7 @@ from rosglass.comm import (
     Status,
 )
 from rosglass.errors import ConnectionLostError, NodeClosedError
-from rosglass.ros2.middleware import (
+from rosglass.wires.base import (
     Middleware,
     OnReply,
     OnRequest,
@@ -58,7 +58,7 @@ from rosglass.wires.zenoh.services import Service
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rosglass.ros2.graph import Graph
+    from rosglass.comm.graph import Graph
     from rosglass.wires.zenoh.options import ZenohOptions
     from rosglass.wires.zenoh.shm import SharedMemory
 

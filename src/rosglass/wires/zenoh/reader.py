@@ -21,13 +21,13 @@ import zenoh.ext
 
 from rosglass.comm import Durability, EndpointKind, Reliability
 from rosglass.comm.lateness import Lateness
-from rosglass.ros2.middleware import OnSample, Reader
+from rosglass.wires.base import OnSample, Reader
 from rosglass.wires.zenoh.endpoints import Declaration, Owner, Pump
 from rosglass.wires.zenoh.keys import ATTACHMENT, HUMBLE_HASH, NO_ATTACHMENT
 
 if TYPE_CHECKING:
     from rosglass.comm import QoS
-    from rosglass.ros2.graph import Graph
+    from rosglass.comm.graph import Graph
     from rosglass.wires.zenoh.local import Places
 
 __all__ = ["Drain", "ZenohReader"]

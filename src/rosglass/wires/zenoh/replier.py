@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 import zenoh
 
 from rosglass.comm import EndpointKind
-from rosglass.ros2.middleware import OnRequest, Replier, RequestId
+from rosglass.wires.base import OnRequest, Replier, RequestId
 from rosglass.wires.zenoh.endpoints import Declaration, Owner, direct
 from rosglass.wires.zenoh.keys import NO_ATTACHMENT, Attachment, gid_of, without_hash
 from rosglass.wires.zenoh.services import Service, send
 
 if TYPE_CHECKING:
     from rosglass.comm import EndpointInfo
-    from rosglass.ros2.graph import Graph
+    from rosglass.comm.graph import Graph
     from rosglass.wires.zenoh.local import Places
     from rosglass.wires.zenoh.requester import ZenohRequester
 

@@ -21,14 +21,14 @@ import zenoh
 
 from rosglass.comm import ConnectionState, EndpointKind
 from rosglass.errors import ConnectionLostError, NodeClosedError
-from rosglass.ros2.middleware import CALL_DROPPED, SERVER_LEFT, OnReply, Requester, RequestId
+from rosglass.wires.base import CALL_DROPPED, SERVER_LEFT, OnReply, Requester, RequestId
 from rosglass.wires.zenoh.endpoints import Declaration, Owner
 from rosglass.wires.zenoh.keys import HUMBLE_HASH, Attachment, gid_of
 from rosglass.wires.zenoh.replier import HeldCall
 from rosglass.wires.zenoh.services import Service, send
 
 if TYPE_CHECKING:
-    from rosglass.ros2.graph import Graph
+    from rosglass.comm.graph import Graph
     from rosglass.wires.zenoh.local import Places
     from rosglass.wires.zenoh.replier import ZenohReplier
 
@@ -138,7 +138,7 @@ class ZenohRequester(Declaration, Requester):
         return bool(self._own()) or bool(self._route()[1])
 
     def send(self, data: bytes | bytearray, timeout: float | None) -> int:
-        """Send a request; see :meth:`rosglass.ros2.middleware.Requester.send`."""
+        """Send a request; see :meth:`rosglass.wires.base.Requester.send`."""
         own, (key, others) = self._own(), self._route()
         number = next(self._numbers)
         deadline = float("inf") if timeout is None else time.monotonic() + timeout

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from rosglass.comm import EndpointInfo, NodeName, Status
+    from rosglass.comm.graph import Graph
     from rosglass.interfaces import Definition
-    from rosglass.ros2.graph import Graph
 
 __all__ = [
     "CALL_DROPPED",
