@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import os
+import random
 import shutil
 import signal
 import socket
@@ -36,10 +38,17 @@ INSTALL_CPP = (
 
 
 def free_port() -> int:
-    """Return a port of the loopback interface that nobody listens on."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+    """Return a port of the loopback interface that is not in use.
+
+    From a range that no other process of tests takes ports from, nor the system by itself: until
+    the test's program listens there, another one's must not.
+    """
+    number = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
+    while True:
+        port = 12000 + number % 4 * 5000 + random.SystemRandom().randrange(5000)
+        with suppress(OSError), socket.socket() as probe:
+            probe.bind(("127.0.0.1", port))
+            return port
 
 
 def needs(*programs: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import importlib.metadata
 
 import pytest
@@ -62,6 +63,17 @@ def test_an_empty_profile_is_ddss_default():
     assert profile.reliability is Reliability.BEST_EFFORT
     assert profile.durability is Durability.VOLATILE
     assert (profile.deadline, profile.lifespan, profile.lease_duration) == (None, None, None)
+
+
+@pytest.mark.filterwarnings("error::pytest.PytestUnraisableExceptionWarning")
+def test_a_profile_interrupted_at_its_making_frees_nothing(monkeypatch):
+    def interrupt():
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cyclone_qos, "library", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        cyclone_qos.Qos()
+    gc.collect()
 
 
 def test_user_data_is_any_bytes():

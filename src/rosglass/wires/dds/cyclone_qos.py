@@ -31,8 +31,10 @@ class Qos:
     """
 
     def __init__(self, borrowed: int | None = None) -> None:
-        self._owned = borrowed is None
+        # Last, as Ctrl-C may come in between: what was not created is not freed.
+        self._owned = False
         self.address: int = library().dds_create_qos() if borrowed is None else borrowed
+        self._owned = borrowed is None
 
     def __del__(self) -> None:
         if self._owned:
