@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from rosglass.comm import Duration, Node, QoS, Time
     from rosglass.connection import connect
     from rosglass.errors import (
+        ArgumentError,
         BagError,
         ConnectionLostError,
         ConnectivityException,
@@ -49,6 +50,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "ActionType",
+    "ArgumentError",
     "BagError",
     "ConnectionLostError",
     "ConnectivityException",

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from rosglass.comm.flags import check_flag
-from rosglass.errors import ConversionError, UnsupportedError
+from rosglass.errors import ArgumentError, UnsupportedError
 from rosglass.interfaces import Library
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ def connect(
             appear shortly after connecting.
 
     Raises:
-        ConversionError: A part of the URL, an environment variable or an option is not valid.
+        ArgumentError: A part of the URL, an environment variable or an option is not valid.
         RosArgumentError: One of `arguments` is not valid; the message says which, and what to
             write instead.
         UnsupportedError: The URL's scheme is unknown, or there is neither URL nor environment.
@@ -131,13 +131,13 @@ def connect(
     if url is None:
         url = default_url(os.environ)
     if not isinstance(url, str):
-        raise ConversionError("url", url, f"a text such as {_EXAMPLES}")
+        raise ArgumentError("url", url, f"a text such as {_EXAMPLES}")
     scheme, separator, rest = url.partition("://")
     scheme = scheme.lower()
     if separator:
         url = f"{scheme}://{rest}"
     if library is not None and not isinstance(library, Library):
-        raise ConversionError("library", library, "a rosglass.Library, or None for the shared one")
+        raise ArgumentError("library", library, "a rosglass.Library, or None for the shared one")
     check_flag(own_services, "own_services", "connect()")
     if url.lower().startswith("replay:"):
         from rosglass.bags.replay_node import connect_replay  # noqa: PLC0415

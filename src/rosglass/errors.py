@@ -9,6 +9,7 @@ import builtins
 import re
 
 __all__ = [
+    "ArgumentError",
     "BagError",
     "ConnectionLostError",
     "ConnectivityException",
@@ -137,6 +138,19 @@ class ConversionError(Error):
         where = f"{type_name}: " if type_name else ""
         super().__init__(f"{where}{path or '(message)'}: expected {expected}, got {shown}")
         self.path, self.value, self.expected, self.type_name = path, value, expected, type_name
+
+
+class ArgumentError(ConversionError, TypeError, ValueError):
+    """An argument, an option of a URL or a setting is not what it may be.
+
+    It is a :class:`ConversionError` as well until 0.3; from then on, that is for values that do not
+    fit a message.
+
+    Attributes:
+        path: Name of the argument, option or setting.
+        value: What was given.
+        expected: What would have been accepted, in words.
+    """
 
 
 class DecodeError(Error):

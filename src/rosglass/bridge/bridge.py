@@ -18,7 +18,7 @@ from rosglass.bridge.topic_relay import TopicRelay
 from rosglass.comm import IMMEDIATE, ConnectionState, Handle, Node, QoS, Worker
 from rosglass.comm.promise import check_timeout
 from rosglass.comm.similar import similar
-from rosglass.errors import ConversionError, Error, InvalidNameError, NodeClosedError
+from rosglass.errors import ArgumentError, Error, InvalidNameError, NodeClosedError
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping
@@ -74,7 +74,7 @@ class Bridge(Handle):
     Raises:
         InvalidNameError: A name, or pattern, makes no sense, nothing is to be relayed, or the nodes
             have two names.
-        ConversionError: Another argument makes no sense.
+        ArgumentError: Another argument makes no sense.
         NodeClosedError: A node is closed.
     """
 
@@ -95,19 +95,19 @@ class Bridge(Handle):
     ) -> None:
         for name, node in (("node_a", node_a), ("node_b", node_b)):
             if not isinstance(node, Node):
-                raise ConversionError(name, node, "a node of rosglass.connect()", "Bridge")
+                raise ArgumentError(name, node, "a node of rosglass.connect()", "Bridge")
         if node_a is node_b:
-            raise ConversionError("node_b", node_b, "another node than node_a", "Bridge")
+            raise ArgumentError("node_b", node_b, "another node than node_a", "Bridge")
         if node_a.name != node_b.name:
             raise InvalidNameError(
                 f"both nodes of a bridge need one name, by which other bridges know them; these "
                 f"are {node_a.name} and {node_b.name}"
             )
         if node_a.url == node_b.url:
-            raise ConversionError("node_b", node_b.url, "another world than node_a's", "Bridge")
+            raise ArgumentError("node_b", node_b.url, "another world than node_a's", "Bridge")
         check_timeout(timeout, "Bridge")
         if isinstance(memory, bool) or not isinstance(memory, int) or memory < 1:
-            raise ConversionError("memory", memory, "a number of bytes", "Bridge")
+            raise ArgumentError("memory", memory, "a number of bytes", "Bridge")
         self._topics = Rules(topics, exclude)
         #: By kind: what has servers.
         self._offers = {"action": Rules(actions, exclude), "service": Rules(services, exclude)}

@@ -8,7 +8,7 @@ from enum import Enum
 from fnmatch import fnmatchcase, translate
 from typing import TYPE_CHECKING
 
-from rosglass.errors import ConversionError, InvalidNameError
+from rosglass.errors import ArgumentError, InvalidNameError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -98,7 +98,7 @@ class Rules:
 
     Raises:
         InvalidNameError: A text makes no sense.
-        ConversionError: `exclude` is no regular expression.
+        ArgumentError: `exclude` is no regular expression.
     """
 
     def __init__(self, rules: Iterable[str | Rule], exclude: str = "") -> None:
@@ -109,7 +109,7 @@ class Rules:
             self._exclude = re.compile(exclude) if exclude else None
         except re.error as error:
             what = f"a regular expression ({error})"
-            raise ConversionError("exclude", exclude, what, "Bridge") from None
+            raise ArgumentError("exclude", exclude, what, "Bridge") from None
 
     def __bool__(self) -> bool:
         return bool(self.rules)

@@ -66,7 +66,7 @@ def split_type(rest: Sequence[str]) -> tuple[str | None, str]:
 
 
 def profile(args: argparse.Namespace) -> QoS:
-    """Return what ``--qos`` and its companions say; raises UnsupportedError."""
+    """Return what ``--qos`` and its companions say; raises ArgumentError."""
     from dataclasses import replace
 
     from rosglass.comm import Durability, History, QoS, Reliability

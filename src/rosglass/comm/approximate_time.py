@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections import deque
 from typing import Generic, TypeVar
 
-from rosglass.errors import ConversionError
+from rosglass.errors import ArgumentError
 
 __all__ = ["ApproximateTime"]
 
@@ -36,16 +36,16 @@ class ApproximateTime(Generic[_T]):
         dropped: Messages that came into no set.
 
     Raises:
-        ConversionError: An argument makes no sense.
+        ArgumentError: An argument makes no sense.
     """
 
     def __init__(self, count: int, queue_size: int = 10, slop: int = 100_000_000) -> None:
         if count < 2:
-            raise ConversionError("topics", count, "at least two of them")
+            raise ArgumentError("topics", count, "at least two of them")
         if queue_size < 1:
-            raise ConversionError("queue size", queue_size, "at least 1")
+            raise ArgumentError("queue size", queue_size, "at least 1")
         if slop < 0:
-            raise ConversionError("slop", slop, "a time of 0 or more")
+            raise ArgumentError("slop", slop, "a time of 0 or more")
         self._size, self._slop = queue_size, slop
         self._queues: list[deque[tuple[int, _T]]] = [deque() for _ in range(count)]
         #: What was passed over since the candidate was found, the candidate's own messages first.

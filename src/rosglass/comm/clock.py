@@ -23,7 +23,7 @@ from rosglass.comm.node import Executor, Handle
 from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.comm.time import Duration, Time
 from rosglass.comm.unique import Unique
-from rosglass.errors import ConversionError, NodeClosedError
+from rosglass.errors import ArgumentError, NodeClosedError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -112,7 +112,7 @@ class Clock(Unique):
     def sleep_until(self, when: Time) -> bool:
         """Wait until the clock shows `when`; results and errors as for :meth:`sleep`."""
         if not isinstance(when, Time):
-            raise ConversionError("when", when, "a rosglass.Time")
+            raise ArgumentError("when", when, "a rosglass.Time")
         return self._sleep(when.nanoseconds, lambda: self.now().nanoseconds, self._switches)
 
     def on_jump(
@@ -130,7 +130,7 @@ class Clock(Unique):
             executor: Where `callback` runs; None for the node's own dispatcher thread.
         """
         if not callable(callback):
-            raise ConversionError("callback", callback, "something that can be called")
+            raise ArgumentError("callback", callback, "something that can be called")
 
         watcher = _Watcher(self._watchers, forward)
         watcher.listeners.add(callback, executor or self._executor)
@@ -148,17 +148,15 @@ class Clock(Unique):
         A callback that is still running or waiting when its time comes again misses that turn.
 
         Raises:
-            ConversionError: The period is not above zero.
+            ArgumentError: The period is not above zero.
             NodeClosedError: The node is closed.
         """
         length = period if isinstance(period, Duration) else _seconds("period", period)
         if length <= Duration():
-            raise ConversionError("period", period, "a time above zero")
+            raise ArgumentError("period", period, "a time above zero")
         check_plain(callback, "create_timer()")
         if executor is not None and not isinstance(executor, Executor):
-            raise ConversionError(
-                "executor", executor, "a rosglass.comm.Executor", "create_timer()"
-            )
+            raise ArgumentError("executor", executor, "a rosglass.comm.Executor", "create_timer()")
         timer = Timer(self, length, callback, executor or self._executor)
         with self._changed:
             if self._closed:
@@ -351,5 +349,5 @@ class Timer(Handle):
 
 def _seconds(what: str, value: object) -> Duration:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < 1e9:
-        raise ConversionError(what, value, "seconds or a rosglass.Duration")
+        raise ArgumentError(what, value, "seconds or a rosglass.Duration")
     return Duration.from_seconds(value)

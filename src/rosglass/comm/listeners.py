@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 from rosglass.comm.executor import RetryingExecutor, run_job
 from rosglass.comm.loop import check_plain
 from rosglass.comm.node import Executor, Handle
-from rosglass.errors import ConversionError
+from rosglass.errors import ArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -42,11 +42,11 @@ class Listeners(Generic[_T]):
         """Tell `callback` each new value on `executor`, until the handle is closed.
 
         Raises:
-            ConversionError: One of the two is not what it should be.
+            ArgumentError: One of the two is not what it should be.
         """
         check_plain(callback, self._where)
         if not isinstance(executor, Executor):
-            raise ConversionError("executor", executor, "a rosglass.comm.Executor", self._where)
+            raise ArgumentError("executor", executor, "a rosglass.comm.Executor", self._where)
         listener = Listener(self, callback, executor, self._depth, self._where)
         with self._lock:
             self._listeners.append(listener)

@@ -6,7 +6,7 @@ import inspect
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.node import Executor
-from rosglass.errors import ConversionError
+from rosglass.errors import ArgumentError
 
 if TYPE_CHECKING:
     import asyncio
@@ -31,14 +31,14 @@ class LoopExecutor(Executor):
         """Return one for the loop that runs in this thread, for a coroutine function.
 
         Raises:
-            ConversionError: None runs, so that `callback` could never be called.
+            ArgumentError: None runs, so that `callback` could never be called.
         """
         import asyncio  # noqa: PLC0415 - only for those who use it
 
         try:
             return cls(asyncio.get_running_loop())
         except RuntimeError:
-            raise ConversionError(
+            raise ArgumentError(
                 "callback",
                 callback,
                 "a plain function, or to be created inside a running event loop, as in "
@@ -74,26 +74,26 @@ def is_coroutine_function(callback: object) -> bool:
 
 
 def check_plain(callback: object, where: str = "", name: str = "callback") -> None:
-    """Raise ConversionError unless `callback` can be called and is no coroutine function."""
+    """Raise ArgumentError unless `callback` can be called and is no coroutine function."""
     if not callable(callback):
-        raise ConversionError(name, callback, "something that can be called", where)
+        raise ArgumentError(name, callback, "something that can be called", where)
     if is_coroutine_function(callback):
         # It would be called, and nothing in it would ever run.
         told = "a plain function (loop.call_soon_threadsafe() brings work into asyncio)"
-        raise ConversionError(name, callback, told, where)
+        raise ArgumentError(name, callback, told, where)
 
 
 def executor_for(
     callback: Any, executor: Executor | None, default: Executor, where: str
 ) -> Executor:
-    """Return where a callback runs; raises ConversionError when it cannot run."""
+    """Return where a callback runs; raises ArgumentError when it cannot run."""
     if not callable(callback):
-        raise ConversionError("callback", callback, "something that can be called", where)
+        raise ArgumentError("callback", callback, "something that can be called", where)
     if executor is not None and not isinstance(executor, Executor):
-        raise ConversionError("executor", executor, "a rosglass.comm.Executor", where)
+        raise ArgumentError("executor", executor, "a rosglass.comm.Executor", where)
     if not is_coroutine_function(callback):
         return executor or default
     if executor is not None:
         told = "no executor beside a coroutine function, which runs in its event loop"
-        raise ConversionError("executor", executor, told, where)
+        raise ArgumentError("executor", executor, told, where)
     return LoopExecutor.running(callback, where)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from rosglass.comm.executor import RetryingExecutor, run_job
 from rosglass.comm.receiving import check_may_wait
-from rosglass.errors import ConversionError, TimeoutError  # noqa: A004 - the field's own word
+from rosglass.errors import ArgumentError, TimeoutError  # noqa: A004 - the field's own word
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -27,11 +27,11 @@ _GIVE_UP_S = 30.0
 
 
 def check_timeout(timeout: float | None, where: str) -> float | None:
-    """Return a timeout in seconds, None for infinite ones; raises ConversionError."""
+    """Return a timeout in seconds, None for infinite ones; raises ArgumentError."""
     if timeout is None:
         return None
     if isinstance(timeout, bool) or not isinstance(timeout, (int, float)) or not timeout >= 0:
-        raise ConversionError("timeout", timeout, "seconds from 0 on, or None for ever", where)
+        raise ArgumentError("timeout", timeout, "seconds from 0 on, or None for ever", where)
     return None if math.isinf(timeout) else float(timeout)
 
 
@@ -95,7 +95,7 @@ class Promise(Future[_T]):
             executor: Where it runs; None for the node's own dispatcher thread.
         """
         if not callable(callback):
-            raise ConversionError("callback", callback, "something that can be called", "on_done")
+            raise ArgumentError("callback", callback, "something that can be called", "on_done")
         chosen = executor or self._executor
         if chosen is None:
             self.add_done_callback(callback)

@@ -11,7 +11,7 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 from rosglass.comm.time import Duration
-from rosglass.errors import UnsupportedError
+from rosglass.errors import ArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
@@ -83,7 +83,7 @@ class QoS:
     The constant :data:`BEST_AVAILABLE` may stand for a deadline or a lease duration.
 
     Raises:
-        UnsupportedError: A policy has a value that it cannot have.
+        ArgumentError: A policy has a value that it cannot have.
     """
 
     depth: int = 10
@@ -98,15 +98,16 @@ class QoS:
     def __post_init__(self) -> None:
         depth = self.depth
         if isinstance(depth, str) and depth in _PRESETS:
-            raise UnsupportedError(
-                f"a QoS profile or a depth was expected, got the text {depth!r}; "
-                f"use QoS.preset({depth!r})"
+            expected = (
+                f"a number of samples; for the profile of that name use QoS.preset({depth!r})"
             )
+            raise ArgumentError("depth", depth, expected, "QoS")
         if type(depth) is not int or not 1 <= depth <= _MAX_DEPTH:
-            raise UnsupportedError(
-                f"QoS depth must be an integer from 1 to {_MAX_DEPTH}, got {depth!r}; "
-                "use History.KEEP_ALL to keep every sample, or a profile such as QoS.sensor_data()"
+            expected = (
+                f"an integer from 1 to {_MAX_DEPTH}; use History.KEEP_ALL to keep every sample, or "
+                "a profile such as QoS.sensor_data()"
             )
+            raise ArgumentError("depth", depth, expected, "QoS")
         for name, kind in (
             ("reliability", Reliability),
             ("durability", Durability),
@@ -116,21 +117,20 @@ class QoS:
             value = getattr(self, name)
             if not isinstance(value, kind):
                 choices = " or ".join(f"{kind.__name__}.{member.name}" for member in kind)
-                raise UnsupportedError(f"QoS {name} must be {choices}, got {value!r}")
+                raise ArgumentError(name, value, choices, "QoS")
         for name in ("deadline", "lifespan", "lease_duration"):
             value = getattr(self, name)
             if value is None:
                 continue
             if not (isinstance(value, Duration) and Duration() < value <= BEST_AVAILABLE):
-                raise UnsupportedError(
-                    f"QoS {name} must be a Duration above zero and below 292 years, e.g. "
-                    f"Duration.from_seconds(0.5), or None for no limit; got {value!r}"
+                expected = (
+                    "a Duration above zero and below 292 years, e.g. Duration.from_seconds(0.5), "
+                    "or None for no limit"
                 )
+                raise ArgumentError(name, value, expected, "QoS")
             if name == "lifespan" and value == BEST_AVAILABLE:
-                raise UnsupportedError(
-                    "QoS lifespan cannot be BEST_AVAILABLE: it is the publisher's alone; give a "
-                    "Duration, or None for no limit"
-                )
+                expected = "a Duration, or None for no limit, as it is the publisher's alone"
+                raise ArgumentError(name, value, expected, "QoS")
 
     @classmethod
     def sensor_data(cls) -> QoS:
@@ -199,11 +199,10 @@ class QoS:
         """Return the preset that is called `name`, e.g. ``sensor_data``.
 
         Raises:
-            UnsupportedError: There is none of that name; the message lists them.
+            ArgumentError: There is none of that name; the message lists them.
         """
         if not isinstance(name, str) or name not in _PRESETS:
-            known = ", ".join(_PRESETS)
-            raise UnsupportedError(f"there is no QoS preset {name!r}; there are: {known}")
+            raise ArgumentError("name", name, f"one of {', '.join(_PRESETS)}", "QoS.preset()")
         return _PRESETS[name]()
 
     def with_depth(self, depth: int) -> QoS:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rosglass.comm import Listeners
 from rosglass.comm.promise import check_timeout
 from rosglass.comm.receiving import check_may_wait
-from rosglass.errors import ConversionError
+from rosglass.errors import ArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -64,7 +64,7 @@ class Readiness:
         """Tell `callback` each change."""
         self._check_open()
         if not callable(callback):
-            raise ConversionError("callback", callback, "something that can be called", self._name)
+            raise ArgumentError("callback", callback, "something that can be called", self._name)
         return self._listeners.add(callback, executor or self._default)
 
     def update(self) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, overload
 
 from rosglass.comm.rclpy_names import hint_at_members
-from rosglass.errors import ConversionError
+from rosglass.errors import ArgumentError
 
 if TYPE_CHECKING:
     from rosglass.messages.message import Stamp
@@ -19,7 +19,7 @@ _NS = 1_000_000_000
 
 def _check(kind: str, nanoseconds: object, instead: str) -> None:
     if type(nanoseconds) is not int:
-        raise ConversionError("nanoseconds", nanoseconds, f"an integer; {instead}", kind)
+        raise ArgumentError("nanoseconds", nanoseconds, f"an integer; {instead}", kind)
 
 
 @hint_at_members
@@ -38,12 +38,12 @@ class Duration:
 
     @classmethod
     def from_seconds(cls, seconds: float) -> Duration:
-        """Return the duration nearest to `seconds`; raises ConversionError unless it is finite."""
+        """Return the duration nearest to `seconds`; raises ArgumentError unless it is finite."""
         try:
             return cls(round(seconds * _NS))
         except (TypeError, ValueError, OverflowError):
             told = "a finite number of seconds"
-            raise ConversionError("seconds", seconds, told, "Duration.from_seconds()") from None
+            raise ArgumentError("seconds", seconds, told, "Duration.from_seconds()") from None
 
     @property
     def seconds(self) -> float:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.qos import BEST_AVAILABLE, Durability, History, Liveliness, QoS, Reliability
 from rosglass.comm.time import Duration
-from rosglass.errors import ConversionError, UnsupportedError
+from rosglass.errors import ArgumentError, ConversionError
 from rosglass.qml.js_values import shown
 
 if TYPE_CHECKING:
@@ -57,10 +57,10 @@ def qos_from_js(value: QJSValue | None, default: QoS) -> QoS:
             ),
             lease_duration=_limit(value, "lease"),
         )
+    except ArgumentError as error:
+        raise ConversionError(f"qos.{error.path}", shown(value), error.expected) from None
     except ValueError:
         raise ConversionError("qos", shown(value), "a queue size or Ros2.QoS()") from None
-    except UnsupportedError as error:
-        raise ConversionError("qos", shown(value), str(error)) from None
 
 
 def _limit(value: QJSValue, name: str) -> Duration | None:

@@ -10,7 +10,7 @@ import re
 import socket
 from typing import TYPE_CHECKING
 
-from rosglass.errors import ConversionError
+from rosglass.errors import ArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -27,7 +27,7 @@ def given_address(env: Mapping[str, str]) -> tuple[str, str]:
     """Return the host name or address that the environment says to announce, and which variable.
 
     Raises:
-        ConversionError: The variable's value is no host.
+        ArgumentError: The variable's value is no host.
     """
     for variable in ("ROS_HOSTNAME", "ROS_IP"):
         if value := env.get(variable, "").strip():
@@ -36,10 +36,10 @@ def given_address(env: Mapping[str, str]) -> tuple[str, str]:
 
 
 def check_host(value: str, what: str) -> str:
-    """Return a host or address; raises ConversionError, which names `what`, for anything else."""
+    """Return a host or address; raises ArgumentError, which names `what`, for anything else."""
     # One colon separates a port, more are an address of IPv6.
     if not _HOST.match(value) or value.count(":") == 1:
-        raise ConversionError(what, value, "a host or address only, without port")
+        raise ArgumentError(what, value, "a host or address only, without port")
     return value
 
 
@@ -89,7 +89,7 @@ def bracketed(host: str) -> str:
 
 
 def parse_uri(uri: str, what: str) -> tuple[str, int]:
-    """Return host and port of an XML-RPC or ``rosrpc://`` URI; raises ConversionError.
+    """Return host and port of an XML-RPC or ``rosrpc://`` URI; raises ArgumentError.
 
     Args:
         uri: Such as ``http://robot:11311/``.
@@ -103,7 +103,7 @@ def parse_uri(uri: str, what: str) -> tuple[str, int]:
     except ValueError:
         host = port = None
     if not host or not port:
-        raise ConversionError(what, uri, "scheme, host and port, as in http://robot:11311")
+        raise ArgumentError(what, uri, "scheme, host and port, as in http://robot:11311")
     return host, port
 
 

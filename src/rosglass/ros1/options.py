@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, unquote, urlsplit
 
 from rosglass.comm import anonymous_name
-from rosglass.errors import ConversionError
+from rosglass.errors import ArgumentError
 from rosglass.ros1.address import bracketed, check_host, given_address, parse_uri
 from rosglass.ros1.arguments import NO_ARGUMENTS
 from rosglass.ros1.names import absolute_namespace
@@ -63,18 +63,18 @@ class Ros1Options:
                 expressly, and wins over both.
 
         Raises:
-            ConversionError: A part of the URL or an environment variable is not valid.
+            ArgumentError: A part of the URL or an environment variable is not valid.
         """
         try:
             parts = urlsplit(url)
             host, port = parts.hostname, parts.port
         except ValueError as error:
-            raise ConversionError("url", url, f"{_EXAMPLE} ({error})") from error
+            raise ArgumentError("url", url, f"{_EXAMPLE} ({error})") from error
         host = unquote(host or "")
         if parts.path not in ("", "/") or parts.fragment or "@" in parts.netloc or port == 0:
-            raise ConversionError("url", url, _EXAMPLE)
+            raise ArgumentError("url", url, _EXAMPLE)
         if " " in host or not host.isprintable():
-            raise ConversionError("url", url, f"{_EXAMPLE} (no host is named {host!r})")
+            raise ArgumentError("url", url, f"{_EXAMPLE} (no host is named {host!r})")
         options = _options(parts.query, url)
         if host or port:
             master = f"http://{bracketed(host or 'localhost')}:{port or _PORT}"
@@ -86,7 +86,7 @@ class Ros1Options:
             master = master or f"http://localhost:{_PORT}"
         parse_uri(master, source)
         if not master.startswith("http://"):
-            raise ConversionError(source, master, "a URI such as http://robot:11311")
+            raise ArgumentError(source, master, "a URI such as http://robot:11311")
         if "ip" in options:
             address, told = check_host(options["ip"], "url option ip"), "ip"
         elif arguments.address:
@@ -136,9 +136,9 @@ def _options(query: str, url: str) -> dict[str, str]:
     found: dict[str, str] = {}
     for name, value in parse_qsl(query, keep_blank_values=True):
         if name not in _OPTIONS:
-            raise ConversionError(f"url option {name}", url, f"one of {', '.join(_OPTIONS)}")
+            raise ArgumentError(f"url option {name}", url, f"one of {', '.join(_OPTIONS)}")
         if name in found or not value:
-            raise ConversionError(f"url option {name}", url, "each option once, with a value")
+            raise ArgumentError(f"url option {name}", url, "each option once, with a value")
         found[name] = value
     return found
 
@@ -146,12 +146,12 @@ def _options(query: str, url: str) -> dict[str, str]:
 def _port(options: Mapping[str, str], name: str) -> int:
     text = options.get(name, "0")
     if not (text.isascii() and text.isdecimal()) or int(text) > 65535:
-        raise ConversionError(f"url option {name}", text, "a port number from 0 to 65535")
+        raise ArgumentError(f"url option {name}", text, "a port number from 0 to 65535")
     return int(text)
 
 
 def _flag(options: Mapping[str, str], name: str) -> bool:
     text = options.get(name, "false").lower()
     if text not in ("true", "false"):
-        raise ConversionError(f"url option {name}", text, "true or false")
+        raise ArgumentError(f"url option {name}", text, "true or false")
     return text == "true"

@@ -9,7 +9,7 @@ from rosglass.comm.core_node import CoreNode
 from rosglass.comm.flags import check_flag
 from rosglass.comm.names import validate_namespace, validate_node_name
 from rosglass.comm.rclpy_names import check_order
-from rosglass.errors import UnsupportedError
+from rosglass.errors import ArgumentError
 from rosglass.ros2.arguments import NO_ARGUMENTS
 from rosglass.ros2.core import Core
 from rosglass.ros2.furniture import Furniture
@@ -294,5 +294,5 @@ def _profile(qos: QoS | int, place: str) -> QoS:
         return qos
     try:
         return QoS(depth=qos)
-    except UnsupportedError as error:
-        raise UnsupportedError(f"{place}: {error}") from None
+    except ArgumentError as error:
+        raise ArgumentError("qos", error.value, error.expected, place) from None

@@ -19,7 +19,7 @@ from rosglass.comm.promise import check_timeout
 from rosglass.comm.similar import similar
 from rosglass.comm.time import Duration, Time
 from rosglass.errors import (
-    ConversionError,
+    ArgumentError,
     InvalidArgumentException,
     LookupException,
     TimeoutException,
@@ -80,7 +80,7 @@ class TransformBuffer(Handle):
             ``not normalised``, ``loop``.
 
     Raises:
-        ConversionError: The time is not above zero.
+        ArgumentError: The time is not above zero.
     """
 
     def __init__(self, cache_time: float | Duration = 10.0) -> None:
@@ -88,7 +88,7 @@ class TransformBuffer(Handle):
         if isinstance(kept, (int, float)) and not isinstance(kept, bool) and 0 < kept < 1e9:
             kept = Duration.from_seconds(kept)
         if not isinstance(kept, Duration) or kept <= Duration():
-            raise ConversionError("cache_time", cache_time, "seconds above zero, or a Duration")
+            raise ArgumentError("cache_time", cache_time, "seconds above zero, or a Duration")
         self.cache_time = kept
         self.ignored: Counter[str] = Counter()
         self._lock = threading.Lock()
@@ -395,7 +395,7 @@ class TransformBuffer(Handle):
                 not wait for anything.
 
         Raises:
-            ConversionError: `callback` or `executor` is not what it should be.
+            ArgumentError: `callback` or `executor` is not what it should be.
             InvalidArgumentException: A name is empty or starts with a slash.
         """
         for frame, what in ((target, "target"), (source, "source")):

@@ -17,7 +17,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from rosglass.comm import ConnectionState, Durability, EndpointKind, Handle, History, Status
-from rosglass.errors import ConversionError, NodeClosedError
+from rosglass.errors import ArgumentError, NodeClosedError
 from rosglass.wires.base import (
     SERVER_LEFT,
     Middleware,
@@ -381,7 +381,7 @@ class LocalMiddleware(Middleware):
         network: What it shares with the other nodes of that name.
 
     Raises:
-        ConversionError: The URL has more than a name.
+        ArgumentError: The URL has more than a name.
     """
 
     matches_qos = True
@@ -390,7 +390,7 @@ class LocalMiddleware(Middleware):
         name = url.partition("://")[2].rstrip("/")
         if not _NAME.fullmatch(name):
             expected = "local://NAME with a name of letters, digits, '_', '-' and '.', no options"
-            raise ConversionError("url", url, expected)
+            raise ArgumentError("url", url, expected)
         self._name = name
         self._lock = threading.Lock()
         self._ends: dict[Handle, None] = {}

@@ -12,7 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rosglass.errors import ConversionError
+from rosglass.errors import ArgumentError
 from rosglass.wires.dds.options import DdsOptions, DiscoveryRange
 from rosglass.wires.dds.peers import addresses
 
@@ -56,13 +56,13 @@ def domain_config(options: DdsOptions) -> str:
     """Return what Cyclone DDS is to be configured with; looks up the names of peers.
 
     Raises:
-        ConversionError: The URL and the user's own configuration say different things.
+        ArgumentError: The URL and the user's own configuration say different things.
         ConnectionLostError: A peer's name is unknown.
     """
     for option, elements in _CLAIMS.items():
         said = [name for name in elements if option in options.chosen and _says(options, name)]
         if said:
-            raise ConversionError(
+            raise ArgumentError(
                 option,
                 options.config,
                 f"CYCLONEDDS_URI without <{said[0]}>, as the URL chooses that; leave out one",

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from rosglass.comm import Handle
-from rosglass.errors import ConnectionLostError, ConversionError, UnsupportedError
+from rosglass.errors import ArgumentError, ConnectionLostError, UnsupportedError
 from rosglass.wires.dds import cyclone
 from rosglass.wires.dds.config import ANY_PORTS, domain_config, users_part
 
@@ -70,7 +70,7 @@ class Domain(Handle):
         number: The ROS domain.
 
     Raises:
-        ConversionError: Cyclone DDS refuses the configuration; it says what is wrong.
+        ArgumentError: Cyclone DDS refuses the configuration; it says what is wrong.
         ConnectionLostError: A peer's name is unknown, or this machine cannot do it now.
         UnsupportedError: The process is in the domain already with another configuration, or is a
             fork of one that uses DDS.
@@ -161,10 +161,10 @@ def _check(domain: int, config: str) -> None:
 def _refuse(domain: int, config: str, problem: str) -> None:
     interface = _NO_INTERFACE.match(problem)
     if interface:
-        raise ConversionError("interface", interface[1], f"one of this machine's ({problem})")
+        raise ArgumentError("interface", interface[1], f"one of this machine's ({problem})")
     own = users_part(config)
     if own and _trial(domain, config.removesuffix(f",{own}")) != problem:
-        raise ConversionError("CYCLONEDDS_URI", own, f"what Cyclone DDS accepts ({problem})")
+        raise ArgumentError("CYCLONEDDS_URI", own, f"what Cyclone DDS accepts ({problem})")
     raise ConnectionLostError(f"Cyclone DDS cannot take part in domain {domain}: {problem}")
 
 

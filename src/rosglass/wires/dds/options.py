@@ -9,7 +9,7 @@ from enum import Enum
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, urlsplit
 
-from rosglass.errors import ConversionError
+from rosglass.errors import ArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -69,7 +69,7 @@ class DdsOptions:
         wins over the next two), ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_STATIC_PEERS, CYCLONEDDS_URI.
 
         Raises:
-            ConversionError: A part of the URL or a variable is not valid; it says which.
+            ArgumentError: A part of the URL or a variable is not valid; it says which.
         """
         hosts, options = _split(url)
         peers = (*hosts, *_list(options, "peers", _PEER, "a host name or an IPv4 address", url))
@@ -82,7 +82,7 @@ class DdsOptions:
             domain = _domain(env.get("ROS_DOMAIN_ID") or "0", "ROS_DOMAIN_ID", "environment")
         distro = options.get("distro")
         if distro is not None and distro not in _DISTRIBUTIONS:
-            raise ConversionError("distro", distro, f"one of {', '.join(_DISTRIBUTIONS)}", url)
+            raise ArgumentError("distro", distro, f"one of {', '.join(_DISTRIBUTIONS)}", url)
         discovery, others = _range(options.get("range"), bool(peers), url, env)
         return cls(
             domain=domain,
@@ -100,11 +100,11 @@ def _split(url: str) -> tuple[list[str], dict[str, str]]:
         parts = urlsplit(url)
         port = parts.netloc.rpartition(":")[2] if ":" in parts.netloc else ""
     except ValueError as error:
-        raise ConversionError("url", url, f"a URL {_EXAMPLE} ({error})") from error
+        raise ArgumentError("url", url, f"a URL {_EXAMPLE} ({error})") from error
     if parts.path not in ("", "/") or parts.fragment or "@" in parts.netloc:
-        raise ConversionError("url", url, f"nothing but peers and options, {_EXAMPLE}")
+        raise ArgumentError("url", url, f"nothing but peers and options, {_EXAMPLE}")
     if port.isdigit() and parts.netloc.count(":") == 1:
-        raise ConversionError(
+        raise ArgumentError(
             "address", parts.netloc, f"no port: DDS derives it from the domain, {_EXAMPLE}", url
         )
     hosts = [host for host in _SEPARATOR.split(parts.netloc) if host]
@@ -114,9 +114,9 @@ def _split(url: str) -> tuple[list[str], dict[str, str]]:
     options = dict(given)
     for key, value in given:
         if key not in _KNOWN:
-            raise ConversionError("option", key, f"one of {', '.join(_KNOWN)}", url)
+            raise ArgumentError("option", key, f"one of {', '.join(_KNOWN)}", url)
         if options[key] != value:
-            raise ConversionError(key, value, f"to be given once, not also {options[key]}", url)
+            raise ArgumentError(key, value, f"to be given once, not also {options[key]}", url)
     return hosts, options
 
 
@@ -131,15 +131,15 @@ def _range(
     wanted = env.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "")
     source = "ROS_AUTOMATIC_DISCOVERY_RANGE"
     if localhost_only not in ("", "0", "1"):
-        raise ConversionError("ROS_LOCALHOST_ONLY", localhost_only, "0 or 1", "environment")
+        raise ArgumentError("ROS_LOCALHOST_ONLY", localhost_only, "0 or 1", "environment")
     if option is not None:
         if option.lower() not in words.split(", "):
-            raise ConversionError("range", option, f"one of {words}", url)
+            raise ArgumentError("range", option, f"one of {words}", url)
         discovery, source = DiscoveryRange(option.lower()), "range"
     elif localhost_only == "1":
         discovery, source, others = DiscoveryRange.LOCALHOST, "ROS_LOCALHOST_ONLY", []
     elif wanted and wanted.lower() not in words.split(", "):
-        raise ConversionError(source, wanted, f"one of {words.upper()}", "environment")
+        raise ArgumentError(source, wanted, f"one of {words.upper()}", "environment")
     else:
         discovery = DiscoveryRange(wanted.lower() or "subnet")
     for peer in others:
@@ -147,7 +147,7 @@ def _range(
     if discovery in (DiscoveryRange.OFF, DiscoveryRange.SYSTEM_DEFAULT):
         reason = f"{source}={discovery.value} lets no peer be named"
         if named:
-            raise ConversionError(
+            raise ArgumentError(
                 "peers", url, f"range=subnet or range=localhost beside them ({reason})"
             )
         if others:
@@ -163,7 +163,7 @@ def _list(
         return []
     items = [item.strip() for item in _SEPARATOR.split(options[key]) if item.strip()]
     if not items:
-        raise ConversionError(key, options[key], expected, url)
+        raise ArgumentError(key, options[key], expected, url)
     for item in items:
         _check(item, key, form, expected, url)
     return items
@@ -171,12 +171,12 @@ def _list(
 
 def _check(item: str, what: str, form: re.Pattern[str], expected: str, where: str) -> None:
     if not form.match(item):
-        raise ConversionError(what, item, expected, where)
+        raise ArgumentError(what, item, expected, where)
 
 
 def _domain(text: str, what: str, where: str) -> int:
     if not (text.isascii() and text.isdigit() and int(text[:12]) <= MAX_DOMAIN):
-        raise ConversionError(
+        raise ArgumentError(
             what, text, f"a ROS domain: 0 to {MAX_DOMAIN}, as DDS derives its ports from it", where
         )
     return int(text)

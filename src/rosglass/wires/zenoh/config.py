@@ -20,7 +20,7 @@ from typing import Any
 
 import zenoh
 
-from rosglass.errors import ConversionError, UnsupportedError
+from rosglass.errors import ArgumentError, UnsupportedError
 from rosglass.wires.zenoh.options import ZenohOptions, locator
 
 __all__ = [
@@ -53,7 +53,7 @@ def session_config(options: ZenohOptions) -> tuple[zenoh.Config, str]:
     """Return the configuration of a session, and the addresses it connects to in words.
 
     Raises:
-        ConversionError: The configuration file cannot be read, or Zenoh rejects it.
+        ArgumentError: The configuration file cannot be read, or Zenoh rejects it.
     """
     settings: dict[str, Any] = {
         # Opening returns at once; linking goes on in the background.
@@ -189,7 +189,7 @@ def _read(file: str) -> zenoh.Config:
     try:
         config: zenoh.Config = zenoh.Config.from_file(path)
     except zenoh.ZError as error:
-        raise ConversionError(
+        raise ArgumentError(
             "ZENOH_SESSION_CONFIG_URI",
             file,
             f"a Zenoh configuration file that can be read ({path}: {reason(error)})",

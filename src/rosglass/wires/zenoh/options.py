@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, urlsplit
 
-from rosglass.errors import ConversionError
+from rosglass.errors import ArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -58,32 +58,32 @@ class ZenohOptions:
         """Return what `url` says, completed by the environment `env`.
 
         Raises:
-            ConversionError: A part of the URL, or ROS_DOMAIN_ID, is not valid; it says which.
+            ArgumentError: A part of the URL, or ROS_DOMAIN_ID, is not valid; it says which.
         """
         example = "as in zenoh://127.0.0.1:7447?domain=0"
         try:
             parts = urlsplit(url)
             host = parts.hostname
         except ValueError as error:
-            raise ConversionError("url", url, f"a URL {example} ({error})") from error
+            raise ArgumentError("url", url, f"a URL {example} ({error})") from error
         if parts.path not in ("", "/") or parts.fragment or parts.username is not None:
-            raise ConversionError("url", url, f"nothing but host, port and options, {example}")
+            raise ArgumentError("url", url, f"nothing but host, port and options, {example}")
         if host is not None and not _HOST.match(host):
-            raise ConversionError("host", host, "a host name or an address", url)
+            raise ArgumentError("host", host, "a host name or an address", url)
         try:
             port = DEFAULT_PORT if parts.port is None else parts.port
         except ValueError:
             port = 0
         if port == 0 or (host is None and parts.netloc):
-            raise ConversionError("address", parts.netloc, f"host:port, port 1 to 65535, {example}")
+            raise ArgumentError("address", parts.netloc, f"host:port, port 1 to 65535, {example}")
         given = parse_qsl(parts.query, keep_blank_values=True)
         options = dict(given)
         known = ("domain", *_CHOICES)
         for key, value in given:
             if key not in known:
-                raise ConversionError("option", key, f"one of {', '.join(known)}", url)
+                raise ArgumentError("option", key, f"one of {', '.join(known)}", url)
             if options[key] != value:
-                raise ConversionError(key, value, f"to be given once, not also {options[key]}", url)
+                raise ArgumentError(key, value, f"to be given once, not also {options[key]}", url)
         if "domain" in options:
             domain = _domain(options["domain"], "domain", url)
         else:
@@ -107,7 +107,7 @@ def locator(host: str, port: int) -> str:
 
 def _domain(text: str, what: str, where: str) -> int:
     if not (text.isascii() and text.isdigit() and int(text[:12]) <= _MAX_DOMAIN):
-        raise ConversionError(what, text, "a ROS domain: a whole number, 0 or more", where)
+        raise ArgumentError(what, text, "a ROS domain: a whole number, 0 or more", where)
     return int(text)
 
 
@@ -116,5 +116,5 @@ def _choice(options: Mapping[str, str], key: str, url: str) -> str | bool | None
         return None
     choices = _CHOICES[key]
     if options[key] not in choices:
-        raise ConversionError(key, options[key], f"one of {', '.join(choices)}", url)
+        raise ArgumentError(key, options[key], f"one of {', '.join(choices)}", url)
     return choices[options[key]]

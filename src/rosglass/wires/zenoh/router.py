@@ -12,7 +12,7 @@ import time
 import zenoh
 
 from rosglass.comm import Handle
-from rosglass.errors import ConnectionLostError, ConversionError
+from rosglass.errors import ArgumentError, ConnectionLostError
 from rosglass.wires.zenoh.config import (
     close_session,
     open_session,
@@ -47,7 +47,7 @@ class Router(Handle):
         is_local: Whether only programs on this machine can reach it.
 
     Raises:
-        ConversionError: `listen` is not an address.
+        ArgumentError: `listen` is not an address.
         ConnectionLostError: The address is taken, or not one of this machine's.
     """
 
@@ -102,7 +102,7 @@ def is_router_reachable(url: str, timeout: float = 0.5) -> bool:
         timeout: How long to wait for an answer, in seconds.
 
     Raises:
-        ConversionError: The URL is not valid.
+        ArgumentError: The URL is not valid.
     """
     options = ZenohOptions.parse(url, os.environ)
     host = options.host or "127.0.0.1"
@@ -129,7 +129,7 @@ def is_router_reachable(url: str, timeout: float = 0.5) -> bool:
 def _parse(listen: str) -> tuple[str, int]:
     match = _LOCATOR.fullmatch(listen) if isinstance(listen, str) else None
     if match is None or int(match["port"]) > 65535:
-        raise ConversionError(
+        raise ArgumentError(
             "listen", listen, "an address such as tcp/127.0.0.1:7447, port 0 to 65535"
         )
     return match["six"] or match["host"], int(match["port"])
