@@ -1,4 +1,4 @@
-"""Actions on a middleware without network."""
+"""Actions on a wire that the test steers."""
 
 from __future__ import annotations
 
@@ -312,7 +312,7 @@ def test_the_server_announces_itself_as_an_action(robot, server):
     assert {replier.info.name for replier in fake.repliers} == {
         f"/fib/_action/{part}" for part in ("send_goal", "cancel_goal", "get_result")
     }
-    topics = {writer.what[0]: (writer.what[1], writer.what[3]) for writer in fake.writers}
+    topics = {writer.info.name: (writer.info.type, writer.info.qos) for writer in fake.writers}
     assert topics["/fib/_action/feedback"] == (f"{FIB}_FeedbackMessage", rosglass.QoS())
     status = ("action_msgs/msg/GoalStatusArray", rosglass.QoS.latched())
     assert topics["/fib/_action/status"] == status
@@ -490,7 +490,7 @@ def test_without_a_server_a_goal_ends_after_its_time(client, connect):
     goal = client.send_goal(timeout=0.02)
     told = (
         r"no goal could be sent to /fib within 0\.02 s: no server offers the action /fib "
-        rf"\[{FIB}\] on fake:// \(CONNECTING: no answer\); did you mean /base/fib\?"
+        rf"\[{FIB}\] on fake:// \(CONNECTED: in this process\); did you mean /base/fib\?"
     )
     with pytest.raises(rosglass.ServiceUnavailableError, match=told):
         goal.result(5)
@@ -589,14 +589,14 @@ def test_rubbish_is_named_once_per_publisher(client, peer, middleware, caplog, t
     goal = client.send_goal()
     peer.answer()
     reader = getattr(peer, topic)
-    middleware.appear(PUBLISHER, reader.topic, reader.type_name, node="mad", gid=b"m" * 16)
+    middleware.appear(PUBLISHER, reader.info.name, reader.info.type, node="mad", gid=b"m" * 16)
     for _ in range(3):
         reader.receive(b"\0\1\0\0" + goal.id + b"\xff\xff\xff\xff", gid=b"m" * 16)
         reader.receive(b"\0\1", gid=b"n" * 16)
         reader.receive(b"\0\1\0\0" + goal.id, hash=OTHER_HASH, gid=b"o" * 16)
     assert caplog.text.count(f"/fib: ignoring {topic} of /mad: ") == 1
     assert caplog.text.count(f"/fib: ignoring {topic} of gid {b'n'.hex() * 16}: ") == 1
-    assert caplog.text.count(f"another definition of {reader.type_name} ({OTHER_HASH}") == 1
+    assert caplog.text.count(f"another definition of {reader.info.type} ({OTHER_HASH}") == 1
     peer.feed(goal, 5)
     assert list(goal.feedback.sequence) == [5]
 
@@ -903,7 +903,7 @@ def test_a_server_that_is_asked_by_hand(node, robot, server, middleware, eventua
     arrays = [
         rosglass.load("action_msgs/msg/GoalStatusArray").decode(data)
         for writer in robot.fake.writers
-        if writer.what[0] == "/fib/_action/status"
+        if writer.info.name == "/fib/_action/status"
         for data in writer.written
     ]
     codes = [[entry.status for entry in array.status_list] for array in arrays]

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from rosglass import Time, load
+from rosglass import Time
 from rosglass.comm import (
     ClockChange,
     NodeName,
     ParameterDescriptor,
     ParameterType,
+    QoS,
     Range,
     State,
     Transition,
@@ -30,19 +31,18 @@ from rosglass.errors import (
 from rosglass.ros2 import Ros2Node
 from rosglass.ros2.arguments import Arguments
 
-from .conftest import FakeMiddleware
+from .steered import SteeredMiddleware
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
-    from .conftest import FakeNetwork
 
 LOG, CLOCK = "rcl_interfaces/msg/Log", "rosgraph_msgs/msg/Clock"
 
 
 @pytest.fixture
-def start(network: FakeNetwork) -> Iterator[Callable[..., Ros2Node]]:
+def start(url: str) -> Iterator[Callable[..., Ros2Node]]:
     """Start a node with the furniture that connect() gives it, told with --ros-args."""
     made: list[Ros2Node] = []
 
@@ -52,10 +52,7 @@ def start(network: FakeNetwork) -> Iterator[Callable[..., Ros2Node]]:
         told = Arguments.parse(["--ros-args", *arguments])
         name = told.node_name(name)
         namespace = told.namespace(name, namespace)
-        middleware = FakeMiddleware(network)
-        for other in network.middlewares[:-1]:
-            ends = (*other.requesters, *other.repliers)
-            middleware.known += [(end.key, end.info) for end in ends if not end.closed]
+        middleware = SteeredMiddleware(url)
         node = Ros2Node(
             middleware, "fake://", name, namespace, None, told, own_services=own_services
         )
@@ -135,7 +132,7 @@ def test_the_services_have_ros_names_types_and_profiles(start, eventually) -> No
         "/arm/robot/set_parameters_atomically": "rcl_interfaces/srv/SetParametersAtomically",
     }
     assert {info.qos.depth for info in offered.values()} == {1000}
-    topics = {writer.what[0]: writer.what[3] for writer in robot.fake.writers}
+    topics = {writer.info.name: writer.info.qos for writer in robot.fake.writers}
     assert topics.keys() == {"/rosout", "/parameter_events"}
     assert topics["/parameter_events"].depth == 1000
     assert topics["/rosout"].durability.value == "transient_local"
@@ -406,7 +403,7 @@ def test_logs_can_be_switched_off(start, node, caplog) -> None:
     time.sleep(0.3)
     assert not messages
     assert "nobody hears" not in caplog.text
-    assert not [writer for writer in robot.fake.writers if writer.what[0] == "/rosout"]
+    assert not [writer for writer in robot.fake.writers if writer.info.name == "/rosout"]
 
 
 def test_a_flood_of_messages_is_bounded_and_counted(start, node, eventually) -> None:
@@ -452,7 +449,7 @@ def test_closing_leaves_no_handlers_and_sends_what_waits(start, node, eventually
     before = list(logging.getLogger("rosglass").handlers)
     robot = start()
     messages = received(node, "/rosout", LOG)
-    eventually(lambda: "/rosout" in [writer.what[0] for writer in robot.fake.writers])
+    eventually(lambda: "/rosout" in [writer.info.name for writer in robot.fake.writers])
     robot.logger.info("last words")
     robot.close()
     eventually(lambda: [message for message in messages if message.msg == "last words"])
@@ -464,26 +461,26 @@ def test_closing_leaves_no_handlers_and_sends_what_waits(start, node, eventually
 # -- simulated time ----------------------------------------------------------------------------
 
 
-def tick(network: FakeNetwork, seconds: int) -> None:
+@pytest.fixture
+def tick(connect: Callable[..., Ros2Node]) -> Callable[[int], None]:
     """Let a simulator publish the time."""
-    data = load(CLOCK, ros=2).encode({"clock": {"sec": seconds}}, wire="cdr")
-    for middleware in network.middlewares:
-        for reader in middleware.readers:
-            if reader.topic == "/clock" and not reader.closed:
-                reader.receive(bytes(data))
+    publisher = connect("simulator").create_publisher("/clock", CLOCK, QoS.clock())
+    return lambda seconds: publisher.publish(clock={"sec": seconds})
 
 
-def test_time_follows_the_simulation_when_told(start, network) -> None:
+def test_time_follows_the_simulation_when_told(start, tick) -> None:
     robot = start("-p", "use_sim_time:=true")
     assert robot.clock.is_simulated
     assert robot.now() == Time(0)
-    tick(network, 42)
+    tick(42)
     assert robot.now() == Time.from_parts(42, 0)
     jumps: list[Any] = []
     robot.clock.on_jump(jumps.append)
     robot.parameters.set({"use_sim_time": False})
     assert abs(robot.now().seconds - time.time()) < 5
-    assert [reader.closed for reader in robot.fake.readers if reader.topic == "/clock"] == [True]
+    assert [reader.closed for reader in robot.fake.readers if reader.info.name == "/clock"] == [
+        True
+    ]
     robot.parameters.set({"use_sim_time": True})
     assert robot.now() == Time(0)
     robot.clock.sleep(0)
@@ -493,15 +490,15 @@ def test_time_follows_the_simulation_when_told(start, network) -> None:
     assert [jump.change for jump in jumps] == [ClockChange.TO_SYSTEM, ClockChange.TO_SIMULATED]
 
 
-def test_time_can_be_switched_from_afar(start, node, network, eventually) -> None:
+def test_time_can_be_switched_from_afar(start, node, tick, eventually) -> None:
     robot = start()
     client = node.create_parameter_client("/robot")
     assert client.set({"use_sim_time": True}, timeout=30)["use_sim_time"].successful
     eventually(lambda: robot.clock.is_simulated)
-    tick(network, 7)
+    tick(7)
     calls: list[Time] = []
     robot.create_timer(2.0, lambda: calls.append(robot.now()))
-    tick(network, 9)
+    tick(9)
     eventually(lambda: calls)
     assert calls == [Time.from_parts(9, 0)]
     assert "simulated" in repr(robot.clock)

@@ -51,7 +51,7 @@ def types(library: Library) -> Types:
 
 @pytest.fixture
 def ask(connect: Callable[..., Any], library: Library) -> Callable[..., Any]:
-    """Ask a node over the (fake) network, as other nodes do."""
+    """Ask a node over the local graph, as other nodes do."""
     server = connect("robot")
     server._core.types._library = library
     offered = TypeDescriptionServer(server._core)

@@ -23,6 +23,8 @@ from rosglass.ros2 import Ros2Node
 from rosglass.ros2.type_descriptions import describe
 from rosglass.ros2.types import Types
 
+from .steered import SteeredMiddleware
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
@@ -45,20 +47,17 @@ def robot_library(state: str = STATE_TEXT) -> Library:
 
 @pytest.fixture(autouse=True)
 def hurry(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The graph of the fake network is complete at once."""
+    """The local graph is complete at once."""
     monkeypatch.setattr("rosglass.ros2.type_fetching._GRACE", 0.1)
 
 
 @pytest.fixture
-def join(network: Any, middleware: Any) -> Iterator[Callable[..., Ros2Node]]:
+def join(url: str) -> Iterator[Callable[..., Ros2Node]]:
     """Connect a node with a library of its own."""
     made: list[Ros2Node] = []
 
     def join(name: str, library: Library | None = None, *, serves: bool = True) -> Ros2Node:
-        fake = type(middleware)(network)
-        for other in network.middlewares[:-1]:
-            ends = (*other.requesters, *other.repliers)
-            fake.known += [(end.key, end.info) for end in ends if not end.closed]
+        fake = SteeredMiddleware(url)
         node = Ros2Node(fake, "fake://", name, "/", library or Library(), own_services=serves)
         node.fake = fake
         made.append(node)
@@ -66,8 +65,8 @@ def join(network: Any, middleware: Any) -> Iterator[Callable[..., Ros2Node]]:
         expected = [f"/{name}/get_type_description"] if serves else []
         expected += [
             end.info.name
-            for other in network.middlewares
-            for end in other.repliers
+            for other in made
+            for end in other.fake.repliers
             if not end.closed and end.info.name.endswith("/get_type_description")
         ]
         deadline = time.monotonic() + 30
