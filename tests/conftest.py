@@ -8,9 +8,10 @@ import random
 import signal
 import subprocess
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
+import waiting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator
@@ -35,6 +36,12 @@ def ros_domains() -> list[int]:
     share = DOMAINS // DOMAIN_SHARES
     number = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:]) % DOMAIN_SHARES
     return random.SystemRandom().sample(range(1 + number * share, 1 + (number + 1) * share), share)
+
+
+@pytest.fixture(scope="session")
+def eventually() -> Callable[..., Any]:
+    """See :func:`waiting.eventually`."""
+    return waiting.eventually
 
 
 @pytest.fixture(autouse=True)

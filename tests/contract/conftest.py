@@ -11,13 +11,13 @@ import itertools
 import random
 import socket
 import subprocess
-import time
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import eventually
 
 import rosglass
 
@@ -104,12 +104,14 @@ class _RosMaster:
         command = [str(_ROSMASTER), "--core", "-p", str(port)]
         with (self._home / "output").open("wb") as output:
             self._process = subprocess.Popen(command, env=env, stdout=output, stderr=output)
-        deadline = time.monotonic() + 30
-        while True:
+
+        def answers() -> bool:
             with suppress(OSError), socket.create_connection(("127.0.0.1", port), 1):
-                return f"ros1://127.0.0.1:{port}?ip=127.0.0.1"
-            assert time.monotonic() < deadline, (self._home / "output").read_text()
-            time.sleep(0.02)
+                return True
+            return False
+
+        eventually(answers, (self._home / "output").read_text)
+        return f"ros1://127.0.0.1:{port}?ip=127.0.0.1"
 
     def __exit__(self, *_: object) -> None:
         self._process.kill()
@@ -146,20 +148,3 @@ def console(connect: Callable[..., Node]) -> Node:
 def topic(request: pytest.FixtureRequest) -> str:
     """A topic, service or action name that no other test has: graphs last longer than tests."""
     return f"/contract_{next(_names)}"
-
-
-@pytest.fixture
-def eventually() -> Callable[..., Any]:
-    """Return the first true value of a condition; fails the test if that takes too long."""
-
-    def eventually(
-        condition: Callable[[], Any], what: Callable[[], object] | str = "", timeout_s: float = 30.0
-    ) -> Any:
-        deadline = time.monotonic() + timeout_s
-        while not (value := condition()):
-            if time.monotonic() > deadline:
-                pytest.fail(f"not within {timeout_s:g} s: {what() if callable(what) else what}")
-            time.sleep(0.005)
-        return value
-
-    return eventually

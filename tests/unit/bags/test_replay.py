@@ -10,6 +10,7 @@ import pytest
 from mcap import writer as mcap_writer
 from rosbags import rosbag1
 from rosbags.typesys import Stores, get_typestore
+from waiting import eventually
 
 import rosglass
 from rosglass import load
@@ -77,13 +78,6 @@ def play() -> Iterator[Callable[..., ReplayNode]]:
         node.close()
 
 
-def until(condition: Callable[[], Any], what: str = "did not happen") -> None:
-    end = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < end, what
-        time.sleep(0.005)
-
-
 def listen(node: ReplayNode, topic: str, **options: Any) -> list[str]:
     found: list[str] = []
     node.create_subscription(topic, callback=lambda m: found.append(m.data), **options)
@@ -93,9 +87,9 @@ def listen(node: ReplayNode, topic: str, **options: Any) -> list[str]:
 def test_subscriptions_get_what_was_recorded(drive, play):
     node = play(drive, "?rate=20")
     found = listen(node, "/chatter", qos=100)
-    until(lambda: len(found) == 21, "the whole recording")
+    eventually(lambda: len(found) == 21, "the whole recording")
     assert found == [str(i) for i in range(21)]
-    until(lambda: not node.playback.is_playing, "it pauses at its end")
+    eventually(lambda: not node.playback.is_playing, "it pauses at its end")
     assert node.playback.position == pytest.approx(2.0)
     assert node.playback.duration == pytest.approx(2.0)
     assert node.status().state is ConnectionState.CONNECTED
@@ -123,7 +117,7 @@ def test_time_is_the_recordings(drive, play):
 
 def test_a_recorded_clock_is_the_time(tmp_path, play):
     node = play(write(tmp_path / "sim.mcap", clock=True), "?rate=5")
-    until(lambda: node.now() >= Time(60 * SECOND))
+    eventually(lambda: node.now() >= Time(60 * SECOND))
     assert node.now() <= Time(70 * SECOND)
 
 
@@ -133,35 +127,35 @@ def test_seeking_shows_what_was_there_while_it_is_paused(drive, play):
     assert not node.playback.is_playing
     node.playback.seek(1.05)
     assert node.playback.position == pytest.approx(1.05)
-    until(lambda: chatter and plan)
+    eventually(lambda: chatter and plan)
     assert (chatter, plan) == (["10"], ["go"])
     node.playback.seek(0.35)
-    until(lambda: len(chatter) > 1)
+    eventually(lambda: len(chatter) > 1)
     assert chatter == ["10", "3"]
     assert not node.playback.is_playing
     node.playback.play()
-    until(lambda: chatter[-1] == "20")
+    eventually(lambda: chatter[-1] == "20")
     assert chatter == ["10", *map(str, range(3, 21))]
 
 
 def test_latecomers_get_what_was_latched(drive, play):
     node = play(drive, "?rate=20")
-    until(lambda: not node.playback.is_playing)
+    eventually(lambda: not node.playback.is_playing)
     assert listen(node, "/chatter") == []
     plan = listen(node, "/plan", qos=QoS.latched(1))
-    until(lambda: plan == ["go"])
+    eventually(lambda: plan == ["go"])
 
 
 def test_playing_again_from_the_end_and_looping(drive, play):
     node = play(drive, "?rate=20")
     found = listen(node, "/chatter", qos=1000)
-    until(lambda: not node.playback.is_playing and len(found) == 21)
+    eventually(lambda: not node.playback.is_playing and len(found) == 21)
     count = len(found)
     node.playback.play()
-    until(lambda: len(found) > count)
+    eventually(lambda: len(found) > count)
     assert found[count] == "0"
     node.playback.set_loop(True)
-    until(lambda: found.count("0") >= 4)
+    eventually(lambda: found.count("0") >= 4)
     assert node.playback.is_playing
     assert node.playback.loop
     node.playback.set_rate(0.5)
@@ -190,7 +184,7 @@ def test_a_lap_lasts_as_long_as_what_was_selected(tmp_path, play, seconds, topic
         open_bag(path) as bag,
         Player(node, bag, topics=topics, loop=True, delay=0.0, **options) as player,
     ):
-        until(lambda: player.status().sent >= 4)  # one in each lap
+        eventually(lambda: player.status().sent >= 4)  # one in each lap
         sent, took = player.status().sent, time.monotonic() - begun
     assert took >= 0.99 * lap * (sent - 1)
 
@@ -230,17 +224,17 @@ def test_some_topics_only(drive, play):
     chatter, plan = listen(node, "/chatter"), listen(node, "/plan", qos=QoS.latched(1))
     assert node.publishers("/chatter") == []
     node.playback.seek(1.0)
-    until(lambda: plan)
+    eventually(lambda: plan)
     assert chatter == []
     node.choose([])
     node.playback.seek(0.55)
-    until(lambda: chatter == ["5"])
+    eventually(lambda: chatter == ["5"])
 
 
 def test_another_type_than_recorded_is_told(drive, play):
     node = play(drive)
     other = node.create_subscription("/chatter", "std_msgs/msg/Bool")
-    until(lambda: other.problem)
+    eventually(lambda: other.problem)
     assert other.problem == "this is std_msgs/msg/String here, not std_msgs/msg/Bool"
     assert "chatter" in node.create_subscription("/chater").hint
 
@@ -257,7 +251,7 @@ def test_a_ros_1_recording(tmp_path, play):
     node = play(path)
     assert node.wire == "ros1"
     found = listen(node, "/chatter")
-    until(lambda: len(found) == 5)
+    eventually(lambda: len(found) == 5)
     assert found == ["0", "1", "2", "3", "4"]
     assert node.now() >= Time(START)
 
@@ -288,7 +282,7 @@ def test_closing_ends_everything(drive, play):
     node.close()
     assert subscription.closed
     assert node.status().state is ConnectionState.CLOSED
-    until(lambda: threading.active_count() <= threads)
+    eventually(lambda: threading.active_count() <= threads)
     with pytest.raises(NodeClosedError):
         node.create_subscription("/chatter")
 

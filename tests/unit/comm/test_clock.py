@@ -8,6 +8,7 @@ import time
 from typing import TYPE_CHECKING
 
 import pytest
+from waiting import eventually, nothing_happens
 
 from rosglass.comm import IMMEDIATE, Clock, ClockChange, Dispatcher, Duration, Jump, Time
 from rosglass.errors import ConversionError, NodeClosedError
@@ -25,13 +26,6 @@ def clock() -> Iterator[Clock]:
 
 def seconds(value: float) -> Time:
     return Time(round(value * 1e9))
-
-
-def eventually(condition: object) -> None:
-    deadline = time.monotonic() + 30
-    while not condition():  # type: ignore[operator]
-        assert time.monotonic() < deadline
-        time.sleep(0.002)
 
 
 def test_system_time_is_the_default(clock: Clock) -> None:
@@ -114,7 +108,7 @@ def test_sleeping_in_simulated_time_waits_for_the_simulation(clock: Clock) -> No
     thread, results = in_background(lambda: clock.sleep(2.0))
     clock.advance(seconds(11.9))
     clock.advance(seconds(3))  # set back: the end stays where it was
-    time.sleep(0.05)
+    nothing_happens(0.05)
     assert not results
     clock.advance(seconds(12))
     thread.join(5)
@@ -161,7 +155,7 @@ def test_a_timer_calls_back_at_its_rate(clock: Clock) -> None:
     timer.close()
     assert 0.07 < calls[4] - calls[0] < 1
     count = len(calls)
-    time.sleep(0.06)
+    nothing_happens(0.06)
     assert len(calls) <= count + 1
 
 
@@ -170,7 +164,7 @@ def test_a_timer_follows_simulated_time(clock: Clock) -> None:
     clock.advance(seconds(100))
     calls: list[Time] = []
     clock.create_timer(Duration.from_seconds(1), lambda: calls.append(clock.now()))
-    time.sleep(0.05)
+    nothing_happens(0.05)
     assert not calls
     clock.advance(seconds(101))
     eventually(lambda: len(calls) == 1)
@@ -178,7 +172,7 @@ def test_a_timer_follows_simulated_time(clock: Clock) -> None:
     eventually(lambda: len(calls) == 2)
     clock.advance(seconds(1))  # set back: the period counts from here
     clock.advance(seconds(1.9))
-    time.sleep(0.05)
+    nothing_happens(0.05)
     assert len(calls) == 2
     clock.advance(seconds(2))
     eventually(lambda: len(calls) == 3)
@@ -196,7 +190,7 @@ def test_a_slow_callback_misses_turns_instead_of_piling_up(clock: Clock) -> None
     time.sleep(0.1)
     timer.close()
     release.set()
-    time.sleep(0.05)
+    nothing_happens(0.05)
     dispatcher.close()
     assert len(calls) == 1
 

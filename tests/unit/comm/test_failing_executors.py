@@ -6,11 +6,11 @@ import asyncio
 import logging
 import queue
 import threading
-import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 
 import pytest
+from waiting import eventually
 
 from rosglass import QoS
 from rosglass.comm import IMMEDIATE, Clock, Dispatcher, History, Sample, Subscription
@@ -259,8 +259,5 @@ def test_a_job_without_owner_is_given_up_and_counted(caplog):
     executor = RetryingExecutor(Refusing(10**9), "on_done() of a call", give_up_s=0.1)
     executor.post(lambda: None)
     executor.post(lambda: None)
-    deadline = time.monotonic() + LIMIT
-    while "2 callbacks are given up" not in caplog.text:
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    eventually(lambda: "2 callbacks are given up" in caplog.text, timeout=LIMIT)
     assert "on_done() of a call" in caplog.text

@@ -8,6 +8,7 @@ import threading
 import time
 
 import pytest
+from waiting import eventually
 
 from rosglass import ConversionError, QoS
 from rosglass.comm import IMMEDIATE, Dispatcher, History, Sample, Subscription
@@ -71,9 +72,7 @@ def test_a_slow_callback_lets_others_have_their_turn_and_goes_on_with_the_newest
         sub.deliver(sample(sequence=number))
     dispatcher.post(lambda: order.append("other"))
     gate.set()
-    deadline = time.monotonic() + 30
-    while len(order) < 6 and time.monotonic() < deadline:
-        time.sleep(0.01)
+    eventually(lambda: len(order) == 6)
     dispatcher.close()
     assert order == ["slow 1", "other", "slow 5", "slow 6", "slow 7", "slow 8"]
     assert sub.statistics().dropped == 3
@@ -137,9 +136,7 @@ def test_samples_from_many_threads_are_called_back_with_one_at_a_time_each_once(
             thread.join()
     finally:
         sys.setswitchinterval(interval)
-    deadline = time.monotonic() + 30
-    while len(seen) < 2000 and time.monotonic() < deadline:
-        time.sleep(0.005)
+    eventually(lambda: len(seen) == 2000)
     assert sorted(seen) == list(range(2000))
     assert overlaps == []
     assert sub.statistics().dropped == 0
@@ -189,8 +186,7 @@ def test_iterating_yields_samples_until_the_subscription_is_closed():
     def feed():
         for number in range(3):
             sub.deliver(sample(sequence=number))
-        while sub.statistics().received == 3 and not taken[2:]:
-            time.sleep(0.001)
+        eventually(lambda: taken[2:])
         sub.close()
 
     taken = []

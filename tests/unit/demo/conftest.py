@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import threading
-import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import eventually
 
 import rosglass
 from rosglass.comm import ParameterEvent, QoS
@@ -98,10 +98,8 @@ class StubNode:
     def last(self, topic: str, timeout: float = 30.0) -> Any:
         """Return the next message sent on a topic."""
         sent = self.publishers[topic].sent
-        count, end = len(sent), time.monotonic() + timeout
-        while len(sent) == count:
-            assert time.monotonic() < end, f"nothing was sent on {topic}"
-            time.sleep(0.005)
+        count = len(sent)
+        eventually(lambda: len(sent) > count, f"something sent on {topic}", timeout=timeout)
         return sent[-1]
 
     def ask(self, service: str, **fields: Any) -> dict[str, Any]:

@@ -10,12 +10,14 @@ import pytest
 
 pytest.importorskip("cv2", reason="the simulated camera needs the extra `camera`")
 
+from waiting import eventually, nothing_happens
+
 from rosglass.demo.equipment import CAMERAS
 from rosglass.demo.robot import Robot, RobotOptions
 from rosglass.errors import Error
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
     from conftest import StubNode
 
@@ -38,13 +40,6 @@ def alive(stub_node: type[StubNode]) -> Iterator[tuple[Any, Robot]]:
     robot.start()
     yield node, robot
     robot.close()
-
-
-def until(condition: Callable[[], Any]) -> None:
-    end = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < end, "did not happen in time"
-        time.sleep(0.01)
 
 
 def test_its_description_is_where_rviz_looks(alive: tuple[Any, Robot]) -> None:
@@ -74,9 +69,9 @@ def test_nothing_is_drawn_while_nobody_looks(alive: tuple[Any, Robot]) -> None:
     topics = ["/points", *(f"/{name}_camera/image_raw" for name in CAMERAS)]
     for topic in topics:
         node.publishers[topic].listeners = 0
-    time.sleep(0.2)
+    nothing_happens(0.2)
     before = [len(node.publishers[topic].sent) for topic in topics]
-    time.sleep(1.0)
+    nothing_happens(1.0)
     assert [len(node.publishers[topic].sent) for topic in topics] == before
     for topic in topics:
         node.publishers[topic].listeners = 1
@@ -85,13 +80,13 @@ def test_nothing_is_drawn_while_nobody_looks(alive: tuple[Any, Robot]) -> None:
 
 
 def test_the_cloud_grows_into_what_the_laser_sees(alive: tuple[Any, Robot]) -> None:
-    until(lambda: alive[0].last("/points").width > 500)
+    eventually(lambda: alive[0].last("/points").width > 500)
 
 
 def test_safe_is_slow(alive: tuple[Any, Robot]) -> None:
     node, robot = alive
     node.ask("/mode/safe")
-    until(lambda: node.command("/cmd_vel", linear={"x": 1.0}) or robot.state.speed > 0.2)
+    eventually(lambda: node.command("/cmd_vel", linear={"x": 1.0}) or robot.state.speed > 0.2)
     for _ in range(30):
         node.command("/cmd_vel", linear={"x": 1.0})
         time.sleep(0.01)
@@ -102,19 +97,19 @@ def test_safe_is_slow(alive: tuple[Any, Robot]) -> None:
 def test_the_emergency_stop_ends_the_mission_and_holds(alive: tuple[Any, Robot]) -> None:
     node, robot = alive
     node.ask("/mode/autonomous")
-    until(lambda: abs(robot.state.speed) + abs(robot.state.turn) > 0.1)
+    eventually(lambda: abs(robot.state.speed) + abs(robot.state.turn) > 0.1)
     node.command("/emergency_stop", data=True)
-    until(lambda: node.last("/emergency_stop/state").data)
-    until(lambda: abs(robot.state.speed) + abs(robot.state.turn) < 0.01)
-    until(lambda: node.last("/mission/state").data == "emergency stop")
+    eventually(lambda: node.last("/emergency_stop/state").data)
+    eventually(lambda: abs(robot.state.speed) + abs(robot.state.turn) < 0.01)
+    eventually(lambda: node.last("/mission/state").data == "emergency stop")
     place = robot.state.x, robot.state.y
     for command in ("/mode/supervised", "/mode/autonomous"):
         node.ask(command)
         node.command("/cmd_vel", linear={"x": 0.5})
-        time.sleep(0.2)
+        nothing_happens(0.2)
     assert (robot.state.x, robot.state.y) == place
     node.command("/emergency_stop", data=False)
-    until(lambda: node.last("/mission/state").data == "waiting for mode autonomous")
+    eventually(lambda: node.last("/mission/state").data == "waiting for mode autonomous")
 
 
 def test_the_battery_tells_charge_and_voltage(alive: tuple[Any, Robot]) -> None:

@@ -11,13 +11,15 @@ import pytest
 
 pytest.importorskip("cv2", reason="the simulated camera needs the extra `camera`")
 
+from waiting import eventually, nothing_happens
+
 from rosglass.comm import Durability, QoS
 from rosglass.demo.robot import Robot, RobotOptions
 from rosglass.demo.simulation import FLIPPERS
 from rosglass.errors import Error
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
     from conftest import StubNode
 
@@ -42,16 +44,9 @@ def robot(alive: tuple[StubNode, Robot]) -> Robot:
     return alive[1]
 
 
-def until(condition: Callable[[], Any], timeout: float = 30.0) -> None:
-    end = time.monotonic() + timeout
-    while not condition():
-        assert time.monotonic() < end, "did not happen in time"
-        time.sleep(0.005)
-
-
 def test_every_topic_is_sent_in_ros_messages(node: StubNode) -> None:
     for topic, recorder in node.publishers.items():
-        until(lambda recorder=recorder: recorder.sent)
+        eventually(lambda recorder=recorder: recorder.sent)
         assert recorder.sent[0] is not None, topic
 
 
@@ -116,9 +111,9 @@ def test_it_drives_and_stops_when_commands_cease(node: StubNode, robot: Robot) -
         node.command("/cmd_vel", linear={"x": 0.3})
         return float(node.last("/odom").twist.twist.linear.x)
 
-    until(lambda: odometry() > 0.2)
+    eventually(lambda: odometry() > 0.2)
     assert robot.state.speed > 0.1
-    until(lambda: robot.state.speed == 0.0)
+    eventually(lambda: robot.state.speed == 0.0)
 
 
 def test_a_stop_is_confirmed_at_once_and_holds(node: StubNode, robot: Robot) -> None:
@@ -152,14 +147,14 @@ def test_garbage_is_logged_and_does_not_move_it(
     named: str,
 ) -> None:
     robot._logged_at = -math.inf
-    until(lambda: robot.state.speed == 0.0)
+    eventually(lambda: robot.state.speed == 0.0)
     with caplog.at_level(logging.WARNING, "rosglass.demo"):
         node.command("/cmd_vel", **fields)
         node.command("/cmd_vel", **fields)
     assert len(caplog.records) == 1, "one line, not one for each message"
     assert "/cmd_vel" in caplog.text
     assert named in caplog.text
-    time.sleep(0.1)
+    nothing_happens(0.1)
     assert robot.state.speed == 0.0
 
 
@@ -178,11 +173,11 @@ def test_flippers_and_lamp(node: StubNode, robot: Robot) -> None:
     assert node.publishers["/flashlight/state"].sent[-1].data is True
     node.command("/flashlight", data=False)
     node.command("/flipper_controller/commands", data=[0.5, 0.5, 0.3, 0.3])
-    until(lambda: robot.state.flippers == (0.5, 0.5, 0.3, 0.3))
+    eventually(lambda: robot.state.flippers == (0.5, 0.5, 0.3, 0.3))
     message = node.last("/joint_states")
     assert tuple(message.name) == FLIPPERS
     node.command("/flipper_controller/commands", data=[9.0] * 4)
-    time.sleep(0.1)
+    nothing_happens(0.1)
     assert robot.state.flippers == (0.5, 0.5, 0.3, 0.3)
 
 
@@ -193,12 +188,12 @@ def test_a_network_that_blocks_does_not_stop_the_body(node: StubNode, robot: Rob
     try:
         time.sleep(0.1)
         before = robot.state.time
-        until(lambda: robot.state.time - before > 0.5)
-        until(lambda: node.command("/cmd_vel", linear={"x": 0.2}) or robot.state.speed > 0.05)
+        eventually(lambda: robot.state.time - before > 0.5)
+        eventually(lambda: node.command("/cmd_vel", linear={"x": 0.2}) or robot.state.speed > 0.05)
     finally:
         for recorder in stuck:
             recorder.blocked.set()
-    until(lambda: robot.state.speed == 0.0)
+    eventually(lambda: robot.state.speed == 0.0)
 
 
 class Turning:
@@ -239,7 +234,7 @@ def test_the_flashlight_is_a_service_too(node: StubNode, robot: Robot) -> None:
 
 def test_the_highest_speed_is_a_parameter(node: StubNode, robot: Robot) -> None:
     node.parameters.set(max_speed=0.1)
-    until(lambda: node.command("/cmd_vel", linear={"x": 1.0}) or robot.state.speed > 0.05)
+    eventually(lambda: node.command("/cmd_vel", linear={"x": 1.0}) or robot.state.speed > 0.05)
     assert robot.state.speed <= 0.11
     node.parameters.set(max_speed=1.2)
 

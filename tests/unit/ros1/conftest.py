@@ -6,7 +6,6 @@ import itertools
 import socket
 import socketserver
 import threading
-import time
 import xmlrpc.client
 import xmlrpc.server
 from contextlib import suppress
@@ -273,20 +272,6 @@ def connect(master: FakeMaster) -> Iterator[Callable[..., Ros1Node]]:
     yield connect
     for node in nodes:
         node.close()
-
-
-@pytest.fixture(scope="session")
-def eventually() -> Callable[..., Any]:
-    """Return the first true value of a condition; fail after 30 s."""
-
-    def eventually(condition: Callable[[], Any], timeout: float = 30.0) -> Any:
-        deadline = time.monotonic() + timeout
-        while not (value := condition()):
-            assert time.monotonic() < deadline, f"not within {timeout} s: {condition}"
-            time.sleep(0.01)
-        return value
-
-    return eventually
 
 
 @pytest.fixture

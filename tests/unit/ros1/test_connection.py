@@ -8,6 +8,7 @@ import threading
 import time
 
 import pytest
+from waiting import eventually, nothing_happens
 
 from rosglass.ros1 import connection as module
 from rosglass.ros1.connection import Connection
@@ -19,14 +20,6 @@ HEADER = encode_header({"callerid": "/peer", "topic": "/t"})
 
 def frame(content: bytes) -> bytes:
     return struct.pack("<I", len(content)) + content
-
-
-def until(check, seconds=30.0):
-    end = time.monotonic() + seconds
-    while not (found := check()):
-        assert time.monotonic() < end
-        time.sleep(0.002)
-    return found
 
 
 class End:
@@ -69,7 +62,7 @@ def end(loop):
 def test_frames_come_byte_by_byte(end):
     for byte in HEADER + frame(b"hello") + frame(b""):
         end.peer.send(bytes([byte]))
-    assert until(lambda: len(end.frames) == 2)
+    assert eventually(lambda: len(end.frames) == 2)
     assert end.frames == [b"hello", b""]
     assert end.link.peer == "/peer"
 
@@ -88,7 +81,7 @@ def test_frames_come_byte_by_byte(end):
 )
 def test_garbage_ends_the_connection_and_says_why(end, data, told):
     end.peer.sendall(data)
-    assert told in until(lambda: end.ended)[0]
+    assert told in eventually(lambda: end.ended)[0]
     assert end.peer.recv(10) == b""
     assert end.frames == []
 
@@ -96,17 +89,17 @@ def test_garbage_ends_the_connection_and_says_why(end, data, told):
 def test_whoever_sends_no_header_is_not_waited_for(loop, monkeypatch):
     monkeypatch.setattr(module, "_HEADER_LIMIT", 0.1)
     end = End(loop)
-    assert "sent no connection header" in until(lambda: end.ended)[0]
+    assert "sent no connection header" in eventually(lambda: end.ended)[0]
 
 
 def test_a_header_in_time_lasts(loop, monkeypatch):
     monkeypatch.setattr(module, "_HEADER_LIMIT", 0.1)
     end = End(loop)
     end.peer.sendall(HEADER)
-    until(lambda: end.headers)
-    time.sleep(0.3)
+    eventually(lambda: end.headers)
+    nothing_happens(0.3)
     end.peer.sendall(frame(b"still there"))
-    assert until(lambda: end.frames) == [b"still there"]
+    assert eventually(lambda: end.frames) == [b"still there"]
 
 
 def test_nobody_listens(loop):
@@ -117,7 +110,7 @@ def test_nobody_listens(loop):
     loop.call(
         lambda: Connection.dial(loop, address, {}, lambda _: None, lambda *_: None, ended.append)
     )
-    assert "refused" in until(lambda: ended)[0]
+    assert "refused" in eventually(lambda: ended)[0]
 
 
 def test_a_slow_reader_costs_bounded_memory_and_gets_the_newest(loop):
@@ -168,7 +161,7 @@ def test_closing_the_loop_ends_every_connection():
     loop = IoLoop("closing")
     ends = [End(loop) for _ in range(5)]
     ends[0].peer.sendall(HEADER)
-    until(lambda: ends[0].headers)
+    eventually(lambda: ends[0].headers)
     loop.call(lambda: ends[0].link.hurry(hurried=False))
     loop.close()
     assert [end.ended for end in ends] == [[""]] * 5
@@ -177,23 +170,23 @@ def test_closing_the_loop_ends_every_connection():
 
 def test_what_nobody_waits_for_is_left_for_a_moment_and_can_be_had_at_once(loop, end):
     end.peer.sendall(HEADER + frame(b"first"))
-    until(lambda: end.frames)
+    eventually(lambda: end.frames)
     loop.call(lambda: end.link.hurry(hurried=False))
     for number in range(20):
         end.peer.sendall(frame(b"%d" % number))
-    until(lambda: end.link.drain() or len(end.frames) == 21)
+    eventually(lambda: end.link.drain() or len(end.frames) == 21)
     end.peer.sendall(frame(b"by itself"))
-    assert until(lambda: end.frames[-1] == b"by itself")
+    assert eventually(lambda: end.frames[-1] == b"by itself")
 
 
 def test_much_that_nobody_waits_for_holds_up_nobody(loop, end):
     end.peer.sendall(HEADER)
-    until(lambda: end.headers)
+    eventually(lambda: end.headers)
     loop.call(lambda: end.link.hurry(hurried=False))
     began = time.monotonic()
     for _ in range(300):
         end.peer.sendall(frame(b"x" * 1_000_000))
-    assert until(lambda: len(end.frames) == 300)
+    assert eventually(lambda: len(end.frames) == 300)
     assert time.monotonic() - began < 15
 
 
@@ -205,8 +198,8 @@ def test_a_failing_callback_ends_its_connection_only(loop, end, caplog):
     other = End(loop)
     for one in (end, other):
         one.peer.sendall(HEADER + frame(b"x"))
-    assert "a fault" in until(lambda: end.ended)[0]
-    assert until(lambda: other.frames) == [b"x"]
+    assert "a fault" in eventually(lambda: end.ended)[0]
+    assert eventually(lambda: other.frames) == [b"x"]
     assert "a message could not be taken" in caplog.text
     other.peer.close()
 
@@ -214,9 +207,9 @@ def test_a_failing_callback_ends_its_connection_only(loop, end, caplog):
 def test_pausing_keeps_what_came_with_the_header(loop, end):
     end.link._on_header = lambda _: end.link.pause(reading=False)
     end.peer.sendall(HEADER + frame(b"latched") + frame(b"next"))
-    until(lambda: end.link.header)
-    time.sleep(0.05)
+    eventually(lambda: end.link.header)
+    nothing_happens(0.05)
     assert end.frames == []
     loop.call(lambda: end.link.pause(reading=True))
-    assert until(lambda: len(end.frames) == 2)
+    assert eventually(lambda: len(end.frames) == 2)
     assert end.frames == [b"latched", b"next"]

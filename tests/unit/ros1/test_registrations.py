@@ -9,6 +9,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import eventually
 
 import rosglass
 from rosglass.comm import ConnectionState, EndpointKind, NodeName
@@ -17,18 +18,11 @@ from rosglass.ros1.intake import Intake
 from rosglass.ros1.publication import Publication
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
     from tests.unit.ros1.conftest import FakeMaster
 
     from rosglass.ros1 import Ros1Node
-
-
-def wait_for(condition: Callable[[], Any], what: Callable[[], object] = str) -> None:
-    deadline = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < deadline, what()
-        time.sleep(0.005)
 
 
 @pytest.fixture
@@ -41,7 +35,7 @@ def node(master: FakeMaster) -> Iterator[Any]:
 
 def connected(master: FakeMaster, name: str = "panel") -> Any:
     made = rosglass.connect(master.url, name, own_services=False)
-    wait_for(lambda: made.status().state is ConnectionState.CONNECTED, made.status)
+    eventually(lambda: made.status().state is ConnectionState.CONNECTED, made.status)
     return made
 
 
@@ -49,12 +43,12 @@ def test_a_master_that_restarts_with_the_same_process_number(
     master: FakeMaster, node: Ros1Node
 ) -> None:
     node.create_publisher("/a", "std_msgs/Empty")
-    wait_for(lambda: "/panel" in master.publishers.get("/a", {}))
+    eventually(lambda: "/panel" in master.publishers.get("/a", {}))
     pid = master.pid
     master.stop()
     master.start()
     master.pid = pid
-    wait_for(lambda: "/panel" in master.publishers.get("/a", {}))
+    eventually(lambda: "/panel" in master.publishers.get("/a", {}))
 
 
 def test_closing_and_creating_again_keeps_a_topic_registered(
@@ -69,7 +63,7 @@ def test_closing_and_creating_again_keeps_a_topic_registered(
     node.create_subscription("/a", "std_msgs/Empty")
     # Whatever waits for the master is done before these.
     node.create_publisher("/last", "std_msgs/Empty")
-    wait_for(lambda: "/panel" in master.publishers.get("/last", {}))
+    eventually(lambda: "/panel" in master.publishers.get("/last", {}))
     assert "/panel" in master.publishers["/a"]
     assert "/panel" in master.subscribers["/a"]
 
@@ -89,9 +83,9 @@ def test_closing_from_other_threads_at_the_same_time(
         thread.join()
     kept = getattr(node, create)("/a", "std_msgs/Empty")
     offers = master.publishers if create == "create_publisher" else master.subscribers
-    wait_for(lambda: "/panel" in offers.get("/a", {}))
+    eventually(lambda: "/panel" in offers.get("/a", {}))
     kept.close()
-    wait_for(lambda: "/panel" not in offers["/a"])
+    eventually(lambda: "/panel" not in offers["/a"])
 
 
 @pytest.mark.parametrize("create", ["create_publisher", "create_subscription"])
@@ -101,7 +95,7 @@ def test_one_that_is_closed_while_the_master_is_told_of_the_one_before(
     member = Publication if create == "create_publisher" else Intake
     offers = master.publishers if create == "create_publisher" else master.subscribers
     first = getattr(node, create)("/a", "std_msgs/Empty")
-    wait_for(lambda: "/panel" in offers.get("/a", {}))
+    eventually(lambda: "/panel" in offers.get("/a", {}))
     second: list[Any] = []
     unregister = member.unregister
 
@@ -120,7 +114,7 @@ def test_one_that_is_closed_while_the_master_is_told_of_the_one_before(
 
     monkeypatch.setattr(member, "unregister", unregister_and_close)
     master.answers["lookupNode"] = hold
-    wait_for(lambda: "/panel" not in offers["/a"])
+    eventually(lambda: "/panel" not in offers["/a"])
     assert not second
 
 
@@ -144,12 +138,12 @@ def test_one_that_is_closed_while_the_master_is_told_of_the_one_before(
 def test_masters_that_talk_nonsense_are_told_apart(master: FakeMaster, answer: Any) -> None:
     master.answers["getSystemState"] = lambda _: answer
     with rosglass.connect(master.url, "panel", own_services=False) as node:
-        wait_for(lambda: "trying again" in node.status().detail, node.status)
+        eventually(lambda: "trying again" in node.status().detail, node.status)
         assert node.status().state is ConnectionState.CONNECTING
         told = node.status().detail
         assert "not as " in told or "refuses getSystemState" in told
         del master.answers["getSystemState"]
-        wait_for(lambda: node.status().state is ConnectionState.CONNECTED)
+        eventually(lambda: node.status().state is ConnectionState.CONNECTED)
 
 
 def test_something_else_at_the_masters_address_is_named() -> None:
@@ -167,7 +161,7 @@ def test_something_else_at_the_masters_address_is_named() -> None:
         threading.Thread(target=serve, daemon=True).start()
         url = f"ros1://127.0.0.1:{server.getsockname()[1]}"
         with rosglass.connect(url, "panel") as node:
-            wait_for(lambda: "HTTP status 404; trying again" in node.status().detail)
+            eventually(lambda: "HTTP status 404; trying again" in node.status().detail)
         server.shutdown(socket.SHUT_RDWR)
 
 
@@ -177,12 +171,12 @@ def test_a_refusal_is_shown_logged_once_and_tried_again(
     master.answers["registerPublisher"] = lambda *_: [0, "not on Sundays", 0]
     with caplog.at_level(logging.WARNING):
         node.create_publisher("/a", "std_msgs/Empty")
-        wait_for(lambda: "not on Sundays" in node.status().detail)
+        eventually(lambda: "not on Sundays" in node.status().detail)
         assert node.status().state is ConnectionState.CONNECTED
-        wait_for(lambda: master.calls.count("registerPublisher") > 2)
+        eventually(lambda: master.calls.count("registerPublisher") > 2)
     assert len([r for r in caplog.records if "not on Sundays" in r.getMessage()]) == 1
     del master.answers["registerPublisher"]
-    wait_for(lambda: node.status().detail == "")
+    eventually(lambda: node.status().detail == "")
     assert "/panel" in master.publishers["/a"]
 
 
@@ -190,11 +184,11 @@ def test_a_wrong_own_address_is_shown(master: FakeMaster, monkeypatch: pytest.Mo
     monkeypatch.setenv("ROS_IP", "192.0.2.7")
     url = master.url.partition("?")[0]
     with rosglass.connect(url, "panel", own_services=False) as node:
-        wait_for(lambda: node.status().state is ConnectionState.CONNECTED)
+        eventually(lambda: node.status().state is ConnectionState.CONNECTED)
         told = "ROS_IP=192.0.2.7 is no address of this machine"
-        wait_for(lambda: node.status().detail.startswith(told))
+        eventually(lambda: node.status().detail.startswith(told))
         node.create_publisher("/a", "std_msgs/Empty")
-        wait_for(lambda: "/panel" in master.publishers.get("/a", {}))
+        eventually(lambda: "/panel" in master.publishers.get("/a", {}))
         assert master.publishers["/a"]["/panel"].startswith("http://192.0.2.7:")
 
 
@@ -205,26 +199,26 @@ def test_a_new_network_address_is_announced_and_the_node_lives_on(
     url = master.url.partition("?")[0]
     with rosglass.connect(url, "panel", own_services=False) as node:
         node.create_publisher("/a", "std_msgs/Empty")
-        wait_for(lambda: "127.0.0.1" in master.publishers.get("/a", {}).get("/panel", ""))
+        eventually(lambda: "127.0.0.1" in master.publishers.get("/a", {}).get("/panel", ""))
         monkeypatch.setattr(address, "_route_elsewhere", lambda: "127.0.0.2")
-        wait_for(lambda: "127.0.0.2" in master.publishers["/a"]["/panel"])
+        eventually(lambda: "127.0.0.2" in master.publishers["/a"]["/panel"])
         # The master takes it for another node, and tells the old one to end.
         core: Any = node._core
         core.shut_down("/master", "[/panel] Reason: new node registered with same name")
-        wait_for(lambda: "shutdown" not in [t.name for t in threading.enumerate()])
+        eventually(lambda: "shutdown" not in [t.name for t in threading.enumerate()])
         assert node.status().state is ConnectionState.CONNECTED
         core.shut_down("/rosnode", "user request")
-        wait_for(lambda: node.status().state is ConnectionState.CLOSED)
+        eventually(lambda: node.status().state is ConnectionState.CLOSED)
 
 
 def test_a_node_that_somebody_else_closes_looks_nothing_up_any_more(
     master: FakeMaster, node: Any
 ) -> None:
     master.offer("/add", 1)
-    wait_for(lambda: "/add" in node.services())
+    eventually(lambda: "/add" in node.services())
     node._core.shut_down("/master", "[/panel] Reason: new node registered with same name")
-    wait_for(lambda: node.status().state is ConnectionState.CLOSED)
-    wait_for(lambda: "shutdown" not in [thread.name for thread in threading.enumerate()])
+    eventually(lambda: node.status().state is ConnectionState.CLOSED)
+    eventually(lambda: "shutdown" not in [thread.name for thread in threading.enumerate()])
     ran = threading.Event()
     for errands in (node._core.errands, node._services.errands):
         errands.run(ran.set)
@@ -238,7 +232,7 @@ def test_the_graph_is_told_and_changes_are(master: FakeMaster, node: Ros1Node) -
     master.types["/scan"] = "sensor_msgs/LaserScan"
     master.subscribers["/cmd"] = {"/robot/base": "http://127.0.0.1:1/"}
     master.types["/cmd"] = "*"
-    wait_for(lambda: "/scan" in node.topics())
+    eventually(lambda: "/scan" in node.topics())
     assert node.topics() == {"/cmd": [], "/scan": ["sensor_msgs/msg/LaserScan"]}
     laser, base = NodeName("/robot", "laser"), NodeName("/robot", "base")
     assert node.nodes() == sorted([laser, base, NodeName("/", "panel")])
@@ -250,20 +244,20 @@ def test_the_graph_is_told_and_changes_are(master: FakeMaster, node: Ros1Node) -
     )
     assert [one.name for one in node.endpoints("/robot/base")] == ["/cmd"]
     assert node.endpoints("/nobody") == []
-    wait_for(lambda: changes)
+    eventually(lambda: changes)
     # A type that becomes known later counts as a change.
     count = len(changes)
     master.types["/cmd"] = "geometry_msgs/Twist"
-    wait_for(lambda: node.topics()["/cmd"] == ["geometry_msgs/msg/Twist"])
-    wait_for(lambda: len(changes) > count)
+    eventually(lambda: node.topics()["/cmd"] == ["geometry_msgs/msg/Twist"])
+    eventually(lambda: len(changes) > count)
     del master.publishers["/scan"]
-    wait_for(lambda: "/scan" not in node.topics())
+    eventually(lambda: "/scan" not in node.topics())
 
 
 def test_misspelled_topics_are_pointed_out(master: FakeMaster, node: Ros1Node) -> None:
     master.publishers["/robot/scan"] = {"/laser": "http://127.0.0.1:1/"}
     subscription = node.create_subscription("/scan")
-    wait_for(lambda: "/robot/scan" in node.topics())
+    eventually(lambda: "/robot/scan" in node.topics())
     assert subscription.hint == "nobody publishes /scan; did you mean /robot/scan?"
 
 
@@ -275,18 +269,18 @@ def test_a_publisher_that_is_registered_but_gone_is_named(
         port = free.getsockname()[1]
     master.publishers["/scan"] = {"/laser": f"http://127.0.0.1:{port}/"}
     subscription = node.create_subscription("/scan")
-    wait_for(lambda: "Connection refused" in subscription.problem)
+    eventually(lambda: "Connection refused" in subscription.problem)
     assert f"http://127.0.0.1:{port}/" in subscription.problem
 
 
 def test_a_node_asks_little_of_its_master(master: FakeMaster, node: Ros1Node) -> None:
     node.create_publisher("/a", "std_msgs/Empty")
-    wait_for(lambda: "/panel" in master.publishers.get("/a", {}))
+    eventually(lambda: "/panel" in master.publishers.get("/a", {}))
     looks = master.calls.count("getSystemState")
     # The first of these may be the one that finds the topic; its type is asked for after that.
-    wait_for(lambda: master.calls.count("getSystemState") >= looks + 2)
+    eventually(lambda: master.calls.count("getSystemState") >= looks + 2)
     master.calls.clear()
-    wait_for(lambda: master.calls.count("getSystemState") >= 2)
+    eventually(lambda: master.calls.count("getSystemState") >= 2)
     assert set(master.calls) == {"getPid", "lookupNode", "getSystemState"}
 
 
@@ -297,7 +291,7 @@ def test_who_closes_while_the_master_hangs_is_forgotten_once_it_answers(
     hung.create_publisher("/a", "std_msgs/Empty")
     hung.create_subscription("/b", "std_msgs/Empty")
     hung.create_service_server("/c", "std_srvs/Empty", lambda _: None)
-    wait_for(lambda: "/c" in master.services and "/hung" in master.subscribers.get("/b", {}))
+    eventually(lambda: "/c" in master.services and "/hung" in master.subscribers.get("/b", {}))
     thaw, answer = threading.Event(), master._dispatch
 
     def hang(*call: Any) -> Any:
@@ -311,8 +305,8 @@ def test_who_closes_while_the_master_hangs_is_forgotten_once_it_answers(
     assert time.monotonic() - began < 8, "about two seconds on a machine that is not loaded"
     (thread,) = [one for one in threading.enumerate() if one.name == "rosglass farewells"]
     thaw.set()
-    wait_for(lambda: "/hung" not in master.publishers["/a"], lambda: master.calls[-20:])
-    wait_for(lambda: "/hung" not in master.subscribers["/b"] and "/c" not in master.services)
+    eventually(lambda: "/hung" not in master.publishers["/a"], lambda: master.calls[-20:])
+    eventually(lambda: "/hung" not in master.subscribers["/b"] and "/c" not in master.services)
     assert node.status().state is not ConnectionState.CLOSED
     thread.join(20)
     assert not thread.is_alive()
@@ -324,12 +318,12 @@ def test_a_master_that_stays_away_is_not_waited_for_for_ever(
     monkeypatch.setattr(farewells, "_PATIENCE", 0.0)
     gone = connected(master, "gone")
     gone.create_publisher("/a", "std_msgs/Empty")
-    wait_for(lambda: "/gone" in master.publishers.get("/a", {}))
+    eventually(lambda: "/gone" in master.publishers.get("/a", {}))
     caplog.set_level(logging.INFO, "rosglass.ros1")
     master.stop()
     gone.close()
-    wait_for(lambda: "may list /gone still" in caplog.text)
-    wait_for(lambda: "rosglass farewells" not in [one.name for one in threading.enumerate()])
+    eventually(lambda: "may list /gone still" in caplog.text)
+    eventually(lambda: "rosglass farewells" not in [one.name for one in threading.enumerate()])
     master.start()
 
 
@@ -338,7 +332,7 @@ def test_a_node_on_the_ports_of_one_that_is_seen_off_stays_registered(
 ) -> None:
     first = connected(master, "same")
     first.create_publisher("/a", "std_msgs/Empty")
-    wait_for(lambda: "/same" in master.publishers.get("/a", {}))
+    eventually(lambda: "/same" in master.publishers.get("/a", {}))
     (known,) = master.publishers["/a"].values()
     master.stop()
     first.close()
@@ -346,8 +340,8 @@ def test_a_node_on_the_ports_of_one_that_is_seen_off_stays_registered(
     second = rosglass.connect(f"{master.url}&slave_port={port}", "same", own_services=False)
     second.create_publisher("/a", "std_msgs/Empty")
     master.start()
-    wait_for(lambda: "rosglass farewells" not in [one.name for one in threading.enumerate()])
-    wait_for(lambda: master.publishers.get("/a", {}).get("/same") == known)
+    eventually(lambda: "rosglass farewells" not in [one.name for one in threading.enumerate()])
+    eventually(lambda: master.publishers.get("/a", {}).get("/same") == known)
     second.close()
 
 
@@ -360,22 +354,22 @@ def test_who_leaves_in_good_order_is_no_warning_and_who_dies_is(
     client = desk.create_action_client("/go", "actionlib/Test")
     publisher = desk.create_publisher("/word", "std_msgs/String")
     assert client.wait_for_server(30)
-    wait_for(publisher.subscription_count)
+    eventually(publisher.subscription_count)
     caplog.set_level(logging.INFO, "rosglass.comm")
     client.close()
     publisher.close()
     for topic in ("/go/goal", "/go/cancel", "/word"):
-        wait_for(lambda topic=topic: f"{topic}: nobody" in caplog.text, lambda: caplog.text)  # type: ignore[misc]
+        eventually(lambda topic=topic: f"{topic}: nobody" in caplog.text, lambda: caplog.text)  # type: ignore[misc]
     assert [r.getMessage() for r in caplog.records if r.levelno >= logging.WARNING] == []
     # Nobody unregisters for those who are killed.
     other = connected(master, "other")
     publisher = other.create_publisher("/word", "std_msgs/String")
-    wait_for(lambda: "/other" in master.publishers.get("/word", {}))
-    wait_for(publisher.subscription_count)
+    eventually(lambda: "/other" in master.publishers.get("/word", {}))
+    eventually(publisher.subscription_count)
     master.answers["unregisterPublisher"] = lambda *_: [1, "", 0]
     other.close()
-    wait_for(lambda: "cannot be received from" in word.problem, lambda: word.problem)
-    wait_for(
+    eventually(lambda: "cannot be received from" in word.problem, lambda: word.problem)
+    eventually(
         lambda: any(
             r.levelno == logging.WARNING and "/word" in r.getMessage() for r in caplog.records
         ),
@@ -391,25 +385,25 @@ def test_a_publisher_out_of_reach_is_told_once_for_all_its_topics_and_when_it_is
     robot = connected(master, "robot")
     for topic in topics:
         robot.create_publisher(topic, "std_msgs/String")
-    wait_for(lambda: all(one.publisher_count() for one in heard))
+    eventually(lambda: all(one.publisher_count() for one in heard))
 
     def told(what: str) -> list[str]:
         return [r.getMessage() for r in caplog.records if what in r.getMessage()]
 
     master.answers["unregisterPublisher"] = lambda *_: [1, "", 0]
     robot.close()
-    wait_for(lambda: told("cannot be received"), lambda: caplog.text)
-    wait_for(lambda: all("refused; trying again" in one.problem.lower() for one in heard))
+    eventually(lambda: told("cannot be received"), lambda: caplog.text)
+    eventually(lambda: all("refused; trying again" in one.problem.lower() for one in heard))
     del master.answers["unregisterPublisher"]
     for topic in topics:
         del master.publishers[topic]["/robot"]  # as a real one does for a new node of that name
     robot = connected(master, "robot")
     for topic in topics:
         robot.create_publisher(topic, "std_msgs/String")
-    wait_for(lambda: told("is back"), lambda: caplog.text)
+    eventually(lambda: told("is back"), lambda: caplog.text)
     (lost,) = told("cannot be received")
     assert lost.startswith("/a, /b, /c: /robot cannot be received from: http://")
     assert told("is back") == ["/a, /b, /c: /robot is back"]
     assert {r.levelno for r in caplog.records if "/robot" in r.getMessage()} == {logging.WARNING}
-    wait_for(lambda: not any(one.problem for one in heard), lambda: [h.problem for h in heard])
+    eventually(lambda: not any(one.problem for one in heard), lambda: [h.problem for h in heard])
     robot.close()

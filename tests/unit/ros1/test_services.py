@@ -11,6 +11,7 @@ import time
 from contextlib import suppress
 
 import pytest
+from waiting import nothing_happens
 
 import rosglass
 from rosglass.comm import IMMEDIATE, Dispatcher
@@ -442,7 +443,7 @@ def test_types_of_a_hundred_services_are_told(node, connect, eventually):
     for number in range(100):
         robot.create_service_server(f"/s{number}", (ADD, BOOL)[number % 2], dict)
     eventually(lambda: len(node.services()) >= 100)
-    eventually(lambda: all(node.services().values()), 30)
+    eventually(lambda: all(node.services().values()), timeout=30)
     found = node.services()
     assert found["/s8"] == ["rospy_tutorials/srv/AddTwoInts"]
     assert found["/s9"] == ["std_srvs/srv/SetBool"]
@@ -857,7 +858,7 @@ def test_who_does_not_read_responses_gets_no_more_of_them(connect, eventually):
     )
     sock.sendall((struct.pack("<I", 1) + b"\1") * 20)
     eventually(lambda: seen)
-    time.sleep(0.5)
+    nothing_happens(0.5)
     assert len(seen) == 1
     for _ in range(20):
         ok, size = struct.unpack("<BI", receive(sock, 5))
@@ -1026,7 +1027,7 @@ def test_a_server_that_is_made_again_at_once_stays_registered(node, master, even
         server.close()
     node.create_service_server("/add", ADD, add)
     eventually(lambda: "/add" in master.services)
-    time.sleep(0.3)
+    nothing_happens(0.3)
     assert "/add" in master.services
 
 

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import eventually
 
 from rosglass.comm import ConnectionState
 from rosglass.demo.robot import Robot, RobotOptions
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
 
 @pytest.fixture
@@ -21,13 +21,6 @@ def robot(connect: Any) -> Iterator[tuple[Any, Robot]]:
     made = Robot(node, RobotOptions(raw=False, compressed=False))
     yield node, made
     made.close()
-
-
-def until(condition: Callable[[], Any]) -> None:
-    end = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < end, "it did not happen within 30 s"
-        time.sleep(0.01)
 
 
 def test_it_starts_and_says_how_fast_it_may_drive(robot: tuple[Any, Robot]) -> None:
@@ -43,17 +36,17 @@ def test_nonsense_makes_it_slow(robot: tuple[Any, Robot], value: Any, used: floa
     node, made = robot
     assert made._duties.max_speed == 1.2
     node.parameters.set({"max_speed": value})
-    until(lambda: made._duties.max_speed == used)
+    eventually(lambda: made._duties.max_speed == used)
 
 
 def test_it_drives_and_stops_without_the_master(robot: tuple[Any, Robot], master: Any) -> None:
     node, made = robot
     made.start()
     node.parameters.set({"max_speed": 0.4})
-    until(lambda: made._duties.max_speed == 0.4)
+    eventually(lambda: made._duties.max_speed == 0.4)
     master.stop()
-    until(lambda: node.status().state is not ConnectionState.CONNECTED)
-    until(lambda: made._drive(1.0, 0.0) or made.state.speed > 0.3)
+    eventually(lambda: node.status().state is not ConnectionState.CONNECTED)
+    eventually(lambda: made._drive(1.0, 0.0) or made.state.speed > 0.3)
     assert made.state.speed < 0.5
     made._on_stop(type("Bool", (), {"data": True}))
     assert made.state.emergency_stop

@@ -6,29 +6,22 @@ import http.client
 import os
 import socket
 import threading
-import time
 import xmlrpc.client
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 import pytest
+from waiting import eventually
 
 import rosglass
 from rosglass.comm import ConnectionState
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
     from tests.unit.ros1.conftest import FakeMaster
 
     from rosglass.ros1 import Ros1Node
-
-
-def wait_for(condition: Callable[[], Any], what: Callable[[], object] = str) -> None:
-    deadline = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < deadline, what()
-        time.sleep(0.005)
 
 
 @pytest.fixture
@@ -39,7 +32,7 @@ def node(master: FakeMaster) -> Iterator[Ros1Node]:
     made.create_subscription("/words", "std_msgs/String")
     made.create_subscription("/any")
     # The master's own answer must not come after what the tests send.
-    wait_for(lambda: made.publishers("/speed") and made.subscriptions("/any"))
+    eventually(lambda: made.publishers("/speed") and made.subscriptions("/any"))
     yield made
     made.close()
 
@@ -69,7 +62,7 @@ def test_what_tools_ask(api: Any, node: Ros1Node, master: FakeMaster) -> None:
 
 def test_connections_are_told_as_rospy_tells_them(api: Any, node: Ros1Node) -> None:
     reader = node.create_subscription("/speed")
-    wait_for(reader.publisher_count)
+    eventually(reader.publisher_count)
     port = node._core.address[1]
     told = api.getBusInfo("/t")[2]
     inbound = next(row for row in told if row[2] == "i" and row[5])
@@ -137,12 +130,12 @@ def test_unknown_methods_and_publishers_are_harmless(api: Any, node: Ros1Node) -
         for topic, one in node._topics.subscribed().items()
         if topic == "/any"
     )
-    wait_for(
+    eventually(
         lambda: all(uri in subscription.problem for uri in ("a..b", "99999")),
         lambda: subscription.problem,
     )
     assert api.publisherUpdate("/m", "/any", [])[0] == 1
-    wait_for(lambda: not subscription.problem)
+    eventually(lambda: not subscription.problem)
 
 
 _DEEP = "<value><array><data>" * 20_000 + "</data></array></value>" * 20_000
@@ -202,17 +195,17 @@ def test_a_flood_of_connections_costs_no_more_than_a_hundred_threads(
         assert socks[0].recv(1) == b""
         assert api.getPid("/t")[0] == 1
         # One that has just served somebody may take a moment to end.
-        wait_for(lambda: sum("process_request" in t.name for t in threading.enumerate()) <= 100)
+        eventually(lambda: sum("process_request" in t.name for t in threading.enumerate()) <= 100)
     finally:
         for sock in socks:
             sock.close()
-    wait_for(lambda: sum("process_request" in t.name for t in threading.enumerate()) < 10)
+    eventually(lambda: sum("process_request" in t.name for t in threading.enumerate()) < 10)
     assert api.getPid("/t")[0] == 1
 
 
 def test_closing_ends_the_connections_of_the_api(node: Ros1Node) -> None:
     with socket.create_connection(place(node), 10) as sock:
-        wait_for(lambda: any("process_request" in t.name for t in threading.enumerate()))
+        eventually(lambda: any("process_request" in t.name for t in threading.enumerate()))
         node.close()
         assert sock.recv(1) == b""
     with pytest.raises(ConnectionRefusedError):

@@ -126,7 +126,7 @@ def test_several_versions_must_be_chosen(
     join("old", old).create_publisher("/a", STATE)
     join("new", new).create_publisher("/b", STATE)
     user = join("cockpit")
-    eventually(lambda: user.topics().keys() >= {"/a", "/b"}, 30)
+    eventually(lambda: user.topics().keys() >= {"/a", "/b"}, timeout=30)
     with pytest.raises(DefinitionConflictError, match=r"several versions .*of /old.*hash or node"):
         user.fetch_type(STATE, timeout=30)
     assert user.fetch_type(STATE, node="/old", timeout=30).md5 == md5_of(STATE, old)
@@ -139,14 +139,14 @@ def test_nobody_uses_it(
     join: Callable[..., Any], master: FakeMaster, eventually: Callable[..., Any]
 ) -> None:
     user = join("cockpit")
-    eventually(lambda: user.status().state.value == "connected", 30)
+    eventually(lambda: user.status().state.value == "connected", timeout=30)
     with pytest.raises(TypeNotFoundError, match=r"within 0\.2 s: nobody in the graph uses it"):
         user.fetch_type(STATE, timeout=0.2)
     with pytest.raises(TypeNotFoundError, match="/arm does not use it"):
         user.fetch_type("std_msgs/String", node="/arm", timeout=0.2)
     master.subscribers["/state"] = {"/arm": "http://127.0.0.1:1/"}
     master.types["/state"] = "my_msgs/State"
-    eventually(lambda: "/state" in user.topics(), 30)
+    eventually(lambda: "/state" in user.topics(), timeout=30)
     with pytest.raises(TypeNotFoundError, match="/state is subscribed to only"):
         user.fetch_type(STATE, timeout=2)
     master.stop()
@@ -243,12 +243,12 @@ def test_publishers_are_asked_for_sum_and_latching(
     latched = robot.create_publisher("/state", STATE, rosglass.QoS.latched())
     latched.publish(state=3)
     user = join("cockpit")
-    (known,) = eventually(lambda: user.publishers("/state"), 30)
+    (known,) = eventually(lambda: user.publishers("/state"), timeout=30)
     assert known.type_hash == ""
     (asked,) = user.ask_publishers("/state", 30)
     assert asked.type_hash == md5_of(STATE)
     assert asked.qos == rosglass.QoS.latched()
-    (own,) = eventually(lambda: robot.publishers("/state"), 30)
+    (own,) = eventually(lambda: robot.publishers("/state"), timeout=30)
     assert (own.type_hash, own.qos) == (asked.type_hash, asked.qos)
     assert user.ask_publishers("/nothing") == []
     with pytest.raises(rosglass.ConversionError):

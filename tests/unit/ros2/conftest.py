@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import itertools
-import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -63,17 +62,3 @@ def node(middleware: SteeredMiddleware) -> Iterator[Ros2Node]:
     made = Ros2Node(middleware, "fake://", "cockpit", "/arm")
     yield made
     made.close()
-
-
-@pytest.fixture
-def eventually() -> Callable[[Callable[[], Any]], Any]:
-    """Return the first true value of a condition; fails after 30 s."""
-
-    def eventually(condition: Callable[[], Any]) -> Any:
-        deadline = time.monotonic() + 30
-        while not (value := condition()):
-            assert time.monotonic() < deadline, "the condition did not come true within 30 s"
-            time.sleep(0.002)
-        return value
-
-    return eventually

@@ -8,6 +8,7 @@ import time
 from concurrent.futures import Future
 
 import pytest
+from waiting import nothing_happens
 
 import rosglass
 from rosglass.comm import (
@@ -361,7 +362,7 @@ def test_feedback_and_status_never_come_before_the_acceptance(client, peer, even
     peer.feed(goal, 1)
     peer.tell(goal, 2)
     peer.feed(goal, 2)
-    time.sleep(0.02)
+    nothing_happens(0.02)
     assert told == []
     assert goal.feedback is None
     peer.answer()
@@ -890,7 +891,7 @@ def test_a_server_that_is_asked_by_hand(node, robot, server, middleware, eventua
     assert not again.accepted  # its id is in use
     result = ask["get_result"].call_async({"goal_id": mine}, timeout=None)
     other = ask["get_result"].call_async({"goal_id": mine}, timeout=None)
-    time.sleep(0.02)
+    nothing_happens(0.02)
     assert not result.done()
     canceled = ask["cancel_goal"].call(cancel)
     assert canceled.return_code == 0

@@ -6,6 +6,7 @@ import threading
 import time
 
 import pytest
+from waiting import nothing_happens
 
 import rosglass
 from rosglass.comm import IMMEDIATE, ConnectionState, EndpointKind, NodeName
@@ -360,12 +361,12 @@ def test_graph_changes_are_told_and_merged(node, middleware, eventually):
         time.sleep(0.001)
     go_on.set()
     eventually(lambda: len(calls) >= 2)
-    time.sleep(0.05)
+    nothing_happens(0.05)
     assert len(calls) <= 3
     handle.close()
     count = len(calls)
     middleware.appear(PUBLISHER, "/more", STRING)
-    time.sleep(0.05)
+    nothing_happens(0.05)
     assert len(calls) == count
 
 

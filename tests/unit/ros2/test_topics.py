@@ -9,6 +9,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+from waiting import eventually, nothing_happens
 
 import rosglass
 from rosglass import Duration, QoS
@@ -327,7 +328,7 @@ def test_a_deadline_that_passes_without_message_is_told(node, middleware, robot,
     subscription = node.create_subscription("/t", STRING, qos=qos)
     events = []
     subscription.on_deadline_missed(events.append, IMMEDIATE)
-    time.sleep(0.3)
+    nothing_happens(0.3)
     assert events == [], "nobody is there to be late"
     key = robot(qos=qos)
     eventually(lambda: len(events) >= 2)
@@ -348,13 +349,13 @@ def test_a_publisher_that_pauses_misses_its_deadline(node, eventually):
     publisher = node.create_publisher("/t", STRING, QoS(deadline=Duration.from_seconds(0.05)))
     events = []
     publisher.on_deadline_missed(events.append)
-    time.sleep(0.1)
+    nothing_happens(0.1)
     assert events == [], "time runs from the first message"
     publisher.publish(data="x")
     eventually(lambda: len(events) >= 2)
     publisher.close()
     count = len(events)
-    time.sleep(0.12)
+    nothing_happens(0.12)
     assert len(events) <= count + 1
 
 
@@ -364,7 +365,7 @@ def test_manual_liveliness_is_lost_once_for_each_silence(node, middleware, event
     publisher.on_liveliness_lost(events.append)
     publisher.assert_liveliness()
     eventually(lambda: events)
-    time.sleep(0.15)
+    nothing_happens(0.15)
     assert events == [LivelinessLost(1)]
     publisher.publish(data="x")
     eventually(lambda: len(events) == 2)
@@ -400,7 +401,7 @@ def test_the_middlewares_word_on_liveliness_is_believed(node, middleware, robot,
     middleware.readers[0].living = 1
     robot(qos=MANUAL, gid=b"m" * 16)
     eventually(lambda: events)
-    time.sleep(0.15)
+    nothing_happens(0.15)
     assert [e.change for e in events] == [1], "it sends nothing, but shows that it is alive"
     middleware.readers[0].living = 0
     eventually(lambda: [e.change for e in events] == [1, -1])
@@ -762,8 +763,7 @@ def test_waiting_for_one_message(node, middleware, robot):
     robot(qos=QoS.latched())
 
     def feed():
-        while not middleware.readers:
-            time.sleep(0.001)
+        eventually(lambda: middleware.readers)
         middleware.readers[0].receive(HELLO)
 
     thread = threading.Thread(target=feed)

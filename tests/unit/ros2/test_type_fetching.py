@@ -9,6 +9,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import eventually, nothing_happens
 
 import rosglass
 from rosglass.comm import EndpointKind
@@ -69,10 +70,7 @@ def join(url: str) -> Iterator[Callable[..., Ros2Node]]:
             for end in other.fake.repliers
             if not end.closed and end.info.name.endswith("/get_type_description")
         ]
-        deadline = time.monotonic() + 30
-        while not all(node.service_servers(service) for service in expected):
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
+        eventually(lambda: all(node.service_servers(service) for service in expected))
         return node
 
     yield join
@@ -538,5 +536,5 @@ def test_a_message_that_is_a_service_is_not_asked_for_for_ever(
     rounds = []
     monkey = user._fetcher._round
     user._fetcher._round = lambda: rounds.append(monkey())
-    time.sleep(0.5)
+    nothing_happens(0.5)
     assert len(rounds) < 20
