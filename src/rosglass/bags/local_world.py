@@ -26,7 +26,7 @@ from rosglass.comm import (
     Subscription,
     Time,
 )
-from rosglass.comm.logger import NodeLogger
+from rosglass.comm.log import NodeLogger
 from rosglass.comm.loop import check_plain
 from rosglass.comm.names import expand
 from rosglass.comm.rclpy_names import check_order

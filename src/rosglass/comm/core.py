@@ -134,6 +134,10 @@ class NodeCore(ABC, Generic[_Member]):
         return self._state()
 
     @abstractmethod
+    def runs_here(self) -> bool:
+        """Return whether the calling thread is one of the node's own."""
+
+    @abstractmethod
     def _state(self) -> Status:
         """Return the state of the connection, in the process that it belongs to."""
 

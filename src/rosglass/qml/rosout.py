@@ -6,7 +6,7 @@ import copy
 import logging
 from typing import TYPE_CHECKING
 
-from rosglass.comm.rosout import RosoutHandler
+from rosglass.comm.log import RosoutHandler
 from rosglass.errors import Error
 from rosglass.qml.log import ROOT
 

@@ -71,7 +71,7 @@ class Member(NodeMember):
         return False
 
 
-class Core(NodeCore[Member]):
+class Core(NodeCore[NodeMember]):
     """Holds what a node consists of, and keeps its members registered and informed.
 
     Args:
@@ -182,18 +182,22 @@ class Core(NodeCore[Member]):
         """Return the absolute name of anything, not remapped; raises InvalidNameError."""
         return expand(name, self.name.name, self.name.namespace)
 
-    def add(self, member: Member) -> None:
+    def add(self, member: NodeMember) -> None:
         """Register a member and let it follow the graph; raises NodeClosedError after closing."""
         super().add(member)
         self._registrations.wake()
         self.wake()
 
-    def remove(self, member: Member) -> None:
+    def remove(self, member: NodeMember) -> None:
         """Unregister a member that was closed, soon."""
         with self._lock:
             known = self._members.pop(member, ...) is None
-        if known and not self._closed:
+        if known and not self._closed and isinstance(member, Member):
             self._registrations.forget(member)
+
+    def registrable(self) -> list[Member]:
+        """Return the members that the master knows, or is to know."""
+        return [member for member in self.members() if isinstance(member, Member)]
 
     def _state(self) -> Status:
         return self._status

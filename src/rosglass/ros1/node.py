@@ -6,6 +6,7 @@ import logging
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import EndpointKind, History, NodeName, QoS, Subscription
+from rosglass.comm.builtin_services import BuiltinServices
 from rosglass.comm.complaints import Complaints
 from rosglass.comm.core_node import CoreNode
 from rosglass.comm.flags import check_flag
@@ -17,10 +18,11 @@ from rosglass.ros1.action_types import actions
 from rosglass.ros1.answers import Answers
 from rosglass.ros1.connection import Connection
 from rosglass.ros1.core import Core
-from rosglass.ros1.furniture import Furniture
 from rosglass.ros1.names import absolute_namespace, split, validate_node_name
 from rosglass.ros1.outages import outlast
+from rosglass.ros1.parameter_server import ParameterServer
 from rosglass.ros1.reading import type_if_known
+from rosglass.ros1.roscpp_services import RoscppServices
 from rosglass.ros1.services import Services
 from rosglass.ros1.topics import Topics
 
@@ -39,14 +41,13 @@ if TYPE_CHECKING:
         ServiceClient,
         ServiceServer,
     )
-    from rosglass.comm.logger import NodeLogger
+    from rosglass.comm.log import NodeLogger
     from rosglass.comm.node import Result
     from rosglass.interfaces import Library
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
     from rosglass.ros1.action_client import Ros1ActionClient
     from rosglass.ros1.action_server import Ros1ActionServer
     from rosglass.ros1.options import Ros1Options
-    from rosglass.ros1.parameter_server import ParameterServer
     from rosglass.ros1.parameters import Ros1Parameters
     from rosglass.ros1.publisher import Ros1Publisher
 
@@ -100,11 +101,15 @@ class Ros1Node(CoreNode):
         self._silent: dict[Connection, None] = {}
         self._max_connections, self._complaints = _max_connections(), Complaints()
         self._services = Services(self._core)
-        self._furniture = Furniture(self, self._core, self._topic_names, parameters or {})
-        self._core.start(
-            Answers(self._core, self._topics, self._furniture.server.changed), self._accept
+        self._parameter_server = ParameterServer(self._core, parameters or {})
+        self._builtin_services = BuiltinServices(
+            self._core,
+            RoscppServices(self, self._core, self._parameter_server, self._topic_names),
         )
-        self._furniture.open(own_services)
+        self._core.start(
+            Answers(self._core, self._topics, self._parameter_server.changed), self._accept
+        )
+        self._builtin_services.open(own_services)
 
     # -- topics ----------------------------------------------------------------------------------
 
@@ -251,12 +256,12 @@ class Ros1Node(CoreNode):
     def parameters(self) -> Ros1Parameters:
         """This node's own parameters: those in its private namespace."""
         self._core.check_open()
-        return self._furniture.parameters
+        return self._builtin_services.parameters
 
     @property
     def parameter_server(self) -> ParameterServer:
         """The master's parameter server: every parameter, under whatever name."""
-        return self._furniture.server
+        return self._parameter_server
 
     def create_parameter_client(self, node: str | NodeName) -> ParameterClient:
         """Return a client of another node's parameters; `node` is its full name.
@@ -269,12 +274,12 @@ class Ros1Node(CoreNode):
         from rosglass.ros1.parameter_client import Ros1ParameterClient  # noqa: PLC0415
 
         self._core.check_open()
-        return Ros1ParameterClient(self._core, self._furniture.server, self._node_name(node))
+        return Ros1ParameterClient(self._core, self._parameter_server, self._node_name(node))
 
     @property
     def logger(self) -> NodeLogger:
         """The node's logger, whose messages go to ``/rosout``, too."""
-        return self._furniture.logger
+        return self._builtin_services.log.logger
 
     # -- the node's names ------------------------------------------------------------------------
 

@@ -190,7 +190,7 @@ class Registrations:
     def _register(self) -> list[str]:
         """Tell the master of members it does not know; return what it has against some."""
         refused = []
-        for member in self._core.members():
+        for member in self._core.registrable():
             if member in self._registered:
                 continue
             with self._lock:

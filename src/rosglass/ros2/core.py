@@ -34,7 +34,7 @@ class Member(NodeMember):
         return False
 
 
-class Core(NodeCore[Member]):
+class Core(NodeCore[NodeMember]):
     """Holds what a node consists of, and keeps its members informed.
 
     Args:
@@ -114,7 +114,8 @@ class Core(NodeCore[Member]):
             return False
         servers = self.graph.endpoints(EndpointKind.SERVICE_SERVER, service)
         with self._lock:
-            own = [m for m in self._members if m.serves(service, self.dispatcher)]
+            members = [m for m in self._members if isinstance(m, Member)]
+        own = [m for m in members if m.serves(service, self.dispatcher)]
         return bool(own) and all(server.node == self.name for server in servers)
 
     def _state(self) -> Status:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointKind, NodeName, QoS, Subscription
+from rosglass.comm.builtin_services import BuiltinServices
 from rosglass.comm.core_node import CoreNode
 from rosglass.comm.flags import check_flag
 from rosglass.comm.names import validate_namespace, validate_node_name
@@ -12,8 +13,8 @@ from rosglass.comm.rclpy_names import check_order
 from rosglass.errors import ArgumentError
 from rosglass.ros2.arguments import NO_ARGUMENTS
 from rosglass.ros2.core import Core
-from rosglass.ros2.furniture import Furniture
 from rosglass.ros2.publisher import Ros2Publisher
+from rosglass.ros2.rcl_services import RclServices
 from rosglass.ros2.reading import Reading, type_if_known
 from rosglass.ros2.service_client import Ros2ServiceClient
 from rosglass.ros2.service_server import Ros2ServiceServer
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
         ServiceClient,
         ServiceServer,
     )
-    from rosglass.comm.logger import NodeLogger
+    from rosglass.comm.log import NodeLogger
     from rosglass.comm.node import Result
     from rosglass.interfaces import Library
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
@@ -87,7 +88,8 @@ class Ros2Node(CoreNode):
         self.url, self.name, self.namespace = url, name, namespace
         self._core = Core(NodeName(namespace, name), url, middleware, library, arguments)
         self._fetcher = TypeFetcher(self._core)
-        self._furniture = Furniture(self, self._core, own_services)
+        self._builtin_services = BuiltinServices(self._core, RclServices(self, self._core))
+        self._builtin_services.open(own_services)
 
     def create_publisher(
         self, topic: str, type: str | MessageType, qos: QoS | int = 10
@@ -184,7 +186,7 @@ class Ros2Node(CoreNode):
     @property
     def parameters(self) -> Ros2Parameters:
         """This node's own parameters."""
-        return self._furniture.parameters
+        return self._builtin_services.parameters
 
     def create_parameter_client(self, node: str | NodeName) -> Ros2ParameterClient:
         """Return a client of another node's parameters; `node` is its full name."""
@@ -203,7 +205,7 @@ class Ros2Node(CoreNode):
     @property
     def logger(self) -> NodeLogger:
         """The node's logger, whose messages go to ``/rosout``, too."""
-        return self._furniture.logger
+        return self._builtin_services.log.logger
 
     def fetch_type_async(
         self,

@@ -20,7 +20,7 @@ from rosglass.ros2.parameter_values import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Iterator
 
     from rosglass.comm import Executor, Node, Publisher
     from rosglass.messages import Message
@@ -57,8 +57,8 @@ class ParameterServices(Handle):
         self._made: list[Handle] = []
         self._events: Publisher | None = None
 
-    def steps(self) -> Iterable[Callable[[], None]]:
-        """Return what is to be done to offer all of it, in pieces of a millisecond or so."""
+    def offer(self) -> Iterator[None]:
+        """Offer all of it, in pieces of a millisecond or so."""
         answers = {
             "describe_parameters": self._describe,
             "get_parameter_types": self._types,
@@ -67,9 +67,10 @@ class ParameterServices(Handle):
             "set_parameters": self._set,
             "set_parameters_atomically": self._set_atomically,
         }
-        yield self._announce
+        self._announce()
         for name, answer in answers.items():
-            yield lambda name=name, answer=answer: self._serve(name, answer)  # type: ignore[misc]
+            yield
+            self._serve(name, answer)
 
     def close(self) -> None:
         """Withdraw the services; safe to call twice."""

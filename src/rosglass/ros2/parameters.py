@@ -22,6 +22,7 @@ from rosglass.comm import (
     Range,
 )
 from rosglass.comm import ParameterEvent as Event
+from rosglass.comm.sim_time import USE_SIM_TIME
 from rosglass.errors import NodeClosedError, ParameterError
 from rosglass.ros2.parameter_values import (
     TYPE_NAMES,
@@ -38,12 +39,11 @@ if TYPE_CHECKING:
 
     from rosglass.comm import Executor, ParameterValue
 
-__all__ = ["DESCRIBE_TYPES", "USE_SIM_TIME", "Change", "Ros2Parameters"]
+__all__ = ["DESCRIBE_TYPES", "Change", "Ros2Parameters"]
 
 _log = logging.getLogger("rosglass.ros2")
-#: The parameter that every node has: whether its clock follows ``/clock``.
-USE_SIM_TIME = "use_sim_time"
-#: The other one: whether the node describes its types to others. Only to be given at the start.
+#: A parameter that every node has, besides :data:`USE_SIM_TIME`: whether the node describes its
+#: types to others. Only to be given at the start.
 DESCRIBE_TYPES = "start_type_description_service"
 _UNSET = TypedValue(ParameterType.NOT_SET, None)
 _NUMBERS = (ParameterType.INTEGER, ParameterType.DOUBLE)

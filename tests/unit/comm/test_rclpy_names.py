@@ -15,7 +15,7 @@ import pytest
 import rosglass
 from rosglass import Duration, InvalidNameError, Time, TypeNotFoundError
 from rosglass.comm import rclpy_names
-from rosglass.comm.logger import NodeLogger
+from rosglass.comm.log import NodeLogger
 from rosglass.ros1 import Ros1Node
 
 TEXT, TRIGGER = "std_msgs/msg/String", "std_srvs/srv/Trigger"

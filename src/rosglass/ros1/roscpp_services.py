@@ -1,0 +1,201 @@
+"""What roscpp and rospy give every node: parameters, ``/rosout``, log levels, simulated time.
+
+Behaviour: ROS wiki, "rosout", "Clock", "roscpp" and "rospy/Overview/Logging"; levels and fields are
+``rosgraph_msgs/Log``'s. As in rospy and roscpp, ``name`` is the node's and ``topics`` are those
+that the node publishes or subscribes to, unless ``/rosout_disable_topics_generation`` is set. The
+services ``~get_loggers`` and ``~set_logger_level`` are what rosconsole and rqt_logger_level call.
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+from typing import TYPE_CHECKING, Any
+
+from rosglass.comm import IMMEDIATE, Handle, QoS
+from rosglass.comm.builtin_services import BuiltinProtocol
+from rosglass.comm.sim_time import USE_SIM_TIME, SimTime
+from rosglass.errors import ServiceError
+from rosglass.ros1.parameter_server import StartParameters
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from rosglass.comm import Executor, Node, ServiceServer
+    from rosglass.comm.builtin_services import BuiltinServices
+    from rosglass.comm.log import NodeLog, NodeLogger
+    from rosglass.messages import Message
+    from rosglass.ros1.core import Core
+    from rosglass.ros1.parameter_server import ParameterServer
+    from rosglass.ros1.parameters import Ros1Parameters
+
+__all__ = ["LoggerServices", "RoscppServices"]
+
+_NO_TOPICS = "/rosout_disable_topics_generation"
+#: Latched, as rospy and roscpp have it.
+_ROSOUT_QOS = QoS(depth=1000, durability=QoS.latched().durability)
+#: How long the first messages wait for the node ``/rosout``: latched is only the last one.
+_ROSOUT_WAIT_S = 2.0
+#: Names of the levels as roscpp spells them; both call fatal what Python calls critical.
+_LEVELS = {
+    "debug": logging.DEBUG,
+    "info": logging.INFO,
+    "warn": logging.WARNING,
+    "error": logging.ERROR,
+    "fatal": logging.CRITICAL,
+}
+#: ``rosgraph_msgs/Log``'s levels by the least of Python's that they stand for.
+_LOG_LEVELS = ((50, 16), (40, 8), (30, 4), (20, 2))
+_DEBUG = 1
+_LIBRARY = "rosglass"
+
+
+class RoscppServices(BuiltinProtocol["Ros1Parameters"]):
+    """What every ROS 1 node has by itself.
+
+    The clock follows ``/use_sim_time`` from the start. ROS 1's own nodes look at that parameter
+    once, as they start; we follow it, so that a screen which was there before the simulation keeps
+    its time all the same.
+
+    Args:
+        node: The node.
+        core: What it consists of.
+        server: The master's parameter server.
+        topics: Returns the topics that the node publishes or subscribes to.
+    """
+
+    def __init__(
+        self, node: Node, core: Core, server: ParameterServer, topics: Callable[[], list[str]]
+    ) -> None:
+        self._node, self._core, self._server, self._topics = node, core, server, topics
+
+    def open(self, services: BuiltinServices[Ros1Parameters]) -> None:
+        """Set the parameters that the program was started with, and follow the simulation's time.
+
+        Until the master has answered, which takes some milliseconds after connecting, the clock
+        shows the system's time.
+        """
+        services.own(self._server)
+        self._core.add(StartParameters(self._server))
+        sim_time = SimTime(self._node, self._core)
+        services.own(sim_time)
+        # As rospy has it: 1 counts, too.
+        services.own(
+            self._server.subscribe(
+                f"/{USE_SIM_TIME}", lambda value: sim_time.follow(bool(value)), IMMEDIATE
+            )
+        )
+
+    def create_parameters(
+        self,
+        services: BuiltinServices[Ros1Parameters],  # noqa: ARG002 - they need no closing
+    ) -> Ros1Parameters:
+        """Return the node's parameters on the master's server."""
+        from rosglass.ros1.parameters import Ros1Parameters  # noqa: PLC0415
+
+        return Ros1Parameters(self._core, self._server)
+
+    def create_log(self, services: BuiltinServices[Ros1Parameters]) -> NodeLog:
+        """Return the log; its logger is below ``ros``, as in roscpp: ``ros.arm.gripper``."""
+        from rosglass.comm.log import NodeLog, RosoutTopic, clean, message_of  # noqa: PLC0415
+
+        core, numbers = self._core, itertools.count(1)
+        without_topics = self._server.subscribe(_NO_TOPICS)
+        services.own(without_topics)
+
+        def fields(record: logging.LogRecord) -> dict[str, Any]:
+            # A robot's time may be a simulation's: the record's own is only the system's.
+            now = core.clock.now().nanoseconds
+            return {
+                "header": {
+                    "seq": next(numbers) % 2**32,
+                    "stamp": {"secs": now // 10**9, "nsecs": now % 10**9},
+                },
+                "level": _level_of(record.levelno),
+                "name": core.name.full,
+                "msg": message_of(record),
+                "file": clean(record.pathname),
+                "function": clean(record.funcName or ""),
+                "line": max(0, record.lineno),
+                "topics": [] if without_topics.value else self._topics(),
+            }
+
+        topic = RosoutTopic("rosgraph_msgs/Log", _ROSOUT_QOS, fields, _ROSOUT_WAIT_S)
+        name = "ros." + core.name.full.strip("/").replace("/", ".")
+        return NodeLog(self._node, core, name, topic)
+
+    def offer(self, services: BuiltinServices[Ros1Parameters]) -> Iterator[None]:
+        """Announce ``/rosout``, and offer the services for log levels."""
+        services.log.open()
+        yield
+        loggers = LoggerServices(self._node, services.log.logger, self._core.own_dispatcher)
+        services.own(loggers)
+        loggers.open()
+
+
+class LoggerServices(Handle):
+    """Offers a node's loggers, its children and the library's own to others.
+
+    Args:
+        node: The node.
+        logger: Its logger.
+        executor: Where the services run.
+    """
+
+    def __init__(self, node: Node, logger: NodeLogger, executor: Executor) -> None:
+        self._node, self._logger, self._executor = node, logger, executor
+        self._servers: list[ServiceServer] = []
+
+    def open(self) -> None:
+        """Offer the services; raises NodeClosedError and what a service server does."""
+        for name, kind, answer in (
+            ("~get_loggers", "roscpp/GetLoggers", self._list_loggers),
+            ("~set_logger_level", "roscpp/SetLoggerLevel", self._set_level),
+        ):
+            self._servers.append(
+                self._node.create_service_server(name, kind, answer, executor=self._executor)
+            )
+
+    def close(self) -> None:
+        """Withdraw them; safe to call twice."""
+        servers, self._servers = self._servers, []
+        for server in servers:
+            server.close()
+
+    def _loggers(self) -> dict[str, logging.Logger]:
+        own = {logger.name: logger for logger in self._logger.family()}
+        library = {
+            name: known
+            for name, known in sorted(logging.Logger.manager.loggerDict.items())
+            if name.partition(".")[0] == _LIBRARY and isinstance(known, logging.Logger)
+        }
+        return own | library
+
+    def _list_loggers(self, _: Message) -> dict[str, Any]:
+        return {
+            "loggers": [
+                {"name": name, "level": _name_of(logger.getEffectiveLevel())}
+                for name, logger in self._loggers().items()
+            ]
+        }
+
+    def _set_level(self, request: Message) -> dict[str, Any]:
+        known = self._loggers()
+        level = _LEVELS.get(request.level.lower())
+        if level is None:
+            raise ServiceError(f"no level {request.level!r}; one of {', '.join(_LEVELS)}")
+        logger = known.get(request.logger) if request.logger else self._logger
+        if logger is None:
+            raise ServiceError(f"no logger {request.logger!r}; one of {', '.join(known)}")
+        logger.setLevel(level)
+        return {}
+
+
+def _name_of(level: int) -> str:
+    """Return the name of the level that is no more severe, the least one at least."""
+    return next((n for n, least in reversed(_LEVELS.items()) if level >= least), "debug")
+
+
+def _level_of(number: int) -> int:
+    """Return the level of ``rosgraph_msgs/Log`` that is no more severe, the least one at least."""
+    return next((ros for least, ros in _LOG_LEVELS if number >= least), _DEBUG)
