@@ -146,28 +146,6 @@ node.create_publisher("/forgotten", {TEXT!r}).publish(data="x")
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_parameters_of_another_node_are_read_set_and_watched(robot, console, eventually):
-    robot.parameters.declare("speed", 1.5)
-    client = console.create_parameter_client("/robot")
-    assert client.wait_for_server(30)
-    assert "speed" in eventually(client.names)
-    assert client.get(["speed"]) == {"speed": 1.5}
-    changes, values = [], iter(range(2, 10_000))
-
-    def set_another():
-        value = float(next(values))
-        assert client.set({"speed": value})["speed"].successful
-        assert robot.parameters.get("speed") == value
-        return changes
-
-    # What changes before the link is made is not reported: a change is made until one is.
-    with client.watch(lambda event: changes.append({**event.new, **event.changed})):
-        eventually(set_another)
-    assert "speed" in changes[0]
-    with pytest.raises(rosglass.ParameterError):
-        robot.parameters.get("sped")
-
-
 def test_the_log_goes_to_rosout(robot, console, wire, eventually):
     found = []
     console.create_subscription(

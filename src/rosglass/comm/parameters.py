@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
+from rosglass.comm.deadline import Deadline
+from rosglass.comm.loop import check_plain
 from rosglass.comm.node import Handle
-from rosglass.errors import UnsupportedError
+from rosglass.errors import ArgumentError, NodeClosedError, ParameterError, UnsupportedError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Sequence
     from os import PathLike
 
     from rosglass.comm.node import Executor
@@ -24,7 +27,10 @@ __all__ = [
     "ParameterValue",
     "Parameters",
     "Range",
+    "RemoteParameters",
     "SetResult",
+    "check_values",
+    "shown",
 ]
 
 #: What a parameter can be; None stands for "not set".
@@ -194,12 +200,10 @@ class Parameters(Handle):
         raise UnsupportedError(f"{type(self).__name__} has no parameter files")
 
 
-class ParameterClient(Handle):
-    """Reads and sets another node's parameters; made by :meth:`Node.create_parameter_client`.
+class RemoteParameters(Handle):
+    """Another node's parameters, as ROS 1 or ROS 2 lets them be read and set.
 
-    Every method that asks the node takes `timeout`, seconds in all (None waits for ever), and
-    raises ServiceUnavailableError when the node (or its parameters) cannot be reached,
-    TimeoutError when it does not answer, and NodeClosedError.
+    A :class:`ParameterClient` asks it, and has checked what the caller gave.
 
     Attributes:
         node: Full name of the other node.
@@ -208,18 +212,91 @@ class ParameterClient(Handle):
     node: str
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} of {self.node}>"
+        return f"<parameters of {self.node}>"
 
     @property
     @abstractmethod
     def ready(self) -> bool:
-        """Whether the node is there and serves its parameters."""
+        """Whether the parameters can be reached."""
 
     @abstractmethod
     def wait_for_server(self, timeout: float | None = None) -> bool:
-        """Wait for the node; return whether it is there."""
+        """Wait until they can be reached; return whether they can."""
 
     @abstractmethod
+    def find(self, prefixes: list[str], depth: int, deadline: Deadline) -> list[str]:
+        """Return the names under one of `prefixes` (all without), up to `depth` levels (0: all)."""
+
+    @abstractmethod
+    def values(self, names: list[str] | None, deadline: Deadline) -> dict[str, ParameterValue]:
+        """Return values by name, of all without `names`; None for what has none."""
+
+    @abstractmethod
+    def descriptors(
+        self, names: list[str] | None, deadline: Deadline
+    ) -> dict[str, ParameterDescriptor]:
+        """Return what is known by name, of all without `names`."""
+
+    @abstractmethod
+    def set(self, values: Mapping[str, ParameterValue], deadline: Deadline) -> dict[str, SetResult]:
+        """Set parameters one by one; raises ParameterError before anything is sent."""
+
+    @abstractmethod
+    def set_atomically(self, values: Mapping[str, ParameterValue], deadline: Deadline) -> SetResult:
+        """Set parameters, all or none; raises as :meth:`set`, or UnsupportedError."""
+
+    @abstractmethod
+    def watch(
+        self, callback: Callable[[ParameterEvent], None], executor: Executor | None
+    ) -> Handle:
+        """Call `callback` with each change, until the handle, or this, is closed."""
+
+    @abstractmethod
+    def load(self, path: str | PathLike[str], deadline: Deadline) -> list[str]:
+        """Set what a file has for the node; return the names; raises ParameterError."""
+
+    @abstractmethod
+    def save(self, path: str | PathLike[str], deadline: Deadline) -> None:
+        """Write a file that can be loaded; raises ParameterError."""
+
+
+class ParameterClient(Handle):
+    """Reads and sets another node's parameters; made by :meth:`Node.create_parameter_client`.
+
+    Every method that asks the node takes `timeout`, seconds in all (None waits for ever), and
+    raises ServiceUnavailableError when the node (or its parameters) cannot be reached,
+    TimeoutError when it does not answer, and NodeClosedError.
+
+    In ROS 1, parameters live on the master's parameter server, whether the node runs or not, and
+    so do those in any other namespace, ``/`` included. Groups are namespaces there:
+    ``camera/exposure``. Values may be what only ROS 1 has: namespaces as dicts, lists of several
+    types, dates; None deletes. A master that does not answer within `timeout`, 5 s at most, is a
+    ConnectionLostError.
+
+    Args:
+        remote: The other node's parameters.
+
+    Attributes:
+        node: Full name of the other node.
+    """
+
+    def __init__(self, remote: RemoteParameters) -> None:
+        self.node, self._remote = remote.node, remote
+        self._closed = False
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {self.node}>"
+
+    @property
+    def ready(self) -> bool:
+        """Whether the node is there and serves its parameters; in ROS 1, the master."""
+        return not self._closed and self._remote.ready
+
+    def wait_for_server(self, timeout: float | None = None) -> bool:
+        """Wait for the node, in ROS 1 for the master; return whether it is there."""
+        self._check_open()
+        return self._remote.wait_for_server(timeout)
+
     def names(
         self, prefixes: Iterable[str] = (), depth: int = 0, *, timeout: float | None = 10.0
     ) -> list[str]:
@@ -230,8 +307,12 @@ class ParameterClient(Handle):
             depth: Levels below the prefix, 0 for all.
             timeout: Seconds to wait.
         """
+        deadline = self._deadline(timeout)
+        wanted = self._texts(prefixes, "prefixes")
+        if type(depth) is not int or depth < 0:
+            raise ArgumentError("depth", depth, "a number of levels, 0 for all", self.node)
+        return sorted(self._remote.find(wanted, depth, deadline))
 
-    @abstractmethod
     def get(
         self, names: Iterable[str] | None = None, *, timeout: float | None = 10.0
     ) -> dict[str, ParameterValue]:
@@ -239,17 +320,19 @@ class ParameterClient(Handle):
 
         Those that are not declared, or have no value, are None.
         """
+        deadline = self._deadline(timeout)
+        return self._remote.values(self._names(names), deadline)
 
-    @abstractmethod
     def describe(
         self, names: Iterable[str] | None = None, *, timeout: float | None = 10.0
     ) -> dict[str, ParameterDescriptor]:
         """Return what is known about parameters, about all without `names`.
 
-        Those that are not declared have the type NOT_SET.
+        Those that are not declared have the type NOT_SET. ROS 1 knows no more than the type.
         """
+        deadline = self._deadline(timeout)
+        return self._remote.descriptors(self._names(names), deadline)
 
-    @abstractmethod
     def set(
         self, values: Mapping[str, ParameterValue], *, timeout: float | None = 10.0
     ) -> dict[str, SetResult]:
@@ -261,31 +344,94 @@ class ParameterClient(Handle):
         Raises:
             ParameterError: A value can be no parameter's; nothing is sent.
         """
+        deadline = self._deadline(timeout)
+        check_values(values, self.node)
+        return self._remote.set(values, deadline)
 
-    @abstractmethod
     def set_atomically(
         self, values: Mapping[str, ParameterValue], *, timeout: float | None = 10.0
     ) -> SetResult:
         """Set parameters, all or none; return what the node says.
 
         Types and errors as in :meth:`set`.
-        """
 
-    @abstractmethod
+        Raises:
+            UnsupportedError: There are several, which ROS 1 cannot set at once.
+        """
+        deadline = self._deadline(timeout)
+        check_values(values, self.node)
+        return self._remote.set_atomically(values, deadline)
+
     def watch(
         self, callback: Callable[[ParameterEvent], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` with each change of the node's parameters."""
+        """Call `callback` with each change of the node's parameters.
+
+        In ROS 1 this waits for the values that changes are compared with, and changes in quick
+        succession may be merged.
+        """
+        self._check_open()
+        check_plain(callback, f"{self.node}: watch()")
+        return self._remote.watch(callback, executor)
 
     def load(self, path: str | PathLike[str], *, timeout: float | None = 10.0) -> list[str]:
         """Set, one by one, the parameters that a file has for the node; return their names.
+
+        In ROS 1 as ``rosparam load FILE /node`` does.
 
         Raises:
             ParameterError: The file cannot be read or has nothing for the node, or the node
                 refuses a value; the message lists all that it refused.
         """
-        raise UnsupportedError(f"{type(self).__name__} has no parameter files")
+        return self._remote.load(path, self._deadline(timeout))
 
     def save(self, path: str | PathLike[str], *, timeout: float | None = 10.0) -> None:
         """Write the node's parameters to a file that can be loaded; raises ParameterError."""
-        raise UnsupportedError(f"{type(self).__name__} has no parameter files")
+        self._remote.save(path, self._deadline(timeout))
+
+    def close(self) -> None:
+        """Ask and watch no more; safe to call twice."""
+        self._closed = True
+        self._remote.close()
+
+    def _deadline(self, timeout: float | None) -> Deadline:
+        self._check_open()
+        return Deadline(timeout, self.node)
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise NodeClosedError(f"{self!r} is closed; create another one")
+
+    def _names(self, names: Iterable[str] | None) -> list[str] | None:
+        if names is None:
+            return None
+        wanted = self._texts(names, "names")
+        for name in wanted:
+            if not isinstance(name, str) or not name:
+                raise ParameterError(
+                    f"{self.node}: a parameter's name must be a text that is not empty, "
+                    f"got {name!r}"
+                )
+        return list(dict.fromkeys(wanted))
+
+    def _texts(self, given: object, what: str) -> list[str]:
+        if isinstance(given, str):
+            return [given]
+        if not isinstance(given, Iterable):
+            raise ParameterError(f"{self.node}: {what} must be a list of names, got {given!r}")
+        return list(given)
+
+
+def check_values(values: object, node: str) -> None:
+    """Raise ParameterError unless `values` gives values by name."""
+    if not isinstance(values, Mapping):
+        raise ParameterError(
+            f"{node}: parameters are set by a dict of names and values, e.g. "
+            f"set({{'speed': 1.5}}); got {values!r}"
+        )
+
+
+def shown(value: object) -> str:
+    """Return a value as error messages show it, cut if it is long."""
+    text = repr(value)
+    return f"{text[:77]}..." if len(text) > 80 else text

@@ -5,7 +5,6 @@ Nothing of ROS is needed on this machine. Import what you need from the modules.
 
 from rosglass.ros1.action_state import CommState, TerminalState
 from rosglass.ros1.node import Ros1Node
-from rosglass.ros1.parameter_server import ParameterServer
-from rosglass.ros1.parameter_watch import ParameterSubscription
+from rosglass.ros1.parameter_server import ParameterServer, ParameterSubscription
 
 __all__ = ["CommState", "ParameterServer", "ParameterSubscription", "Ros1Node", "TerminalState"]

@@ -193,7 +193,7 @@ class _Parser:
 
     def _parameter(self, text: str, name: str, value: str) -> None:
         from rosglass.ros1.parameter_files import parse_value  # noqa: PLC0415 - yaml
-        from rosglass.ros1.parameter_values import to_wire  # noqa: PLC0415 - xmlrpc
+        from rosglass.ros1.parameter_server import to_wire  # noqa: PLC0415 - xmlrpc
 
         try:
             expand("~" + name, "n", "/")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import EndpointKind, History, NodeName, QoS, Subscription
+from rosglass.comm import EndpointKind, History, NodeName, ParameterClient, QoS, Subscription
 from rosglass.comm.builtin_services import BuiltinServices
 from rosglass.comm.complaints import Complaints
 from rosglass.comm.core_node import CoreNode
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
         Answer,
         EndpointInfo,
         Executor,
-        ParameterClient,
         Promise,
         Sample,
         ServerGoal,
@@ -48,7 +47,7 @@ if TYPE_CHECKING:
     from rosglass.ros1.action_client import Ros1ActionClient
     from rosglass.ros1.action_server import Ros1ActionServer
     from rosglass.ros1.options import Ros1Options
-    from rosglass.ros1.parameters import Ros1Parameters
+    from rosglass.ros1.parameter_namespace import Ros1Parameters
     from rosglass.ros1.publisher import Ros1Publisher
 
 __all__ = ["Ros1Node"]
@@ -271,10 +270,11 @@ class Ros1Node(CoreNode):
         Raises:
             InvalidNameError: The name breaks ROS's rules.
         """
-        from rosglass.ros1.parameter_client import Ros1ParameterClient  # noqa: PLC0415
+        from rosglass.ros1.parameter_namespace import RemoteNamespace  # noqa: PLC0415
 
         self._core.check_open()
-        return Ros1ParameterClient(self._core, self._parameter_server, self._node_name(node))
+        full = self._node_name(node)
+        return ParameterClient(RemoteNamespace(self._core, self._parameter_server, full))
 
     @property
     def logger(self) -> NodeLogger:

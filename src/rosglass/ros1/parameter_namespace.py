@@ -1,30 +1,46 @@
-"""The parameters in one namespace, by their names there: a node's private ones, as a rule."""
+"""The parameters in one namespace of ROS 1's parameter server: a node's private ones, as a rule.
+
+Our own node's and other nodes' alike: whoever knows a name may set it, to values of any type.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import threading
+from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import (
     IMMEDIATE,
+    ConnectionState,
     Handle,
     Listeners,
     ParameterDescriptor,
     ParameterEvent,
+    Parameters,
     ParameterType,
+    SetResult,
 )
 from rosglass.comm.loop import check_plain
-from rosglass.errors import ConversionError, ParameterError
-from rosglass.ros1.parameter_values import flat, same
+from rosglass.comm.parameters import RemoteParameters, check_values
+from rosglass.comm.readiness import Readiness
+from rosglass.comm.similar import similar
+from rosglass.errors import ConnectionLostError, NodeClosedError, ParameterError, UnsupportedError
+from rosglass.ros1.parameter_server import flat, same, to_wire
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
+    from os import PathLike
 
-    from rosglass.comm import Executor
+    from rosglass.comm import Executor, ParameterValue
+    from rosglass.comm.deadline import Deadline
+    from rosglass.ros1.core import Core
     from rosglass.ros1.parameter_server import ParameterServer
 
-__all__ = ["ParameterNamespace", "check_values", "type_of"]
+__all__ = ["RemoteNamespace", "Ros1Parameters"]
 
+#: How long the master may take to answer, whatever longer time is given.
+_TIMEOUT_S = 5.0
 _SCALARS = {
     bool: ParameterType.BOOL,
     int: ParameterType.INTEGER,
@@ -74,43 +90,21 @@ class ParameterNamespace:
         found = self.server.get(self.name, None, timeout=timeout)
         return found if isinstance(found, dict) else {}
 
-    def find(self, prefixes: Iterable[str], depth: int, timeout: float) -> list[str]:
-        """Return the names below `prefixes` (all without), up to `depth` levels (0: all)."""
-        wanted = texts(prefixes, "prefixes", self.name)
-        if type(depth) is not int or depth < 0:
-            raise ConversionError("depth", depth, "a number of levels, 0 for all", self.name)
-        names = sorted(name for name, _ in flat(self.tree(timeout)))
-        if not wanted:
-            return [name for name in names if not depth or name.count("/") < depth]
-        return [name for name in names if any(_below(name, p, depth) for p in wanted)]
-
-    def values(self, names: Iterable[str] | None, timeout: float) -> dict[str, Any]:
-        """Return values by name, of all without `names`; None for what is not set."""
-        if names is None:
-            return dict(sorted(flat(self.tree(timeout))))
-        wanted = {name: self.full(name) for name in texts(names, "names", self.name)}
-        if len(wanted) <= 1:
-            return {n: self.server.get(f, None, timeout=timeout) for n, f in wanted.items()}
-        tree = self.tree(timeout)
-        return {name: _at(tree, name) for name in wanted}
-
     def describe(self, name: str, value: Any) -> ParameterDescriptor:
         """Return what is known about a parameter, which is its type."""
         kind = type_of(value)
-        told = ""
+        text = ""
         if value is not None and kind is ParameterType.NOT_SET:
-            told = f"A {'namespace' if isinstance(value, dict) else type(value).__name__}."
-        return ParameterDescriptor(name, kind, told, dynamic_typing=True)
+            text = f"A {'namespace' if isinstance(value, dict) else type(value).__name__}."
+        return ParameterDescriptor(name, kind, text, dynamic_typing=True)
 
     def watch(
         self,
         callback: Callable[[ParameterEvent], None],
         executor: Executor,
-        where: str,
-        before: dict[str, Any] | None = None,
+        before: dict[str, Any] | None,
     ) -> Handle:
         """Call `callback` with each change since the values `before`, or since they are known."""
-        check_plain(callback, where)
         return _Changes(self, callback, executor, before)
 
 
@@ -146,6 +140,296 @@ class _Changes(Handle):
             self._listeners.notify(ParameterEvent(self._name, new, changed, deleted))
 
 
+class Ros1Parameters(Parameters):
+    """A node's own parameters, ``~name``; :attr:`Node.parameters`.
+
+    They live on the master's parameter server, where every node can set them, to values of any
+    type: nothing can be refused, and no parameter is read-only, has a range or keeps its type.
+    Groups are namespaces: ``camera/exposure``. Values may be what only ROS 1 has: namespaces as
+    dicts, lists of several types, dates. Each method asks the master and waits up to 5 s for it;
+    :attr:`Ros1Node.parameter_server` can do so without waiting.
+
+    Raises:
+        ConnectionLostError: The master does not answer; from every method.
+        InvalidNameError: A name breaks ROS's rules; from every method that takes one.
+    """
+
+    def __init__(self, core: Core, server: ParameterServer) -> None:
+        self.node = core.name.full
+        self._core, self._server = core, server
+        self._namespace = ParameterNamespace(server, core.name.full)
+        self._lock = threading.Lock()
+        self._declared: dict[str, ParameterDescriptor] = {}
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {self.node}>"
+
+    def declare(
+        self,
+        name: str,
+        default: ParameterValue = None,
+        descriptor: ParameterDescriptor | None = None,
+    ) -> ParameterValue:
+        """Return a parameter's value; where it has none, `default` is set, for others to see.
+
+        Args:
+            name: Its name.
+            default: Its value unless the parameter server has another one.
+            descriptor: A description for :meth:`describe`; others cannot read it.
+
+        Raises:
+            ParameterError: It is declared already, or can be no parameter's value.
+            UnsupportedError: The descriptor has a range, or makes it read-only.
+        """
+        self._core.check_open()
+        full = self._namespace.full(name)
+        descriptor = ParameterDescriptor() if descriptor is None else descriptor
+        if not isinstance(descriptor, ParameterDescriptor):
+            raise ParameterError(f"parameter {name!r}: {descriptor!r} is not a ParameterDescriptor")
+        if descriptor.range is not None or descriptor.read_only:
+            what = "a range" if descriptor.range is not None else "read-only parameters"
+            raise UnsupportedError(
+                f"parameter {full}: ROS 1's parameter server knows no {what.removeprefix('a ')}: "
+                "every node may set everything; check the value where it is used"
+            )
+        if default is not None:
+            to_wire(full, default)
+        with self._lock:
+            if name in self._declared:
+                raise ParameterError(f"{self.node}: parameter {name!r} is declared already")
+            self._declared[name] = descriptor
+        try:
+            value: ParameterValue = self._server.get(full, None)
+            if value is None and default is not None:
+                self._server.set(full, default)
+        except BaseException:
+            with self._lock:
+                del self._declared[name]
+            raise
+        return default if value is None else value
+
+    def undeclare(self, name: str) -> None:
+        """Forget and delete a parameter; raises ParameterError when it is neither there nor known.
+
+        It may be gone from the server already: others can delete it, too.
+        """
+        self._core.check_open()
+        with self._lock:
+            declared = self._declared.pop(name, None)
+        full = self._namespace.full(name)
+        if declared is None or self._server.has(full):
+            self._server.delete(full)
+
+    def get(self, name: str) -> ParameterValue:
+        """Return its value, None for one that is declared and not set.
+
+        Raises:
+            ParameterError: It is neither declared nor set; similar names are told.
+        """
+        self._core.check_open()
+        value: ParameterValue = self._server.get(self._namespace.full(name), None)
+        if value is None and name not in self._declared:
+            hint = similar(name, self.names())
+            raise ParameterError(f"{self.node}: parameter {name!r} is not set{hint}")
+        return value
+
+    def set(self, values: Mapping[str, ParameterValue]) -> None:
+        """Set parameters one after the other, declared or not; None deletes.
+
+        Raises:
+            ParameterError: A value can be no parameter's; then none is set.
+        """
+        self._core.check_open()
+        check_values(values, self.node)
+        wanted = {self._namespace.full(name): value for name, value in values.items()}
+        for full, value in wanted.items():
+            if value is not None:
+                to_wire(self._server.resolve(full, strict=True), value)
+        for full, value in wanted.items():
+            if value is not None:
+                self._server.set(full, value)
+            elif self._server.has(full):
+                self._server.delete(full)
+
+    def describe(self, name: str) -> ParameterDescriptor:
+        """Return its type, and what it was declared with; errors as of :meth:`get`."""
+        found = self._namespace.describe(name, self.get(name))
+        declared = self._declared.get(name)
+        if declared is None:
+            return found
+        kind = declared.type if found.type is ParameterType.NOT_SET else found.type
+        return replace(declared, name=name, type=kind, dynamic_typing=True)
+
+    def names(self) -> list[str]:
+        """Return the names that are set or declared, sorted."""
+        self._core.check_open()
+        there = (name for name, _ in flat(self._namespace.tree(_TIMEOUT_S)))
+        return sorted({*there, *self._declared})
+
+    def on_set(self, validate: Callable[[Mapping[str, ParameterValue]], str]) -> Handle:
+        """Raise UnsupportedError: nobody asks a node before its parameters are set."""
+        raise UnsupportedError(
+            f"{self.node}: ROS 1's parameter server takes every value without asking "
+            f"{getattr(validate, '__name__', validate)!r}; on_change() tells afterwards"
+        )
+
+    def on_change(
+        self, callback: Callable[[ParameterEvent], None], executor: Executor | None = None
+    ) -> Handle:
+        """Call `callback` with each change, whoever makes it; quick ones may be merged."""
+        self._core.check_open()
+        chosen = executor or self._core.dispatcher
+        check_plain(callback, f"{self.node}: on_change()")
+        return self._namespace.watch(callback, chosen, dict(flat(self._namespace.tree(_TIMEOUT_S))))
+
+    def load(self, path: str | PathLike[str]) -> None:
+        """Set what a file has, as ``rosparam load FILE /node`` does; declared or not.
+
+        Raises:
+            ParameterError: The file cannot be read or is empty, or has a value that can be no
+                parameter's; nothing is set then.
+        """
+        self._core.check_open()
+        if not self._server.load(path, self.node):
+            raise ParameterError(f"{path} has no parameters")
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the parameters into a file, as ``rosparam dump FILE /node`` does."""
+        self._core.check_open()
+        from rosglass.ros1 import parameter_files  # noqa: PLC0415 - yaml
+
+        parameter_files.write(path, self._namespace.tree(_TIMEOUT_S))
+
+    def close(self) -> None:
+        """Do nothing: the parameters stay on the server, and callbacks end with the node."""
+
+
+class RemoteNamespace(RemoteParameters):
+    """Another node's parameters: those in its namespace on the parameter server.
+
+    Args:
+        core: The node that asks.
+        server: The parameter server.
+        node: Full name of the other node, or any absolute namespace.
+    """
+
+    def __init__(self, core: Core, server: ParameterServer, node: str) -> None:
+        self.node = node
+        self._core, self._server = core, server
+        self._namespace = ParameterNamespace(server, node)
+        self._readiness = Readiness(
+            f"parameters of {node}", lambda: self.ready, self._check_open, core.dispatcher
+        )
+        self._lock = threading.Lock()
+        self._watches: list[Handle] = []
+        self._closed = False
+
+    @property
+    def ready(self) -> bool:
+        """Whether the master, which keeps the parameters, is there."""
+        return self._core.status().state is ConnectionState.CONNECTED
+
+    def wait_for_server(self, timeout: float | None = None) -> bool:
+        """Wait for the master; return whether it is there."""
+        return self._readiness.wait(timeout)
+
+    def find(self, prefixes: list[str], depth: int, deadline: Deadline) -> list[str]:
+        """Return the names under `prefixes`."""
+        names = [name for name, _ in flat(self._namespace.tree(_seconds(deadline)))]
+        if not prefixes:
+            return [name for name in names if not depth or name.count("/") < depth]
+        return [name for name in names if any(_below(name, p, depth) for p in prefixes)]
+
+    def values(self, names: list[str] | None, deadline: Deadline) -> dict[str, ParameterValue]:
+        """Return values by name; None for what is not set."""
+        if names is None:
+            return dict(sorted(flat(self._namespace.tree(_seconds(deadline)))))
+        wanted = {name: self._namespace.full(name) for name in names}
+        if len(wanted) <= 1:
+            seconds = _seconds(deadline)
+            return {n: self._server.get(f, None, timeout=seconds) for n, f in wanted.items()}
+        tree = self._namespace.tree(_seconds(deadline))
+        return {name: _at(tree, name) for name in wanted}
+
+    def descriptors(
+        self, names: list[str] | None, deadline: Deadline
+    ) -> dict[str, ParameterDescriptor]:
+        """Return types by name; ROS 1 knows no more."""
+        found = self.values(names, deadline)
+        return {name: self._namespace.describe(name, value) for name, value in found.items()}
+
+    def set(self, values: Mapping[str, ParameterValue], deadline: Deadline) -> dict[str, SetResult]:
+        """Set parameters one by one, None deletes; return what the master says to each."""
+        wanted = {name: self._namespace.full(name) for name in values}
+        for name, full in wanted.items():
+            self._server.resolve(full, strict=True)
+            if values[name] is not None:
+                to_wire(full, values[name])
+        return {name: self._set(full, values[name], deadline) for name, full in wanted.items()}
+
+    def set_atomically(self, values: Mapping[str, ParameterValue], deadline: Deadline) -> SetResult:
+        """Set one parameter; raises UnsupportedError for several."""
+        if len(values) > 1:
+            raise UnsupportedError(
+                f"{self.node}: ROS 1's parameter server sets one parameter after the other; take "
+                "set(), or node.parameter_server.set() with a dict, which replaces a namespace"
+            )
+        return next(iter(self.set(values, deadline).values()), SetResult(True))
+
+    def watch(
+        self, callback: Callable[[ParameterEvent], None], executor: Executor | None
+    ) -> Handle:
+        """Call `callback` with each change; waits for the values that they are compared with."""
+        self._check_open()
+        before = None
+        # Without them, changes count from the master's first answer: when there is no master yet,
+        # and in threads that must not wait.
+        with suppress(ConnectionLostError, UnsupportedError):
+            before = dict(flat(self._namespace.tree(_TIMEOUT_S)))
+        made = self._namespace.watch(callback, executor or self._core.dispatcher, before)
+        with self._lock:
+            self._watches.append(made)
+        return made
+
+    def load(self, path: str | PathLike[str], deadline: Deadline) -> list[str]:
+        """Set what a file has, as ``rosparam load FILE /node`` does; nothing if it is wrong."""
+        prefix = self.node.rstrip("/") + "/"
+        names = self._server.load(path, self.node, timeout=_seconds(deadline))
+        if not names:
+            raise ParameterError(f"{path} has no parameters")
+        return [name.removeprefix(prefix) for name in names]
+
+    def save(self, path: str | PathLike[str], deadline: Deadline) -> None:
+        """Write a file, as ``rosparam dump FILE /node`` does."""
+        from rosglass.ros1 import parameter_files  # noqa: PLC0415 - yaml
+
+        parameter_files.write(path, self._namespace.tree(_seconds(deadline)))
+
+    def close(self) -> None:
+        """Watch no more; safe to call twice."""
+        with self._lock:
+            self._closed = True
+            watches, self._watches = self._watches, []
+        for watch in watches:
+            watch.close()
+        self._readiness.close()
+
+    def _check_open(self) -> None:
+        self._core.check_open()
+        if self._closed:
+            raise NodeClosedError(f"{self!r} is closed; create another one")
+
+    def _set(self, full: str, value: Any, deadline: Deadline) -> SetResult:
+        try:
+            if value is None:
+                self._server.delete(full, timeout=_seconds(deadline))
+            else:
+                self._server.set(full, value, timeout=_seconds(deadline))
+        except ParameterError as error:
+            return SetResult(False, str(error))
+        return SetResult(True)
+
+
 def type_of(value: Any) -> ParameterType:
     """Return a value's type, NOT_SET for what only ROS 1 has: namespaces, mixed lists, dates."""
     if isinstance(value, list):
@@ -156,24 +440,6 @@ def type_of(value: Any) -> ParameterType:
             else (ParameterType.NOT_SET)
         )
     return _SCALARS.get(type(value), ParameterType.NOT_SET)
-
-
-def check_values(values: object, where: str) -> None:
-    """Raise ParameterError unless `values` gives values by name."""
-    if not isinstance(values, Mapping):
-        raise ParameterError(
-            f"{where}: parameters are set by a dict of names and values, e.g. "
-            f"set({{'speed': 1.5}}); got {values!r}"
-        )
-
-
-def texts(given: object, what: str, where: str) -> list[str]:
-    """Return names as a list; raises ParameterError."""
-    if isinstance(given, str):
-        return [given]
-    if not isinstance(given, Iterable):
-        raise ParameterError(f"{where}: {what} must be a list of names, got {given!r}")
-    return list(given)
 
 
 def _below(name: str, prefix: str, depth: int) -> bool:
@@ -190,3 +456,9 @@ def _at(tree: Any, name: str) -> Any:
             return None
         tree = tree[part]
     return tree
+
+
+def _seconds(deadline: Deadline) -> float:
+    """Return how long the master may take to answer."""
+    left = deadline.left()
+    return _TIMEOUT_S if left is None else min(left, _TIMEOUT_S)

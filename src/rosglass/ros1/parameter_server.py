@@ -1,47 +1,68 @@
-"""The parameter server, which is a part of the master: one tree of settings for all nodes.
+"""The parameter server, which is a part of ROS 1's master: one tree of settings for all nodes.
 
-API: ROS wiki, "ROS/Parameter Server API"; names: "Names".
+API: ROS wiki, "ROS/Parameter Server API" and "ROS/Slave_API" (paramUpdate); names: "Names"; types:
+"Parameter Server", section 3: 32-bit integers, booleans, strings, doubles, ISO 8601 dates, lists,
+base64-encoded binary data, and dictionaries, which are namespaces.
 """
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 import threading
+import time
+import xmlrpc.client
+from collections.abc import Mapping
+from datetime import datetime
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from rosglass.comm import Handle
+from rosglass.comm import Executor, Handle, Listeners
+from rosglass.comm.inorder import InOrder
+from rosglass.comm.parameters import shown
 from rosglass.comm.promise import check_timeout
 from rosglass.comm.receiving import check_may_wait
 from rosglass.comm.similar import similar
-from rosglass.errors import (
-    InvalidNameError,
-    MasterError,
-    ParameterError,
-)
+from rosglass.errors import Error, InvalidNameError, MasterError, ParameterError
 from rosglass.ros1.core import Member
-from rosglass.ros1.parameter_values import from_wire, to_wire
-from rosglass.ros1.parameter_watch import ParameterSubscription, ParameterWatches
 from rosglass.ros1.questions import Questions
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator
     from os import PathLike
 
-    from rosglass.comm import Executor, Promise
+    from rosglass.comm import Promise
     from rosglass.ros1.core import Core
     from rosglass.ros1.master import Master
 
-__all__ = ["ParameterServer", "StartParameters"]
+__all__ = [
+    "ParameterServer",
+    "ParameterSubscription",
+    "StartParameters",
+    "flat",
+    "from_wire",
+    "pruned",
+    "same",
+    "to_wire",
+]
 
+_log = logging.getLogger("rosglass.ros1")
 _T = TypeVar("_T")
 #: Tells "no default" from the default None.
 _REQUIRED: Any = object()
-#: Seconds that the master may take to answer, unless told otherwise.
-_TIMEOUT = 5.0
-#: The shortest: none at all would be no question.
-_LEAST = 0.001
+#: How long the master may take to answer, and the shortest time: none would be no question.
+_TIMEOUT_S, _MIN_TIMEOUT_S = 5.0, 0.001
+#: After which the master is asked again, should a change not have reached us.
+_REREAD_S = 10.0
+#: Longest sleep of a thread that waits.
+_WAIT_SLICE_S = 0.1
 _CONTROL = re.compile("[^\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_LOWEST, _GREATEST = -(2**31), 2**31 - 1
+#: XML 1.0, section 2.2; a carriage return is legal there, but arrives as a line feed (2.11).
+_NOT_CARRIED = re.compile("[^\t\n\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+#: Nothing that people write is nested deeper; a list that contains itself is.
+_DEEPEST = 50
+_DATE = "%Y%m%dT%H:%M:%S"
 
 
 class ParameterServer(Handle):
@@ -77,7 +98,7 @@ class ParameterServer(Handle):
 
     # -- reading ---------------------------------------------------------------------------------
 
-    def get(self, name: str, default: Any = _REQUIRED, *, timeout: float = _TIMEOUT) -> Any:
+    def get(self, name: str, default: Any = _REQUIRED, *, timeout: float = _TIMEOUT_S) -> Any:
         """Return a parameter, or a namespace as a dict.
 
         Args:
@@ -100,11 +121,11 @@ class ParameterServer(Handle):
             f"parameter {full} is not set on {self._core.master.uri}{self._similar(full, timeout)}"
         )
 
-    def has(self, name: str, *, timeout: float = _TIMEOUT) -> bool:
+    def has(self, name: str, *, timeout: float = _TIMEOUT_S) -> bool:
         """Return whether a parameter or namespace is there."""
         return bool(self._call("hasParam", self.resolve(name), timeout=timeout))
 
-    def search(self, name: str, *, timeout: float = _TIMEOUT) -> str | None:
+    def search(self, name: str, *, timeout: float = _TIMEOUT_S) -> str | None:
         """Return the closest parameter of that name, from the node's private namespace upwards.
 
         As in ROS, only the first part of `name` is looked for: what is found of ``a/b`` is where
@@ -126,14 +147,14 @@ class ParameterServer(Handle):
         except MasterError:
             return None
 
-    def names(self, namespace: str = "/", *, timeout: float = _TIMEOUT) -> list[str]:
+    def names(self, namespace: str = "/", *, timeout: float = _TIMEOUT_S) -> list[str]:
         """Return the absolute names of all parameters in a namespace, sorted."""
         prefix = self.resolve(namespace).rstrip("/") + "/"
         return [name for name in self._known(timeout) if name.startswith(prefix)]
 
     # -- writing ---------------------------------------------------------------------------------
 
-    def set(self, name: str, value: Any, *, timeout: float = _TIMEOUT) -> None:
+    def set(self, name: str, value: Any, *, timeout: float = _TIMEOUT_S) -> None:
         """Set a parameter; a dict replaces the whole namespace of that name.
 
         Raises:
@@ -145,7 +166,7 @@ class ParameterServer(Handle):
         wire = to_wire(full, value)
         self._change("setParam", full, wire, timeout=timeout)
 
-    def delete(self, name: str, *, timeout: float = _TIMEOUT) -> None:
+    def delete(self, name: str, *, timeout: float = _TIMEOUT_S) -> None:
         """Delete a parameter, or a namespace with all that is in it.
 
         Raises:
@@ -191,7 +212,7 @@ class ParameterServer(Handle):
     # -- files -----------------------------------------------------------------------------------
 
     def load(
-        self, path: str | PathLike[str], namespace: str = "", *, timeout: float = _TIMEOUT
+        self, path: str | PathLike[str], namespace: str = "", *, timeout: float = _TIMEOUT_S
     ) -> list[str]:
         """Set what a file has, as ``rosparam load`` does; what else is there stays.
 
@@ -229,7 +250,7 @@ class ParameterServer(Handle):
         return list(wanted)
 
     def save(
-        self, path: str | PathLike[str], namespace: str = "/", *, timeout: float = _TIMEOUT
+        self, path: str | PathLike[str], namespace: str = "/", *, timeout: float = _TIMEOUT_S
     ) -> None:
         """Write a namespace into a file that can be loaded, as ``rosparam dump`` does.
 
@@ -362,7 +383,7 @@ class ParameterServer(Handle):
         check_may_wait(f"the parameter server {self._core.master.uri}")
         if not self._begun:
             self.begin()
-        seconds = _TIMEOUT if seconds is None else max(seconds, _LEAST)
+        seconds = _TIMEOUT_S if seconds is None else max(seconds, _MIN_TIMEOUT_S)
         return self._core.master.call(method, *arguments, timeout=seconds)
 
     def _check_open(self) -> None:
@@ -388,3 +409,385 @@ class StartParameters(Member):
 
     def close(self) -> None:
         """Leave them as they are: other nodes may read them."""
+
+
+# -- following ---------------------------------------------------------------------------------
+
+
+class ParameterSubscription(Handle):
+    """A parameter, or a namespace of them, as the master has it; made by :meth:`subscribe`.
+
+    Attributes:
+        name: Its absolute name.
+    """
+
+    def __init__(self, watches: ParameterWatches, name: str) -> None:
+        self.name = name
+        self._watches = watches
+        self._changed = threading.Condition()
+        self._known = self._closed = False
+        self._value: Any = None
+        self.listeners: Listeners[Any] = Listeners(where=name)
+
+    def __repr__(self) -> str:
+        value = repr(self._value) if self.is_set else "not set" if self._known else "not known yet"
+        return f"<{type(self).__name__} of {self.name}: {value:.80}>"
+
+    @property
+    def known(self) -> bool:
+        """Whether the master has told what it is."""
+        return self._known
+
+    @property
+    def is_set(self) -> bool:
+        """Whether it is set, as far as is known."""
+        return self._known and self._value is not None
+
+    @property
+    def value(self) -> Any:
+        """What it is, a dict for a namespace; None while it is not set, or not known yet.
+
+        It stays as it is while the master is away; :meth:`Node.status` tells that.
+        """
+        return self._value
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait up to `timeout` seconds, None for ever, until it is known; return whether it is."""
+        timeout = check_timeout(timeout, self.name)
+        deadline = None if timeout is None else time.monotonic() + timeout
+        while not (self._known or self._closed):
+            check_may_wait(self.name)
+            left = _WAIT_SLICE_S if deadline is None else deadline - time.monotonic()
+            if left <= 0:
+                break
+            with self._changed:
+                if not self._known:
+                    self._changed.wait(min(left, _WAIT_SLICE_S))
+        return self._known
+
+    def tell(self, value: Any) -> None:
+        """Take a value; for the watch."""
+        if self._closed:
+            return
+        self._value = value
+        with self._changed:
+            self._known = True
+            self._changed.notify_all()
+        self.listeners.notify(value)
+
+    def close(self) -> None:
+        """Follow it no more; safe to call twice."""
+        if not self._closed:
+            self._closed = True
+            self.listeners.clear()
+            self._watches.leave(self)
+
+
+class ParameterWatches:
+    """What one node follows, each name subscribed to once.
+
+    What the master says of a change only makes us ask: it tells neither its caller's own changes
+    nor a namespace that became a plain value, gives up after one attempt, and forgets all
+    subscribers when it is restarted.
+
+    Args:
+        core: The node.
+    """
+
+    def __init__(self, core: Core) -> None:
+        self._core = core
+        self._lock = threading.Lock()
+        self._watches: dict[str, ParameterWatch] = {}
+        #: Held while the master is told that a name is followed, or not any more.
+        self.telling = threading.Lock()
+
+    def subscribe(
+        self, name: str, callback: Callable[[Any], None] | None, executor: Executor | None
+    ) -> ParameterSubscription:
+        """Follow an absolute name; raises NodeClosedError, and ConversionError for callbacks."""
+        made = ParameterSubscription(self, name)
+        if callback is not None:
+            made.listeners.add(callback, executor or self._core.dispatcher)
+        with self._lock:
+            watch = self._watches.get(name)
+            new = watch is None
+            if watch is None:
+                watch = self._watches[name] = ParameterWatch(self._core, self, name)
+            watch.join(made)
+        if new:
+            self._core.add(watch)
+        else:
+            watch.tell(made)
+        return made
+
+    def leave(self, subscription: ParameterSubscription) -> None:
+        """Follow its name no more if it was the last one; for subscriptions."""
+        with self._lock:
+            watch = self._watches.get(subscription.name)
+            last = watch is not None and watch.leave(subscription)
+            if last:
+                del self._watches[subscription.name]
+        if watch is not None and last:
+            watch.close()
+
+    def current(self, name: str) -> ParameterWatch | None:
+        """Return what follows a name, if it is followed."""
+        return self._watches.get(name)
+
+    def touched(self, name: str) -> list[ParameterWatch]:
+        """Return what follows a name, what is in it, or what it is in."""
+        with self._lock:
+            watches = list(self._watches.values())
+        return [w for w in watches if _within(name, w.name) or _within(w.name, name)]
+
+
+class ParameterWatch(Member):
+    """A name that the node follows: registered with the master like a subscription."""
+
+    def __init__(self, core: Core, watches: ParameterWatches, name: str) -> None:
+        self.name = name
+        self._core, self._watches = core, watches
+        self._turn = InOrder()
+        #: Changed under the watches' lock; read by jobs of `_turn`, which own the rest.
+        self._subscriptions: tuple[ParameterSubscription, ...] = ()
+        self._known, self._value, self._told = False, None, 0
+        self._readings = 0
+        self._errand = threading.Lock()
+        self._asked = self._busy = False
+        self._looked = 0.0
+        self._closed = False
+
+    def __repr__(self) -> str:
+        return f"the subscription to parameter {self.name}"
+
+    def join(self, subscription: ParameterSubscription) -> None:
+        """Tell a subscription from now on; under the watches' lock."""
+        self._subscriptions += (subscription,)
+
+    def leave(self, subscription: ParameterSubscription) -> bool:
+        """Forget a subscription; return whether it was the last one."""
+        self._subscriptions = tuple(s for s in self._subscriptions if s is not subscription)
+        return not self._subscriptions
+
+    def tell(self, subscription: ParameterSubscription) -> None:
+        """Tell a subscription that has just joined what is known."""
+
+        def job() -> None:
+            if self._known and not subscription.known:
+                subscription.tell(self._value)
+
+        self._turn.add(job)
+
+    def register(self, master: Master) -> None:
+        """Subscribe, and read; again after the master's restart."""
+        self.read(master)
+
+    def unregister(self, master: Master) -> Member | None:
+        """Unsubscribe, unless somebody follows the name again."""
+        with self._watches.telling:
+            heir = self._watches.current(self.name)
+            if heir is None:
+                master.call("unsubscribeParam", self._core.uri, self.name)
+        return heir
+
+    def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - not all that moves counts
+        """Look now and then whether a change was missed."""
+        if idle and time.monotonic() - self._looked > _REREAD_S:
+            self.ask()
+
+    def ask(self) -> None:
+        """Read it soon; from any thread, without waiting."""
+        with self._errand:
+            self._asked = True
+            if self._busy or self._closed:
+                return
+            self._busy = True
+        self._core.errands.run(self._run)
+
+    def read(self, master: Master) -> None:
+        """Read it, and tell if it has changed.
+
+        Raises:
+            ConnectionLostError: The master does not answer.
+            MasterError: It refuses.
+        """
+        with self._watches.telling:
+            self._looked = time.monotonic()
+            value = pruned(from_wire(master.call("subscribeParam", self._core.uri, self.name)))
+            self._readings += 1
+            number = self._readings
+        value = None if value == {} else value
+        self._turn.add(lambda: self._take(number, value))
+
+    def close(self) -> None:
+        """Follow it no more; safe to call twice."""
+        if not self._closed:
+            self._closed = True
+            for subscription in self._subscriptions:
+                subscription.close()
+            self._core.remove(self)
+
+    def _run(self) -> None:
+        while True:
+            with self._errand:
+                if not self._asked or self._closed:
+                    self._busy = False
+                    return
+                self._asked = False
+            try:
+                self.read(self._core.master)
+            except Error:
+                pass  # the core looks for a master that is gone, and registers this again
+            except Exception:
+                _log.exception("%s failed", self)
+
+    def _take(self, number: int, value: Any) -> None:
+        """Tell a value; one thread at a time, the newest reading only."""
+        if number < self._told:
+            return
+        self._told = number
+        changed = not self._known or not same(value, self._value)
+        self._known, self._value = True, value
+        for subscription in self._subscriptions:
+            if changed or not subscription.known:
+                subscription.tell(value)
+
+
+def _within(name: str, namespace: str) -> bool:
+    return name == namespace or name.startswith(namespace.rstrip("/") + "/")
+
+
+# -- values ------------------------------------------------------------------------------------
+
+
+def to_wire(name: str, value: object) -> Any:
+    """Return a value as the parameter server takes it, a copy.
+
+    Numpy's scalars and arrays, tuples, bytearrays and the like become plain values and lists.
+
+    Args:
+        name: The parameter's name, for messages.
+        value: A bool, int, float, str, bytes, datetime, or a list or dict of these.
+
+    Raises:
+        ParameterError: The parameter server cannot hold it; the message says why, and what to do.
+    """
+    return _to_wire(name, value, 0)
+
+
+def from_wire(value: Any) -> Any:
+    """Return what the parameter server sent as plain Python values."""
+    if isinstance(value, dict):
+        return {str(key): from_wire(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [from_wire(item) for item in value]
+    if isinstance(value, xmlrpc.client.Binary):
+        return bytes(value.data)
+    if isinstance(value, xmlrpc.client.DateTime):
+        try:
+            return datetime.strptime(str(value), _DATE)
+        except ValueError:
+            return str(value)
+    return value
+
+
+def flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield name and value of each parameter in a namespace, names joined with ``/``."""
+    for key, value in tree.items():
+        name = f"{prefix}{key}"
+        if isinstance(value, Mapping):
+            yield from flat(value, f"{name}/")
+        else:
+            yield name, value
+
+
+def pruned(value: Any) -> Any:
+    """Return a value without empty namespaces: the master says "not set" with them, too."""
+    if not isinstance(value, dict):
+        return value
+    kept = ((key, pruned(item)) for key, item in value.items())
+    return {key: item for key, item in kept if item != {}}
+
+
+def same(one: Any, other: Any) -> bool:
+    """Return whether nothing has changed; 1, 1.0 and True are not the same."""
+    if type(one) is not type(other):
+        return False
+    if isinstance(one, dict):
+        return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
+    if isinstance(one, list):
+        return len(one) == len(other) and all(map(same, one, other))
+    return bool(one == other) or (one != one and other != other)  # noqa: PLR0124 - not a number
+
+
+def _to_wire(name: str, value: object, depth: int) -> Any:
+    if depth > _DEEPEST:
+        raise ParameterError(f"parameter {name}: nested more than {_DEEPEST} levels deep")
+    if not isinstance(value, (bool, int, float, str, bytes, bytearray, memoryview, list, tuple)):
+        plain = getattr(value, "tolist", None)
+        value = value if plain is None else plain()
+    if isinstance(value, bool):
+        return bool(value)
+    if isinstance(value, int):
+        if not _LOWEST <= value <= _GREATEST:
+            raise ParameterError(
+                f"parameter {name}: {value} is beyond the 32 bits of an integer on a ROS 1 "
+                f"parameter server ({_LOWEST} to {_GREATEST}); set it as a float "
+                f"({float(value)!r}) or as a text"
+                if abs(value) < 1e300
+                else f"parameter {name}: an integer has 32 bits on a ROS 1 parameter server"
+            )
+        return int(value)
+    if isinstance(value, float):
+        return float(value)
+    if isinstance(value, str):
+        return _text(f"parameter {name}", value)
+    if isinstance(value, (bytes, bytearray, memoryview)):
+        return xmlrpc.client.Binary(bytes(value))
+    if isinstance(value, datetime):
+        return _date(name, value)
+    if isinstance(value, (list, tuple)):
+        return [_to_wire(f"{name}[{i}]", item, depth + 1) for i, item in enumerate(value)]
+    if isinstance(value, Mapping):
+        return {
+            _key(name, key): _to_wire(f"{name.rstrip('/')}/{key}", item, depth + 1)
+            for key, item in value.items()
+        }
+    advice = "; to unset it, delete it" if value is None else ""
+    raise ParameterError(
+        f"parameter {name}: a ROS 1 parameter is a bool, int, float, str, bytes, datetime, or a "
+        f"list or dict of these, got {shown(value)}{advice}"
+    )
+
+
+def _text(what: str, text: str) -> str:
+    found = _NOT_CARRIED.search(text)
+    if found is None:
+        return str(text)
+    if found.group() == "\r":
+        problem = "a carriage return, which XML turns into a line feed; replace '\\r\\n' by '\\n'"
+    else:
+        problem = f"{found.group()!r}, which XML cannot carry; set bytes instead, or leave it out"
+    raise ParameterError(f"{what}: at position {found.start()} there is {problem}")
+
+
+def _key(name: str, key: object) -> str:
+    if not isinstance(key, str):
+        raise ParameterError(
+            f"parameter {name}: the keys of a dict are names of parameters, got {shown(key)}; "
+            f"write {str(key)!r} for it"
+        )
+    if not key or "/" in key:
+        parts = "{'a': {'b': 1}} instead of {'a/b': 1}"
+        problem = f"{key!r} has a '/'; write {parts}" if key else "there is an empty one"
+        raise ParameterError(f"parameter {name}: the keys of a dict are names: {problem}")
+    return _text(f"parameter {name}: key {key!r}", key)
+
+
+def _date(name: str, value: datetime) -> datetime:
+    if value.tzinfo is not None or value.microsecond:
+        raise ParameterError(
+            f"parameter {name}: dates on a ROS 1 parameter server have whole seconds and no time "
+            f"zone, got {value.isoformat()}; set it as a text, or as seconds"
+        )
+    return value

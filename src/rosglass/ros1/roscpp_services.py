@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from rosglass.comm.log import NodeLog, NodeLogger
     from rosglass.messages import Message
     from rosglass.ros1.core import Core
+    from rosglass.ros1.parameter_namespace import Ros1Parameters
     from rosglass.ros1.parameter_server import ParameterServer
-    from rosglass.ros1.parameters import Ros1Parameters
 
 __all__ = ["LoggerServices", "RoscppServices"]
 
@@ -91,7 +91,7 @@ class RoscppServices(BuiltinProtocol["Ros1Parameters"]):
         services: BuiltinServices[Ros1Parameters],  # noqa: ARG002 - they need no closing
     ) -> Ros1Parameters:
         """Return the node's parameters on the master's server."""
-        from rosglass.ros1.parameters import Ros1Parameters  # noqa: PLC0415
+        from rosglass.ros1.parameter_namespace import Ros1Parameters  # noqa: PLC0415
 
         return Ros1Parameters(self._core, self._server)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rosglass.comm import EndpointKind, NodeName, QoS, Subscription
+from rosglass.comm import EndpointKind, NodeName, ParameterClient, QoS, Subscription
 from rosglass.comm.builtin_services import BuiltinServices
 from rosglass.comm.core_node import CoreNode
 from rosglass.comm.flags import check_flag
@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from rosglass.interfaces import Library
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
     from rosglass.ros2.arguments import Arguments
-    from rosglass.ros2.parameter_client import Ros2ParameterClient
     from rosglass.ros2.parameters import Ros2Parameters
     from rosglass.wires.base import Middleware
 
@@ -188,12 +187,12 @@ class Ros2Node(CoreNode):
         """This node's own parameters."""
         return self._builtin_services.parameters
 
-    def create_parameter_client(self, node: str | NodeName) -> Ros2ParameterClient:
+    def create_parameter_client(self, node: str | NodeName) -> ParameterClient:
         """Return a client of another node's parameters; `node` is its full name."""
-        from rosglass.ros2.parameter_client import Ros2ParameterClient  # noqa: PLC0415 - yaml
+        from rosglass.ros2.parameter_services import RemoteParameterServices  # noqa: PLC0415
 
         self._core.check_open()
-        return Ros2ParameterClient(self, self._node_name(node))
+        return ParameterClient(RemoteParameterServices(self, self._node_name(node)))
 
     def create_lifecycle_client(self, node: str | NodeName) -> LifecycleClient:
         """Return a client that drives a lifecycle node; `node` is its full name."""

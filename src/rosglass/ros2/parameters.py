@@ -1,13 +1,15 @@
-"""The parameters of our own node, by ROS's rules.
+"""The parameters of our own node, by ROS 2's rules, and what values they can have.
 
-Rules: rclcpp's documentation of ``Node::declare_parameter`` and its relatives, and the design
-article "ROS 2 Parameter API": parameters are declared before they are used, and keep their type.
+Types: ``rcl_interfaces/msg/ParameterType``. Rules: rclcpp's documentation of
+``Node::declare_parameter`` and its relatives, and the design article "ROS 2 Parameter API":
+parameters are declared before they are used, and keep their type.
 """
 
 from __future__ import annotations
 
 import logging
 import math
+import sys
 import threading
 from collections import deque
 from dataclasses import dataclass, replace
@@ -22,16 +24,10 @@ from rosglass.comm import (
     Range,
 )
 from rosglass.comm import ParameterEvent as Event
+from rosglass.comm.loop import check_plain
+from rosglass.comm.parameters import check_values, shown
 from rosglass.comm.sim_time import USE_SIM_TIME
 from rosglass.errors import NodeClosedError, ParameterError
-from rosglass.ros2.parameter_values import (
-    TYPE_NAMES,
-    TypedValue,
-    check_name,
-    check_values,
-    in_range,
-    typed,
-)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -39,15 +35,75 @@ if TYPE_CHECKING:
 
     from rosglass.comm import Executor, ParameterValue
 
-__all__ = ["DESCRIBE_TYPES", "Change", "Ros2Parameters"]
+__all__ = [
+    "DESCRIBE_TYPES",
+    "NOT_SET",
+    "TYPE_NAMES",
+    "Change",
+    "Ros2Parameters",
+    "TypedValue",
+    "check_name",
+    "in_range",
+    "typed",
+]
 
 _log = logging.getLogger("rosglass.ros2")
 #: A parameter that every node has, besides :data:`USE_SIM_TIME`: whether the node describes its
 #: types to others. Only to be given at the start.
 DESCRIBE_TYPES = "start_type_description_service"
-_UNSET = TypedValue(ParameterType.NOT_SET, None)
-_NUMBERS = (ParameterType.INTEGER, ParameterType.DOUBLE)
+#: What people call the types, and what ROS's own tools print.
+TYPE_NAMES = {
+    ParameterType.NOT_SET: "not set",
+    ParameterType.BOOL: "boolean",
+    ParameterType.INTEGER: "integer",
+    ParameterType.DOUBLE: "double",
+    ParameterType.STRING: "string",
+    ParameterType.BYTE_ARRAY: "byte array",
+    ParameterType.BOOL_ARRAY: "boolean array",
+    ParameterType.INTEGER_ARRAY: "integer array",
+    ParameterType.DOUBLE_ARRAY: "double array",
+    ParameterType.STRING_ARRAY: "string array",
+}
+_SCALARS: dict[type, ParameterType] = {
+    bool: ParameterType.BOOL,
+    int: ParameterType.INTEGER,
+    float: ParameterType.DOUBLE,
+    str: ParameterType.STRING,
+}
+_ARRAYS = {
+    ParameterType.BOOL: ParameterType.BOOL_ARRAY,
+    ParameterType.INTEGER: ParameterType.INTEGER_ARRAY,
+    ParameterType.DOUBLE: ParameterType.DOUBLE_ARRAY,
+    ParameterType.STRING: ParameterType.STRING_ARRAY,
+}
+_ARRAY_TYPES = frozenset(_ARRAYS.values()) | {ParameterType.BYTE_ARRAY}
 _INT_LIMITS = (-(2**63), 2**63 - 1)
+#: Units in the last place that two doubles may differ by and count as equal, as in rclcpp.
+_ULPS = 100
+_NUMBERS = (ParameterType.INTEGER, ParameterType.DOUBLE)
+
+
+class TypedValue(NamedTuple):
+    """A value together with its type, which an empty list does not show.
+
+    Attributes:
+        type: The type.
+        value: The value: None, bool, int, float, str, bytes, or a list of the middle four.
+    """
+
+    type: ParameterType
+    value: ParameterValue
+
+    def copy(self) -> ParameterValue:
+        """Return the value, a list as a copy of its own."""
+        return list(self.value) if isinstance(self.value, list) else self.value  # type: ignore[return-value]
+
+    def is_already(self, value: ParameterValue) -> bool:
+        """Return whether setting `value` would change nothing: equal, and of the same type."""
+        return self.value == value and typed("", value, self.type).type is self.type
+
+
+NOT_SET = TypedValue(ParameterType.NOT_SET, None)
 
 
 @dataclass(slots=True)
@@ -77,7 +133,7 @@ class Ros2Parameters(Parameters):
         self, node: str, executor: Executor, overrides: Mapping[str, ParameterValue] | None = None
     ) -> None:
         self.node = node
-        #: Told each change as it is made, types included.
+        #: Notified of each change as it is made, types included.
         self.changes: Listeners[Change] = Listeners()
         self._executor = executor
         self._overrides = dict(overrides or {})
@@ -195,7 +251,7 @@ class Ros2Parameters(Parameters):
     def typed_value(self, name: str) -> TypedValue:
         """Return the value with its type; type NOT_SET for what is not declared or has no value."""
         entry = self._entries.get(name)
-        return _UNSET if entry is None else entry.value
+        return NOT_SET if entry is None else entry.value
 
     def snapshot(self) -> dict[str, TypedValue]:
         """Return all values with their types, by name."""
@@ -226,8 +282,7 @@ class Ros2Parameters(Parameters):
     def on_set(self, validate: Callable[[Mapping[str, ParameterValue]], str]) -> Handle:
         """Let `validate` refuse values; see :meth:`rosglass.comm.Parameters.on_set`."""
         self._check_open()
-        if not callable(validate):
-            raise ParameterError(f"on_set() needs something that can be called, got {validate!r}")
+        check_plain(validate, f"{self.node}: on_set()")
         validator = _Validator(self, validate)
         with self._lock:
             self._validators.append(validator)
@@ -238,17 +293,14 @@ class Ros2Parameters(Parameters):
     ) -> Handle:
         """Call `callback` with each change."""
         self._check_open()
-        if not callable(callback):
-            raise ParameterError(
-                f"on_change() needs something that can be called, got {callback!r}"
-            )
+        check_plain(callback, f"{self.node}: on_change()")
 
-        def told(change: Change) -> None:
+        def on_change(change: Change) -> None:
             new = {name: value.copy() for name, value in change.new.items()}
             changed = {name: value.copy() for name, value in change.changed.items()}
             callback(Event(self.node, new, changed, change.deleted))
 
-        return self.changes.add(told, executor or self._executor)
+        return self.changes.add(on_change, executor or self._executor)
 
     def load(self, path: str | PathLike[str]) -> None:
         """Set the parameters that a file has for this node; see the base class."""
@@ -420,7 +472,7 @@ def _check_value(descriptor: ParameterDescriptor, value: TypedValue) -> None:
         advice = "; write 1.0 instead of 1" if _is_whole(kind, value) else ""
         raise ParameterError(
             f"parameter {name!r} is of type {TYPE_NAMES[kind]}, and cannot be set to "
-            f"{_shown(value.value)} of type {TYPE_NAMES[value.type]}{advice}"
+            f"{shown(value.value)} of type {TYPE_NAMES[value.type]}{advice}"
         )
     if descriptor.range is not None and value.type in _NUMBERS:
         problem = in_range(descriptor.range, value.value)  # type: ignore[arg-type]
@@ -435,13 +487,138 @@ def _is_whole(kind: ParameterType, value: TypedValue) -> bool:
     )
 
 
-def _shown(value: object) -> str:
-    shown = repr(value)
-    return f"{shown[:77]}..." if len(shown) > 80 else shown
-
-
 def _below(name: str, prefix: str, depth: int) -> bool:
     if name == prefix:
         return True
     rest = name[len(prefix) + 1 :] if name.startswith(f"{prefix}.") else ""
     return bool(rest) and (not depth or rest.count(".") < depth)
+
+
+def check_name(name: object) -> str:
+    """Return `name` if a parameter can have it; raises ParameterError."""
+    if not isinstance(name, str) or not name:
+        raise ParameterError(f"a parameter's name must be a text that is not empty, got {name!r}")
+    _check_text(f"the parameter name {name!r}", name)
+    return name
+
+
+def typed(name: str, value: object, known: ParameterType = ParameterType.NOT_SET) -> TypedValue:
+    """Return a Python value with the parameter type that it has.
+
+    Numpy's scalars and arrays, tuples, bytearrays and the like become plain values and lists.
+
+    Args:
+        name: The parameter's name, for messages.
+        value: The value.
+        known: The type the parameter has already; an empty list takes it over.
+
+    Raises:
+        ParameterError: The value can be no parameter's.
+    """
+    if not isinstance(value, (bool, int, float, str, bytes, bytearray, memoryview, list, tuple)):
+        plain = getattr(value, "tolist", None)
+        if plain is not None:
+            value = plain()
+    if value is None:
+        return NOT_SET
+    if isinstance(value, (bytes, bytearray, memoryview)):
+        return TypedValue(ParameterType.BYTE_ARRAY, bytes(value))
+    if isinstance(value, (list, tuple)):
+        return _typed_list(name, value, known)
+    return _typed_scalar(f"parameter {name!r}", value)
+
+
+def _typed_list(name: str, values: list[Any] | tuple[Any, ...], known: ParameterType) -> TypedValue:
+    if not values:
+        if known is ParameterType.BYTE_ARRAY:
+            return TypedValue(known, b"")
+        if known in _ARRAY_TYPES:
+            return TypedValue(known, [])
+        if known is not ParameterType.NOT_SET:
+            raise ParameterError(
+                f"parameter {name!r} is of type {TYPE_NAMES[known]}, and cannot become a list"
+            )
+        raise ParameterError(
+            f"parameter {name!r}: an empty list does not say its type; give it in the descriptor, "
+            "e.g. ParameterDescriptor(type=ParameterType.STRING_ARRAY)"
+        )
+    if isinstance(values[0], (bytes, bytearray)):
+        raise ParameterError(
+            f"parameter {name!r}: a byte array is one bytes object, e.g. bytes([1, 2]), not a list"
+        )
+    items = [_typed_scalar(f"parameter {name!r}[{i}]", item) for i, item in enumerate(values)]
+    first = items[0].type
+    for position, item in enumerate(items):
+        if item.type is not first:
+            advice = (
+                "; write whole numbers as 1.0" if ParameterType.DOUBLE in (first, item.type) else ""
+            )
+            raise ParameterError(
+                f"parameter {name!r}: the items of a list must be of one type, but [0] is of type "
+                f"{TYPE_NAMES[first]} and [{position}] of type {TYPE_NAMES[item.type]}{advice}"
+            )
+    return TypedValue(_ARRAYS[first], [item.value for item in items])  # type: ignore[arg-type]
+
+
+def _typed_scalar(what: str, value: object) -> TypedValue:
+    plain = getattr(value, "tolist", None)
+    if plain is not None:
+        value = plain()
+    kind = next((kind for kind in _SCALARS if isinstance(value, kind)), None)
+    if kind is None:
+        raise ParameterError(
+            f"{what}: a parameter is a bool, int, float, str, bytes or a list of one of the first "
+            f"four, got {shown(value)}"
+        )
+    parameter_type = _SCALARS[kind]
+    if parameter_type is ParameterType.INTEGER:
+        low, high = _INT_LIMITS
+        assert isinstance(value, int)
+        if not low <= value <= high:
+            raise ParameterError(
+                f"{what}: {value} is beyond the 64 bits of an integer ({low} to {high}); "
+                "a float would hold it, without its last digits"
+            )
+    if parameter_type is ParameterType.STRING:
+        assert isinstance(value, str)
+        _check_text(what, value)
+    # Subclasses (IntEnum, numpy's float64) would surprise whoever reads the value.
+    return TypedValue(parameter_type, kind(value))
+
+
+def _check_text(what: str, text: str) -> None:
+    if "\0" in text:
+        raise ParameterError(f"{what} has a NUL character at position {text.index(chr(0))}")
+    try:
+        text.encode()
+    except UnicodeEncodeError as error:
+        raise ParameterError(
+            f"{what} cannot be written as UTF-8 (position {error.start}: {error.reason})"
+        ) from None
+
+
+def in_range(allowed: Range, value: float) -> str:
+    """Say why a number is not allowed; an empty string when it is.
+
+    The rules are rclcpp's (``node_parameters.cpp``): both ends are allowed, and between them the
+    steps counted from the lower one; doubles may be off by rounding.
+    """
+    low, high, step = allowed
+    if isinstance(value, float):
+        if _same(value, low) or _same(value, high):
+            return ""
+        inside = low < value < high
+        on_step = not step or _same(value, low + round((value - low) / step) * step)
+    else:
+        if value in (low, high):
+            return ""
+        inside = low < value < high
+        on_step = not step or (value - low) % step == 0
+    if not inside:
+        return f"{value} is outside {low} to {high}"
+    return "" if on_step else f"{value} is not among {low}, {low + step} ... {high} (step {step})"
+
+
+def _same(one: float, other: float) -> bool:
+    tolerance = sys.float_info.epsilon * abs(one + other) * _ULPS
+    return one == other or (math.isfinite(tolerance) and abs(one - other) <= tolerance)

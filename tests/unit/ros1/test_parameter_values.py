@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rosglass.errors import ParameterError
-from rosglass.ros1.parameter_values import flat, from_wire, pruned, same, to_wire
+from rosglass.ros1.parameter_server import flat, from_wire, pruned, same, to_wire
 
 
 class Gear(IntEnum):

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from rosglass.comm import IMMEDIATE, ParameterDescriptor, ParameterEvent, ParameterType, Range
-from rosglass.errors import ParameterError
-from rosglass.ros2.parameter_values import TypedValue
-from rosglass.ros2.parameters import Ros2Parameters
+from rosglass.errors import ConversionError, ParameterError
+from rosglass.ros2.parameters import Ros2Parameters, TypedValue
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -249,10 +248,14 @@ def test_callbacks_are_asked_again_when_another_thread_was_faster(
 
 
 def test_bad_callbacks_are_refused(parameters: Ros2Parameters) -> None:
-    with pytest.raises(ParameterError, match="on_set"):
-        parameters.on_set(3)  # type: ignore[arg-type]
-    with pytest.raises(ParameterError, match="on_change"):
-        parameters.on_change(3)  # type: ignore[arg-type]
+    async def never() -> None:
+        """Would be called, and nothing in it would ever run."""
+
+    for callback in (3, never):
+        with pytest.raises(ConversionError, match="on_set"):
+            parameters.on_set(callback)  # type: ignore[arg-type]
+        with pytest.raises(ConversionError, match="on_change"):
+            parameters.on_change(callback)  # type: ignore[arg-type]
     parameters.on_set(lambda _: 3)  # type: ignore[arg-type, return-value]
     with pytest.raises(ParameterError, match="returned 3 instead of a text"):
         parameters.set({"use_sim_time": True})
