@@ -73,7 +73,7 @@ def _get(server: ParameterServer, args: argparse.Namespace) -> None:
 
 
 def _set(server: ParameterServer, args: argparse.Namespace) -> None:
-    from rosglass.ros1.parameter_files import parse_value
+    from rosglass.ros1.rosparam_files import parse_value
 
     parameter, text = args.parameter, args.value
     if text is None:
@@ -94,7 +94,7 @@ def _delete(server: ParameterServer, args: argparse.Namespace) -> None:
 
 
 def _dump(server: ParameterServer, args: argparse.Namespace) -> None:
-    from rosglass.ros1.parameter_files import dump
+    from rosglass.ros1.rosparam_files import dump
 
     place = "/" + (args.node or "").strip("/")
     if args.output:

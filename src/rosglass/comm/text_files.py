@@ -10,7 +10,7 @@ from typing import Any
 
 from rosglass.errors import ParameterError
 
-__all__ = ["check_yaml", "load_yaml", "read_text", "write_text"]
+__all__ = ["check_yaml", "explain_yaml_error", "load_yaml", "read_text", "write_text"]
 
 #: Values that YAML may stand for, aliases written out: ``&a [*b, *b]`` makes small texts large.
 _MOST_VALUES = 1_000_000
@@ -75,6 +75,20 @@ def check_yaml(text: str) -> None:
         if problem:
             mark: Any = event.start_mark
             raise yaml.MarkedYAMLError(problem=problem, problem_mark=mark)
+
+
+def explain_yaml_error(error: Exception, label: str, fault: str) -> str:
+    """Return where a text is wrong, and why.
+
+    Args:
+        error: A yaml.YAMLError.
+        label: Where the text came from.
+        fault: What it is, or is not, e.g. ``not YAML``.
+    """
+    mark = getattr(error, "problem_mark", None)
+    where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
+    problem = getattr(error, "problem", None) or str(error).partition("\n")[0]
+    return f"{label}{where}: this is {fault}: {problem}"
 
 
 def read_text(path: str | os.PathLike[str], most: int) -> tuple[str, str]:

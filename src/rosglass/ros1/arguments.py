@@ -192,8 +192,8 @@ class _Parser:
         self._special[key] = value
 
     def _parameter(self, text: str, name: str, value: str) -> None:
-        from rosglass.ros1.parameter_files import parse_value  # noqa: PLC0415 - yaml
         from rosglass.ros1.parameter_server import to_wire  # noqa: PLC0415 - xmlrpc
+        from rosglass.ros1.rosparam_files import parse_value  # noqa: PLC0415 - yaml
 
         try:
             expand("~" + name, "n", "/")

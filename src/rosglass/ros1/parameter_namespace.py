@@ -296,9 +296,9 @@ class Ros1Parameters(Parameters):
     def save(self, path: str | PathLike[str]) -> None:
         """Write the parameters into a file, as ``rosparam dump FILE /node`` does."""
         self._core.check_open()
-        from rosglass.ros1 import parameter_files  # noqa: PLC0415 - yaml
+        from rosglass.ros1 import rosparam_files  # noqa: PLC0415 - yaml
 
-        parameter_files.write(path, self._namespace.tree(_TIMEOUT_S))
+        rosparam_files.write(path, self._namespace.tree(_TIMEOUT_S))
 
     def close(self) -> None:
         """Do nothing: the parameters stay on the server, and callbacks end with the node."""
@@ -401,9 +401,9 @@ class RemoteNamespace(RemoteParameters):
 
     def save(self, path: str | PathLike[str], deadline: Deadline) -> None:
         """Write a file, as ``rosparam dump FILE /node`` does."""
-        from rosglass.ros1 import parameter_files  # noqa: PLC0415 - yaml
+        from rosglass.ros1 import rosparam_files  # noqa: PLC0415 - yaml
 
-        parameter_files.write(path, self._namespace.tree(_seconds(deadline)))
+        rosparam_files.write(path, self._namespace.tree(_seconds(deadline)))
 
     def close(self) -> None:
         """Watch no more; safe to call twice."""

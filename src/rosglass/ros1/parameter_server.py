@@ -230,11 +230,11 @@ class ParameterServer(Handle):
             ParameterError: The file cannot be read, or a value can be no parameter's; nothing is
                 set then.
         """
-        from rosglass.ros1 import parameter_files  # noqa: PLC0415 - yaml
+        from rosglass.ros1 import rosparam_files  # noqa: PLC0415 - yaml
 
         wanted: dict[str, Any] = {}
         place = self.resolve(namespace or self._core.name.namespace)
-        found = parameter_files.read(path)
+        found = rosparam_files.read(path)
         try:
             for inner, value in found:
                 wanted.update(self._leaves(place, {inner: value} if inner else value))
@@ -257,9 +257,9 @@ class ParameterServer(Handle):
         Raises:
             ParameterError: It is not there, or the file cannot be written.
         """
-        from rosglass.ros1 import parameter_files  # noqa: PLC0415 - yaml
+        from rosglass.ros1 import rosparam_files  # noqa: PLC0415 - yaml
 
-        parameter_files.write(path, self.get(namespace, timeout=timeout))
+        rosparam_files.write(path, self.get(namespace, timeout=timeout))
 
     # -- without waiting -------------------------------------------------------------------------
 

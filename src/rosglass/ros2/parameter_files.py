@@ -1,4 +1,4 @@
-"""Parameter files: YAML as ``ros2 param dump``, ``ros2 param load`` and ``--params-file`` have it.
+"""Parameter files of ROS 2, as ``ros2 param dump`` and ``load`` and ``--params-file`` have them.
 
 Rules: ``rcl_yaml_param_parser`` (which nodes read such files with), whose idea of a scalar is not
 quite YAML's; rclcpp's ``parameter_map`` (wildcards in node names); ros2cli's ``ros2 param dump``
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from rosglass.comm.names import validate_node_name
-from rosglass.comm.text_files import read_text, write_text
+from rosglass.comm.text_files import explain_yaml_error, read_text, write_text
 from rosglass.errors import InvalidNameError, ParameterError
 
 if TYPE_CHECKING:
@@ -161,10 +161,7 @@ class _Reader:
         try:
             event = next(self._events)
         except yaml.YAMLError as error:
-            mark = getattr(error, "problem_mark", None)
-            where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
-            problem = getattr(error, "problem", None) or str(error).partition("\n")[0]
-            raise ParameterError(f"{self._label}{where}: this is not YAML: {problem}") from None
+            raise ParameterError(explain_yaml_error(error, self._label, "not YAML")) from None
         if isinstance(event, yaml.AliasEvent):
             raise self._error(
                 event,

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from rosglass.errors import ParameterError
-from rosglass.ros1.parameter_files import dump, parse, parse_value, read, write
+from rosglass.ros1.rosparam_files import dump, parse, parse_value, read, write
 
 
 def test_documents_have_namespaces_and_angles():

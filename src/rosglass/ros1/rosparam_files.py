@@ -1,4 +1,4 @@
-"""Parameter files: YAML as ``rosparam load`` and ``rosparam dump`` have it.
+"""Parameter files of ROS 1: YAML as ``rosparam load`` and ``rosparam dump`` have it.
 
 Rules: ROS wiki, "rosparam" and "YAML Overview": several documents, ``_ns`` for a document's
 namespace, ``!degrees``, ``!radians``, ``deg(90)``, ``rad(pi/2)`` for angles.
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from rosglass.comm.text_files import load_yaml, read_text, write_text
+from rosglass.comm.text_files import explain_yaml_error, load_yaml, read_text, write_text
 from rosglass.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -94,10 +94,7 @@ def _documents(text: str, label: str, fault: str = "no parameter file") -> list[
     try:
         return load_yaml(text, _Loader)
     except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
-        problem = getattr(error, "problem", None) or str(error).partition("\n")[0]
-        raise ParameterError(f"{label}{where}: this is {fault}: {problem}") from None
+        raise ParameterError(explain_yaml_error(error, label, fault)) from None
 
 
 class _Loader(yaml.SafeLoader):
