@@ -25,6 +25,7 @@ from rosglass.comm import (
     Status,
     Subscription,
     Time,
+    Timers,
 )
 from rosglass.comm.log import NodeLogger
 from rosglass.comm.loop import check_plain
@@ -54,7 +55,8 @@ class LocalWorld:
     def __init__(self, wire: str) -> None:
         self.wire, self.ros = wire, 1 if wire == "ros1" else 2
         self.dispatcher = Dispatcher("local callbacks")
-        self.clock = Clock("local", self.dispatcher)
+        self.timers = Timers("local timers")
+        self.clock = Clock("local", self.dispatcher, self.timers)
         self.clock.simulate(True)
         #: When a message that is sent now arrives, in nanoseconds since the Unix epoch.
         self.arrival: Callable[[], int] = lambda: self.clock.now().nanoseconds
@@ -164,6 +166,7 @@ class LocalWorld:
             subscription.close()
         self.graph_listeners.clear()
         self.clock.close()
+        self.timers.close()
         self.dispatcher.close()
 
 

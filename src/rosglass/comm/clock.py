@@ -6,8 +6,6 @@ time is simulated but was not told yet lives at time zero.
 
 from __future__ import annotations
 
-import heapq
-import itertools
 import logging
 import threading
 import time
@@ -28,11 +26,11 @@ from rosglass.errors import ArgumentError, NodeClosedError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from rosglass.comm.timers import Timers
+
 __all__ = ["Clock", "ClockChange", "Jump", "Timer"]
 
 _log = logging.getLogger("rosglass.comm")
-#: Longest pause of the timers' thread in seconds.
-_IDLE = 3600.0
 #: Longest uninterrupted wait in seconds: on Windows a lock that is waited for holds up Ctrl-C.
 _SLICE_S = 0.2
 #: Seconds that simulated time may stand still before those who sleep by it are warned.
@@ -66,19 +64,21 @@ class Clock(Unique):
     Args:
         name: Of the node, for threads and messages.
         executor: Where callbacks run that bring no executor of their own.
+        timers: The node's, on whose thread callbacks are posted to their executors.
     """
 
-    def __init__(self, name: str, executor: Executor) -> None:
-        self._name, self._executor = name, executor
+    def __init__(self, name: str, executor: Executor, timers: Timers) -> None:
+        self._name, self._executor, self._timers = name, executor, timers
         self._changed = threading.Condition()
         self._simulated = False
         self._time = 0
         self._switches = 0
         self._closed = False
         self._watchers: list[_Watcher] = []
-        self._heap: list[tuple[int, int, Timer]] = []
-        self._numbers = itertools.count()
-        self._thread: threading.Thread | None = None
+        #: The timers in use, few at a time; changed with the lock.
+        self._periodic: list[Timer] = []
+        #: Fires what is due; None while nothing is, or only the simulation's time can tell.
+        self._alarm: Handle | None = None
 
     def __repr__(self) -> str:
         kind = "simulated" if self._simulated else "system"
@@ -161,13 +161,9 @@ class Clock(Unique):
         with self._changed:
             if self._closed:
                 raise NodeClosedError(f"node {self._name} is closed; connect again")
-            self._put(timer, self._tick() + length.nanoseconds)
-            if self._thread is None:
-                self._thread = threading.Thread(
-                    target=self._work, name=f"{self._name} clock", daemon=True
-                )
-                self._thread.start()
-            self._changed.notify_all()
+            timer.due = self._tick() + length.nanoseconds
+            self._periodic.append(timer)
+            self._set_alarm()
         return timer
 
     def simulate(self, simulated: bool) -> None:
@@ -193,6 +189,8 @@ class Clock(Unique):
             self._time = now.nanoseconds
             if delta < 0:
                 self._restart()
+            else:
+                self._set_alarm()
             self._changed.notify_all()
         if self._watchers:
             self._tell(Jump(Duration(delta), ClockChange.NONE))
@@ -201,19 +199,17 @@ class Clock(Unique):
         """End timers and sleeps; safe to call twice."""
         with self._changed:
             self._closed = True
-            self._heap.clear()
-            thread = self._thread
+            self._periodic.clear()
+            self._set_alarm()
             self._changed.notify_all()
         for watcher in list(self._watchers):
             watcher.close()
-        if thread is not None and thread is not threading.current_thread():
-            thread.join(2.0)
 
     def forget(self, timer: Timer) -> None:
         """Let go of a timer that was closed; for :class:`Timer`."""
-        with self._changed:
-            self._heap = [entry for entry in self._heap if entry[2] is not timer]
-            heapq.heapify(self._heap)
+        with self._changed, suppress(ValueError):
+            self._periodic.remove(timer)
+            self._set_alarm()
 
     def _tell(self, jump: Jump) -> None:
         for watcher in list(self._watchers):
@@ -253,35 +249,38 @@ class Clock(Unique):
     def _restart(self) -> None:
         """Count the timers' periods from now on: the old times mean nothing any more."""
         now = self._tick()
-        timers = [timer for _, _, timer in self._heap]
-        self._heap = []
-        for timer in timers:
-            self._put(timer, now + timer.period.nanoseconds)
+        for timer in self._periodic:
+            timer.due = now + timer.period.nanoseconds
+        self._set_alarm()
         self._changed.notify_all()
 
-    def _put(self, timer: Timer, due: int) -> None:
-        heapq.heappush(self._heap, (due, next(self._numbers), timer))
+    def _set_alarm(self) -> None:
+        """Let the timers that are due next be fired in time; the lock is held."""
+        if self._alarm is not None:
+            self._alarm.close()
+            self._alarm = None
+        if not self._periodic:
+            return
+        left = (min(timer.due for timer in self._periodic) - self._tick()) / 1e9
+        if left <= 0 or not self._simulated:  # else, the simulation's time has to move first
+            self._alarm = self._timers.after(max(0.0, left), self._fire_due)
 
-    def _work(self) -> None:
-        while True:
-            with self._changed:
-                while not self._closed and (not self._heap or self._heap[0][0] > self._tick()):
-                    self._changed.wait(self._pause())
-                if self._closed:
-                    return
-                due, _, timer = heapq.heappop(self._heap)
-                period = timer.period.nanoseconds
+    def _fire_due(self) -> None:
+        """Fire the timers that are due, in their order; run on the timers' thread."""
+        with self._changed:
+            now = self._tick()
+            due = sorted((t for t in self._periodic if t.due <= now), key=lambda timer: timer.due)
+            for timer in due:
                 # Turns that were missed are not made up for.
-                self._put(timer, due + period * max(1, (self._tick() - due) // period + 1))
+                timer.due += timer.period.nanoseconds * (
+                    (now - timer.due) // timer.period.nanoseconds + 1
+                )
+            self._set_alarm()
+        for timer in due:
             try:
                 timer.fire()
-            except BaseException:  # sys.exit() in one timer's callback must not end all others
+            except BaseException:  # noqa: PERF203 - sys.exit() must not end the others
                 _log.exception("%s asked to end its thread, which goes on", timer)
-
-    def _pause(self) -> float | None:
-        if self._simulated or not self._heap:
-            return None
-        return min(max(0.0, (self._heap[0][0] - self._tick()) / 1e9), _IDLE)
 
 
 class _Watcher(Handle):
@@ -308,7 +307,10 @@ class Timer(Handle):
 
     Attributes:
         period: Time between two calls.
+        due: When to call next, in nanoseconds of what the clock measures intervals with.
     """
+
+    due = 0
 
     def __init__(
         self, clock: Clock, period: Duration, callback: Callable[[], None], executor: Executor

@@ -60,7 +60,8 @@ class NodeCore(ABC, Generic[_Member]):
         dispatcher: Runs callbacks that bring no executor of their own.
         own_dispatcher: Runs what the node answers for itself, such as questions for its parameters;
             no callback of a user can hold that up.
-        timers: Runs short jobs later, and jobs that the middleware's threads must not wait for.
+        timers: Runs short jobs later, and jobs that the middleware's threads must not wait for;
+            posts the callbacks of the clock's timers.
         graph_listeners: Told after each change of the graph.
         status_listeners: Told each new status.
     """
@@ -74,8 +75,8 @@ class NodeCore(ABC, Generic[_Member]):
         self.status_listeners: Listeners[Status] = Listeners()
         self.dispatcher = Dispatcher(f"{name.name} callbacks")
         self.own_dispatcher = Dispatcher(f"{name.name} services")
-        self.clock = Clock(name.name, self.dispatcher)
         self.timers = Timers(f"{name.name} timers")
+        self.clock = Clock(name.name, self.dispatcher, self.timers)
         self._lock = threading.Lock()
         self._closed = self._moved = False
         self._process = os.getpid()

@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING
 import pytest
 from waiting import eventually, nothing_happens
 
-from rosglass.comm import IMMEDIATE, Clock, ClockChange, Dispatcher, Duration, Jump, Time
+from rosglass.comm import (
+    IMMEDIATE,
+    Clock,
+    ClockChange,
+    Dispatcher,
+    Duration,
+    Jump,
+    Time,
+    Timers,
+)
 from rosglass.errors import ConversionError, NodeClosedError
 
 if TYPE_CHECKING:
@@ -19,9 +28,11 @@ if TYPE_CHECKING:
 
 @pytest.fixture
 def clock() -> Iterator[Clock]:
-    made = Clock("tester", IMMEDIATE)
+    timers = Timers("tester")
+    made = Clock("tester", IMMEDIATE, timers)
     yield made
     made.close()
+    timers.close()
 
 
 def seconds(value: float) -> Time:
@@ -237,14 +248,19 @@ def test_other_bad_arguments_are_refused(clock: Clock) -> None:
         clock.sleep_until(5)  # type: ignore[arg-type]
 
 
-def test_closing_ends_timers_and_their_thread() -> None:
-    clock = Clock("closed", IMMEDIATE)
-    clock.create_timer(100, lambda: None)
-    before = [t.name for t in threading.enumerate() if t.name == "closed clock"]
+def test_closing_ends_timers() -> None:
+    timers, calls = Timers("closed"), threading.Semaphore(0)
+    clock = Clock("closed", IMMEDIATE, timers)
+    clock.create_timer(0.02, calls.release)
+    assert calls.acquire(timeout=30)
     clock.close()
     clock.close()
-    assert before
-    assert not [t for t in threading.enumerate() if t.name == "closed clock"]
+    done = threading.Event()
+    timers.after(0.1, done.set)
+    calls.acquire(blocking=False)  # one may have been under way
+    assert done.wait(30)
+    assert not calls.acquire(blocking=False)
+    timers.close()
     with pytest.raises(NodeClosedError):
         clock.create_timer(1, lambda: None)
     with pytest.raises(NodeClosedError):

@@ -13,7 +13,7 @@ import pytest
 from waiting import eventually
 
 from rosglass import QoS
-from rosglass.comm import IMMEDIATE, Clock, Dispatcher, History, Sample, Subscription
+from rosglass.comm import IMMEDIATE, Clock, Dispatcher, History, Sample, Subscription, Timers
 from rosglass.comm.executor import RetryingExecutor
 from rosglass.comm.goal_runner import GoalRunner
 from rosglass.comm.listeners import Listeners
@@ -149,7 +149,8 @@ def test_sys_exit_in_the_main_thread_ends_the_program_but_nothing_halfway(caplog
 
 @pytest.mark.parametrize("kind", ["refuses", "exits"])
 def test_one_timer_that_fails_stops_neither_itself_nor_the_others(kind, caplog):
-    clock = Clock("tester", IMMEDIATE)
+    timers = Timers("tester")
+    clock = Clock("tester", IMMEDIATE, timers)
     calls = {"good": threading.Semaphore(0), "bad": threading.Semaphore(0)}
 
     def bad():
@@ -163,6 +164,7 @@ def test_one_timer_that_fails_stops_neither_itself_nor_the_others(kind, caplog):
         assert calls["good"].acquire(timeout=LIMIT)
         assert calls["bad"].acquire(timeout=LIMIT)
     clock.close()
+    timers.close()
     assert "Timer every 0.01 s" in caplog.text
 
 

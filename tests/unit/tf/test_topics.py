@@ -18,6 +18,7 @@ from rosglass.comm import (
     Status,
     Subscription,
     Time,
+    Timers,
 )
 from rosglass.comm.qos import Durability
 from rosglass.errors import InvalidArgumentException, InvalidNameError, NodeClosedError
@@ -38,7 +39,7 @@ class Node:
     def __init__(self, ros: int = 2) -> None:
         self.wire = "ros1" if ros == 1 else "cdr"
         self.type: Any = rosglass.load(NAME, ros)
-        self.clock = Clock("test", IMMEDIATE)
+        self.clock = Clock("test", IMMEDIATE, Timers("test"))
         self.subscriptions: dict[str, Subscription] = {}
         self.profiles: dict[str, QoS] = {}
         self.sent: list[tuple[str, bytes]] = []
