@@ -73,7 +73,7 @@ def publish(plan: dict[str, Any]) -> None:
             due += 1 / plan["hz"]
 
         def waiting() -> int:
-            return sum(link.waiting() for link in publisher.publication.links())
+            return sum(link.waiting() for link in publisher._writer.publication.links())
 
         settle(waiting, 0)
         found = {"sent": count, "dropped": publisher.dropped, "left": waiting()}

@@ -156,7 +156,7 @@ def firehose(url: str, kind: str, seconds: float) -> None:
         time.sleep(0.01)
     print("ready", flush=True)
     sys.stdin.readline()
-    (link,) = publisher.publication.links()
+    (link,) = publisher._writer.publication.links()
     sock = link._sock  # making and queueing messages is not what is measured
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4 * 1024 * 1024)
     room = select.poll()

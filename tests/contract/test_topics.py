@@ -6,10 +6,11 @@ import asyncio
 import threading
 
 import pytest
+from waiting import nothing_happens
 
 import rosglass
 from rosglass import QoS
-from rosglass.comm import IMMEDIATE, Sample
+from rosglass.comm import IMMEDIATE, NodeName, Sample
 
 TEXT, TWIST, IMAGE = "std_msgs/msg/String", "geometry_msgs/msg/Twist", "sensor_msgs/msg/Image"
 HEADER = "std_msgs/msg/Header"
@@ -64,13 +65,65 @@ def publisher_wire(wire):
     return "ros1" if wire.is_ros1 else "cdr"
 
 
-def test_none_is_not_published(link):
-    publisher, subscription = link(TWIST)
-    with pytest.raises(rosglass.ConversionError, match="a message, a dict or keyword fields"):
-        publisher.publish(None)
-    with pytest.raises(rosglass.ConversionError, match="linear"):
-        publisher.publish({"linear": 3})
+@pytest.mark.parametrize(
+    ("arguments", "fields", "told"),
+    [
+        ((None,), {}, "a message, a dict or keyword fields"),
+        (({"data": 7},), {}, "data: expected"),
+        (({"text": "x"},), {}, "text"),
+        (({"data": "x"},), {"data": "y"}, "either a message or keyword fields"),
+        (("hello",), {}, "expected"),
+    ],
+)
+def test_values_that_do_not_fit_are_refused_and_not_sent(link, arguments, fields, told):
+    publisher, subscription = link()
+    with pytest.raises(rosglass.ConversionError, match=told):
+        publisher.publish(*arguments, **fields)
+    publisher.publish(data="next")
+    assert subscription.wait(30).message().data == "next"
+
+
+@pytest.mark.parametrize("data", ["text", None, 3])
+def test_only_bytes_and_samples_are_sent_as_they_are(robot, topic, data):
+    publisher = robot.create_publisher(topic, TEXT)
+    with pytest.raises(rosglass.ConversionError, match=f"{TEXT}.* bytes"):
+        publisher.publish_serialized(data)
+
+
+def test_a_buffer_may_be_reused_as_soon_as_it_is_sent(link, wire):
+    publisher, subscription = link()
+    buffer = bytearray(publisher.type.encode({"data": "first"}, wire=publisher_wire(wire)))
+    publisher.publish_serialized(memoryview(buffer))
+    buffer[-6:] = bytes(6)
+    assert subscription.wait(30).message().data == "first"
+
+
+def test_a_sample_of_another_type_is_not_passed_on(link, robot, topic):
+    publisher, subscription = link()
+    publisher.publish(data="x")
+    sample = subscription.wait(30)
+    with pytest.raises(rosglass.ConversionError, match=f"expected a sample of {TWIST}"):
+        robot.create_publisher(f"{topic}_other", TWIST).publish_serialized(sample)
+    other = "cdr" if sample.wire == "ros1" else "ros1"
+    with pytest.raises(rosglass.ConversionError, match=f"wire: .*{other}"):
+        publisher.publish_serialized(sample._replace(wire=other))
     assert subscription.wait(0.1) is None
+
+
+def test_a_publisher_that_is_closed_says_so(link, eventually):
+    publisher, subscription = link()
+    publisher.close()
+    publisher.close()
+    for use in (
+        lambda: publisher.publish(data="x"),
+        lambda: publisher.publish_serialized(b"x"),
+        publisher.assert_liveliness,
+    ):
+        with pytest.raises(rosglass.NodeClosedError, match="is closed; create another one"):
+            use()
+    assert publisher.subscription_count() == 0
+    assert publisher.hint == ""
+    eventually(lambda: subscription.publisher_count() == 0)
 
 
 def test_a_subscription_without_type_takes_the_publishers(link, eventually):
@@ -205,6 +258,57 @@ def test_publishers_and_subscriptions_that_come_and_go_are_reported(
     publisher.close()
     eventually(lambda: counts == [1, 0], lambda: counts)
     assert subscription.publisher_count() == 0
+
+
+def test_a_publisher_reports_subscriptions_that_come_and_go(robot, console, topic, eventually):
+    publisher = robot.create_publisher(topic, TEXT)
+    events, before = [], console.create_subscription(topic, TEXT)
+    eventually(lambda: publisher.subscription_count() == 1)
+    publisher.on_matched(events.append)
+    eventually(lambda: events)
+    before.close()
+    eventually(lambda: len(events) == 2)
+    console.create_subscription(topic, TEXT)
+    eventually(lambda: len(events) == 3)
+    assert [(e.endpoint.node, e.change, e.count, e.total) for e in events] == [
+        (name_of(console), 1, 1, 1),
+        (name_of(console), -1, 0, 1),
+        (name_of(console), 1, 1, 2),
+    ]
+    assert (publisher.problem, publisher.dropped) == ("", 0)
+
+
+def name_of(node):
+    return NodeName(node.namespace, node.name)
+
+
+def test_a_publisher_without_subscriptions_hints_at_a_name_that_is_alike(
+    robot, console, topic, eventually
+):
+    console.create_subscription(f"{topic}/cmd_vel", TEXT)
+    publisher = robot.create_publisher(f"{topic}/cmd_vle", TEXT)
+    eventually(lambda: "did you mean" in publisher.hint, lambda: publisher.hint)
+    assert publisher.hint == (
+        f"nobody subscribes to {topic}/cmd_vle; did you mean {topic}/cmd_vel?"
+    )
+    console.create_subscription(f"{topic}/cmd_vle", TEXT)
+    eventually(lambda: publisher.hint == "")
+
+
+def test_a_publisher_that_pauses_misses_its_deadline(robot, topic, eventually):
+    profile = QoS(deadline=rosglass.Duration.from_seconds(0.05))
+    publisher = robot.create_publisher(topic, TEXT, profile)
+    events = []
+    publisher.on_deadline_missed(events.append)
+    nothing_happens(0.1)
+    assert events == [], "time runs from the first message"
+    publisher.publish(data="x")
+    eventually(lambda: len(events) >= 2)
+    assert events[-1].total == sum(event.change for event in events)
+    publisher.close()
+    count = len(events)
+    nothing_happens(0.12)
+    assert len(events) <= count + 1
 
 
 def test_two_types_on_a_topic_are_a_problem_that_names_both(robot, console, topic, eventually):

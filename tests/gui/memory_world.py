@@ -74,7 +74,7 @@ class MemoryPublisher(Publisher):
         self.closed = False
         #: For how many nanoseconds the network holds back what is sent.
         self.held_back = 0
-        self.events: PublisherEvents = PublisherEvents(node.dispatcher, self.look, topic)
+        self._events = PublisherEvents(node.dispatcher, self.look, topic)
         node.world.publishers.append(self)
         node.world.changed()
 
@@ -108,7 +108,7 @@ class MemoryPublisher(Publisher):
             for one in self.node.world.subscriptions
             if one.topic == self.topic
         ]
-        self.events.matched.update(there, Matched)
+        self._events.matched.update(there, Matched)
 
     def subscription_count(self) -> int:
         return sum(s.topic == self.topic for s in self.node.world.subscriptions)

@@ -19,6 +19,7 @@ from rosglass.comm import (
     Node,
     NodeName,
     Publisher,
+    PublisherEvents,
     QoS,
     Sample,
     Source,
@@ -33,14 +34,14 @@ from rosglass.comm.names import expand
 from rosglass.comm.rclpy_names import check_order
 from rosglass.comm.similar import similar
 from rosglass.comm.terminal import show_on_terminal
-from rosglass.errors import ConversionError, NodeClosedError
+from rosglass.errors import ConversionError, NodeClosedError, UnsupportedError
 from rosglass.interfaces.names import join_name
 from rosglass.messages import Message, MessageType, OpaqueType, load
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-__all__ = ["LocalNode", "LocalPublisher", "LocalWorld"]
+__all__ = ["LocalNode", "LocalPublisher", "LocalWorld", "SilentPublisher"]
 
 
 class LocalWorld:
@@ -170,7 +171,26 @@ class LocalWorld:
         self.dispatcher.close()
 
 
-class LocalPublisher(Publisher):
+class SilentPublisher(Publisher):
+    """A publisher without news of subscriptions: it has no writer."""
+
+    _problem = ""
+
+    @property
+    def hint(self) -> str:
+        """Nothing."""
+        return ""
+
+    @property
+    def _events(self) -> PublisherEvents:  # type: ignore[override]
+        raise UnsupportedError(f"{self!r} tells nothing of itself: it belongs to a recording")
+
+    def assert_liveliness(self) -> None:
+        """Refuse: nobody would see it."""
+        raise UnsupportedError(f"{self!r} cannot show that it is alive")
+
+
+class LocalPublisher(SilentPublisher):
     """Hands messages to the subscriptions of its world."""
 
     def __init__(self, world: LocalWorld, node: LocalNode, topic: str, kind: MessageType, qos: QoS):

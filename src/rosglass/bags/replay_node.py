@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl, quote, unquote
 
 from rosglass.bags.bag import open_bag
-from rosglass.bags.local_world import LocalNode, LocalWorld
+from rosglass.bags.local_world import LocalNode, LocalWorld, SilentPublisher
 from rosglass.bags.playback import Playback
 from rosglass.comm import ConnectionState, Publisher, QoS, Status, Time
 from rosglass.errors import ConversionError, NodeClosedError, UnsupportedError
@@ -133,7 +133,7 @@ class ReplayNode(LocalNode):
         )
 
 
-class _Nowhere(Publisher):
+class _Nowhere(SilentPublisher):
     """Takes what an interface publishes while it shows a recording."""
 
     def __init__(self, topic: str, kind: MessageType, qos: QoS) -> None:

@@ -338,9 +338,8 @@ class TopicRelay:
             made.close()
         if closed:
             return None
-        if made.events is not None:
-            with suppress(Error):
-                made.on_matched(lambda _: self._wake(), IMMEDIATE)
+        with suppress(Error):
+            made.on_matched(lambda _: self._wake(), IMMEDIATE)
         return kept
 
     # -- for people ------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ import os
 import threading
 from abc import ABC, abstractmethod
 from contextlib import suppress
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from rosglass.comm.clock import Clock
 from rosglass.comm.executor import Dispatcher
@@ -19,8 +19,11 @@ from rosglass.errors import NodeClosedError
 
 if TYPE_CHECKING:
     import logging
+    from collections.abc import Callable
 
-    from rosglass.comm.graph import NodeName
+    from rosglass.comm.graph import EndpointInfo, NodeName
+    from rosglass.messages import MessageType
+    from rosglass.wires.base import Middleware, Writer
 
 __all__ = ["NodeCore", "NodeMember"]
 
@@ -44,7 +47,7 @@ class NodeMember(Handle):
         """End it; safe to call twice."""
 
 
-_Member = TypeVar("_Member", bound=NodeMember)
+_Member = TypeVar("_Member", bound=Handle)
 
 
 class NodeCore(ABC, Generic[_Member]):
@@ -56,6 +59,7 @@ class NodeCore(ABC, Generic[_Member]):
         log: Where failures are told.
 
     Attributes:
+        log: As given.
         clock: The node's clock.
         dispatcher: Runs callbacks that bring no executor of their own.
         own_dispatcher: Runs what the node answers for itself, such as questions for its parameters;
@@ -64,13 +68,22 @@ class NodeCore(ABC, Generic[_Member]):
             posts the callbacks of the clock's timers.
         graph_listeners: Told after each change of the graph.
         status_listeners: Told each new status.
+        local_gids: Identities of the node's own publishers.
     """
 
+    #: Wire format of the node's messages, ``cdr`` or ``ros1``.
+    wire: str
+    #: What is seen of the ROS graph.
+    graph: Any
+    #: What moves the bytes; a ROS 1 node has none yet, and no endpoint of its asks for it.
+    middleware: Middleware
+    #: Announces a publisher, given its type, and returns its sending end.
+    create_writer: Callable[[EndpointInfo, MessageType], Writer]
     #: Calls :meth:`_follow`; made by the world, once all is there that this needs.
     _worker: Worker
 
     def __init__(self, name: NodeName, url: str, log: logging.Logger) -> None:
-        self.name, self.url, self._log = name, url, log
+        self.name, self.url, self.log = name, url, log
         self.graph_listeners: Listeners[None] = Listeners(merge=True)
         self.status_listeners: Listeners[Status] = Listeners()
         self.dispatcher = Dispatcher(f"{name.name} callbacks")
@@ -80,7 +93,8 @@ class NodeCore(ABC, Generic[_Member]):
         self._lock = threading.Lock()
         self._closed = self._moved = False
         self._process = os.getpid()
-        self._members: dict[_Member, None] = {}
+        self._members: dict[_Member, Callable[[bool, bool], None]] = {}
+        self.local_gids: set[bytes] = set()
 
     def _start_following(self) -> Worker:
         return Worker(f"{self.name.name} graph", self._follow, _POLL)
@@ -105,10 +119,17 @@ class NodeCore(ABC, Generic[_Member]):
         if self._closed:
             raise NodeClosedError(f"node {self.name} is closed; connect again")
 
-    def add(self, member: _Member) -> None:
-        """Let a member follow the graph from now on; raises NodeClosedError after closing it."""
+    def add(self, member: _Member, follow: Callable[[bool, bool], None] | None = None) -> None:
+        """Let a member follow the graph from now on; raises NodeClosedError after closing it.
+
+        Args:
+            member: Closed with the node.
+            follow: What a member that is no :class:`NodeMember` has in place of its method.
+        """
+        if follow is None:
+            follow = member.follow if isinstance(member, NodeMember) else _ignore
         with self._lock:
-            self._members[member] = None
+            self._members[member] = follow
         if self._closed:
             member.close()
         self.check_open()
@@ -147,14 +168,20 @@ class NodeCore(ABC, Generic[_Member]):
         moved, self._moved = self._moved, False
         if not moved and not idle:
             return
-        for member in self.members():
+        with self._lock:
+            members = list(self._members.items())
+        for member, follow in members:
             # Another thread may close the node, or this member, meanwhile.
             with suppress(NodeClosedError):
                 try:
-                    member.follow(moved, idle)
+                    follow(moved, idle)
                 except NodeClosedError:
                     raise
                 except Exception:
-                    self._log.exception("%s cannot follow the graph", member)
+                    self.log.exception("%s cannot follow the graph", member)
         if moved:
             self.graph_listeners.notify(None)
+
+
+def _ignore(moved: bool, idle: bool) -> None:
+    """Follow nothing."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import IMMEDIATE, Subscription
+from rosglass.comm import IMMEDIATE, Publisher, Subscription
 from rosglass.ros1.action_types import CANCEL, FEEDBACK, GOAL, QUEUE, RESULT, STATUS, goal_id, part
 
 if TYPE_CHECKING:
@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from rosglass.comm import Sample, Time
     from rosglass.ros1.action_types import ActionTypes
     from rosglass.ros1.core import Core
-    from rosglass.ros1.publisher import Ros1Publisher
     from rosglass.ros1.topics import Topics
 
 __all__ = ["ActionEnds"]
@@ -46,12 +45,12 @@ class ActionEnds:
             word: core.resolve(part(name, word))
             for word in (GOAL, CANCEL, STATUS, RESULT, FEEDBACK)
         }
-        self._publishers: dict[str, Ros1Publisher] = {}
+        self._publishers: dict[str, Publisher] = {}
         self._subscriptions: dict[str, Subscription] = {}
         try:
             for word in (GOAL, CANCEL):
                 kind = getattr(types, word)
-                self._publishers[word] = topics.publish(self._names[word], kind, QUEUE)
+                self._publishers[word] = Publisher(core, self._names[word], kind, QUEUE)
         except BaseException:
             self.close()
             raise

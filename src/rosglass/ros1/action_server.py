@@ -10,7 +10,7 @@ import time
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import IMMEDIATE, QoS, Subscription
+from rosglass.comm import IMMEDIATE, Publisher, QoS, Subscription
 from rosglass.comm.flags import check_flag
 from rosglass.comm.goal_server import GoalServer
 from rosglass.comm.inorder import InOrder
@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from rosglass.ros1.core import Core
     from rosglass.ros1.goal_list import GoalEntry
     from rosglass.ros1.master import Master
-    from rosglass.ros1.publisher import Ros1Publisher
     from rosglass.ros1.topics import Topics
 
 __all__ = ["Ros1ActionServer"]
@@ -100,12 +99,12 @@ class Ros1ActionServer(GoalServer, Member):
         self._frequency = _FREQUENCY
         self._publishing = InOrder()
         types = ActionTypes.of(type, core.types)
-        self._publishers: dict[str, Ros1Publisher] = {}
+        self._publishers: dict[str, Publisher] = {}
         self._subscriptions: list[Subscription] = []
         try:
             for word, qos in ((STATUS, QoS.latched()), (RESULT, QUEUE), (FEEDBACK, QUEUE)):
                 topic = core.resolve(part(name, word))
-                self._publishers[word] = topics.publish(topic, getattr(types, word), qos)
+                self._publishers[word] = Publisher(core, topic, getattr(types, word), qos)
         except BaseException:
             self._close_topics()
             raise

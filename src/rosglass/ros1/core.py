@@ -8,7 +8,7 @@ import threading
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from rosglass.comm import ConnectionState, Status
+from rosglass.comm import ConnectionState, Handle, Status
 from rosglass.comm.core import NodeCore, NodeMember
 from rosglass.errors import Error
 from rosglass.ros1.address import bracketed, own_address
@@ -71,7 +71,7 @@ class Member(NodeMember):
         return False
 
 
-class Core(NodeCore[NodeMember]):
+class Core(NodeCore[Handle]):
     """Holds what a node consists of, and keeps its members registered and informed.
 
     Args:
@@ -97,6 +97,9 @@ class Core(NodeCore[NodeMember]):
     Raises:
         ConnectionLostError: This machine cannot listen for connections.
     """
+
+    wire = "ros1"
+    graph: Graph
 
     def __init__(
         self, name: NodeName, url: str, options: Ros1Options, library: Library | None
@@ -182,16 +185,17 @@ class Core(NodeCore[NodeMember]):
         """Return the absolute name of anything, not remapped; raises InvalidNameError."""
         return expand(name, self.name.name, self.name.namespace)
 
-    def add(self, member: NodeMember) -> None:
+    def add(self, member: Handle, follow: Callable[[bool, bool], None] | None = None) -> None:
         """Register a member and let it follow the graph; raises NodeClosedError after closing."""
-        super().add(member)
-        self._registrations.wake()
+        super().add(member, follow)
+        if isinstance(member, Member):
+            self._registrations.wake()
         self.wake()
 
-    def remove(self, member: NodeMember) -> None:
+    def remove(self, member: Handle) -> None:
         """Unregister a member that was closed, soon."""
         with self._lock:
-            known = self._members.pop(member, ...) is None
+            known = self._members.pop(member, None) is not None
         if known and not self._closed and isinstance(member, Member):
             self._registrations.forget(member)
 

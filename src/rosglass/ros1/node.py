@@ -5,7 +5,15 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import EndpointKind, History, NodeName, ParameterClient, QoS, Subscription
+from rosglass.comm import (
+    EndpointKind,
+    History,
+    NodeName,
+    ParameterClient,
+    Publisher,
+    QoS,
+    Subscription,
+)
 from rosglass.comm.builtin_services import BuiltinServices
 from rosglass.comm.complaints import Complaints
 from rosglass.comm.core_node import CoreNode
@@ -48,7 +56,6 @@ if TYPE_CHECKING:
     from rosglass.ros1.action_server import Ros1ActionServer
     from rosglass.ros1.options import Ros1Options
     from rosglass.ros1.parameter_namespace import Ros1Parameters
-    from rosglass.ros1.publisher import Ros1Publisher
 
 __all__ = ["Ros1Node"]
 
@@ -114,12 +121,12 @@ class Ros1Node(CoreNode):
 
     def create_publisher(
         self, topic: str, type: str | MessageType, qos: QoS | int = 10
-    ) -> Ros1Publisher:
+    ) -> Publisher:
         """Announce `topic`; see :meth:`rosglass.comm.Node.create_publisher`."""
         self._core.check_open()
         check_order("create_publisher", topic, type)
-        return self._topics.publish(
-            self.resolve(topic), self._core.types.message(type), _profile(qos)
+        return Publisher(
+            self._core, self.resolve(topic), self._core.types.message(type), _profile(qos)
         )
 
     def create_subscription(

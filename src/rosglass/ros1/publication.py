@@ -1,4 +1,4 @@
-"""What a node publishes on one topic: one registration and the subscribers' connections."""
+"""A topic that a node publishes: one registration, and the subscribers' connections."""
 
 from __future__ import annotations
 
@@ -10,42 +10,45 @@ import time
 from collections import deque
 from typing import TYPE_CHECKING
 
-from rosglass.comm import EndpointInfo, EndpointKind, History, NodeName
+from rosglass.comm import Durability, EndpointInfo, EndpointKind, History, NodeName
 from rosglass.comm.inbox import INBOX_LIMIT
-from rosglass.comm.similar import similar
-from rosglass.errors import DefinitionConflictError
+from rosglass.errors import ConversionError, DefinitionConflictError, UnsupportedError
 from rosglass.interfaces import ros1_name
 from rosglass.ros1.core import Member
 from rosglass.ros1.definitions import definition_text
 from rosglass.ros1.names import split
 from rosglass.ros1.outgoing import Frame
 from rosglass.ros1.types import ANY
+from rosglass.wires.base import Writer
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
+    from rosglass.comm import QoS
     from rosglass.messages import MessageType
     from rosglass.ros1.connection import Connection
     from rosglass.ros1.core import Core
     from rosglass.ros1.master import Master
-    from rosglass.ros1.publisher import Ros1Publisher
     from rosglass.ros1.topics import Topics
 
     Buffer = bytes | bytearray | memoryview
 
-__all__ = ["Publication"]
+__all__ = ["Publication", "PublicationWriter"]
 
 _log = logging.getLogger("rosglass.ros1")
 _SUBSCRIPTION = EndpointKind.SUBSCRIPTION
-#: Seconds for which a subscriber counts as slow after it lost messages, and between two counts.
-_SLOW = 10.0
-#: Seconds that what waits may still be sent when nobody publishes any more.
-_FAREWELL = 1.0
-#: Subscribers between two looks, come and gone, that listeners are informed of at most.
+#: Largest message that ROS 1 nodes accept.
+_MAX_MESSAGE_BYTES = 1_000_000_000
+#: How long a subscriber counts as slow after it lost messages, and between two counts.
+_SLOW_S = 10.0
+#: How long queued messages may still be sent after the topic's last publisher was closed.
+_FLUSH_TIMEOUT_S = 1.0
+#: Most subscribers, come and gone between two looks, that listeners are informed of.
 _MAX_BRIEF = 100
-#: Seconds until the master's list shows a subscriber for certain.
-_SETTLED = 5.0
-_length = struct.Struct("<I")
+#: How long the master's list may lack a subscriber that has connected.
+_LISTED_AFTER_S = 5.0
+_HEADER = "std_msgs/msg/Header"
+_uint32 = struct.Struct("<I")
 
 
 class Publication(Member):
@@ -58,7 +61,8 @@ class Publication(Member):
         type: What is published on it.
 
     Attributes:
-        numbers: What messages that begin with a header are numbered with.
+        writers: The sending ends of its publishers.
+        numbers: The running numbers of messages that begin with a header.
     """
 
     def __init__(self, core: Core, topics: Topics, topic: str, type: MessageType) -> None:
@@ -66,76 +70,80 @@ class Publication(Member):
         self._core, self._topics = core, topics
         self._lock = threading.Lock()
         self.numbers = itertools.count(1)
-        self.publishers: list[Ros1Publisher] = []
+        self.writers: list[PublicationWriter] = []
         self._links: list[Connection] = []
-        #: Those of them that the last look has found.
-        self._found: set[Connection] = set()
-        #: What `_links` was when one left that no look had found.
-        self._brief: deque[list[Connection]] = deque(maxlen=_MAX_BRIEF)
         #: The last message of each latched publisher.
-        self._latched: dict[Ros1Publisher, Frame] = {}
+        self._latched: dict[PublicationWriter, Frame] = {}
         self._closed = False
-        #: What those lost that are gone.
+        #: Messages lost by connections that have ended.
         self._lost_before = 0
-        #: How much each link had lost when it was told of last, when, and how.
+        #: Messages that each link had lost when it was reported last, the time, and the report.
         self._slow: dict[Connection, tuple[int, float, str]] = {}
-        #: Who was refused, why, and when.
+        #: Refused subscribers: the reason and the time.
         self._refused: dict[str, tuple[str, float]] = {}
 
-    # -- who is there ----------------------------------------------------------------------------
+    # -- subscribers -----------------------------------------------------------------------------
 
     def connected(self) -> list[EndpointInfo]:
-        """Return who is connected."""
+        """Return the subscribers that are connected."""
         return self._endpoints(self.links())
 
+    def changes(self, writer: PublicationWriter) -> list[list[EndpointInfo]]:
+        """Return the subscribers after each change since a writer's last call."""
+        with self._lock:
+            looks = [*writer.brief, self._links.copy()]
+            writer.brief.clear()
+            writer.found = set(self._links)
+        return [self._endpoints(links) for links in looks]
+
     def lost(self) -> int:
-        """Return how many messages made room for newer ones because somebody is slow."""
+        """Return how many messages made room for newer ones because a subscriber is slow."""
         with self._lock:
             return self._lost_before + sum(link.lost for link in self._links)
+
+    def problem(self) -> str:
+        """Return why subscribers were refused, and which are too slow."""
+        return "; ".join([*self._refusals(), *self._losses()])
 
     def links(self) -> list[Connection]:
         """Return the subscribers' connections."""
         with self._lock:
             return list(self._links)
 
-    def hint(self) -> str:
-        """Say what may be wrong when nobody subscribes; empty when somebody does."""
-        graph = self._core.graph
-        if self._links or graph.endpoints(_SUBSCRIPTION, self.topic):
-            return ""
-        wanted = [name for name in graph.topics() if graph.endpoints(_SUBSCRIPTION, name)]
-        return f"nobody subscribes to {self.topic}{similar(self.topic, wanted)}"
-
     # -- sending ---------------------------------------------------------------------------------
 
-    def send(self, publisher: Ros1Publisher, parts: Sequence[Buffer]) -> None:
-        """Send a message to everybody; does not wait.
+    def send(self, writer: PublicationWriter, parts: Sequence[Buffer]) -> None:
+        """Send a message to every subscriber; does not wait.
 
         Args:
-            publisher: Who sends; its profile tells how many messages may wait.
+            writer: The sender; its profile tells how many messages may wait.
             parts: The message, which may change afterwards.
+
+        Raises:
+            ConversionError: The message is larger than ROS 1 nodes accept.
         """
-        latched = publisher.latched
+        size = sum(map(len, parts))
+        if size > _MAX_MESSAGE_BYTES:
+            expected = f"at most {_MAX_MESSAGE_BYTES} bytes, as ROS 1 takes no larger message"
+            raise ConversionError("", f"{size} bytes", expected, self.topic)
+        latched = writer.latched
         if not latched and not self._links:
             return
-        size = sum(map(len, parts))
         if size < 4096:
             # One part is handed to the system sooner than several.
-            frame = Frame((b"".join((_length.pack(size), *parts)),), latched)
+            frame = Frame((b"".join((_uint32.pack(size), *parts)),), latched)
         else:
-            frame = Frame((_length.pack(size), *parts), latched)
+            frame = Frame((_uint32.pack(size), *parts), latched)
         if latched:
             frame.parts = [frame.rest(0)]
-        qos = publisher.qos
-        keep_all = qos.history is History.KEEP_ALL
-        keep, keep_bytes = (0, INBOX_LIMIT) if keep_all else (qos.depth, 0)
-        # Whoever connects meanwhile must get it once: as the latched one, or as a new one.
+        keep, keep_bytes = writer.keep, writer.keep_bytes
+        # Hold the lock so that a new subscriber gets the message exactly once.
         with self._lock:
             if latched:
-                known = self._latched.get(publisher)
+                known = self._latched.get(writer)
                 if known is not None:
                     known.kept = False
-                self._latched[publisher] = frame
+                self._latched[writer] = frame
             for link in self._links:
                 link.send_frame(frame, keep, keep_bytes)
 
@@ -143,7 +151,7 @@ class Publication(Member):
         """Return the last message of each latched publisher."""
         with self._lock:
             frames = list(self._latched.values())
-        return [frame.rest(0)[_length.size :] for frame in frames]
+        return [frame.rest(0)[_uint32.size :] for frame in frames]
 
     # -- connections, in the loop's thread -------------------------------------------------------
 
@@ -155,13 +163,13 @@ class Publication(Member):
         if not theirs_md5:
             return self._refuse(link, "its connection header has no md5sum")
         if theirs not in (ANY, name) or theirs_md5 not in (ANY, md5):
-            told = header.get("message_definition", "").strip() or "(it sends no definition)"
+            given = header.get("message_definition", "").strip() or "(it sends no definition)"
             problem = (
                 f"{self.topic} is {name} with md5 {md5} here, but {link.peer} subscribes to "
                 f"{theirs} with md5 {theirs_md5}"
             )
             ours = definition_text(self._core.types, self.type).strip()
-            return self._refuse(link, problem, f". Theirs:\n{told}\nOurs:\n{ours}")
+            return self._refuse(link, problem, f". Theirs:\n{given}\nOurs:\n{ours}")
         with self._lock:
             if self._closed:
                 return f"{self.topic} is not published here any more"
@@ -174,10 +182,10 @@ class Publication(Member):
         return ""
 
     def header(self) -> dict[str, str]:
-        """Return what subscribers are told when they connect; from any thread."""
+        """Return the connection header that subscribers get; from any thread."""
         return {
             "callerid": self._core.name.full,
-            "latching": "1" if any(publisher.latched for publisher in self.publishers) else "0",
+            "latching": "1" if any(writer.latched for writer in self.writers) else "0",
             "md5sum": self.type.md5,
             "message_definition": definition_text(self._core.types, self.type),
             "topic": self.topic,
@@ -188,8 +196,9 @@ class Publication(Member):
         """Forget a subscriber that has gone."""
         with self._lock:
             if link in self._links:
-                if link not in self._found:
-                    self._brief.append(self._links.copy())
+                for writer in self.writers:
+                    if link not in writer.found:
+                        writer.brief.append(self._links.copy())
                 self._links.remove(link)
                 self._lost_before += link.lost
         self._core.wake()
@@ -204,29 +213,38 @@ class Publication(Member):
 
     # -- as a member -----------------------------------------------------------------------------
 
-    def join(self, publisher: Ros1Publisher) -> None:
-        """Add a publisher.
+    def join(
+        self, type: MessageType, qos: QoS, on_close: Callable[[PublicationWriter], None]
+    ) -> PublicationWriter:
+        """Add a publisher; returns its sending end.
+
+        Args:
+            type: What it publishes.
+            qos: Transient local means latched; the depth is the queue of each slow subscriber.
+            on_close: Called when the sending end is closed.
 
         Raises:
             DefinitionConflictError: It publishes another type.
         """
-        if publisher.type.md5 != self.type.md5 or publisher.type.name != self.type.name:
-            first, second = ros1_name(self.type.name), ros1_name(publisher.type.name)
+        if type.md5 != self.type.md5 or type.name != self.type.name:
+            first, second = ros1_name(self.type.name), ros1_name(type.name)
             raise DefinitionConflictError(
                 f"{self._core.name} publishes {self.topic} as {first} already, and ROS 1 has one "
                 f"type for a topic of a node: it cannot be {second}, too"
             )
+        writer = PublicationWriter(self, type, qos, on_close)
         with self._lock:
-            self.publishers = [*self.publishers, publisher]
+            self.writers = [*self.writers, writer]
+        return writer
 
-    def leave(self, publisher: Ros1Publisher) -> bool:
-        """Remove a publisher; return whether it was the last one."""
+    def leave(self, writer: PublicationWriter) -> bool:
+        """Remove a publisher's sending end; return whether it was the last one."""
         with self._lock:
-            frame = self._latched.pop(publisher, None)
+            frame = self._latched.pop(writer, None)
             if frame is not None:
                 frame.kept = False
-            self.publishers = [one for one in self.publishers if one is not publisher]
-            return not self.publishers
+            self.writers = [one for one in self.writers if one is not writer]
+            return not self.writers
 
     @property
     def place(self) -> tuple[EndpointKind, str]:  # type: ignore[override]
@@ -248,59 +266,44 @@ class Publication(Member):
                 return None
         return heir
 
-    def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - connections come by themselves
-        """Tell the publishers who is connected, and who is in trouble."""
-        problem = "; ".join([*self._refusals(), *self._losses()])
-        with self._lock:
-            looks = [*self._brief, self._links.copy()]
-            self._brief.clear()
-            self._found = set(self._links)
-        for links in looks:
-            connected = self._endpoints(links)
-            for publisher in self.publishers:
-                publisher.follow(connected, problem)
-
     def _refusals(self) -> list[str]:
-        """Return why some are refused that still want to subscribe."""
+        """Return why subscribers were refused that are still listed by the master."""
         now = time.monotonic()
         graph = self._core.graph
         there = {one.node.full for one in graph.endpoints(_SUBSCRIPTION, self.topic)}
         for peer, (_, since) in self._refused.copy().items():
-            if peer not in there and now - since > _SETTLED:
+            if peer not in there and now - since > _LISTED_AFTER_S:
                 self._refused.pop(peer, None)
-        return [told for told, _ in self._refused.copy().values()]
+        return [reason for reason, _ in self._refused.copy().values()]
 
     def _losses(self) -> list[str]:
-        """Return who is too slow."""
+        """Return which subscribers are too slow."""
         now = time.monotonic()
         slow: dict[Connection, tuple[int, float, str]] = {}
         for link in self.links():
-            told, at, text = self._slow.get(link, (0, -_SLOW, ""))
-            if now - at >= _SLOW:
+            reported, at, text = self._slow.get(link, (0, -_SLOW_S, ""))
+            if now - at >= _SLOW_S:
                 lost = link.lost
-                if lost == told:
+                if lost == reported:
                     text = ""
                 else:
-                    told, at = lost, now
+                    reported, at = lost, now
                     text = f"{link.peer} is too slow: {lost} messages made room for newer ones"
-            slow[link] = (told, at, text)
+            slow[link] = (reported, at, text)
         self._slow = slow
         return [text for _, _, text in slow.values() if text]
 
     def close(self) -> None:
-        """End the publishers, and the connections once what waits is sent, or a second later."""
+        """End the connections once what waits is sent, or a second later; safe to call twice."""
         with self._lock:
             if self._closed:
                 return
             self._closed = True
             links, self._links = self._links, []
-            publishers = self.publishers
             self._lost_before += sum(link.lost for link in links)
             self._latched.clear()
-        for publisher in publishers:
-            publisher.close()
         for link in links:
-            self._core.loop.call(lambda link=link: link.finish(_FAREWELL))  # type: ignore[misc]
+            self._core.loop.call(lambda link=link: link.finish(_FLUSH_TIMEOUT_S))  # type: ignore[misc]
         self._core.remove(self)
 
     def _endpoints(self, links: Sequence[Connection]) -> list[EndpointInfo]:
@@ -318,3 +321,88 @@ class Publication(Member):
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.topic} [{self.type.name}]>"
+
+
+class PublicationWriter(Writer):
+    """The sending end of one publisher of a topic.
+
+    Args:
+        publication: The node's registration of the topic.
+        type: What is published.
+        qos: The publisher's profile.
+        on_close: Called when it is closed.
+
+    Attributes:
+        latched: Whether a subscriber that connects later gets the last message.
+        keep: Most messages that wait for a slow subscriber, 0 for any number.
+        keep_bytes: Most bytes that wait for it, 0 for any number.
+        found: The connections that :meth:`changes` has reported last.
+        brief: The connections at moments when one left that was never reported.
+    """
+
+    def __init__(
+        self,
+        publication: Publication,
+        type: MessageType,
+        qos: QoS,
+        on_close: Callable[[PublicationWriter], None],
+    ) -> None:
+        self.publication, self._on_close = publication, on_close
+        self.latched = qos.durability is Durability.TRANSIENT_LOCAL
+        keep_all = qos.history is History.KEEP_ALL
+        self.keep, self.keep_bytes = (0, INBOX_LIMIT) if keep_all else (qos.depth, 0)
+        self.found: set[Connection] = set()
+        self.brief: deque[list[Connection]] = deque(maxlen=_MAX_BRIEF)
+        if _has_header(type):
+            self.number = self._number
+
+    def write(self, data: bytes | bytearray) -> None:
+        """Send a message."""
+        self.publication.send(self, (data,))
+
+    def write_parts(self, parts: Sequence[Buffer]) -> None:
+        """Send a message that comes in parts."""
+        self.publication.send(self, parts)
+
+    def subscribers(self) -> list[EndpointInfo]:
+        """Return the subscribers that are connected."""
+        return self.publication.connected()
+
+    def changes(self) -> list[list[EndpointInfo]]:
+        """Return the subscribers after each change since the last call, those of now last."""
+        return self.publication.changes(self)
+
+    def lost(self) -> int:
+        """Return how many messages on the topic made room for newer ones."""
+        return self.publication.lost()
+
+    @property
+    def problem(self) -> str:  # type: ignore[override]
+        """Why some subscribers get nothing, or not all, in words; empty when all is well."""
+        return self.publication.problem()
+
+    def assert_liveliness(self) -> None:
+        """Refuse: ROS 1 has no word for it."""
+        raise UnsupportedError(
+            f"{self.publication.topic}: a publisher cannot show that it is alive in ROS 1 but by "
+            "sending"
+        )
+
+    def close(self) -> None:
+        """Send no more; safe to call twice."""
+        self._on_close(self)
+
+    def _number(self, parts: Sequence[Buffer]) -> Sequence[Buffer]:
+        """Put the topic's next running number in place of ``header.seq``."""
+        number = _uint32.pack(next(self.publication.numbers) & 0xFFFFFFFF)
+        return (number, memoryview(parts[0])[_uint32.size :], *parts[1:])
+
+
+def _has_header(type: MessageType) -> bool:
+    """Return whether messages begin with a header, whose number publishers set."""
+    from rosglass.messages import OpaqueType  # noqa: PLC0415 - numpy
+
+    if isinstance(type, OpaqueType):
+        return False
+    fields = type.definition.fields
+    return bool(fields) and (fields[0].name, str(fields[0].type)) == ("header", _HEADER)

@@ -8,11 +8,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointKind, QoS
-from rosglass.errors import Error
+from rosglass.errors import Error, TypeNotFoundError
 from rosglass.interfaces import ros1_name
 from rosglass.ros1.intake import Intake
 from rosglass.ros1.publication import Publication
-from rosglass.ros1.publisher import Ros1Publisher
 from rosglass.ros1.reading import Reading
 from rosglass.ros1.topic_probe import ask_publisher
 from rosglass.ros1.types import ANY
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
     from rosglass.messages import MessageType
     from rosglass.ros1.connection import Connection
     from rosglass.ros1.core import Core
+    from rosglass.ros1.publication import PublicationWriter
 
 __all__ = ["Topics"]
 
@@ -50,27 +50,32 @@ class Topics:
         #: Who takes connections of topics that are about to be published.
         self._stand_ins: dict[str, Callable[[Connection, dict[str, str]], str]] = {}
         self._intakes: dict[str, Intake] = {}
+        core.create_writer = self.create_writer
 
-    def publish(self, topic: str, type: MessageType, qos: QoS) -> Ros1Publisher:
-        """Return a new publisher of a topic.
+    def create_writer(self, endpoint: EndpointInfo, type: MessageType) -> PublicationWriter:
+        """Publish a topic and return the sending end of its publisher.
 
         Raises:
             DefinitionConflictError: The node publishes another type there.
+            TypeNotFoundError: The type is opaque, and comes without md5 sum.
         """
+        topic = endpoint.name
+        if not type.md5:
+            raise TypeNotFoundError(
+                f"{topic} cannot be published as {type.name} without definition or md5 sum: "
+                "subscribers could not tell whether they understand it; give the type of a "
+                "received sample, or OpaqueType(name, md5, ros=1)"
+            )
         with self._lock:
             publication = self._publications.get(topic)
             new = publication is None
             if publication is None:
                 publication = Publication(self._core, self, topic, type)
-            made = Ros1Publisher(self._core, publication, type, qos, self._end_publisher)
-            publication.join(made)
+            writer = publication.join(type, endpoint.qos, self._end_writer)
             self._publications[topic] = publication
         if new:
             self._core.add(publication)
-        elif self._core.closed:
-            made.close()
-            self._core.check_open()
-        return made
+        return writer
 
     def subscribe(
         self, subscription: Subscription, ignore_local: bool, type_name: str = ""
@@ -204,12 +209,12 @@ class Topics:
         """Return what is subscribed to, by topic."""
         return dict(self._intakes)
 
-    def _end_publisher(self, publisher: Ros1Publisher) -> None:
-        publication = publisher.publication
+    def _end_writer(self, writer: PublicationWriter) -> None:
+        publication = writer.publication
         with self._lock:
-            last = publication.leave(publisher)
-            if last and self._publications.get(publisher.topic) is publication:
-                del self._publications[publisher.topic]
+            last = publication.leave(writer)
+            if last and self._publications.get(publication.topic) is publication:
+                del self._publications[publication.topic]
         if last:
             publication.close()
 

@@ -13,7 +13,7 @@ from concurrent.futures import Future
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import Dispatcher, EndpointKind, Time
+from rosglass.comm import Dispatcher, EndpointKind, Publisher, Time
 from rosglass.comm.goal_server import GoalServer
 from rosglass.comm.inorder import InOrder
 from rosglass.errors import NodeClosedError
@@ -33,7 +33,6 @@ from rosglass.ros2.action_types import (
     stamp_of,
 )
 from rosglass.ros2.core import Member
-from rosglass.ros2.publisher import Ros2Publisher
 from rosglass.ros2.server_goal import Ros2ServerGoal
 from rosglass.ros2.service_server import Ros2ServiceServer
 
@@ -92,8 +91,8 @@ class Ros2ActionServer(GoalServer, Member):
         self._publishing = InOrder()
         #: Runs the protocol: neither the middleware's threads nor users' callbacks hold it up.
         self._desk = Dispatcher(f"{name} goals")
-        self._feedback = Ros2Publisher(core, part(name, FEEDBACK), types.feedback, FEEDBACK_QOS)
-        self._status = Ros2Publisher(core, part(name, STATUS), types.status, STATUS_QOS)
+        self._feedback = Publisher(core, part(name, FEEDBACK), types.feedback, FEEDBACK_QOS)
+        self._status = Publisher(core, part(name, STATUS), types.status, STATUS_QOS)
         self._services = [
             Ros2ServiceServer(core, part(name, service), kind, callback, executor=self._desk)
             for service, kind, callback in (

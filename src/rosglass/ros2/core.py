@@ -7,7 +7,7 @@ import logging
 from typing import TYPE_CHECKING
 from weakref import WeakValueDictionary
 
-from rosglass.comm import ConnectionState, EndpointKind, Status
+from rosglass.comm import ConnectionState, EndpointKind, Handle, Status
 from rosglass.comm.core import NodeCore, NodeMember
 from rosglass.comm.graph import Graph
 from rosglass.comm.names import expand
@@ -34,7 +34,7 @@ class Member(NodeMember):
         return False
 
 
-class Core(NodeCore[NodeMember]):
+class Core(NodeCore[Handle]):
     """Holds what a node consists of, and keeps its members informed.
 
     Args:
@@ -47,13 +47,15 @@ class Core(NodeCore[NodeMember]):
     Attributes:
         graph: What is seen of the ROS graph.
         types: Finds types.
-        local_gids: Identities of the node's own publishers.
         windows: The open requests to each service, which all its clients share.
 
     Raises:
         ConnectionLostError: The middleware cannot start on this machine.
         RosArgumentError: A remapping rule makes a name that is not valid.
     """
+
+    wire = "cdr"
+    graph: Graph
 
     def __init__(
         self,
@@ -65,12 +67,12 @@ class Core(NodeCore[NodeMember]):
     ) -> None:
         super().__init__(name, url, _log)
         self.middleware, self.arguments = middleware, arguments
+        self.create_writer = lambda endpoint, _: middleware.create_writer(endpoint)
         self._new_names = {
             kind: arguments.remappings(kind, name.name, name.namespace)
             for kind in ("topic", "service")
         }
         self.types = Types(library, url)
-        self.local_gids: set[bytes] = set()
         self.windows: WeakValueDictionary[str, RequestWindow] = WeakValueDictionary()
         self._moved = True
         self._told = middleware.status()

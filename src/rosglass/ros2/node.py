@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rosglass.comm import EndpointKind, NodeName, ParameterClient, QoS, Subscription
+from rosglass.comm import EndpointKind, NodeName, ParameterClient, Publisher, QoS, Subscription
 from rosglass.comm.builtin_services import BuiltinServices
 from rosglass.comm.core_node import CoreNode
 from rosglass.comm.flags import check_flag
@@ -13,7 +13,6 @@ from rosglass.comm.rclpy_names import check_order
 from rosglass.errors import ArgumentError
 from rosglass.ros2.arguments import NO_ARGUMENTS
 from rosglass.ros2.core import Core
-from rosglass.ros2.publisher import Ros2Publisher
 from rosglass.ros2.rcl_services import RclServices
 from rosglass.ros2.reading import Reading, type_if_known
 from rosglass.ros2.service_client import Ros2ServiceClient
@@ -31,7 +30,6 @@ if TYPE_CHECKING:
         Executor,
         LifecycleClient,
         Promise,
-        Publisher,
         Sample,
         ServerGoal,
         ServiceClient,
@@ -98,7 +96,7 @@ class Ros2Node(CoreNode):
         check_order("create_publisher", topic, type)
         self._core.types.ensure(type)
         full = self.resolve(topic)
-        return Ros2Publisher(self._core, full, self._core.types.message(type), _profile(qos, full))
+        return Publisher(self._core, full, self._core.types.message(type), _profile(qos, full))
 
     def create_subscription(
         self,

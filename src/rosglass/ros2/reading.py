@@ -17,12 +17,12 @@ from rosglass.comm import (
     Source,
 )
 from rosglass.comm.absence import Absence
+from rosglass.comm.matching import conflict_events, conflicts, words
 from rosglass.comm.similar import similar
 from rosglass.comm.watchdog import Watchdog
 from rosglass.errors import Error, NodeClosedError, TypeNotFoundError
 from rosglass.ros2.core import Member
 from rosglass.ros2.liveliness import Liveness
-from rosglass.ros2.matching import conflict_events, conflicts, words
 from rosglass.ros2.repeats import Repeats
 from rosglass.ros2.topic_types import TopicTypes
 

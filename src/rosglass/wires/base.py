@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from rosglass.comm.graph import Graph
     from rosglass.interfaces import Definition
 
+    Buffer = bytes | bytearray | memoryview
+
 __all__ = [
     "CALL_DROPPED",
     "SERVER_LEFT",
@@ -64,15 +66,21 @@ class Writer(Handle):
 
     #: Identity of the publisher, as readers are told it with samples; empty when unknown.
     gid: bytes = b""
+    #: Why some subscribers get nothing, or not all, in words; empty when all is well. The graph is
+    #: not considered: it is for the publisher to say which subscriptions there do not match.
+    problem: str = ""
+    #: Puts the wire's running number into a message that was encoded here, given and returned in
+    #: parts; None where messages bear none.
+    number: Callable[[Sequence[Buffer]], Sequence[Buffer]] | None = None
 
     @abstractmethod
     def write(self, data: bytes | bytearray) -> None:
-        """Send a payload, which begins with its encapsulation header."""
+        """Send a payload, which begins with its encapsulation header where the format has one."""
 
-    def write_parts(self, parts: Sequence[bytes | bytearray | memoryview]) -> None:
+    def write_parts(self, parts: Sequence[Buffer]) -> None:
         """Send a payload that comes in parts, which may change as soon as this returns.
 
-        The first begins with the encapsulation header; views are contiguous and of bytes. For
+        The first begins as the payload of :meth:`write`; views are contiguous and of bytes. For
         middlewares that take big payloads without another copy; all others join them.
         """
         self.write(b"".join(parts))
@@ -83,6 +91,24 @@ class Writer(Handle):
         For middlewares that must address them one way or the other; called on every change of
         the graph, never on a thread of the middleware.
         """
+
+    def subscribers(self) -> list[EndpointInfo] | None:
+        """Return the subscribers that are connected; called from any thread.
+
+        None on wires where the graph alone tells which subscriptions match.
+        """
+        return None
+
+    def changes(self) -> list[list[EndpointInfo]]:
+        """Return the subscribers after each change since the last call, those of now last.
+
+        For wires with :meth:`subscribers`: one may come and go between two looks.
+        """
+        return []
+
+    def lost(self) -> int:
+        """Return how many messages made room for newer ones because a subscriber is slow."""
+        return 0
 
     def assert_liveliness(self) -> None:
         """Show that the publisher is alive; nothing where the middleware has no word for it."""

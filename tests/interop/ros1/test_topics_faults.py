@@ -121,7 +121,7 @@ def test_a_slow_subscriber_is_told_of_and_holds_up_nobody(connect, wait_for):
         publisher.publish_serialized(data)
         wait_for(lambda wanted=number: len(got) > wanted)
     assert publisher.dropped >= 40
-    assert all(link.waiting() <= 6 for link in publisher.publication.links())
+    assert all(link.waiting() <= 6 for link in node._topics.published()["/fast"].links())
     wait_for(lambda: "/raw is too slow" in publisher.problem)
     slow.close()
     wait_for(lambda: publisher.problem == "" and publisher.subscription_count() == 1)

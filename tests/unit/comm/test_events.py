@@ -1,17 +1,14 @@
 from __future__ import annotations
 
-from contextlib import suppress
-
 import pytest
 
-from rosglass import ConversionError, QoS, UnsupportedError
+from rosglass import ConversionError, QoS
 from rosglass.comm import (
     IMMEDIATE,
     EndpointInfo,
     EndpointKind,
     Matched,
     NodeName,
-    Publisher,
     Subscription,
 )
 from rosglass.comm.events import Appearances
@@ -113,23 +110,3 @@ def test_listeners_are_checked(name):
         register(3)
     with pytest.raises(ConversionError, match=r"executor: expected a rosglass\.comm\.Executor"):
         register(print, 3)
-
-
-def test_a_world_that_tells_nothing_of_its_publishers_says_so():
-    class Mute(Publisher):
-        topic = "/t"
-        type = type("T", (), {"name": "p/msg/T"})
-
-        def publish(self, *_):
-            pass
-
-        publish_serialized = subscription_count = close = publish
-
-    mute = Mute()
-    assert (mute.problem, mute.hint) == ("", "")
-    for use in (lambda: mute.on_matched(print), mute.assert_liveliness):
-        with pytest.raises(UnsupportedError, match=r"/t \[p/msg/T\]"):
-            use()
-    with suppress(UnsupportedError):
-        mute.on_problem_change(print)
-        pytest.fail("it tells nothing")

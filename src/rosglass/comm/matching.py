@@ -1,15 +1,16 @@
-"""What publishers and subscriptions say of each other's quality of service."""
+"""Whether the quality of service of a publisher and a subscription matches, and why not."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rosglass.comm import IncompatibleQoS
+from rosglass.comm.events import IncompatibleQoS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from rosglass.comm import EndpointInfo, QoS
+    from rosglass.comm.graph import EndpointInfo
+    from rosglass.comm.qos import QoS
     from rosglass.wires.base import Middleware
 
     Conflicts = Mapping[EndpointInfo, Mapping[str, str]]
@@ -33,7 +34,7 @@ def conflicts(
 
 def words(found: Mapping[str, str]) -> str:
     """Return the conflicts of policies as one line."""
-    return "; ".join(f"{policy}: {told}" for policy, told in found.items())
+    return "; ".join(f"{policy}: {reason}" for policy, reason in found.items())
 
 
 def conflict_events(
@@ -46,7 +47,7 @@ def conflict_events(
     ) -> IncompatibleQoS | None:
         if change < 0:
             return None
-        told = found[endpoint]
-        return IncompatibleQoS(endpoint, tuple(told), words(told), total)
+        policies = found[endpoint]
+        return IncompatibleQoS(endpoint, tuple(policies), words(policies), total)
 
     return event
