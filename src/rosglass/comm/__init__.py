@@ -48,7 +48,8 @@ if TYPE_CHECKING:
     from rosglass.comm.publisher import Publisher
     from rosglass.comm.qos import BEST_AVAILABLE, Durability, History, Liveliness, QoS, Reliability
     from rosglass.comm.sample import Sample
-    from rosglass.comm.service import Call, ServiceClient, ServiceServer
+    from rosglass.comm.service import Call, ServiceClient
+    from rosglass.comm.service_server import ServiceServer
     from rosglass.comm.source import Source
     from rosglass.comm.statistics import Statistics
     from rosglass.comm.subscription import Subscription
@@ -205,8 +206,8 @@ _HOMES = {
     "service": (
         "Call",
         "ServiceClient",
-        "ServiceServer",
     ),
+    "service_server": ("ServiceServer",),
     "source": ("Source",),
     "statistics": ("Statistics",),
     "subscription": ("Subscription",),

@@ -69,6 +69,7 @@ class NodeCore(ABC, Generic[_Member]):
         graph_listeners: Told after each change of the graph.
         status_listeners: Told each new status.
         local_gids: Identities of the node's own publishers.
+        servers: The services that the node offers.
     """
 
     #: Wire format of the node's messages, ``cdr`` or ``ros1``.
@@ -95,6 +96,7 @@ class NodeCore(ABC, Generic[_Member]):
         self._process = os.getpid()
         self._members: dict[_Member, Callable[[bool, bool], None]] = {}
         self.local_gids: set[bytes] = set()
+        self.servers: set[Handle] = set()
 
     def _start_following(self) -> Worker:
         return Worker(f"{self.name.name} graph", self._follow, _POLL)

@@ -1,4 +1,4 @@
-"""Services: calling them, and offering them."""
+"""Calling services."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rosglass.comm.qos import QoS
     from rosglass.messages import Message, ServiceType
 
-__all__ = ["Call", "ServiceClient", "ServiceServer"]
+__all__ = ["Call", "ServiceClient"]
 
 
 class Call(Promise["Message"]):
@@ -115,26 +115,3 @@ class ServiceClient(Handle):
             callback: Told the new value.
             executor: Where it runs; None for the node's own dispatcher thread.
         """
-
-
-@hint_at_members
-class ServiceServer(Handle):
-    """Offers a service; made by :meth:`Node.create_service_server`.
-
-    Attributes:
-        name: Absolute service name.
-        type: The service type.
-        qos: The quality of service of requests and replies.
-    """
-
-    name: str
-    type: ServiceType
-    qos: QoS
-
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__} {self.name} [{self.type.name}]>"
-
-    @property
-    @abstractmethod
-    def problem(self) -> str:
-        """Why some clients cannot be served, in words; empty when all is well."""

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.comm.node import Node
-    from rosglass.comm.service import ServiceServer as Server
+    from rosglass.comm.service_server import ServiceServer as Server
     from rosglass.messages import Message
     from rosglass.qml.runtime import Runtime
 

@@ -425,7 +425,7 @@ class Ros1Node(CoreNode):
             self._core.loop,
             sock,
             on_header,
-            lambda data, _: self._services.take(link, data),  # subscribers have nothing to say
+            lambda data, _: self._services.on_frame(link, data),  # subscribers have nothing to say
             lambda _: self._drop(link),
             peer=address,
         )
@@ -439,7 +439,7 @@ class Ros1Node(CoreNode):
         self._connections.discard(link)
         self._silent.pop(link, None)
         self._topics.drop(link)
-        self._services.drop(link)
+        self._services.on_disconnected(link)
 
     def _node_name(self, node: str | NodeName) -> str:
         """Return a node's full name; raises InvalidNameError."""

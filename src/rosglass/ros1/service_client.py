@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.calling import CallingClient
 from rosglass.comm.client import untyped
+from rosglass.comm.service_server import served_by_this_thread
 from rosglass.errors import Error, ServiceError
 from rosglass.ros1.core import Member
 from rosglass.ros1.service_finder import ServiceFinder
@@ -101,7 +102,7 @@ class Ros1ServiceClient(CallingClient[Request], Member):
     # -- calling ---------------------------------------------------------------------------------
 
     def _answered_here(self) -> bool:
-        return self._services.serves_here(self.name)
+        return served_by_this_thread(self._core, self.name)
 
     def _encode(self, value: Any) -> tuple[ServiceType | None, Any]:
         kind = self.type

@@ -6,11 +6,11 @@ import threading
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rosglass.comm import Dispatcher, EndpointKind, QoS
-from rosglass.comm.loop import LoopExecutor
+from rosglass.comm import EndpointKind, QoS
+from rosglass.comm.service_server import ServiceServer
 from rosglass.errors import ConversionError, ServiceError
 from rosglass.ros1.service_client import Ros1ServiceClient
-from rosglass.ros1.service_server import Ros1ServiceServer
+from rosglass.ros1.service_replier import TcprosReplier
 from rosglass.ros1.service_types import ServiceTypes
 
 if TYPE_CHECKING:
@@ -20,12 +20,13 @@ if TYPE_CHECKING:
     from rosglass.messages import Message, ServiceType
     from rosglass.ros1.connection import Connection
     from rosglass.ros1.core import Core
+    from rosglass.wires.base import OnRequest
 
 __all__ = ["Services"]
 
 
 class Services:
-    """Servers by name, and what clients share.
+    """Repliers by name, and what clients share.
 
     Args:
         core: The node.
@@ -38,7 +39,7 @@ class Services:
     def __init__(self, core: Core) -> None:
         self._core = core
         self._lock = threading.Lock()
-        self._servers: dict[str, Ros1ServiceServer] = {}
+        self._repliers: dict[str, TcprosReplier] = {}
         self.errands = core.lookups
         self.types = ServiceTypes(core, self.errands)
 
@@ -60,63 +61,58 @@ class Services:
         callback: Callable[[Message], Answer | Awaitable[Answer]],
         qos: QoS | None,
         executor: Executor | None,
-    ) -> Ros1ServiceServer:
+    ) -> ServiceServer:
         """Offer a service.
 
         Raises:
             ServiceError: The node offers it already.
         """
-        made = Ros1ServiceServer(
-            self._core, self, name, type, callback, _profile(qos, name), executor
-        )
-        with self._lock:
-            taken = name in self._servers
-            if not taken:
-                self._servers[name] = made
-        if taken:
-            raise ServiceError(
-                f"{self._core.name} offers {name} already, and in ROS 1 a service has one server: "
-                "close that one first"
-            )
-        self._core.add(made)
-        return made
+        core, kind, profile = self._core, self._core.types.service(type), _profile(qos, name)
+
+        # A request is only put aside for the callback, or it is taken at once: both are quick.
+        def create(on_request: OnRequest, _quick: bool) -> TcprosReplier:
+            made = TcprosReplier(core, name, kind, on_request, self._on_close)
+            with self._lock:
+                taken = name in self._repliers
+                if not taken:
+                    self._repliers[name] = made
+            if taken:
+                raise ServiceError(
+                    f"{core.name} offers {name} already, and in ROS 1 a service has one server: "
+                    "close that one first"
+                )
+            core.add(made)
+            return made
+
+        return ServiceServer(core, name, kind, callback, profile, executor, create)
 
     # -- connections, in the loop's thread -------------------------------------------------------
 
     def accept(self, link: Connection, header: dict[str, str]) -> str:
         """Take a client's connection; return why not, empty when it is taken."""
-        server = self._servers.get(header.get("service", ""))
-        if server is None:
+        replier = self._repliers.get(header.get("service", ""))
+        if replier is None:
             return f"{self._core.name} does not offer {header.get('service')}"
-        return server.accept(link, header)
+        return replier.accept(link, header)
 
-    def take(self, link: Connection, data: bytes | memoryview) -> None:
+    def on_frame(self, link: Connection, data: bytes | memoryview) -> None:
         """Take a request."""
-        server = self._servers.get(link.header.get("service", ""))
-        if server is not None:
-            server.take(link, data)
+        replier = self._repliers.get(link.header.get("service", ""))
+        if replier is not None:
+            replier.on_frame(link, data)
 
-    def drop(self, link: Connection) -> None:
+    def on_disconnected(self, link: Connection) -> None:
         """Forget a client's connection that has ended."""
-        server = self._servers.get(link.header.get("service", ""))
-        if server is not None:
-            server.drop(link)
+        replier = self._repliers.get(link.header.get("service", ""))
+        if replier is not None:
+            replier.on_disconnected(link)
 
-    def end(self, server: Ros1ServiceServer) -> None:
-        """Forget a server."""
+    def _on_close(self, replier: TcprosReplier) -> None:
         with self._lock:
-            if self._servers.get(server.name) is server:
-                del self._servers[server.name]
+            if self._repliers.get(replier.name) is replier:
+                del self._repliers[replier.name]
 
     # -- what there is ---------------------------------------------------------------------------
-
-    def serves_here(self, name: str) -> bool:
-        """Return whether only the thread that asks can answer a service."""
-        server = self._servers.get(name)
-        if server is None or server.problem:
-            return False
-        executor = server.executor
-        return isinstance(executor, (Dispatcher, LoopExecutor)) and executor.is_current
 
     def listing(self) -> dict[str, list[str]]:
         """Return every service with its type, none as long as its server has not told it."""
@@ -138,7 +134,7 @@ class Services:
 
     def _type_of(self, name: str) -> tuple[str, str]:
         """Return a service's type and md5 sum, empty as long as they are not known."""
-        own = self._servers.get(name)
+        own = self._repliers.get(name)
         nodes = self._core.graph.services().get(name, [])
         if own is not None and nodes == [self._core.name.full]:
             return own.type.name, own.type.md5

@@ -34,7 +34,7 @@ from rosglass.ros2.action_types import (
 )
 from rosglass.ros2.core import Member
 from rosglass.ros2.server_goal import Ros2ServerGoal
-from rosglass.ros2.service_server import Ros2ServiceServer
+from rosglass.ros2.service_replier import create_service_server
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Sequence
@@ -94,7 +94,7 @@ class Ros2ActionServer(GoalServer, Member):
         self._feedback = Publisher(core, part(name, FEEDBACK), types.feedback, FEEDBACK_QOS)
         self._status = Publisher(core, part(name, STATUS), types.status, STATUS_QOS)
         self._services = [
-            Ros2ServiceServer(core, part(name, service), kind, callback, executor=self._desk)
+            create_service_server(core, part(name, service), kind, callback, executor=self._desk)
             for service, kind, callback in (
                 (GET_RESULT, types.get_result, self._on_result_request),
                 (CANCEL_GOAL, types.cancel_goal, self._on_cancel_request),

@@ -7,7 +7,7 @@ import logging
 from typing import TYPE_CHECKING
 from weakref import WeakValueDictionary
 
-from rosglass.comm import ConnectionState, EndpointKind, Handle, Status
+from rosglass.comm import ConnectionState, Handle, Status
 from rosglass.comm.core import NodeCore, NodeMember
 from rosglass.comm.graph import Graph
 from rosglass.comm.names import expand
@@ -15,7 +15,7 @@ from rosglass.ros2.arguments import NO_ARGUMENTS
 from rosglass.ros2.types import Types
 
 if TYPE_CHECKING:
-    from rosglass.comm import Executor, NodeName
+    from rosglass.comm import NodeName
     from rosglass.interfaces import Library
     from rosglass.ros2.arguments import Arguments
     from rosglass.ros2.pacing import RequestWindow
@@ -26,12 +26,8 @@ __all__ = ["Core", "Member"]
 _log = logging.getLogger("rosglass.ros2")
 
 
-class Member(NodeMember):
-    """Something created from a node: it follows the graph, and ends with the node."""
-
-    def serves(self, service: str, executor: Executor) -> bool:  # noqa: ARG002 - most do not
-        """Return whether it answers a service on an executor."""
-        return False
+#: What the members of a ROS 2 node are.
+Member = NodeMember
 
 
 class Core(NodeCore[Handle]):
@@ -109,16 +105,6 @@ class Core(NodeCore[Handle]):
     def runs_here(self) -> bool:
         """Return whether the calling thread is one of the node's own."""
         return self._worker.is_current or self.dispatcher.is_current
-
-    def serves_here(self, service: str) -> bool:
-        """Return whether only the thread that asks can answer a service: the dispatcher's."""
-        if not self.dispatcher.is_current:
-            return False
-        servers = self.graph.endpoints(EndpointKind.SERVICE_SERVER, service)
-        with self._lock:
-            members = [m for m in self._members if isinstance(m, Member)]
-        own = [m for m in members if m.serves(service, self.dispatcher)]
-        return bool(own) and all(server.node == self.name for server in servers)
 
     def _state(self) -> Status:
         return self.middleware.status()

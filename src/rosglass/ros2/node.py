@@ -16,7 +16,7 @@ from rosglass.ros2.core import Core
 from rosglass.ros2.rcl_services import RclServices
 from rosglass.ros2.reading import Reading, type_if_known
 from rosglass.ros2.service_client import Ros2ServiceClient
-from rosglass.ros2.service_server import Ros2ServiceServer
+from rosglass.ros2.service_replier import create_service_server
 from rosglass.ros2.type_fetching import TypeFetcher
 
 if TYPE_CHECKING:
@@ -150,7 +150,7 @@ class Ros2Node(CoreNode):
         self._core.types.ensure(type)
         profile = _service_profile(qos, name)
         full = self._core.resolve(name, "service")
-        return Ros2ServiceServer(self._core, full, type, callback, profile, executor)
+        return create_service_server(self._core, full, type, callback, profile, executor)
 
     def create_action_client(self, name: str, type: str | ActionType | None = None) -> ActionClient:
         """Return a client; see :meth:`rosglass.comm.Node.create_action_client`."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm import EndpointInfo, EndpointKind, QoS
 from rosglass.comm.calling import CallingClient
 from rosglass.comm.client import untyped
+from rosglass.comm.service_server import served_by_this_thread
 from rosglass.comm.similar import similar
 from rosglass.errors import ConnectionLostError, Error, ServiceError
 from rosglass.ros2.announced import (
@@ -108,7 +109,7 @@ class Ros2ServiceClient(CallingClient[Request], Member):
     # -- calling ---------------------------------------------------------------------------------
 
     def _answered_here(self) -> bool:
-        return self._core.serves_here(self.name)
+        return served_by_this_thread(self._core, self.name)
 
     def withdraw(self, call: Call) -> bool:
         """Cancel a call if its request was not sent yet; return whether that was so."""

@@ -88,12 +88,12 @@ class TypeDescriptionServer(Handle):
 
     def open(self) -> None:
         """Begin to offer it; raises NodeClosedError, or UnsupportedError without services."""
-        from rosglass.ros2.service_server import Ros2ServiceServer  # noqa: PLC0415
+        from rosglass.ros2.service_replier import create_service_server  # noqa: PLC0415
 
         core = self._core
         name = f"{core.name.full}/{SERVICE}"
         kind = service_type()
-        server = Ros2ServiceServer(core, name, kind, self._answer, executor=core.own_dispatcher)
+        server = create_service_server(core, name, kind, self._answer, executor=core.own_dispatcher)
         self._server = server
         if self._closed:
             server.close()

@@ -230,6 +230,8 @@ class Replier(Handle):
     quick: bool = False
     #: Whether :meth:`fail` tells anything.
     tells_failures: bool = False
+    #: Most bytes that a response may have; None for any number.
+    max_reply: int | None = None
 
     @abstractmethod
     def reply(self, request: RequestId, data: bytes | bytearray) -> None:
@@ -237,6 +239,18 @@ class Replier(Handle):
 
     def fail(self, request: RequestId, reason: str) -> None:
         """Tell the client that no response will come, where the middleware can say so."""
+
+    def describe_failure(self, error: Exception) -> str:
+        """Return what :meth:`fail` tells of an exception that the service's callback raised."""
+        return f"{type(error).__name__}: {error}"
+
+    def abandoned(self, request: RequestId) -> bool:
+        """Return whether the client of a request has gone, so that its answer is of no use."""
+        return False
+
+    def client_name(self, request: RequestId) -> str:
+        """Return who sent a request, for people."""
+        return f"client {request.client.hex()}"
 
 
 class Middleware(ABC):

@@ -148,7 +148,7 @@ def test_a_service_is_called_and_answered(connect, client):
     assert client.pending == 0
     full = "rospy_tutorials/srv/AddTwoInts"
     assert repr(client) == f"<Ros1ServiceClient /add [{full}]>"
-    assert repr(server) == f"<Ros1ServiceServer /add [{full}]>"
+    assert repr(server) == f"<ServiceServer /add [{full}]>"
     assert client.qos == server.qos == rosglass.QoS()
 
 
@@ -1078,16 +1078,16 @@ def test_what_a_client_that_has_gone_asked_for_is_not_begun(connect, eventually)
         begun.set()
         go.wait(30)
 
-    robot.create_service_server("/add", ADD, callback)
+    server = robot.create_service_server("/add", ADD, callback)
     kind = rosglass.load(ADD, ros=1).request
     socks = [dial(robot, callerid="/me", service="/add", md5sum=MD5)[0] for _ in range(2)]
-    server = robot._services._servers["/add"]
+    replier = robot._services._repliers["/add"]
     for number, sock in enumerate(socks):
         sock.sendall(struct.pack("<I", 16) + kind.encode({"a": number}))
         eventually(lambda n=number: len(seen) + server._waiting > n)
     assert begun.wait(30)
     socks[1].close()
-    eventually(lambda: len(server._sessions) == 1)
+    eventually(lambda: len(replier._sessions) == 1)
     go.set()
     socks[0].settimeout(10)
     assert receive(socks[0], 13) == response(0)

@@ -48,7 +48,7 @@ def server(node, eventually):
     """A server with its writer, whose requests are in ``got``."""
     made = node.create_service_server(SERVICE, ADD, lambda r: made.got.append(r.a) or {"sum": r.b})
     made.got = []
-    eventually(lambda: made._replier._ends.writer is not None)
+    eventually(lambda: made._replier._replier._ends.writer is not None)
     return made
 
 
@@ -76,7 +76,7 @@ def ready(client):
 
 
 def test_a_reply_is_ready_before_its_client_was_noticed(node, participant, server):
-    ends = server._replier._ends
+    ends = server._replier._replier._ends
     ends.reader._on_matched = None
     participant.pump._acts[ends.writer.entity] = lambda: None
     client = ready(node.create_service_client(SERVICE, ADD))
@@ -102,7 +102,7 @@ def test_a_request_in_the_memory_of_another_is_not_taken_for_that(node, server):
         def pop(self, *_: Any) -> Origin:
             return ELSEWHERE
 
-    server._replier._ends.origins._noted = Haunted()
+    server._replier._replier._ends.origins._noted = Haunted()
     client = ready(node.create_service_client(SERVICE, ADD))
     assert client.call({"a": 1, "b": 2}, timeout=30).sum == 2
 
@@ -122,7 +122,7 @@ def test_a_request_that_comes_again_is_carried_out_once(server, eventually):
 
     def receive(client: bytes, number: int, value: int) -> None:
         origin = Origin(b"\x00\x00\x12\x03", number, None, client)
-        server._replier._on_requests([(request.encode({"a": value}), 0, 0, origin)])
+        server._replier._replier._on_requests([(request.encode({"a": value}), 0, 0, origin)])
 
     one, other = (b"\x01\x0f" + bytes(9) + last for last in (b"1", b"2"))  # Fast DDS's
     for number, value in ((1, 10), (2, 20), (1, 10), (2, 20)):

@@ -71,7 +71,7 @@ def test_a_service_is_called_and_answered(node, robot, client):
     assert client.ready
     assert client.pending == 0
     assert repr(client) == f"<Ros2ServiceClient /add [{ADD}]>"
-    assert repr(server) == f"<Ros2ServiceServer /add [{ADD}]>"
+    assert repr(server) == f"<ServiceServer /add [{ADD}]>"
 
 
 def test_names_are_resolved_and_the_type_is_announced_with_its_hash(node, robot, middleware):

@@ -1,0 +1,256 @@
+"""Offering a service: from a request to its answer by a callback, a coroutine or a future."""
+
+from __future__ import annotations
+
+import inspect
+import logging
+import threading
+from concurrent.futures import CancelledError, Future
+from typing import TYPE_CHECKING, Any
+
+from rosglass.comm.complaints import Complaints
+from rosglass.comm.executor import Dispatcher
+from rosglass.comm.graph import EndpointKind
+from rosglass.comm.loop import LoopExecutor, executor_for
+from rosglass.comm.node import Handle
+from rosglass.comm.rclpy_names import hint_at_members
+from rosglass.errors import DecodeError, Error, NodeClosedError, ServiceError
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable
+
+    from rosglass.comm.core import NodeCore
+    from rosglass.comm.node import Answer, Executor
+    from rosglass.comm.qos import QoS
+    from rosglass.messages import Message, MessageType, ServiceType
+    from rosglass.wires.base import OnRequest, Replier, RequestId
+
+__all__ = ["ServiceServer", "decode_checked", "served_by_this_thread"]
+
+_log = logging.getLogger("rosglass.comm")
+#: Requests that wait for the callback; more come only from a client gone wild.
+_MAX_WAITING = 1000
+
+
+@hint_at_members
+class ServiceServer(Handle):
+    """Offers a service; made by :meth:`Node.create_service_server`.
+
+    Args:
+        core: The node it belongs to.
+        name: Absolute service name.
+        type: The service type.
+        callback: Called with each request; see :meth:`Node.create_service_server`.
+        qos: The quality of service of requests and replies.
+        executor: Where `callback` runs; None for the node's dispatcher, or for the running event
+            loop when `callback` is a coroutine function.
+        create_replier: Announces the service; called with what takes its requests, and whether
+            that only puts them aside for another thread (:attr:`Replier.quick`).
+
+    Attributes:
+        name: Absolute service name.
+        type: The service type.
+        qos: The quality of service of requests and replies.
+    """
+
+    def __init__(
+        self,
+        core: NodeCore[Any],
+        name: str,
+        type: ServiceType,
+        callback: Callable[[Message], Answer | Awaitable[Answer]],
+        qos: QoS,
+        executor: Executor | None,
+        create_replier: Callable[[OnRequest, bool], Replier],
+    ) -> None:
+        self._core, self.name, self.type, self.qos = core, name, type, qos
+        self._executor = executor_for(callback, executor, core.dispatcher, name)
+        self._callback = callback
+        self._lock = threading.Lock()
+        self._closed = False
+        self._waiting = 0
+        self._running: set[Future[Any]] = set()
+        self._complaints = Complaints()
+        #: Requests that come before the replier that answers them is here; None from then on.
+        self._early: list[tuple[RequestId, bytes]] | None = []
+        # Executors other than our own may do anything.
+        quick = isinstance(self._executor, (Dispatcher, LoopExecutor))
+        self._replier = create_replier(self._on_request, quick)
+        core.servers.add(self)
+        core.add(self)
+        with self._lock:
+            early, self._early = self._early or [], None
+        for request, data in early:
+            self._on_request(request, data)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.name} [{self.type.name}]>"
+
+    @property
+    def problem(self) -> str:
+        """Why some clients cannot be served, in words; empty when all is well."""
+        return "the server is closed" if self._closed else self._replier.problem
+
+    def close(self) -> None:
+        """Withdraw the service; requests without response end unanswered. Safe to call twice."""
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+            running, self._running = self._running, set()
+        if self._core.forked:
+            return
+        self._replier.close()
+        self._core.servers.discard(self)
+        self._core.remove(self)
+        for future in running:
+            future.cancel()
+
+    # -- from a request to its answer --------------------------------------------------------------
+
+    def _on_request(self, request: RequestId, data: bytes | memoryview) -> None:
+        """Hand a request to the callback's executor."""
+        with self._lock:
+            if self._closed:
+                return
+            if self._early is not None:
+                # The buffer is the wire's, and ends with this call.
+                self._early.append((request, bytes(data)))
+                return
+            full = self._waiting >= _MAX_WAITING
+            if not full:
+                self._waiting += 1
+        if full:
+            self._refuse(request, f"{_MAX_WAITING} requests wait for the callback already")
+            return
+        try:
+            self._executor.post(lambda: self._serve(request, data))
+        except Exception as error:
+            with self._lock:
+                self._waiting -= 1
+            self._on_failure(request, error)
+
+    def _serve(self, request: RequestId, data: bytes | memoryview) -> None:
+        with self._lock:
+            self._waiting -= 1
+            if self._closed:
+                return
+        if self._replier.abandoned(request):
+            return
+        try:
+            message = decode_checked(self.type.request, data)
+        except DecodeError as error:
+            self._refuse(request, f"the request is no {self.type.request.name}: {error}")
+            return
+        try:
+            answer = self._callback(message)
+        except Exception as error:
+            self._on_failure(request, error)
+            return
+        if inspect.iscoroutine(answer):
+            if not isinstance(self._executor, LoopExecutor):
+                answer.close()
+                misuse = TypeError("the callback must be an async def to be awaited")
+                self._on_failure(request, misuse)
+                return
+            answer = self._executor.run(answer)
+            with self._lock:
+                self._running.add(answer)
+        if isinstance(answer, Future):
+            answer.add_done_callback(lambda future: self._finish(request, future))
+        else:
+            self._respond(request, answer)
+
+    def _finish(self, request: RequestId, future: Future[Any]) -> None:
+        """Answer a request whose response was promised."""
+        with self._lock:
+            self._running.discard(future)
+        if self._closed:
+            return
+        try:
+            answer = future.result(0)
+        except CancelledError:
+            self._refuse(request, "the callback's future was cancelled")
+        except Exception as error:
+            self._on_failure(request, error)
+        else:
+            self._respond(request, answer)
+
+    def _respond(self, request: RequestId, answer: Any) -> None:
+        """Send what the callback answers."""
+        try:
+            data = self.type.response.encode(answer)
+            most = self._replier.max_reply
+            if most is not None and len(data) > most:
+                raise ServiceError(f"it has {len(data)} bytes, and clients take at most {most}")
+        except Error as error:
+            _log.error(
+                "%s: the callback's response to %s does not fit: %s; %s",
+                self.name,
+                self._replier.client_name(request),
+                error,
+                self._consequence,
+            )
+            self._replier.fail(request, f"the server made no valid response: {error}")
+            return
+        try:
+            self._replier.reply(request, data)
+        except NodeClosedError:
+            pass  # another thread has closed it
+        except Error as error:
+            client = self._replier.client_name(request)
+            _log.error("%s: cannot answer %s: %s", self.name, client, error)
+
+    # -- what goes wrong ---------------------------------------------------------------------------
+
+    @property
+    def _consequence(self) -> str:
+        """What a client gets instead of a response, for people."""
+        tells = self._replier.tells_failures
+        return "it is told the error instead" if tells else "it gets no response, and waits"
+
+    def _on_failure(self, request: RequestId, error: Exception) -> None:
+        """Log that the callback failed, and tell the client where the wire can."""
+        client = self._replier.client_name(request)
+        if isinstance(error, ServiceError) and self._replier.tells_failures:
+            # Raised on purpose, as rospy's ServiceException: the client is told, that is all.
+            _log.info("%s: the request of %s is refused: %s", self.name, client, error)
+        else:
+            # Our own errors say where and why, as those of handlers in QML do.
+            reason = f": {error}" if isinstance(error, Error) else ""
+            _log.error(
+                "%s: the callback failed on a request of %s; %s%s",
+                self.name,
+                client,
+                self._consequence,
+                reason,
+                exc_info=None if reason else error,
+            )
+        self._replier.fail(request, self._replier.describe_failure(error))
+
+    def _refuse(self, request: RequestId, reason: str) -> None:
+        """Turn a client's fault down, and name it in the log once."""
+        if self._complaints.fresh(request.client):
+            client = self._replier.client_name(request)
+            _log.warning("%s: refusing requests of %s: %s", self.name, client, reason)
+        self._replier.fail(request, reason)
+
+
+def decode_checked(kind: MessageType, data: bytes | memoryview) -> Message:
+    """Return the request or response in `data`; raises DecodeError for anything else."""
+    # Each ROS 2 implementation fills what is empty with another number of bytes.
+    if kind.fields or kind.wire == "ros1":
+        kind.validate(data)
+    return kind.decode(data)
+
+
+def served_by_this_thread(core: NodeCore[Any], name: str) -> bool:
+    """Return whether only the calling thread can answer a service of its own node."""
+    for server in list(core.servers):
+        if not isinstance(server, ServiceServer) or server.name != name:
+            continue
+        executor = server._executor
+        if isinstance(executor, (Dispatcher, LoopExecutor)) and executor.is_current:
+            found = core.graph.endpoints(EndpointKind.SERVICE_SERVER, name)
+            return all(other.node == core.name for other in found)
+    return False
