@@ -6,10 +6,12 @@ import asyncio
 import concurrent.futures
 import threading
 from concurrent.futures import Future
+from contextlib import contextmanager
 
 import pytest
 
 import rosglass
+from rosglass.comm import IMMEDIATE, Dispatcher, Executor
 
 TRIGGER = "std_srvs/srv/Trigger"
 
@@ -36,7 +38,7 @@ def offer(robot, topic, wire, client):
 
 
 @pytest.mark.parametrize("way", ["call", "call_async", "await"])
-def test_a_service_is_called_and_answered(offer, client, way):
+def test_a_service_is_called_and_answered(offer, client, way, topic, wire):
     server = offer()
     request = {"a": 1, "b": 2}
     if way == "call":
@@ -51,6 +53,32 @@ def test_a_service_is_called_and_answered(offer, client, way):
         response = asyncio.run(call())
     assert response.sum == 3
     assert client.problem == server.problem == ""
+    assert client.ready
+    assert client.pending == 0
+    full = rosglass.load(wire.add, ros=1 if wire.is_ros1 else 2).name
+    assert repr(client) == f"<ServiceClient {topic} [{full}]>"
+    assert repr(server) == f"<ServiceServer {topic} [{full}]>"
+
+
+def test_names_are_resolved(connect, wire):
+    arm = connect("arm", "/left")
+    assert arm.create_service_client("add", wire.add).name == "/left/add"
+    assert arm.create_service_server("~/add", wire.add, add).name == "/left/arm/add"
+
+
+def test_the_end_of_a_call_is_reported_on_an_executor(offer, client, eventually):
+    offer()
+    seen = []
+    call = client.call_async({"a": 1})
+    call.on_done(lambda c: seen.append((c, threading.current_thread().name)))
+    elsewhere = Dispatcher("elsewhere")
+    call.on_done(lambda c: seen.append((c, threading.current_thread().name)), elsewhere)
+    eventually(lambda: len(seen) == 2)
+    assert sorted(name for _, name in seen) == ["console callbacks", "elsewhere"]
+    assert {each for each, _ in seen} == {call}
+    elsewhere.close()
+    with pytest.raises(rosglass.ConversionError, match="callback"):
+        call.on_done(None)
 
 
 def test_a_message_is_a_request_too(offer, client, wire):
@@ -61,11 +89,20 @@ def test_a_message_is_a_request_too(offer, client, wire):
     assert client.call(timeout=30).sum == 0
 
 
-def test_a_client_without_type_takes_the_servers(offer, console, topic, eventually):
-    offer()
-    with console.create_service_client(topic) as client:
-        assert client.wait_for_server(30), client.problem
-        assert client.call({"a": 20, "b": 22}, timeout=30).sum == 42
+def test_a_client_without_type_takes_the_servers(robot, console, topic, wire):
+    client = console.create_service_client(topic)
+    assert client.type is None
+    assert "type not known yet" in repr(client)
+    request = {"a": 20, "b": 22}
+    early, wrong = client.call_async(request), client.call_async({"a": "text"})
+    request["a"] = 100
+    with pytest.raises(rosglass.ConversionError, match="a message or a dict"):
+        client.call_async(7)
+    robot.create_service_server(topic, wire.add, add)
+    assert early.result(30).sum == 42
+    assert client.type == rosglass.load(wire.add, ros=1 if wire.is_ros1 else 2)
+    with pytest.raises(rosglass.ConversionError, match="a: expected an integer"):
+        wrong.result(30)
 
 
 def test_the_node_calls_its_own_service(robot, topic, wire, offer):
@@ -75,28 +112,70 @@ def test_the_node_calls_its_own_service(robot, topic, wire, offer):
         assert client.call({"a": 1, "b": 1}, timeout=30).sum == 2
 
 
-def test_a_call_waits_for_the_server(robot, client, topic, wire):
-    call = client.call_async({"a": 1, "b": 2})
+def test_calls_wait_for_the_server_as_they_were_made(robot, client, topic, wire):
+    request = {"a": 1, "b": 2}
+    calls = [client.call_async(request) for _ in range(3)]
+    request["a"] = 100
     assert not client.ready
+    assert client.pending == 3
     robot.create_service_server(topic, wire.add, add)
+    assert [call.result(30).sum for call in calls] == [3, 3, 3]
+
+
+def test_a_blocking_call_waits_for_the_server_too(robot, client, topic, wire):
+    offer = lambda: robot.create_service_server(topic, wire.add, add)  # noqa: E731
+    threading.Timer(0.05, offer).start()
+    assert client.call({"a": 1, "b": 2}, timeout=30).sum == 3
+
+
+@pytest.mark.parametrize("timeout", [0, 0.1])
+def test_without_a_server_a_call_ends_after_its_time_and_names_the_service(client, topic, timeout):
+    with pytest.raises(rosglass.ServiceUnavailableError, match=f"{topic}.*nothing was sent"):
+        client.call(timeout=timeout)
+    with pytest.raises(rosglass.ServiceUnavailableError, match=f"{topic}.*nothing was sent"):
+        client.call_async(timeout=timeout).result(30)
+    assert client.pending == 0
+
+
+def test_a_missing_service_is_explained_with_similar_names(robot, client, topic, wire, eventually):
+    robot.create_service_server(f"/base{topic}", wire.add, add)
+    eventually(lambda: f"did you mean /base{topic}?" in client.problem, lambda: client.problem)
+    assert f"no server offers {topic} [{client.type.name}] on {wire.url}" in client.problem
+
+
+@pytest.mark.parametrize("way", ["call", "call_async"])
+def test_a_server_that_does_not_answer_is_given_up(offer, client, way):
+    answers: list[Future] = []
+
+    def never(_):
+        answers.append(Future())
+        return answers[-1] if len(answers) == 1 else {"sum": 3}
+
+    offer(never)
+    call = {
+        "call": lambda: client.call(timeout=0.5),
+        "call_async": lambda: client.call_async(timeout=0.5).result(30),
+    }[way]
+    with pytest.raises(rosglass.TimeoutError, match=r"was sent the request.*may still carry it"):
+        call()
+    assert client.pending == 0
+    # Given up, not in the way of the next one.
+    assert client.call(timeout=30).sum == 3
+
+
+def test_waiting_for_a_call_ends_without_ending_the_call(offer, client, topic):
+    answer = Future()
+    offer(lambda _: answer)
+    call = client.call_async(timeout=None)
+    with pytest.raises(rosglass.TimeoutError, match=rf"{topic} has not answered.* within 0\.01 s"):
+        call.result(0.01)
+    with pytest.raises(TimeoutError):
+        call.exception(0.01)
+    with pytest.raises(rosglass.ConversionError, match="timeout"):
+        call.result("soon")
+    answer.set_result({"sum": 3})
     assert call.result(30).sum == 3
-
-
-def test_without_a_server_a_call_ends_after_its_time_and_names_the_service(client, topic):
-    with pytest.raises(rosglass.ServiceUnavailableError, match=topic):
-        client.call(timeout=0.1)
-    with pytest.raises(rosglass.ServiceUnavailableError, match=topic):
-        client.call_async(timeout=0.1).result(30)
-
-
-def test_a_server_that_does_not_answer_is_given_up(offer, client):
-    held = threading.Event()
-    offer(lambda _: held.wait(30) and {})
-    try:
-        with pytest.raises(rosglass.TimeoutError):
-            client.call(timeout=0.2)
-    finally:
-        held.set()
+    assert call.exception() is None
 
 
 def test_fifty_calls_at_once_are_all_answered(offer, client):
@@ -112,12 +191,27 @@ def test_calls_from_many_threads(offer, client):
     assert list(found) == list(range(1, 41))
 
 
-def test_what_does_not_fit_is_refused_naming_the_field(offer, client):
-    offer()
-    with pytest.raises(rosglass.ConversionError, match="a"):
-        client.call({"a": "one"}, timeout=30)
-    with pytest.raises(rosglass.ConversionError, match="c"):
-        client.call_async({"c": 1})
+@pytest.mark.parametrize("way", ["call", "call_async"])
+@pytest.mark.parametrize(
+    ("request_", "timeout", "reason"),
+    [
+        ({"a": "x"}, 1, "a: expected an integer"),
+        ({"c": 1}, 1, "c"),
+        ("text", 1, "expected"),
+        ({}, -1, "timeout: expected seconds from 0 on, or None for ever, got -1"),
+        ({}, "soon", "timeout: expected seconds"),
+        ({}, True, "timeout: expected seconds"),
+        ({}, float("nan"), "timeout: expected seconds"),
+    ],
+)
+def test_what_does_not_fit_is_refused_and_not_sent(offer, client, way, request_, timeout, reason):
+    seen = []
+    offer(lambda request: seen.append(request.a))
+    with pytest.raises(rosglass.ConversionError, match=reason):
+        getattr(client, way)(request_, timeout=timeout)
+    assert client.pending == 0
+    client.call({"a": 7}, timeout=30)
+    assert seen == [7]
 
 
 @pytest.mark.parametrize("name", ["a b", ""])
@@ -126,11 +220,55 @@ def test_bad_names_are_refused(robot, wire, create, name):
     more = (add,) if create.endswith("server") else ()
     with pytest.raises(rosglass.InvalidNameError):
         getattr(robot, create)(name, wire.add, *more)
-    with pytest.raises(rosglass.TypeNotFoundError, match="nowhere_msgs"):
-        getattr(robot, create)("/x", "nowhere_msgs/srv/Nothing", *more)
 
 
-def test_a_response_may_come_later(offer, client):
+@pytest.mark.parametrize("create", ["create_service_client", "create_service_server"])
+def test_what_is_no_service_type_is_refused(robot, wire, create):
+    more = (add,) if create.endswith("server") else ()
+    other = rosglass.load(TRIGGER, ros=2 if wire.is_ros1 else 1)
+    for kind, error, reason in (
+        ("nowhere_msgs/srv/Nothing", rosglass.TypeNotFoundError, "nowhere_msgs"),
+        ("std_msgs/msg/String", rosglass.TypeNotFoundError, "is not a service type"),
+        (7, rosglass.TypeNotFoundError, "7 is not a service type"),
+        (other, rosglass.UnsupportedError, f"ROS {2 if wire.is_ros1 else 1}'s"),
+    ):
+        with pytest.raises(error, match=reason):
+            getattr(robot, create)("/x", kind, *more)
+
+
+async def serve(_):
+    return None
+
+
+@pytest.mark.parametrize(
+    ("callback", "executor", "reason"),
+    [
+        (None, None, "callback: expected something that can be called, got None"),
+        (add, "gui", "executor: expected a rosglass.comm.Executor"),
+        (serve, None, "created inside a running event loop"),
+        (serve, IMMEDIATE, "no executor beside a coroutine function"),
+    ],
+)
+def test_callbacks_that_cannot_run_are_refused_at_creation(
+    robot, wire, topic, callback, executor, reason
+):
+    with pytest.raises(rosglass.ConversionError, match=f"{topic}: .*{reason}"):
+        robot.create_service_server(topic, wire.add, callback, executor=executor)
+    robot.create_service_server(topic, wire.add, add)  # nothing is left of the others
+
+
+def test_a_response_is_a_message_a_dict_or_nothing(robot, console, topic, wire):
+    kind = rosglass.load(TRIGGER, ros=1 if wire.is_ros1 else 2)
+    done = {"success": True, "message": "done"}
+    for number, response in enumerate((kind.response.create(**done), done, None)):
+        name = f"{topic}_{number}"
+        robot.create_service_server(name, kind, lambda _, r=response: r)
+        found = console.create_service_client(name, TRIGGER).call(timeout=30).to_dict()
+        assert found == (done if response else {"success": False, "message": ""})
+
+
+@pytest.mark.parametrize("end", ["result", "exception", "cancel", "misfit"])
+def test_a_response_may_come_later(offer, client, wire, eventually, end):
     answers: list[Future] = []
 
     def later(_):
@@ -138,46 +276,255 @@ def test_a_response_may_come_later(offer, client):
         return answers[-1]
 
     offer(later)
-    call = client.call_async({"a": 1, "b": 2})
-    for _ in range(3000):
-        if answers or call.done():
-            break
-        threading.Event().wait(0.01)
-    answers[0].set_result({"sum": 7})
-    assert call.result(30).sum == 7
+    call = client.call_async({"a": 1, "b": 2}, timeout=30 if end == "result" else 1)
+    eventually(lambda: answers)
+    assert not call.done()
+    if end == "result":
+        answers[0].set_result({"sum": 7})
+        assert call.result(30).sum == 7
+        return
+    if end == "exception":
+        answers[0].set_exception(ValueError("broken"))
+    elif end == "cancel":
+        answers[0].cancel()
+    else:
+        answers[0].set_result({"sum": "x"})
+    reason = {"exception": "broken", "cancel": "cancelled", "misfit": "no valid response: "}[end]
+    with refused(wire, reason):
+        call.result(30)
 
 
-def test_a_callback_that_fails_ends_the_call_with_an_error(offer, client, caplog):
+@contextmanager
+def refused(wire, reason):
+    """Expect that a call ends with an error of its server; over DDS, nothing can be said."""
+    if wire.name == "dds":
+        with pytest.raises(rosglass.TimeoutError):
+            yield
+    else:
+        with pytest.raises(rosglass.ServiceError, match=reason):
+            yield
+
+
+def test_a_callback_that_fails_ends_the_call_with_an_error(offer, client, wire, topic, caplog):
+    answers = iter([ValueError("of the user's"), {"sum": 1}])
+
     def fail(_):
-        raise ValueError("of the user's")
+        answer = next(answers)
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
 
     offer(fail)
-    with pytest.raises((rosglass.ServiceError, rosglass.TimeoutError)):
+    with refused(wire, "of the user's"):
         client.call(timeout=1)
-    assert "of the user's" in caplog.text
+    assert f"{topic}: the callback failed on a request of /console; it " in caplog.text
+    assert "ValueError: of the user's" in caplog.text
+    assert client.call(timeout=30).sum == 1
+
+
+def test_a_service_error_of_a_callback_refuses_the_request(offer, client, wire, caplog):
+    def refuse(_):
+        raise rosglass.ServiceError("not homed")
+
+    offer(refuse)
+    with refused(wire, "the call of .* failed: .*not homed$"):
+        client.call(timeout=1)
+    errors = [record for record in caplog.records if record.levelname == "ERROR"]
+    assert bool(errors) == (wire.name == "dds"), "the client knows, where it can be told"
+
+
+@pytest.mark.parametrize(
+    ("response", "reason"), [({"sum": "x"}, "sum: expected"), ({"total": 1}, "total"), (7, "7")]
+)
+def test_a_response_that_does_not_fit_is_logged(offer, client, wire, caplog, response, reason):
+    offer(lambda _: response)
+    with refused(wire, "the server made no valid response"):
+        client.call(timeout=1)
+    assert "the callback's response to /console does not fit" in caplog.text
+    assert reason in caplog.text
+
+
+def test_a_plain_function_that_returns_a_coroutine_is_an_error(offer, client, wire, caplog):
+    offer(lambda _: serve(None))
+    with refused(wire, "must be an async def"):
+        client.call(timeout=1)
+    assert "must be an async def" in caplog.text
+
+
+def test_a_server_whose_executor_raises_fails_the_request(offer, client, wire, caplog):
+    class Broken(Executor):
+        def post(self, job):
+            raise RuntimeError("the pool was shut down")
+
+    offer(executor=Broken())
+    with refused(wire, "the pool was shut down"):
+        client.call(timeout=1)
+    assert "the pool was shut down" in caplog.text
+
+
+def test_executors_of_servers(offer, client, eventually):
+    jobs = []
+
+    class Manual(Executor):
+        def post(self, job):
+            jobs.append(job)
+
+    offer(executor=Manual())
+    call = client.call_async({"a": 1})
+    eventually(lambda: jobs)
+    assert not call.done()
+    jobs.pop()()
+    assert call.result(30).sum == 1
+
+
+def test_a_slow_callback_holds_up_neither_other_services_nor_the_graph(
+    robot, console, topic, wire, eventually
+):
+    begun, go = threading.Event(), threading.Event()
+
+    def slow(_):
+        begun.set()
+        go.wait(30)
+
+    robot.create_service_server(f"{topic}_slow", TRIGGER, slow)
+    robot.create_service_server(topic, wire.add, add, executor=IMMEDIATE)
+    held = console.create_service_client(f"{topic}_slow", TRIGGER).call_async(timeout=30)
+    assert begun.wait(30)
+    client = console.create_service_client(topic, wire.add)
+    assert client.call({"a": 1, "b": 2}, timeout=30).sum == 3
+    go.set()
+    held.result(30)
+
+
+# -- threads that may not wait -------------------------------------------------------------------
+
+
+def test_a_callback_that_would_wait_for_itself_is_refused(robot, console, topic, wire, eventually):
+    client = robot.create_service_client(topic, wire.add)
+    robot.create_service_server(topic, wire.add, add)
+    assert client.wait_for_server(30), client.problem
+    refusals = []
+
+    def twice(request):
+        try:
+            client.call({"a": request.a}, timeout=1)
+        except rosglass.UnsupportedError as error:
+            refusals.append(str(error))
+
+    robot.create_service_server(f"{topic}_twice", wire.add, twice)
+    console.create_service_client(f"{topic}_twice", wire.add).call({"a": 1}, timeout=30)
+    assert "this callback would wait for itself" in refusals[0]
+    assert client.call({"a": 2}, timeout=30).sum == 2
+
+
+def test_an_event_loop_is_not_held_up_by_a_call_of_its_own_service(robot, topic, wire):
+    async def slowly(request):
+        return {"sum": request.a}
+
+    async def main():
+        with robot.create_service_server(topic, wire.add, slowly):
+            client = robot.create_service_client(topic, wire.add)
+            with pytest.raises(rosglass.UnsupportedError, match="would wait for itself"):
+                client.call({"a": 1}, timeout=1)
+            return (await client.call_async({"a": 1}, timeout=30)).sum
+
+    assert asyncio.run(main()) == 1
+
+
+def test_a_callback_may_call_what_runs_elsewhere(robot, console, topic, wire):
+    own = Dispatcher("own")
+    client = robot.create_service_client(topic, wire.add)
+    robot.create_service_server(topic, wire.add, add, executor=own)
+    robot.create_service_server(
+        f"{topic}_twice", wire.add, lambda r: client.call({"a": r.a, "b": r.a}, timeout=30)
+    )
+    outer = console.create_service_client(f"{topic}_twice", wire.add)
+    assert outer.call({"a": 4}, timeout=30).sum == 8
+    own.close()
+
+
+def test_a_callback_in_the_receiving_thread_may_not_wait(offer, client, wire):
+    if wire.name == "local":
+        pytest.skip("no thread receives: the response comes in the one that the server answers in")
+    offer()
+    failed = Future()
+
+    def callback(_):
+        try:
+            client.call()
+        except rosglass.UnsupportedError as error:
+            failed.set_result(str(error))
+        else:
+            failed.set_result("it waited")
+
+    client.call_async(timeout=30).add_done_callback(callback)
+    assert "runs in a thread that receives" in failed.result(30)
 
 
 def test_coroutine_functions_serve_in_their_loop(robot, console, topic, wire):
     async def slow_add(request):
-        await asyncio.sleep(0)
+        await asyncio.sleep(0.01)
         return {"sum": request.a + request.b}
 
-    async def serve():
-        with robot.create_service_server(topic, wire.add, slow_add):
-            client = console.create_service_client(topic, wire.add)
-            return await client.call_async({"a": 3, "b": 4})
+    class Callable:
+        async def __call__(self, request):
+            return {"sum": 7}
 
-    assert asyncio.run(asyncio.wait_for(serve(), 30)).sum == 7
+    async def main():
+        with (
+            robot.create_service_server(topic, wire.add, slow_add),
+            robot.create_service_server(f"{topic}_seven", wire.add, Callable()),
+        ):
+            client = console.create_service_client(topic, wire.add)
+            calls = [client.call_async({"a": 3, "b": value}) for value in range(5)]
+            sums = [message.sum for message in await asyncio.gather(*calls)]
+            seven = await console.create_service_client(f"{topic}_seven", wire.add).call_async()
+            return sums, seven.sum
+
+    assert asyncio.run(asyncio.wait_for(main(), 30)) == ([3, 4, 5, 6, 7], 7)
+
+
+def test_closing_a_server_cancels_its_coroutines(robot, console, topic, wire):
+    begun, ended = threading.Event(), threading.Event()
+
+    async def slow(_):
+        try:
+            begun.set()
+            await asyncio.sleep(60)
+        finally:
+            ended.set()
+
+    async def main():
+        server = robot.create_service_server(topic, wire.add, slow)
+        console.create_service_client(topic, wire.add).call_async()
+        assert await asyncio.to_thread(begun.wait, 30)
+        server.close()
+        assert await asyncio.to_thread(ended.wait, 30)
+        assert server.problem == "the server is closed"
+        server.close()
+
+    asyncio.run(main())
 
 
 def test_readiness_changes_are_reported(offer, client, eventually):
     seen = []
     client.on_ready_change(seen.append)
+    assert not client.wait_for_server(0.02)
+    assert not client.wait_for_server(0)
     server = offer()
-    eventually(lambda: seen[-1:] == [True], lambda: seen)
+    eventually(lambda: seen == [True], lambda: seen)
+    assert client.wait_for_server()
     server.close()
-    eventually(lambda: seen[-1:] == [False], lambda: seen)
+    eventually(lambda: seen == [True, False], lambda: seen)
     assert not client.ready
+    with pytest.raises(rosglass.ConversionError, match="callback"):
+        client.on_ready_change("told")
+
+
+def test_closing_ends_waiting_for_the_server(client):
+    threading.Timer(0.05, client.close).start()
+    with pytest.raises(rosglass.NodeClosedError, match="is closed"):
+        client.wait_for_server()
 
 
 def test_a_cancelled_call_ends_at_once(client, offer):
@@ -191,13 +538,39 @@ def test_a_cancelled_call_ends_at_once(client, offer):
 
 
 @pytest.mark.parametrize("what", ["client", "node"])
-def test_closing_ends_pending_calls(client, console, what):
-    call = client.call_async({"a": 1})
+@pytest.mark.parametrize("sent", [False, True], ids=["waiting", "sent"])
+def test_closing_ends_pending_calls(offer, client, console, what, sent, eventually):
+    begun, go = threading.Event(), threading.Event()
+    if sent:
+        offer(lambda _: begun.set() or (go.wait(30) and {}))
+    calls = [client.call_async(timeout=None) for _ in range(2)]
+    assert not sent or begun.wait(30)
+    seen = []
+    calls[0].add_done_callback(seen.append)
     (client if what == "client" else console).close()
+    go.set()
+    for call in calls:
+        with pytest.raises(rosglass.NodeClosedError, match="was closed during a call"):
+            call.result(0)
+    assert seen == [calls[0]]
+    client.close()
+    assert (client.ready, client.pending, client.problem) == (False, 0, "the client is closed")
+    for use in (
+        client.call,
+        client.call_async,
+        client.wait_for_server,
+        lambda: client.on_ready_change(print),
+    ):
+        with pytest.raises(rosglass.NodeClosedError):
+            use()
+
+
+@pytest.mark.parametrize("create", ["create_service_client", "create_service_server"])
+def test_nothing_is_created_from_a_closed_node(console, topic, wire, create):
+    console.close()
+    more = (add,) if create.endswith("server") else ()
     with pytest.raises(rosglass.NodeClosedError):
-        call.result(30)
-    with pytest.raises(rosglass.NodeClosedError):
-        client.call(timeout=1)
+        getattr(console, create)(topic, wire.add, *more)
 
 
 def test_empty_requests_and_responses(robot, console, topic):

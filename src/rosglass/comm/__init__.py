@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from rosglass.comm.publisher import Publisher
     from rosglass.comm.qos import BEST_AVAILABLE, Durability, History, Liveliness, QoS, Reliability
     from rosglass.comm.sample import Sample
-    from rosglass.comm.service import Call, ServiceClient
+    from rosglass.comm.service_client import Call, ServiceClient
     from rosglass.comm.service_server import ServiceServer
     from rosglass.comm.source import Source
     from rosglass.comm.statistics import Statistics
@@ -203,7 +203,7 @@ _HOMES = {
         "Reliability",
     ),
     "sample": ("Sample",),
-    "service": (
+    "service_client": (
         "Call",
         "ServiceClient",
     ),

@@ -71,7 +71,12 @@ class Client(Handle):
     def on_ready_change(
         self, callback: Callable[[bool], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` with :attr:`ready` whenever it changes."""
+        """Call `callback` with :attr:`ready` whenever it changes, to and fro.
+
+        Args:
+            callback: Called with the new value.
+            executor: Where it runs; None for the node's own dispatcher thread.
+        """
         return self._readiness.add(callback, executor)
 
     def _warn(self, log: logging.Logger, level: int = logging.WARNING) -> None:

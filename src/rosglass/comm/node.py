@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from rosglass.comm.promise import Promise
     from rosglass.comm.publisher import Publisher
     from rosglass.comm.sample import Sample
-    from rosglass.comm.service import ServiceClient
+    from rosglass.comm.service_client import ServiceClient
     from rosglass.comm.service_server import ServiceServer
     from rosglass.comm.subscription import Subscription
     from rosglass.comm.time import Duration, Time

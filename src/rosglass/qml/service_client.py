@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     from rosglass.comm.node import Node
     from rosglass.comm.qos import QoS
-    from rosglass.comm.service import Call
-    from rosglass.comm.service import ServiceClient as Caller_
+    from rosglass.comm.service_client import Call
+    from rosglass.comm.service_client import ServiceClient as Caller_
     from rosglass.messages import Message
     from rosglass.qml.runtime import Runtime
 

@@ -13,8 +13,8 @@ from rosglass.ros1.types import ANY
 if TYPE_CHECKING:
     from rosglass.messages import ServiceType
     from rosglass.ros1.core import Core
-    from rosglass.ros1.service_link import ServiceLink
     from rosglass.ros1.service_probe import Peer, Place
+    from rosglass.ros1.service_requester import ServiceLink
     from rosglass.ros1.services import Services
 
 __all__ = ["FinderOwner", "ServiceFinder"]
@@ -203,11 +203,11 @@ class ServiceFinder:
         if self._closed:
             return
         if peer is not None:
-            self.meet(peer)
+            self.on_server_header(peer)
         else:
             self.fail(place, why)
 
-    def meet(self, peer: Peer) -> None:
+    def on_server_header(self, peer: Peer) -> None:
         """Take what the server says of itself."""
         if self._closed:
             return

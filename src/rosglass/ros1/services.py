@@ -7,20 +7,22 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointKind, QoS
+from rosglass.comm.service_client import ServiceClient
 from rosglass.comm.service_server import ServiceServer
 from rosglass.errors import ConversionError, ServiceError
-from rosglass.ros1.service_client import Ros1ServiceClient
 from rosglass.ros1.service_replier import TcprosReplier
+from rosglass.ros1.service_requester import TcprosRequester
 from rosglass.ros1.service_types import ServiceTypes
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
+    from collections.abc import Awaitable, Callable, Mapping
 
     from rosglass.comm import Answer, EndpointInfo, Executor
+    from rosglass.comm.service_client import PendingCall
     from rosglass.messages import Message, ServiceType
     from rosglass.ros1.connection import Connection
     from rosglass.ros1.core import Core
-    from rosglass.wires.base import OnRequest
+    from rosglass.wires.base import OnReply, OnRequest
 
 __all__ = ["Services"]
 
@@ -47,12 +49,16 @@ class Services:
 
     def client(
         self, name: str, type: ServiceType | str | None, qos: QoS | None, persistent: bool
-    ) -> Ros1ServiceClient:
+    ) -> ServiceClient:
         """Return a new client of a service."""
-        profile = _profile(qos, name)
-        made = Ros1ServiceClient(self._core, self, name, type, profile, persistent)
-        self._core.add(made)
-        return made
+
+        # The client keeps the calls; a connection knows the one that it was made for.
+        def create(
+            _pending: Mapping[int, PendingCall], on_reply: OnReply, on_change: Callable[[], None]
+        ) -> TcprosRequester:
+            return TcprosRequester(self._core, self, name, type, persistent, on_reply, on_change)
+
+        return ServiceClient(self._core, name, _profile(qos, name), create)
 
     def serve(
         self,

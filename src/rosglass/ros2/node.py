@@ -15,7 +15,7 @@ from rosglass.ros2.arguments import NO_ARGUMENTS
 from rosglass.ros2.core import Core
 from rosglass.ros2.rcl_services import RclServices
 from rosglass.ros2.reading import Reading, type_if_known
-from rosglass.ros2.service_client import Ros2ServiceClient
+from rosglass.ros2.service_client import create_service_client
 from rosglass.ros2.service_replier import create_service_server
 from rosglass.ros2.type_fetching import TypeFetcher
 
@@ -133,7 +133,8 @@ class Ros2Node(CoreNode):
         check_order("create_service_client", name, type)
         self._core.types.ensure(type)
         profile = _service_profile(qos, name)
-        return Ros2ServiceClient(self._core, self._core.resolve(name, "service"), type, profile)
+        full = self._core.resolve(name, "service")
+        return create_service_client(self._core, full, type, profile)
 
     def create_service_server(
         self,

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from rosglass.ros2.type_descriptions import service_type
 
 if TYPE_CHECKING:
+    from rosglass.comm import ServiceClient
     from rosglass.ros2.core import Core
-    from rosglass.ros2.service_client import Ros2ServiceClient
 
 __all__ = ["TypeClients"]
 
@@ -29,18 +29,18 @@ class TypeClients:
         self._core = core
         self._lock = threading.Lock()
         self._closed = False
-        self._known: dict[str, tuple[Ros2ServiceClient, float]] = {}
+        self._known: dict[str, tuple[ServiceClient, float]] = {}
 
     def __bool__(self) -> bool:
         return bool(self._known)
 
-    def get(self, service: str) -> Ros2ServiceClient:
+    def get(self, service: str) -> ServiceClient:
         """Return the client of a service; raises NodeClosedError, or what creating one raises."""
-        from rosglass.ros2.service_client import Ros2ServiceClient  # noqa: PLC0415 - when needed
+        from rosglass.ros2.service_client import create_service_client  # noqa: PLC0415 - when needed
 
         known = self._known.get(service)
         if known is None:
-            client = Ros2ServiceClient(self._core, service, service_type())
+            client = create_service_client(self._core, service, service_type())
         else:
             client = known[0]
         with self._lock:

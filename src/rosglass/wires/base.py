@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from rosglass.comm import EndpointInfo, NodeName, Status
     from rosglass.comm.graph import Graph
+    from rosglass.errors import Error
     from rosglass.interfaces import Definition
 
     Buffer = bytes | bytearray | memoryview
@@ -147,13 +148,14 @@ SERVER_LEFT, CALL_DROPPED = "its server went away", "its server ended the call w
 class OnReply(Protocol):
     """Takes the reply to a request; called on the middleware's thread, must return at once."""
 
-    def __call__(self, number: int, data: bytes | memoryview | None, error: str) -> None:
+    def __call__(self, number: int, data: bytes | memoryview | None, error: str | Error) -> None:
         """Take a reply.
 
         Args:
-            number: What :meth:`Requester.send` returned for the request.
+            number: What :meth:`Requester.send` was given with the request.
             data: The response with its encapsulation header; None when there is none.
-            error: Why there is none, :data:`SERVER_LEFT` and :data:`CALL_DROPPED` among others.
+            error: Why there is none, :data:`SERVER_LEFT` and :data:`CALL_DROPPED` among others, or
+                the error with which the call ends.
         """
 
 
@@ -165,8 +167,8 @@ class Requester(Handle):
     #: Called, from any thread, when what :meth:`ready` returns may have changed; set by whoever
     #: created it. Without such calls, a server is noticed up to a second late.
     changed: Callable[[], None] | None = None
-    #: Told a request's number, whether taking its reply runs none but our own code, and at once:
-    #: it may be taken in the middle of receiving then. Set by whoever created the requester.
+    #: Returns whether taking the reply to the request with a number runs none but our own code, and
+    #: at once: it may be taken in the middle of receiving then. Set by the requester's owner.
     quick: Callable[[int], bool] | None = None
 
     @abstractmethod
@@ -174,16 +176,15 @@ class Requester(Handle):
         """Return whether a server is linked, so that a request sent now is not lost."""
 
     @abstractmethod
-    def send(self, data: bytes | bytearray, timeout: float | None) -> int:
+    def send(self, number: int, data: bytes | bytearray, timeout: float | None) -> None:
         """Send a request.
 
         Args:
+            number: What the reply will bear, above those of the requests before. The reply may
+                come before this returns.
             data: The payload with its encapsulation header.
             timeout: Seconds after which the reply is of no use any more, None for never. The
                 caller keeps the time; the middleware may forget the request then.
-
-        Returns:
-            A number that the reply will bear. The reply may come before this returns.
         """
 
     def stranded(self, number: int) -> bool:

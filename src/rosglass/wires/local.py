@@ -264,7 +264,6 @@ class LocalRequester(_Endpoint["LocalReplier"], Requester):
     def __init__(self, owner: LocalMiddleware, info: EndpointInfo, on_reply: OnReply) -> None:
         super().__init__(owner, info)
         self._on_reply = on_reply
-        self._numbers = itertools.count(1)
         #: The servers that may still answer, by the request's number.
         self._pending: dict[int, set[LocalReplier]] = {}
         self._open()
@@ -273,19 +272,17 @@ class LocalRequester(_Endpoint["LocalReplier"], Requester):
         """Return whether there is a server."""
         return bool(self._counterparts())
 
-    def send(self, data: bytes | bytearray, timeout: float | None) -> int:  # noqa: ARG002 - the caller keeps it
+    def send(self, number: int, data: bytes | bytearray, timeout: float | None) -> None:  # noqa: ARG002 - the caller keeps it
         """Send a request to all servers; the first reply counts."""
         servers = self._counterparts()
         with self._lock:
             self._check_open()
-            number = next(self._numbers)
             self._pending[number] = set(servers)
         request = RequestId(self.info.gid, number, self)
         for server in servers:
             server.take(request, bytes(data))
         if not servers:
             self._fail(number, SERVER_LEFT)
-        return number
 
     def forget(self, number: int) -> None:
         """Drop the reply to a request."""

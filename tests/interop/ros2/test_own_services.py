@@ -184,7 +184,7 @@ def test_the_status_of_goals_is_there_for_late_listeners(node, url, wait_for):
 def test_a_server_that_is_killed_at_work(new_url, run_peer, monkeypatch):
     """Its calls and goals end soon, with an error, and the client is ready for the next server."""
     # Usually some seconds, in which a router may be restarted.
-    monkeypatch.setattr("rosglass.ros2.service_client._GRACE", 0.5)
+    monkeypatch.setattr("rosglass.ros2.service_client._GRACE_S", 0.5)
     monkeypatch.setattr("rosglass.ros2.client_goal._GRACE", 0.7)
     monkeypatch.setattr("rosglass.ros2.client_goal._OUTAGE", 0.9)
     url = new_url()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import concurrent.futures
 import socket
 import struct
@@ -14,7 +13,7 @@ import pytest
 from waiting import nothing_happens
 
 import rosglass
-from rosglass.comm import IMMEDIATE, Dispatcher
+from rosglass.comm import IMMEDIATE
 from rosglass.interfaces import Library
 from rosglass.ros1.header import encode_header, parse_header
 
@@ -138,50 +137,6 @@ def dial(node, **header):
 # -- calling -------------------------------------------------------------------------------------
 
 
-def test_a_service_is_called_and_answered(connect, client):
-    server = connect("robot").create_service_server("/add", ADD, add)
-    assert client.call({"a": 1, "b": 2}).sum == 3
-    assert client.call(rosglass.load(ADD, ros=1).request.create(a=2, b=3)).sum == 5
-    assert client.call().sum == 0
-    assert (client.problem, server.problem) == ("", "")
-    assert client.ready
-    assert client.pending == 0
-    full = "rospy_tutorials/srv/AddTwoInts"
-    assert repr(client) == f"<Ros1ServiceClient /add [{full}]>"
-    assert repr(server) == f"<ServiceServer /add [{full}]>"
-    assert client.qos == server.qos == rosglass.QoS()
-
-
-def test_services_of_the_own_node_are_called_too(node):
-    node.create_service_server("/add", ADD, add)
-    assert node.create_service_client("/add", ADD).call({"a": 1, "b": 2}).sum == 3
-
-
-def test_names_are_resolved(connect, master, eventually):
-    arm = connect("arm", "/left")
-    assert arm.create_service_client("add", ADD).name == "/left/add"
-    assert arm.create_service_server("~add", ADD, add).name == "/left/arm/add"
-    eventually(lambda: "/left/arm/add" in master.services)
-
-
-@pytest.mark.parametrize("create", ["create_service_client", "create_service_server"])
-@pytest.mark.parametrize(
-    ("name", "type_", "error", "told"),
-    [
-        ("a b", ADD, rosglass.InvalidNameError, "' ' at position 1"),
-        ("/x", "nowhere_msgs/Nothing", rosglass.TypeNotFoundError, "nowhere_msgs"),
-        ("/x", "std_msgs/String", rosglass.TypeNotFoundError, "is not a service type"),
-        ("/x", 7, rosglass.TypeNotFoundError, "7 is not a service type"),
-        ("/x", rosglass.load(TRIGGER), rosglass.UnsupportedError, "ROS 2's"),
-    ],
-    ids=["name", "unknown", "message", "number", "ROS 2"],
-)
-def test_what_cannot_be_used_is_refused_at_creation(node, create, name, type_, error, told):
-    arguments = (name, type_) if create == "create_service_client" else (name, type_, add)
-    with pytest.raises(error, match=told):
-        getattr(node, create)(*arguments)
-
-
 @pytest.mark.parametrize(
     ("options", "told"),
     [({"qos": 10}, "/x: qos: expected"), ({"persistent": "no"}, "/x: persistent: expected")],
@@ -189,36 +144,6 @@ def test_what_cannot_be_used_is_refused_at_creation(node, create, name, type_, e
 def test_options_of_another_kind_are_refused(node, options, told):
     with pytest.raises(rosglass.ConversionError, match=told):
         node.create_service_client("/x", ADD, **options)
-
-
-@pytest.mark.parametrize("call", ["call", "call_async"])
-@pytest.mark.parametrize(
-    ("request_", "timeout", "told"),
-    [
-        ({"a": "x"}, 1, "a: expected an integer"),
-        ({"c": 1}, 1, "c"),
-        ("text", 1, "expected"),
-        ({}, -1, "timeout: expected seconds from 0 on, or None for ever, got -1"),
-        ({}, True, "timeout: expected seconds"),
-    ],
-)
-def test_what_does_not_fit_is_refused_and_not_sent(
-    client, start_robot, call, request_, timeout, told
-):
-    robot = start_robot()
-    with pytest.raises(rosglass.ConversionError, match=told):
-        getattr(client, call)(request_, timeout=timeout)
-    assert client.pending == 0
-    assert robot.headers == []
-
-
-def test_a_request_waits_for_the_server_as_it_was_when_it_was_made(connect, client):
-    request = {"a": 1, "b": 2}
-    calls = [client.call_async(request) for _ in range(3)]
-    request["a"] = 100
-    assert client.pending == 3
-    connect("robot").create_service_server("/add", ADD, add)
-    assert [call.result(30).sum for call in calls] == [3, 3, 3]
 
 
 def test_requests_through_one_connection_arrive_in_the_order_of_the_calls(connect, node):
@@ -272,18 +197,6 @@ def test_threads_that_share_a_client_get_their_own_answers(connect, client):
     assert client.pending == 0
 
 
-def test_a_call_can_be_awaited_and_calls_back(connect, client):
-    connect("robot").create_service_server("/add", ADD, add)
-
-    async def main():
-        return (await client.call_async({"a": 1, "b": 1})).sum
-
-    assert asyncio.run(main()) == 2
-    done = threading.Event()
-    client.call_async().on_done(lambda _: done.set())
-    assert done.wait(30)
-
-
 def test_a_persistent_client_uses_one_connection_and_others_one_for_each_call(
     client, persistent, start_robot
 ):
@@ -305,7 +218,7 @@ def test_a_server_that_keeps_no_connections_serves_persistent_clients_too(
     start_robot()
     for _ in range(3):
         assert client.call().sum == 3
-        eventually(lambda: not client._links)
+        eventually(lambda: not client._requester.busy)
 
 
 def test_a_connection_that_is_lost_is_made_again(connect, node, eventually):
@@ -320,30 +233,7 @@ def test_a_connection_that_is_lost_is_made_again(connect, node, eventually):
     assert client.call({"a": 1}).sum == 9
 
 
-@pytest.mark.parametrize("name", ["/add", None], ids=["given", "none"])
-def test_a_call_without_time_is_over_at_once(node, start_robot, name):
-    client = node.create_service_client("/add", ADD)
-    with pytest.raises(rosglass.ServiceUnavailableError, match="nothing was sent"):
-        client.call(timeout=0)
-    assert client.pending == 0
-
-
 # -- types ---------------------------------------------------------------------------------------
-
-
-def test_a_client_without_type_takes_the_servers(connect, node, persistent):
-    client = node.create_service_client("/add", persistent=persistent)
-    assert client.type is None
-    assert "type not known yet" in repr(client)
-    early = client.call_async({"a": 4, "b": 5})
-    wrong = client.call_async({"c": 1})
-    with pytest.raises(rosglass.ConversionError, match="a message or a dict"):
-        client.call_async(7)
-    connect("robot").create_service_server("/add", ADD, add)
-    assert early.result(30).sum == 9
-    assert client.type == rosglass.load(ADD, ros=1)
-    with pytest.raises(rosglass.ConversionError, match="c"):
-        wrong.result(30)
 
 
 def test_a_type_that_nobody_knows_here_is_named_with_what_to_do(node, start_robot, eventually):
@@ -456,28 +346,6 @@ def test_nobody_is_asked_for_types_that_nobody_wants(node, master, start_robot, 
 
 
 # -- who is there --------------------------------------------------------------------------------
-
-
-def test_a_server_is_waited_for_and_changes_are_told(connect, client, eventually):
-    told = []
-    client.on_ready_change(told.append)
-    assert not client.wait_for_server(0.05)
-    robot = connect("robot")
-    threading.Timer(0.1, lambda: robot.create_service_server("/add", ADD, add)).start()
-    assert client.wait_for_server(30)
-    eventually(lambda: told == [True])
-    robot.close()
-    eventually(lambda: told == [True, False])
-
-
-def test_a_missing_service_is_explained_with_similar_names(connect, node, eventually):
-    connect("robot").create_service_server("/arm/add", ADD, add)
-    client = node.create_service_client("/add", ADD)
-    eventually(lambda: "did you mean /arm/add?" in client.problem)
-    assert "no server offers /add [rospy_tutorials/srv/AddTwoInts] on ros1://" in client.problem
-    assert "CONNECTED" in client.problem
-    with pytest.raises(rosglass.ServiceUnavailableError, match="did you mean /arm/add"):
-        client.call(timeout=0.1)
 
 
 def test_a_master_that_is_not_there_is_named(connect, free_port):
@@ -726,14 +594,6 @@ def test_closing_while_connecting_leaves_nothing(master, connect, eventually):
             pass  # until it is closed
 
 
-def test_nothing_is_created_from_a_closed_node(node):
-    node.close()
-    with pytest.raises(rosglass.NodeClosedError):
-        node.create_service_client("/add", ADD)
-    with pytest.raises(rosglass.NodeClosedError):
-        node.create_service_server("/add", ADD, add)
-
-
 def test_hundreds_of_clients_and_servers_leave_no_files_and_threads(connect, eventually):
     robot, node = connect("robot"), connect("console")
     open_files = lambda: len(__import__("os").listdir("/proc/self/fd"))  # noqa: E731
@@ -911,104 +771,6 @@ def test_a_request_that_makes_no_sense_is_refused(connect):
     assert not ok
     assert b"the request is no rospy_tutorials" in receive(sock, size)
     assert seen == []
-
-
-@pytest.mark.parametrize("ends", ["result", "exception", "cancel"])
-def test_a_promise_answers_later(connect, client, ends):
-    promise = concurrent.futures.Future()
-    connect("robot").create_service_server("/add", ADD, lambda _: promise)
-    call = client.call_async()
-    with pytest.raises(rosglass.TimeoutError):
-        call.result(0.1)
-    if ends == "result":
-        promise.set_result({"sum": 4})
-        assert call.result(30).sum == 4
-        return
-    promise.set_exception(ValueError("late")) if ends == "exception" else promise.cancel()
-    with pytest.raises(rosglass.ServiceError, match="late" if ends == "exception" else "cancel"):
-        call.result(30)
-
-
-def test_coroutines_answer_in_their_event_loop(connect, node):
-    async def slowly(request):
-        await asyncio.sleep(0.01)
-        return {"sum": request.a}
-
-    async def main():
-        robot = connect("robot")
-        with robot.create_service_server("/add", ADD, slowly):
-            client = node.create_service_client("/add", ADD)
-            calls = [client.call_async({"a": value}) for value in range(10)]
-            return [(await call).sum for call in calls]
-
-    assert asyncio.run(main()) == list(range(10))
-    with pytest.raises(rosglass.ConversionError, match="event loop"):
-        node.create_service_server("/late", ADD, slowly)
-
-
-def test_a_slow_callback_holds_up_neither_other_services_nor_the_graph(connect, node):
-    robot = connect("robot")
-    begun, go = threading.Event(), threading.Event()
-
-    def slow(_):
-        begun.set()
-        go.wait(30)
-
-    robot.create_service_server("/slow", TRIGGER, slow)
-    robot.create_service_server("/add", ADD, add, executor=IMMEDIATE)
-    held = node.create_service_client("/slow", TRIGGER).call_async()
-    assert begun.wait(30)
-    assert node.create_service_client("/add", ADD).call({"a": 1, "b": 2}).sum == 3
-    go.set()
-    held.result(30)
-
-
-def test_a_callback_that_would_wait_for_itself_is_told(node, connect, caplog):
-    client = node.create_service_client("/add", ADD)
-    node.create_service_server("/add", ADD, add)
-    node.create_service_server("/twice", ADD, lambda r: client.call({"a": r.a}))
-    outer = connect("other").create_service_client("/twice", ADD)
-    with pytest.raises(rosglass.ServiceError, match="would wait for itself"):
-        outer.call({"a": 1}, timeout=30)
-
-
-def test_an_event_loop_is_not_held_up_by_a_call_of_its_own_service(node):
-    async def slowly(request):
-        return {"sum": request.a}
-
-    async def main():
-        with node.create_service_server("/add", ADD, slowly):
-            client = node.create_service_client("/add", ADD)
-            with pytest.raises(rosglass.UnsupportedError, match="would wait for itself"):
-                client.call({"a": 1})
-            return (await client.call_async({"a": 1})).sum
-
-    assert asyncio.run(main()) == 1
-
-
-def test_a_callback_may_call_what_runs_elsewhere(node, connect):
-    own = Dispatcher("own")
-    client = node.create_service_client("/add", ADD)
-    node.create_service_server("/add", ADD, add, executor=own)
-    node.create_service_server("/twice", ADD, lambda r: client.call({"a": r.a, "b": r.a}))
-    outer = connect("other").create_service_client("/twice", ADD)
-    assert outer.call({"a": 4}, timeout=30).sum == 8
-    own.close()
-
-
-def test_a_callback_in_the_receiving_thread_may_not_wait(node, connect):
-    client = node.create_service_client("/add", ADD)
-    connect("robot").create_service_server("/add", ADD, add)
-    failed = concurrent.futures.Future()
-
-    def callback(_):
-        try:
-            client.call()
-        except rosglass.UnsupportedError as error:
-            failed.set_result(str(error))
-
-    client.call_async().add_done_callback(callback)
-    assert "runs in a thread that receives" in failed.result(30)
 
 
 def test_a_service_has_one_server_in_a_node(node):

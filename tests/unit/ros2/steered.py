@@ -71,7 +71,7 @@ class SteeredReader(LocalReader):
 
 
 class SteeredRequester(LocalRequester):
-    """`sent` has what was sent; `reply` answers by hand."""
+    """`sent` has what was sent; `reply` answers by hand, the first that was sent as number 1."""
 
     def __init__(self, owner: LocalMiddleware, info: EndpointInfo, on_reply: OnReply) -> None:
         self.on_reply = on_reply
@@ -80,6 +80,7 @@ class SteeredRequester(LocalRequester):
         self.sent: list[bytes] = []
         self.timeouts: list[float | None] = []
         self.forgotten: list[int] = []
+        self._numbers: list[int] = []
         #: Requests whose servers left, whoever is there now.
         self.abandoned: set[int] = set()
         super().__init__(owner, info, on_reply)
@@ -87,27 +88,28 @@ class SteeredRequester(LocalRequester):
     def ready(self) -> bool:
         return super().ready() if self.linked is None else self.linked
 
-    def send(self, data: bytes | bytearray, timeout: float | None) -> int:
-        number = super().send(data, timeout)
+    def send(self, number: int, data: bytes | bytearray, timeout: float | None) -> None:
+        self._numbers.append(number)
+        super().send(number, data, timeout)
         self.sent.append(bytes(data))
         self.timeouts.append(timeout)
-        return number
 
     def _fail(self, number: int, reason: str) -> None:
         if self.linked is None:  # else the test answers
             super()._fail(number, reason)
 
     def stranded(self, number: int) -> bool:
-        return number in self.abandoned
+        return self._numbers.index(number) + 1 in self.abandoned
 
     def forget(self, number: int) -> None:
-        self.forgotten.append(number)
+        self.forgotten.append(self._numbers.index(number) + 1)
         super().forget(number)
 
-    def reply(self, number: int, data: bytes | None, error: str = "") -> None:
-        """Hand over a reply as if it had been received."""
+    def reply(self, count: int, data: bytes | None, error: str = "") -> None:
+        """Hand over a reply to a request that was sent, as if it had been received."""
+        known = count <= len(self._numbers)
         if not self.closed:
-            self.on_reply(number, data, error)
+            self.on_reply(self._numbers[count - 1] if known else -count, data, error)
 
 
 class SteeredReplier(LocalReplier):

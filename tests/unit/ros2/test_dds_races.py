@@ -113,7 +113,7 @@ def test_a_reply_in_the_memory_of_another_is_not_taken_for_that(node, server):
             return ELSEWHERE
 
     client = ready(node.create_service_client(SERVICE, ADD))
-    client._link.requester._ends.origins._noted = Haunted()
+    client._requester._requester._ends.origins._noted = Haunted()
     assert client.call({"a": 1, "b": 2}, timeout=30).sum == 2
 
 

@@ -13,10 +13,8 @@ import pytest
 import rosglass
 from rosglass.comm import (
     IMMEDIATE,
-    Dispatcher,
     EndpointInfo,
     EndpointKind,
-    Executor,
     NodeName,
     Promise,
 )
@@ -62,18 +60,6 @@ def answer(total=3):
 # -- calling -------------------------------------------------------------------------------------
 
 
-def test_a_service_is_called_and_answered(node, robot, client):
-    server = robot.create_service_server("/add", ADD, add)
-    assert client.call({"a": 1, "b": 2}).sum == 3
-    assert client.call(rosglass.load(ADD).request.create(a=2, b=3)).sum == 5
-    assert client.call().sum == 0
-    assert client.problem == server.problem == ""
-    assert client.ready
-    assert client.pending == 0
-    assert repr(client) == f"<Ros2ServiceClient /add [{ADD}]>"
-    assert repr(server) == f"<ServiceServer /add [{ADD}]>"
-
-
 def test_names_are_resolved_and_the_type_is_announced_with_its_hash(node, robot, middleware):
     client = node.create_service_client("add", ADD)
     assert client.name == "/arm/add"
@@ -82,66 +68,6 @@ def test_names_are_resolved_and_the_type_is_announced_with_its_hash(node, robot,
     server = robot.create_service_server("~/add", ADD, add, qos=rosglass.QoS(3))
     assert server.name == "/robot/add"
     assert robot.fake.repliers[0].info.qos == rosglass.QoS(3)
-
-
-@pytest.mark.parametrize("create", ["create_service_client", "create_service_server"])
-@pytest.mark.parametrize(
-    ("name", "type_", "error", "told"),
-    [
-        ("a b", ADD, rosglass.InvalidNameError, "contains ' '"),
-        ("/x", "nowhere_msgs/srv/Nothing", rosglass.TypeNotFoundError, "nowhere_msgs/srv/Nothing"),
-        ("/x", "std_msgs/msg/String", rosglass.TypeNotFoundError, "is not a service type"),
-        ("/x", 7, rosglass.TypeNotFoundError, "7 is not a service type"),
-        (
-            "/x",
-            rosglass.load(TRIGGER, ros=1),
-            rosglass.UnsupportedError,
-            "ROS 1's",
-        ),
-    ],
-    ids=["name", "unknown", "message", "number", "ROS 1"],
-)
-def test_what_cannot_be_used_is_refused_at_creation(node, create, name, type_, error, told):
-    arguments = (name, type_) if create == "create_service_client" else (name, type_, add)
-    with pytest.raises(error, match=told):
-        getattr(node, create)(*arguments)
-
-
-@pytest.mark.parametrize("call", ["call", "call_async"])
-@pytest.mark.parametrize(
-    ("request_", "timeout", "told"),
-    [
-        ({"a": "x"}, 1, "a: expected an integer"),
-        ({"c": 1}, 1, "c"),
-        ("text", 1, "expected"),
-        ({}, -1, "timeout: expected seconds from 0 on, or None for ever, got -1"),
-        ({}, "soon", "timeout: expected seconds"),
-        ({}, True, "timeout: expected seconds"),
-        ({}, float("nan"), "timeout: expected seconds"),
-    ],
-)
-def test_what_does_not_fit_is_refused_and_not_sent(
-    client, requester, call, request_, timeout, told
-):
-    requester.linked = True
-    with pytest.raises(rosglass.ConversionError, match=told):
-        getattr(client, call)(request_, timeout=timeout)
-    assert requester.sent == []
-    assert client.pending == 0
-
-
-def test_a_request_waits_for_the_server_as_it_was_when_it_was_made(robot, client):
-    request = {"a": 1, "b": 2}
-    calls = [client.call_async(request) for _ in range(3)]
-    request["a"] = 100
-    assert client.pending == 3
-    robot.create_service_server("/add", ADD, add)
-    assert [call.result(30).sum for call in calls] == [3, 3, 3]
-
-
-def test_a_blocking_call_waits_for_the_server_too(robot, client):
-    threading.Timer(0.05, lambda: robot.create_service_server("/add", ADD, add)).start()
-    assert client.call({"a": 1, "b": 2}, timeout=30).sum == 3
 
 
 def test_requests_are_sent_in_the_order_of_the_calls(robot, client):
@@ -351,20 +277,6 @@ def test_a_server_that_does_not_answer_is_given_up(client, requester, middleware
     assert client.pending == 0
 
 
-def test_waiting_for_a_call_ends_without_ending_the_call(client, requester):
-    requester.linked = True
-    call = client.call_async(timeout=None)
-    with pytest.raises(rosglass.TimeoutError, match=r"/add has not answered.* within 0\.01 s"):
-        call.result(0.01)
-    with pytest.raises(TimeoutError):
-        call.exception(0.01)
-    with pytest.raises(rosglass.ConversionError, match="timeout"):
-        call.result("soon")
-    requester.reply(1, answer())
-    assert call.result().sum == 3
-    assert call.exception() is None
-
-
 def test_a_cancelled_call_is_not_sent_or_its_reply_dropped(robot, client, node, middleware):
     waiting = client.call_async({"a": 1})
     assert waiting.cancel()
@@ -421,7 +333,7 @@ def test_an_empty_response_is_taken_in_every_shape(node, middleware):
 
 
 def test_calls_end_soon_when_their_server_is_gone(client, requester, middleware, monkeypatch):
-    monkeypatch.setattr("rosglass.ros2.service_client._GRACE", 0.05)
+    monkeypatch.setattr("rosglass.ros2.service_client._GRACE_S", 0.05)
     requester.linked = True
     key = middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01, gid=b"1" * 16)
     call = client.call_async(timeout=60)
@@ -452,7 +364,7 @@ def test_a_server_that_comes_back_soon_keeps_its_calls(client, requester, middle
 def test_calls_end_when_their_server_was_away_and_is_back(
     client, requester, middleware, monkeypatch
 ):
-    monkeypatch.setattr("rosglass.ros2.service_client._GRACE", 0.05)
+    monkeypatch.setattr("rosglass.ros2.service_client._GRACE_S", 0.05)
     requester.linked = True
     middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01, gid=b"1" * 16)
     calls = [client.call_async(timeout=None) for _ in range(2)]
@@ -464,7 +376,7 @@ def test_calls_end_when_their_server_was_away_and_is_back(
 
 
 def test_patient_calls_wait_for_their_server_to_be_back(node, middleware, monkeypatch):
-    monkeypatch.setattr("rosglass.ros2.service_client._GRACE", 0.05)
+    monkeypatch.setattr("rosglass.ros2.service_client._GRACE_S", 0.05)
     client = Ros2ServiceClient(node._core, "/add", ADD, patient=True)
     (requester,) = middleware.requesters
     key = middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01, gid=b"1" * 16)
@@ -622,22 +534,6 @@ def test_several_servers_are_named_and_called(client, connect, eventually, caplo
 # -- readiness -----------------------------------------------------------------------------------
 
 
-def test_readiness_is_told_to_and_fro(client, robot, eventually):
-    changes = []
-    client.on_ready_change(changes.append)
-    assert not client.wait_for_server(0.02)
-    assert not client.wait_for_server(0)
-    server = robot.create_service_server("/add", ADD, add)
-    assert client.wait_for_server(30)
-    assert client.wait_for_server()
-    eventually(lambda: changes == [True])
-    server.close()
-    eventually(lambda: changes == [True, False])
-    assert not client.ready
-    with pytest.raises(rosglass.ConversionError, match="callback"):
-        client.on_ready_change("told")
-
-
 def test_a_change_that_only_the_middleware_sees_is_told(client, requester, eventually):
     changes = []
     client.on_ready_change(changes.append)
@@ -647,17 +543,6 @@ def test_a_change_that_only_the_middleware_sees_is_told(client, requester, event
 
 
 # -- threads and asyncio -------------------------------------------------------------------------
-
-
-def test_calls_are_awaited_in_asyncio(client, robot):
-    robot.create_service_server("/add", ADD, add)
-
-    async def main():
-        calls = [client.call_async({"a": value}) for value in range(5)]
-        slow = client.call_async({"a": 7}, timeout=None)
-        return [m.sum for m in await asyncio.gather(*calls)], (await slow).sum
-
-    assert asyncio.run(main()) == ([0, 1, 2, 3, 4], 7)
 
 
 def test_giving_up_in_asyncio_cancels_the_call(client, requester, eventually):
@@ -671,20 +556,6 @@ def test_giving_up_in_asyncio_cancels_the_call(client, requester, eventually):
     eventually(lambda: requester.forgotten == [1])
 
 
-def test_the_end_of_a_call_is_told_on_an_executor(client, robot, eventually):
-    robot.create_service_server("/add", ADD, add)
-    told = []
-    call = client.call_async({"a": 1})
-    call.on_done(lambda c: told.append((c, threading.current_thread().name)))
-    elsewhere = Dispatcher("elsewhere")
-    call.on_done(lambda c: told.append((c, threading.current_thread().name)), elsewhere)
-    eventually(lambda: len(told) == 2)
-    assert sorted(told, key=lambda t: t[1]) == [(call, "cockpit callbacks"), (call, "elsewhere")]
-    elsewhere.close()
-    with pytest.raises(rosglass.ConversionError, match="callback"):
-        call.on_done(None)
-
-
 def test_callbacks_may_call_and_wait(node, robot, client, eventually):
     """The reply does not need the thread that waits for it."""
     robot.create_service_server("/add", ADD, add)
@@ -694,14 +565,6 @@ def test_callbacks_may_call_and_wait(node, robot, client, eventually):
     )
     robot.create_service_server("/x", ADD, add)
     eventually(lambda: results == [5])
-
-
-def test_a_callback_that_would_wait_for_itself_is_told_so(node, client, robot):
-    node.create_service_server("/add", ADD, add)
-    node.create_service_server("/twice", ADD, lambda r: client.call({"a": r.a, "b": r.a}))
-    with pytest.raises(rosglass.ServiceError, match="this callback would wait for itself"):
-        robot.create_service_client("/twice", ADD).call({"a": 2}, timeout=30)
-    assert client.call({"a": 2}).sum == 2
 
 
 def test_threads_that_everything_waits_for_must_not_wait(node, robot, client, eventually):
@@ -738,64 +601,7 @@ def test_ctrl_c_gives_the_call_up(client, requester, monkeypatch):
     assert requester.forgotten == [1]
 
 
-def test_calls_from_many_threads(client, robot):
-    robot.create_service_server("/add", ADD, add)
-    with concurrent.futures.ThreadPoolExecutor(8) as pool:
-        sums = pool.map(lambda value: client.call({"a": value, "b": 1}).sum, range(200))
-        assert list(sums) == list(range(1, 201))
-
-
 # -- serving -------------------------------------------------------------------------------------
-
-
-def test_a_response_is_a_message_a_dict_or_nothing(node, robot):
-    kind = rosglass.load(SET)
-    for name, response in (
-        ("/message", kind.response.create(success=True, message="done")),
-        ("/dict", {"success": True, "message": "done"}),
-    ):
-        robot.create_service_server(name, SET, lambda _, r=response: r)
-        got = node.create_service_client(name).call({"data": True}, timeout=30)
-        assert got.to_dict() == {"success": True, "message": "done"}
-    robot.create_service_server("/nothing", kind, lambda _: None)
-    assert node.create_service_client("/nothing").call(timeout=30).message == ""
-
-
-def test_a_response_may_come_later(node, robot, client, eventually):
-    futures = []
-
-    def later(request):
-        futures.append(concurrent.futures.Future())
-        return futures[-1]
-
-    robot.create_service_server("/add", ADD, later)
-    calls = [client.call_async() for _ in range(4)]
-    eventually(lambda: len(futures) == 4)
-    futures[1].set_result({"sum": 1})
-    assert calls[1].result(30).sum == 1
-    futures[0].set_exception(ValueError("broken"))
-    futures[2].cancel()
-    futures[3].set_result({"sum": "x"})
-    for number, told in ((0, "ValueError: broken"), (2, "cancelled"), (3, "no valid response: ")):
-        with pytest.raises(rosglass.ServiceError, match=told):
-            calls[number].result(30)
-
-
-@pytest.mark.parametrize(
-    ("response", "told"),
-    [
-        ({"sum": "x"}, f"{ADD}_Response: sum: expected an integer"),
-        ({"total": 1}, "total"),
-        (7, "expected"),
-        (rosglass.load(SET).response.create(), "expected"),
-    ],
-)
-def test_a_response_that_does_not_fit_is_logged(robot, client, caplog, response, told):
-    robot.create_service_server("/add", ADD, lambda _: response)
-    with pytest.raises(rosglass.ServiceError, match="the server made no valid response"):
-        client.call(timeout=30)
-    assert "/add: the callback's response to /arm/cockpit does not fit" in caplog.text
-    assert told in caplog.text
 
 
 @pytest.mark.parametrize(
@@ -860,82 +666,6 @@ def test_a_client_gone_wild_cannot_fill_the_memory(robot, middleware, client, ca
     release.set()
     assert 499 <= len(replier.failures) <= 500
     assert caplog.text.count("1000 requests wait for the callback already") == 1
-
-
-def test_executors_of_servers(robot, client, eventually):
-    jobs = []
-
-    class Manual(Executor):
-        def post(self, job):
-            jobs.append(job)
-
-    robot.create_service_server("/add", ADD, add, executor=Manual())
-    call = client.call_async({"a": 1})
-    eventually(lambda: jobs)
-    assert not call.done()
-    jobs.pop()()
-    assert call.result(30).sum == 1
-
-
-def test_a_server_whose_executor_raises_fails_the_request(robot, client, caplog):
-    class Broken(Executor):
-        def post(self, job):
-            raise RuntimeError("the pool was shut down")
-
-    robot.create_service_server("/add", ADD, add, executor=Broken())
-    with pytest.raises(rosglass.Error, match="the pool was shut down"):
-        client.call({"a": 1}, timeout=30)
-
-
-def test_coroutine_functions_serve_in_their_loop(node, connect):
-    robot = connect("robot")
-
-    async def slow(request):
-        await asyncio.sleep(0.01)
-        if request.a < 0:
-            raise ValueError("negative")
-        return {"sum": request.a}
-
-    class Callable:
-        async def __call__(self, request):
-            return {"sum": 7}
-
-    async def main():
-        robot.create_service_server("/add", ADD, slow)
-        robot.create_service_server("/seven", ADD, Callable())
-        client = node.create_service_client("/add", ADD)
-        sums = await asyncio.gather(*(client.call_async({"a": value}) for value in range(3)))
-        with pytest.raises(rosglass.ServiceError, match="ValueError: negative"):
-            await client.call_async({"a": -1})
-        seven = await node.create_service_client("/seven", ADD).call_async()
-        return [message.sum for message in sums], seven.sum
-
-    assert asyncio.run(main()) == ([0, 1, 2], 7)
-
-
-async def serve(request):
-    return None
-
-
-@pytest.mark.parametrize(
-    ("callback", "executor", "told"),
-    [
-        (None, None, "callback: expected something that can be called, got None"),
-        (add, "gui", "executor: expected a rosglass.comm.Executor"),
-        (serve, None, "created inside a running event loop"),
-        (serve, rosglass.comm.IMMEDIATE, "no executor beside a coroutine function"),
-    ],
-)
-def test_callbacks_that_cannot_run_are_refused_at_creation(robot, callback, executor, told):
-    with pytest.raises(rosglass.ConversionError, match=f"/add: .*{told}"):
-        robot.create_service_server("/add", ADD, callback, executor=executor)
-    assert robot.fake.repliers == []
-
-
-def test_a_plain_function_that_returns_a_coroutine_is_told_so(robot, client):
-    robot.create_service_server("/add", ADD, lambda _: serve(None))
-    with pytest.raises(rosglass.ServiceError, match="must be an async def"):
-        client.call(timeout=30)
 
 
 def test_another_version_of_the_response_alone_is_named_and_taken(middleware, eventually):
@@ -1007,12 +737,6 @@ def test_closing_ends_pending_calls(node, client, requester, close, eventually):
         client.on_ready_change(print)
 
 
-def test_closing_ends_waiting_for_the_server(client):
-    threading.Timer(0.05, client.close).start()
-    with pytest.raises(rosglass.NodeClosedError, match="client of /add is closed"):
-        client.wait_for_server()
-
-
 def test_closing_a_server(robot, client, eventually):
     started, futures = threading.Event(), []
 
@@ -1033,26 +757,6 @@ def test_closing_a_server(robot, client, eventually):
         call.result(30)
     assert len(futures) == 1
     assert not client.ready
-
-
-def test_closing_a_server_cancels_its_coroutines(node, robot):
-    ended = threading.Event()
-
-    async def slow(request):
-        try:
-            await asyncio.sleep(60)
-        finally:
-            ended.set()
-
-    async def main():
-        server = robot.create_service_server("/add", ADD, slow)
-        node.create_service_client("/add", ADD).call_async()
-        await asyncio.sleep(0.05)
-        server.close()
-        await asyncio.to_thread(ended.wait, 5)
-
-    asyncio.run(main())
-    assert ended.is_set()
 
 
 def test_clients_and_servers_leave_nothing_behind(node, robot, middleware):

@@ -6,7 +6,6 @@ A service's replies go to all its clients, who pick their own. How, depends on t
 
 from __future__ import annotations
 
-import itertools
 import logging
 import math
 import secrets
@@ -69,7 +68,6 @@ class DdsRequester(Requester):
         self._lock = threading.Lock()
         #: What rmw_cyclonedds takes an instance handle for: nobody else's may be the same.
         self._id = secrets.randbits(64)
-        self._next = itertools.count(1)
         #: Numbers of calls, and the sequence number that each was sent with, 0 for none.
         self._calls: dict[int, int] = {}
         self._by_sequence: dict[int, int] = {}
@@ -112,11 +110,10 @@ class DdsRequester(Requester):
             self._ends.look()
         return self._scheme is not None and not self._ends.closed
 
-    def send(self, data: bytes | bytearray, timeout: float | None) -> int:
+    def send(self, number: int, data: bytes | bytearray, timeout: float | None) -> None:
         """Send a request; see :meth:`rosglass.wires.base.Requester.send`."""
         if self._ends.closed:
             raise NodeClosedError(f"the client of {self._service} is closed")
-        number = next(self._next)
         with self._lock:
             self._calls[number] = 0
 
@@ -130,7 +127,6 @@ class DdsRequester(Requester):
             # A signal's exception in the main thread must not spoil the count of what was sent.
             now=self._scheme is not Scheme.IDENTITY or not in_main_thread(),
         )
-        return number
 
     def stranded(self, number: int) -> bool:
         """Return whether a request's servers have left; what they sent meanwhile is lost."""

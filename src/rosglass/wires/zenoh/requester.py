@@ -8,7 +8,6 @@ are cancelled when that is over; and their end is noticed by Python letting go o
 
 from __future__ import annotations
 
-import itertools
 import logging
 import time
 import weakref
@@ -50,15 +49,14 @@ class _Call:
     Attributes:
         cancel: Ends the query.
         servers: Identities of the servers that were asked and have not refused.
-        deadline: Monotonic time after which nobody waits for the reply.
-        left: Whether all servers have left since.
+        lost: Monotonic time from which no reply can come, for all servers have left; None while one
+            is there.
         end: Tells of the query's end.
     """
 
     cancel: zenoh.CancellationToken
     servers: set[bytes]
-    deadline: float
-    left: bool = False
+    lost: float | None = None
     end: _End | None = None
 
 
@@ -108,7 +106,6 @@ class ZenohRequester(Declaration, Requester):
         self._service, self._graph, self._own_servers = service, graph, own_servers
         self._gid = gid_of(token)
         self._on_reply = on_reply
-        self._numbers = itertools.count(1)
         self._session: zenoh.Session | None = None
         self._queriers: dict[str, zenoh.Querier] = {}
         self._known_route: tuple[int, tuple[str, set[bytes]]] = -1, ("", set())
@@ -137,13 +134,11 @@ class ZenohRequester(Declaration, Requester):
         """
         return bool(self._own()) or bool(self._route()[1])
 
-    def send(self, data: bytes | bytearray, timeout: float | None) -> int:
+    def send(self, number: int, data: bytes | bytearray, timeout: float | None) -> None:
         """Send a request; see :meth:`rosglass.wires.base.Requester.send`."""
         own, (key, others) = self._own(), self._route()
-        number = next(self._numbers)
-        deadline = float("inf") if timeout is None else time.monotonic() + timeout
         servers = others | {replier.gid for replier in own}
-        call = _Call(zenoh.CancellationToken(), servers, deadline)
+        call = _Call(zenoh.CancellationToken(), servers)
         session = self._session
         if session is None and not own:
             raise ConnectionLostError(f"{self._service.name}: not linked with anything yet")
@@ -160,7 +155,6 @@ class ZenohRequester(Declaration, Requester):
         for replier in own:
             held = HeldCall(self, number, replier.gid)
             replier.take_own(RequestId(self._gid, number, held), bytes(data))
-        return number
 
     def forget(self, number: int) -> None:
         """Drop the reply to a request, should it still come."""
@@ -174,7 +168,7 @@ class ZenohRequester(Declaration, Requester):
             if gid in call.servers:
                 call.servers.discard(gid)
                 if not call.servers:
-                    call.left, call.deadline = True, time.monotonic() + _LINGER
+                    call.lost = time.monotonic() + _LINGER
 
     def poll(self) -> None:
         """End the calls that can get no reply any more; called about once a second."""
@@ -186,10 +180,8 @@ class ZenohRequester(Declaration, Requester):
             self._fail(end.number, CALL_DROPPED)
         now = time.monotonic()
         for number, call in tuple(self._calls.items()):
-            if now > call.deadline and call.left:
+            if call.lost is not None and now > call.lost:
                 self._fail(number, SERVER_LEFT)
-            elif now > call.deadline:
-                self.forget(number)
 
     def close(self) -> None:
         """Withdraw the client; replies that still come are dropped."""
