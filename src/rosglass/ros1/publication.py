@@ -43,8 +43,8 @@ _MAX_MESSAGE_BYTES = 1_000_000_000
 _SLOW_S = 10.0
 #: How long queued messages may still be sent after the topic's last publisher was closed.
 _FLUSH_TIMEOUT_S = 1.0
-#: Most subscribers, come and gone between two looks, that listeners are informed of.
-_MAX_BRIEF = 100
+#: Most connections that end between two looks of which listeners are informed one by one.
+_MAX_ENDED = 100
 #: How long the master's list may lack a subscriber that has connected.
 _LISTED_AFTER_S = 5.0
 _HEADER = "std_msgs/msg/Header"
@@ -91,9 +91,8 @@ class Publication(Member):
     def changes(self, writer: PublicationWriter) -> list[list[EndpointInfo]]:
         """Return the subscribers after each change since a writer's last call."""
         with self._lock:
-            looks = [*writer.brief, self._links.copy()]
-            writer.brief.clear()
-            writer.found = set(self._links)
+            looks = [*writer.before, self._links.copy()]
+            writer.before.clear()
         return [self._endpoints(links) for links in looks]
 
     def lost(self) -> int:
@@ -197,8 +196,7 @@ class Publication(Member):
         with self._lock:
             if link in self._links:
                 for writer in self.writers:
-                    if link not in writer.found:
-                        writer.brief.append(self._links.copy())
+                    writer.before.append(self._links.copy())
                 self._links.remove(link)
                 self._lost_before += link.lost
         self._core.wake()
@@ -336,8 +334,8 @@ class PublicationWriter(Writer):
         latched: Whether a subscriber that connects later gets the last message.
         keep: Most messages that wait for a slow subscriber, 0 for any number.
         keep_bytes: Most bytes that wait for it, 0 for any number.
-        found: The connections that :meth:`changes` has reported last.
-        brief: The connections at moments when one left that was never reported.
+        before: The connections before each that ended since the last look: a subscriber, or a
+            listener, may have come since then.
     """
 
     def __init__(
@@ -351,8 +349,7 @@ class PublicationWriter(Writer):
         self.latched = qos.durability is Durability.TRANSIENT_LOCAL
         keep_all = qos.history is History.KEEP_ALL
         self.keep, self.keep_bytes = (0, INBOX_LIMIT) if keep_all else (qos.depth, 0)
-        self.found: set[Connection] = set()
-        self.brief: deque[list[Connection]] = deque(maxlen=_MAX_BRIEF)
+        self.before: deque[list[Connection]] = deque(maxlen=_MAX_ENDED)
         if _has_header(type):
             self.number = self._number
 

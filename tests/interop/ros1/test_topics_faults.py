@@ -88,7 +88,7 @@ def test_messages_flow_on_while_the_master_is_killed_and_restarted(
 def test_subscribers_that_come_and_go_between_two_looks_are_not_missed(connect, wait_for):
     node = connect("busy")
     publisher = node.create_publisher("/brief", STRING)
-    changes, held, go_on = [], threading.Event(), threading.Event()
+    changes, late, held, go_on = [], [], threading.Event(), threading.Event()
     publisher.on_matched(lambda event: changes.append((event.change, event.count)))
 
     def hold_up(_):
@@ -105,8 +105,18 @@ def test_subscribers_that_come_and_go_between_two_looks_are_not_missed(connect, 
             wait_for(lambda: publisher.subscription_count() == 1)
         go_on.set()
         wait_for(lambda: len(changes) == 7, what=lambda: changes)
-    wait_for(lambda: len(changes) == 8, what=lambda: changes)
-    assert changes == [(1, 1), *3 * [(1, 2), (-1, 1)], (-1, 0)]
+        # The look that reports it has been; whoever listens from now on is told first who is there.
+        held.clear(), go_on.clear()
+        with dial(node, "/brief", md5sum="*", type="*"):
+            assert held.wait(30)
+            publisher.on_matched(lambda event: late.append((event.change, event.count)))
+        wait_for(lambda: publisher.subscription_count() == 1)
+        go_on.set()
+        wait_for(lambda: len(changes) == 9, what=lambda: changes)
+    wait_for(lambda: len(changes) == 10, what=lambda: changes)
+    wait_for(lambda: len(late) == 4, what=lambda: late)
+    assert late == [(1, 1), (1, 2), (-1, 1), (-1, 0)]
+    assert changes == [(1, 1), *4 * [(1, 2), (-1, 1)], (-1, 0)]
 
 
 def test_a_slow_subscriber_is_told_of_and_holds_up_nobody(connect, wait_for):
