@@ -51,7 +51,7 @@ class BuiltinProtocol(ABC, Generic[_Parameters]):
         """Offer what other nodes expect to find, in pieces of a millisecond or so.
 
         Raises:
-            NodeClosedError: The node is closed meanwhile.
+            NodeClosedError: The node was closed.
             UnsupportedError: The wire cannot carry a service.
         """
 

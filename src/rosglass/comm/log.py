@@ -183,7 +183,7 @@ class RosoutHandler(logging.Handler):
         self._waiting: deque[dict[str, Any]] = deque()
         self._lost = 0
         self._second, self._count = 0, 0
-        #: Reentrant: a node that closes meanwhile closes the handler as it adds its publisher.
+        #: Reentrant: a node that is just closing closes the handler as it adds its publisher.
         self._start = threading.RLock()
         self._publisher: Publisher | None = None
         self._worker: Worker | None = None
@@ -311,7 +311,7 @@ class LibraryLog(logging.Handler):
 
 
 def message_of(record: logging.LogRecord) -> str:
-    """Return a record's text, with the error it tells of."""
+    """Return a record's text, with the error that it reports."""
     return clean(_FORMATTER.format(record))
 
 

@@ -1,6 +1,6 @@
 """The parameters in one namespace of ROS 1's parameter server: a node's private ones, as a rule.
 
-Our own node's and other nodes' alike: whoever knows a name may set it, to values of any type.
+Our own node's and other nodes' alike: every node may set each of them, to values of any type.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ class ParameterNamespace:
 
 
 class _Changes(Handle):
-    """Tells what has changed between two values of a namespace."""
+    """Calls back with what has changed between two values of a namespace."""
 
     def __init__(
         self,
@@ -122,13 +122,13 @@ class _Changes(Handle):
         self._before = before
         self._listeners: Listeners[ParameterEvent] = Listeners(where=namespace.name)
         self._listeners.add(callback, executor)
-        self._subscription = namespace.server.subscribe(namespace.name, self._take, IMMEDIATE)
+        self._subscription = namespace.server.subscribe(namespace.name, self._on_value, IMMEDIATE)
 
     def close(self) -> None:
         self._listeners.clear()
         self._subscription.close()
 
-    def _take(self, value: Any) -> None:
+    def _on_value(self, value: Any) -> None:
         now = dict(flat(value)) if isinstance(value, dict) else {}
         before, self._before = self._before, now
         if before is None:
@@ -224,7 +224,7 @@ class Ros1Parameters(Parameters):
         """Return its value, None for one that is declared and not set.
 
         Raises:
-            ParameterError: It is neither declared nor set; similar names are told.
+            ParameterError: It is neither declared nor set; the message names similar ones.
         """
         self._core.check_open()
         value: ParameterValue = self._server.get(self._namespace.full(name), None)
@@ -267,16 +267,16 @@ class Ros1Parameters(Parameters):
         return sorted({*there, *self._declared})
 
     def on_set(self, validate: Callable[[Mapping[str, ParameterValue]], str]) -> Handle:
-        """Raise UnsupportedError: nobody asks a node before its parameters are set."""
+        """Raise UnsupportedError: a node is not asked before its parameters are set."""
         raise UnsupportedError(
             f"{self.node}: ROS 1's parameter server takes every value without asking "
-            f"{getattr(validate, '__name__', validate)!r}; on_change() tells afterwards"
+            f"{getattr(validate, '__name__', validate)!r}; on_change() reports it afterwards"
         )
 
     def on_change(
         self, callback: Callable[[ParameterEvent], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` with each change, whoever makes it; quick ones may be merged."""
+        """Call `callback` with each change, of any node's making; quick ones may be merged."""
         self._core.check_open()
         chosen = executor or self._core.dispatcher
         check_plain(callback, f"{self.node}: on_change()")
@@ -320,7 +320,6 @@ class RemoteNamespace(RemoteParameters):
         self._readiness = Readiness(
             f"parameters of {node}", lambda: self.ready, self._check_open, core.dispatcher
         )
-        self._lock = threading.Lock()
         self._watches: list[Handle] = []
         self._closed = False
 
@@ -387,8 +386,9 @@ class RemoteNamespace(RemoteParameters):
         with suppress(ConnectionLostError, UnsupportedError):
             before = dict(flat(self._namespace.tree(_TIMEOUT_S)))
         made = self._namespace.watch(callback, executor or self._core.dispatcher, before)
-        with self._lock:
-            self._watches.append(made)
+        self._watches.append(made)
+        if self._closed:  # just now, by another thread
+            self.close()
         return made
 
     def load(self, path: str | PathLike[str], deadline: Deadline) -> list[str]:
@@ -407,11 +407,9 @@ class RemoteNamespace(RemoteParameters):
 
     def close(self) -> None:
         """Watch no more; safe to call twice."""
-        with self._lock:
-            self._closed = True
-            watches, self._watches = self._watches, []
-        for watch in watches:
-            watch.close()
+        self._closed = True
+        while self._watches:
+            self._watches.pop().close()
         self._readiness.close()
 
     def _check_open(self) -> None:

@@ -48,9 +48,9 @@ __all__ = [
 
 _log = logging.getLogger("rosglass.ros1")
 _T = TypeVar("_T")
-#: Tells "no default" from the default None.
+#: Stands for "no default", for None is one.
 _REQUIRED: Any = object()
-#: How long the master may take to answer, and the shortest time: none would be no question.
+#: How long the master may take to answer, and the shortest time that asks at all.
 _TIMEOUT_S, _MIN_TIMEOUT_S = 5.0, 0.001
 #: After which the master is asked again, should a change not have reached us.
 _REREAD_S = 10.0
@@ -107,7 +107,7 @@ class ParameterServer(Handle):
             timeout: Seconds to wait.
 
         Raises:
-            ParameterError: It is not set, and there is no default; similar names are told.
+            ParameterError: It is not set, and there is no default; the message names similar ones.
         """
         full = self.resolve(name)
         try:
@@ -191,7 +191,7 @@ class ParameterServer(Handle):
         callback: Callable[[Any], None] | None = None,
         executor: Executor | None = None,
     ) -> ParameterSubscription:
-        """Follow a parameter, or a namespace; returns at once, and is told when the master answers.
+        """Follow a parameter, or a namespace; returns at once, before the master has answered.
 
         The master is asked again after it was restarted, so that the value is always what it has.
 
@@ -216,7 +216,7 @@ class ParameterServer(Handle):
     ) -> list[str]:
         """Set what a file has, as ``rosparam load`` does; what else is there stays.
 
-        The node's own subscriptions are told once, when all is set.
+        The node's own subscriptions are called back once, when all is set.
 
         Args:
             path: A YAML file; ``_ns``, ``!degrees``, ``!radians``, ``deg()``, ``rad()`` count.
@@ -246,7 +246,7 @@ class ParameterServer(Handle):
                 sent.append(full)
                 self._send("setParam", full, wire, timeout=timeout)
         finally:
-            self._look_again(sent)
+            self._reread(sent)
         return list(wanted)
 
     def save(
@@ -364,7 +364,7 @@ class ParameterServer(Handle):
 
     def _change(self, method: str, full: str, *arguments: Any, timeout: float) -> None:
         self._send(method, full, *arguments, timeout=timeout)
-        self._look_again([full])
+        self._reread([full])
 
     def _send(self, method: str, full: str, *arguments: Any, timeout: float) -> None:
         try:
@@ -372,8 +372,8 @@ class ParameterServer(Handle):
         except MasterError as error:
             raise ParameterError(f"parameter {full}: {error}") from error
 
-    def _look_again(self, names: list[str]) -> None:
-        """Read what is followed of these: the master tells everybody but who made the change."""
+    def _reread(self, names: list[str]) -> None:
+        """Read what is followed of these: the master notifies all nodes but the one that set it."""
         for watch in {watch for name in names for watch in self._watches.touched(name)}:
             watch.ask()
 
@@ -435,7 +435,7 @@ class ParameterSubscription(Handle):
 
     @property
     def known(self) -> bool:
-        """Whether the master has told what it is."""
+        """Whether the master has answered."""
         return self._known
 
     @property
@@ -447,7 +447,7 @@ class ParameterSubscription(Handle):
     def value(self) -> Any:
         """What it is, a dict for a namespace; None while it is not set, or not known yet.
 
-        It stays as it is while the master is away; :meth:`Node.status` tells that.
+        It stays as it is while the master is away, which :meth:`Node.status` says.
         """
         return self._value
 
@@ -465,8 +465,7 @@ class ParameterSubscription(Handle):
                     self._changed.wait(min(left, _WAIT_SLICE_S))
         return self._known
 
-    def tell(self, value: Any) -> None:
-        """Take a value; for the watch."""
+    def _on_value(self, value: Any) -> None:
         if self._closed:
             return
         self._value = value
@@ -486,9 +485,9 @@ class ParameterSubscription(Handle):
 class ParameterWatches:
     """What one node follows, each name subscribed to once.
 
-    What the master says of a change only makes us ask: it tells neither its caller's own changes
-    nor a namespace that became a plain value, gives up after one attempt, and forgets all
-    subscribers when it is restarted.
+    What the master says of a change only makes us read: it leaves out a caller's own changes and a
+    namespace that became a plain value, gives up after one attempt, and forgets all subscribers
+    when it is restarted.
 
     Args:
         core: The node.
@@ -498,8 +497,8 @@ class ParameterWatches:
         self._core = core
         self._lock = threading.Lock()
         self._watches: dict[str, ParameterWatch] = {}
-        #: Held while the master is told that a name is followed, or not any more.
-        self.telling = threading.Lock()
+        #: Held while the master is called to subscribe to a name, or to unsubscribe.
+        self.subscribing = threading.Lock()
 
     def subscribe(
         self, name: str, callback: Callable[[Any], None] | None, executor: Executor | None
@@ -517,7 +516,7 @@ class ParameterWatches:
         if new:
             self._core.add(watch)
         else:
-            watch.tell(made)
+            watch.share(made)
         return made
 
     def leave(self, subscription: ParameterSubscription) -> None:
@@ -550,18 +549,18 @@ class ParameterWatch(Member):
         self._turn = InOrder()
         #: Changed under the watches' lock; read by jobs of `_turn`, which own the rest.
         self._subscriptions: tuple[ParameterSubscription, ...] = ()
-        self._known, self._value, self._told = False, None, 0
+        self._known, self._value, self._newest = False, None, 0
         self._readings = 0
-        self._errand = threading.Lock()
+        self._asking = threading.Lock()
         self._asked = self._busy = False
-        self._looked = 0.0
+        self._read_at = 0.0
         self._closed = False
 
     def __repr__(self) -> str:
         return f"the subscription to parameter {self.name}"
 
     def join(self, subscription: ParameterSubscription) -> None:
-        """Tell a subscription from now on; under the watches' lock."""
+        """Pass values on to a subscription from now on; under the watches' lock."""
         self._subscriptions += (subscription,)
 
     def leave(self, subscription: ParameterSubscription) -> bool:
@@ -569,12 +568,12 @@ class ParameterWatch(Member):
         self._subscriptions = tuple(s for s in self._subscriptions if s is not subscription)
         return not self._subscriptions
 
-    def tell(self, subscription: ParameterSubscription) -> None:
-        """Tell a subscription that has just joined what is known."""
+    def share(self, subscription: ParameterSubscription) -> None:
+        """Give a subscription that has just joined the value that is known."""
 
         def job() -> None:
             if self._known and not subscription.known:
-                subscription.tell(self._value)
+                subscription._on_value(self._value)
 
         self._turn.add(job)
 
@@ -583,8 +582,8 @@ class ParameterWatch(Member):
         self.read(master)
 
     def unregister(self, master: Master) -> Member | None:
-        """Unsubscribe, unless somebody follows the name again."""
-        with self._watches.telling:
+        """Unsubscribe, unless the name is followed again."""
+        with self._watches.subscribing:
             heir = self._watches.current(self.name)
             if heir is None:
                 master.call("unsubscribeParam", self._core.uri, self.name)
@@ -592,12 +591,12 @@ class ParameterWatch(Member):
 
     def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - not all that moves counts
         """Look now and then whether a change was missed."""
-        if idle and time.monotonic() - self._looked > _REREAD_S:
+        if idle and time.monotonic() - self._read_at > _REREAD_S:
             self.ask()
 
     def ask(self) -> None:
         """Read it soon; from any thread, without waiting."""
-        with self._errand:
+        with self._asking:
             self._asked = True
             if self._busy or self._closed:
                 return
@@ -605,19 +604,19 @@ class ParameterWatch(Member):
         self._core.errands.run(self._run)
 
     def read(self, master: Master) -> None:
-        """Read it, and tell if it has changed.
+        """Read it, and pass it on if it has changed.
 
         Raises:
             ConnectionLostError: The master does not answer.
             MasterError: It refuses.
         """
-        with self._watches.telling:
-            self._looked = time.monotonic()
+        with self._watches.subscribing:
+            self._read_at = time.monotonic()
             value = pruned(from_wire(master.call("subscribeParam", self._core.uri, self.name)))
             self._readings += 1
             number = self._readings
         value = None if value == {} else value
-        self._turn.add(lambda: self._take(number, value))
+        self._turn.add(lambda: self._on_reading(number, value))
 
     def close(self) -> None:
         """Follow it no more; safe to call twice."""
@@ -629,7 +628,7 @@ class ParameterWatch(Member):
 
     def _run(self) -> None:
         while True:
-            with self._errand:
+            with self._asking:
                 if not self._asked or self._closed:
                     self._busy = False
                     return
@@ -641,16 +640,16 @@ class ParameterWatch(Member):
             except Exception:
                 _log.exception("%s failed", self)
 
-    def _take(self, number: int, value: Any) -> None:
-        """Tell a value; one thread at a time, the newest reading only."""
-        if number < self._told:
+    def _on_reading(self, number: int, value: Any) -> None:
+        """Pass a value on; one thread at a time, the newest reading only."""
+        if number < self._newest:
             return
-        self._told = number
+        self._newest = number
         changed = not self._known or not same(value, self._value)
         self._known, self._value = True, value
         for subscription in self._subscriptions:
             if changed or not subscription.known:
-                subscription.tell(value)
+                subscription._on_value(value)
 
 
 def _within(name: str, namespace: str) -> bool:

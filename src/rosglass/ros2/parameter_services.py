@@ -116,9 +116,9 @@ class ParameterServices(Handle):
 
     def _announce(self) -> None:
         self._events = self._node.create_publisher(EVENTS, EVENT_TYPE, EVENTS_QOS)
-        self._made += [self._events, self._parameters.changes.add(self._tell, IMMEDIATE)]
+        self._made += [self._events, self._parameters.changes.add(self._publish_event, IMMEDIATE)]
 
-    def _tell(self, change: Change) -> None:
+    def _publish_event(self, change: Change) -> None:
         events = self._events
         assert events is not None
         with suppress(NodeClosedError):
@@ -131,7 +131,7 @@ class ParameterServices(Handle):
         for name in request.names:
             try:
                 descriptor = self._parameters.describe(name)
-            except (ParameterError, NodeClosedError):  # closing is told by the service's end
+            except (ParameterError, NodeClosedError):  # the service's end says that it closed
                 descriptor = ParameterDescriptor(name)
             descriptors.append(descriptor_to_message(descriptor))
         return {"descriptors": descriptors}

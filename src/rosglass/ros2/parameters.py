@@ -142,13 +142,15 @@ class Ros2Parameters(Parameters):
         self._version = 0
         self._validators: list[_Validator] = []
         self._waiting: deque[Change] = deque()
-        self._telling = False
+        self._notifying = False
         self._closed = False
         self.declare(
             USE_SIM_TIME, False, ParameterDescriptor(description="Follow the time on /clock.")
         )
-        told = ParameterDescriptor(description="Describe types to other nodes.", read_only=True)
-        self.declare(DESCRIBE_TYPES, True, told)
+        described = ParameterDescriptor(
+            description="Describe types to other nodes.", read_only=True
+        )
+        self.declare(DESCRIBE_TYPES, True, described)
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.node}>"
@@ -197,7 +199,7 @@ class Ros2Parameters(Parameters):
             self._entries[name] = _Entry(value, descriptor)
             self._version += 1
             self._waiting.append(Change({name: value}, {}, ()))
-        self._tell()
+        self._notify()
         return value.copy()
 
     def undeclare(self, name: str) -> None:
@@ -212,7 +214,7 @@ class Ros2Parameters(Parameters):
             del self._entries[name]
             self._version += 1
             self._waiting.append(Change({}, {}, (name,)))
-        self._tell()
+        self._notify()
 
     def get(self, name: str) -> ParameterValue:
         """Return its value, None when it has none; raises ParameterError when not declared."""
@@ -271,12 +273,12 @@ class Ros2Parameters(Parameters):
             problem = problem or self._validate({n: value.copy() for n, value in values.items()})
             if problem:
                 return problem
-            # Validators run unlocked; should others have set something meanwhile, ask them again.
+            # Validators run unlocked; ask them again should another thread have set something.
             with self._lock:
                 if self._version != version:
                     continue
                 self._apply(values)
-            self._tell()
+            self._notify()
             return ""
 
     def on_set(self, validate: Callable[[Mapping[str, ParameterValue]], str]) -> Handle:
@@ -331,7 +333,7 @@ class Ros2Parameters(Parameters):
         parameter_files.write(path, {self.node: values})
 
     def close(self) -> None:
-        """Call nobody back any more; safe to call twice."""
+        """Call back no more; safe to call twice."""
         with self._lock:
             self._closed = True
             self._validators.clear()
@@ -396,16 +398,16 @@ class Ros2Parameters(Parameters):
         self._version += 1
         self._waiting.append(Change({}, changed, tuple(deleted)))
 
-    def _tell(self) -> None:
-        """Tell changes in the order they were made, without holding a lock."""
+    def _notify(self) -> None:
+        """Notify of changes in the order they were made, without holding a lock."""
         with self._lock:
-            if self._telling:
+            if self._notifying:
                 return
-            self._telling = True
+            self._notifying = True
         while True:
             with self._lock:
                 if not self._waiting or self._closed:
-                    self._telling = False
+                    self._notifying = False
                     return
                 change = self._waiting.popleft()
             self.changes.notify(change)
@@ -582,7 +584,7 @@ def _typed_scalar(what: str, value: object) -> TypedValue:
     if parameter_type is ParameterType.STRING:
         assert isinstance(value, str)
         _check_text(what, value)
-    # Subclasses (IntEnum, numpy's float64) would surprise whoever reads the value.
+    # Subclasses (IntEnum, numpy's float64) would surprise its reader.
     return TypedValue(parameter_type, kind(value))
 
 
