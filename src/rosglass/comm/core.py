@@ -76,6 +76,8 @@ class NodeCore(ABC, Generic[_Member]):
     wire: str
     #: What is seen of the ROS graph.
     graph: Any
+    #: Finds types.
+    types: Any
     #: What moves the bytes; a ROS 1 node has none yet, and no endpoint of its asks for it.
     middleware: Middleware
     #: Announces a publisher, given its type, and returns its sending end.

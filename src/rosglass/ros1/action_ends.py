@@ -76,8 +76,8 @@ class ActionEnds:
 
     def tellers(self) -> dict[str, str]:
         """Return the nodes that are connected to tell the status of goals, with their URIs."""
-        intake = self._topics.subscribed().get(self._names[STATUS])
-        links = [] if intake is None else intake.links()
+        shared = self._topics.subscribed().get(self._names[STATUS])
+        links = [] if shared is None else shared.links()
         return {link.name: link.uri for link in links if link.connected}
 
     def missing(self, server: str) -> list[str]:
@@ -89,8 +89,8 @@ class ActionEnds:
             if all(end.node.full != server for end in there):
                 names.append(self._names[word])
         for word in (STATUS, RESULT, FEEDBACK):
-            intake = self._topics.subscribed().get(self._names[word])
-            links = [] if intake is None else intake.links()
+            shared = self._topics.subscribed().get(self._names[word])
+            links = [] if shared is None else shared.links()
             understood = self._subscriptions[word].publisher_count() > 0
             if not understood or all(n.name != server or not n.connected for n in links):
                 names.append(self._names[word])

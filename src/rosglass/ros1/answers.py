@@ -46,8 +46,8 @@ class Answers:
             for link in publication.links():
                 peer = link.header.get("callerid", link.peer)
                 found.append([len(found) + 1, peer, "o", _PROTOCOL, topic, True, link.info])
-        for topic, intake in self._topics.subscribed().items():
-            for source in intake.links():
+        for topic, shared in self._topics.subscribed().items():
+            for source in shared.links():
                 # The publisher's URI: rosnode and rqt_graph find the node by it.
                 told = [len(found) + 1, source.uri, "i", _PROTOCOL, topic, source.connected]
                 found.append([*told, source.info])
@@ -64,10 +64,10 @@ class Answers:
                 topic,
                 [
                     [n, min(source.received, _MOST), _UNKNOWN, _UNKNOWN, source.connected]
-                    for n, source in enumerate(intake.links(), 1)
+                    for n, source in enumerate(shared.links(), 1)
                 ],
             ]
-            for topic, intake in self._topics.subscribed().items()
+            for topic, shared in self._topics.subscribed().items()
         ]
         return [publishers, subscriptions, []]
 
@@ -93,9 +93,9 @@ class Answers:
 
     def publishers_changed(self, topic: str, uris: list[str]) -> None:
         """Take the publishers that a topic has now."""
-        intake = self._topics.subscribed().get(topic)
-        if intake is not None:
-            intake.publishers_changed(uris)
+        shared = self._topics.subscribed().get(topic)
+        if shared is not None:
+            shared.on_publishers_changed(uris)
 
     def request_topic(self, topic: str, protocols: list[Any]) -> list[Any]:
         """Return how to connect to a published topic.

@@ -100,6 +100,7 @@ class Core(NodeCore[Handle]):
 
     wire = "ros1"
     graph: Graph
+    types: Types
 
     def __init__(
         self, name: NodeName, url: str, options: Ros1Options, library: Library | None

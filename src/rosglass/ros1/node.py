@@ -21,6 +21,7 @@ from rosglass.comm.flags import check_flag
 from rosglass.comm.promise import check_timeout
 from rosglass.comm.rclpy_names import check_order
 from rosglass.comm.receiving import check_may_wait
+from rosglass.comm.subscription_feed import find_subscribed_type
 from rosglass.errors import InvalidNameError
 from rosglass.ros1.action_types import actions
 from rosglass.ros1.answers import Answers
@@ -29,7 +30,6 @@ from rosglass.ros1.core import Core
 from rosglass.ros1.names import absolute_namespace, split, validate_node_name
 from rosglass.ros1.outages import outlast
 from rosglass.ros1.parameter_server import ParameterServer
-from rosglass.ros1.reading import type_if_known
 from rosglass.ros1.roscpp_services import RoscppServices
 from rosglass.ros1.services import Services
 from rosglass.ros1.topics import Topics
@@ -144,7 +144,7 @@ class Ros1Node(CoreNode):
         self._core.check_open()
         check_order("create_subscription", topic, type)
         full = self.resolve(topic)
-        kind = type_if_known(self._core, full, type)
+        kind = find_subscribed_type(self._core, full, type)
         subscription = Subscription(
             full,
             kind,

@@ -14,7 +14,7 @@ from rosglass.ros1.master import reason_of
 from rosglass.ros1.topic_probe import publisher_addresses, subscriber_header
 
 if TYPE_CHECKING:
-    from rosglass.ros1.intake import Intake
+    from rosglass.ros1.topic_subscription import TopicSubscription
 
     Received = bytes | memoryview
 
@@ -43,7 +43,7 @@ class PublisherLink:
     """A publisher of the topic, as long as the master names it; all in the loop's thread.
 
     Args:
-        intake: Whom it belongs to.
+        subscription: The node's subscription of the topic.
         uri: The publisher's API.
         epoch: Which master named it.
 
@@ -59,14 +59,14 @@ class PublisherLink:
         ended: Whether it is forgotten.
     """
 
-    def __init__(self, intake: Intake, uri: str, epoch: int) -> None:
-        self.intake, self.uri, self.name, self.epoch = intake, uri, uri, epoch
-        self.topic = intake.topic
+    def __init__(self, subscription: TopicSubscription, uri: str, epoch: int) -> None:
+        self.subscription, self.topic, self.epoch = subscription, subscription.topic, epoch
+        self.uri = self.name = uri
         self.header: dict[str, str] = {}
         self.problem, self.lost = "", False
         self.latched: Received | None = None
         self.ended = False
-        self._core = intake.core
+        self._core = subscription.core
         self._connection: Connection | None = None
         self._addresses: list[tuple[str, int]] = []
         self._latches = False
@@ -175,28 +175,28 @@ class PublisherLink:
         self._silence, self._count = Silence(), 0
         self._measured_at, self._measured, self._rate = time.monotonic(), 0, 0.0
         self._core.unreachable.greet(self)
-        self.intake.greet(self)
+        self.subscription.on_publisher_connected(self)
 
     def _on_frames(self, frames: list[Received], _: int) -> None:
         received = time.time_ns()
         self._count += len(frames)
         if self._silence.problem:
-            self._core.wake()  # it is none any more
+            self.subscription.inform()  # it is none any more
         if self._latches:
             self.latched = frames[-1]
         try:
             for start in range(0, len(frames), _BATCH):
                 part = frames[start : start + _BATCH]
-                for reading in self.intake.readings:
-                    reading.take(self, part, received)
+                for reader in self.subscription.readers:
+                    reader.take(self, part, received)
             if len(frames) >= _BATCH and self._core.loop.is_current:
-                self._let_up()
+                self._apply_backpressure()
         except Exception:  # an executor of somebody's
-            _log.exception("%s: messages could not be handed on", self.intake.topic)
+            _log.exception("%s: messages could not be handed on", self.topic)
 
-    def _let_up(self) -> None:
+    def _apply_backpressure(self) -> None:
         """Read nothing for a moment if callbacks are behind: reading takes time from them."""
-        behind = max((one.subscription.waiting for one in self.intake.readings), default=0)
+        behind = max((reader.waiting for reader in self.subscription.readers), default=0)
         connection = self._connection
         if behind > _BEHIND and connection is not None:
             connection.pause(reading=False)
@@ -216,7 +216,7 @@ class PublisherLink:
         self.problem, self.lost = f"{self.name} {what}: {reason}; trying again", was_connected
         if not was_connected:
             self._core.unreachable.fail(self)
-        self.intake.part(self)
+        self.subscription.on_publisher_disconnected(self)
         if not self.ended:
             self._core.loop.after(self._delay, self._begin)
             self._delay = min(_LONGEST_RETRY, 2 * self._delay)

@@ -8,12 +8,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointKind, QoS
+from rosglass.comm.subscription_feed import SubscriptionFeed
 from rosglass.errors import Error, TypeNotFoundError
 from rosglass.interfaces import ros1_name
-from rosglass.ros1.intake import Intake
 from rosglass.ros1.publication import Publication
-from rosglass.ros1.reading import Reading
 from rosglass.ros1.topic_probe import ask_publisher
+from rosglass.ros1.topic_subscription import TopicSubscription
+from rosglass.ros1.type_negotiation import TypeNegotiation
 from rosglass.ros1.types import ANY
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ _TIMEOUT = 5.0
 
 
 class Topics:
-    """Publications and intakes by topic.
+    """Publications and subscriptions by topic.
 
     Args:
         core: The node.
@@ -49,7 +50,7 @@ class Topics:
         self._publications: dict[str, Publication] = {}
         #: Who takes connections of topics that are about to be published.
         self._stand_ins: dict[str, Callable[[Connection, dict[str, str]], str]] = {}
-        self._intakes: dict[str, Intake] = {}
+        self._subscribed: dict[str, TopicSubscription] = {}
         core.create_writer = self.create_writer
 
     def create_writer(self, endpoint: EndpointInfo, type: MessageType) -> PublicationWriter:
@@ -89,20 +90,19 @@ class Topics:
         """
         topic = subscription.topic
         with self._lock:
-            intake = self._intakes.get(topic)
-            new = intake is None
-            if intake is None:
+            shared = self._subscribed.get(topic)
+            new = shared is None
+            if shared is None:
                 kind = subscription.type
                 name = ANY if kind is None else ros1_name(kind.name)
                 name = ros1_name(type_name) if type_name else name
-                intake = self._intakes[topic] = Intake(self._core, self, topic, name)
-            intake.join(
-                Reading(
-                    self._core, intake, subscription, type_name, ignore_local, self._end_reading
-                )
+                shared = self._subscribed[topic] = TopicSubscription(self._core, self, topic, name)
+            matching = TypeNegotiation(
+                self._core, shared, subscription, type_name, ignore_local, self._end_subscription
             )
+            SubscriptionFeed(self._core, subscription, matching)
         if new:
-            self._core.add(intake)
+            self._core.add(shared)
         elif self._core.closed:
             subscription.close()
             self._core.check_open()
@@ -188,10 +188,10 @@ class Topics:
 
     def _known(self, topic: str, node: NodeName) -> dict[str, str]:
         """Return what is known already of a publisher, empty for nothing."""
-        publication, intake = self._publications.get(topic), self._intakes.get(topic)
+        publication, shared = self._publications.get(topic), self._subscribed.get(topic)
         if node == self._core.name:
             return {} if publication is None else publication.header()
-        for link in intake.links() if intake is not None else ():
+        for link in shared.links() if shared is not None else ():
             if link.connected and link.name == node.full:
                 return link.header
         return {}
@@ -205,9 +205,9 @@ class Topics:
         """Return what is published, by topic."""
         return dict(self._publications)
 
-    def subscribed(self) -> dict[str, Intake]:
+    def subscribed(self) -> dict[str, TopicSubscription]:
         """Return what is subscribed to, by topic."""
-        return dict(self._intakes)
+        return dict(self._subscribed)
 
     def _end_writer(self, writer: PublicationWriter) -> None:
         publication = writer.publication
@@ -218,14 +218,14 @@ class Topics:
         if last:
             publication.close()
 
-    def _end_reading(self, reading: Reading) -> None:
-        intake = reading.intake
+    def _end_subscription(self, reader: TypeNegotiation) -> None:
+        shared = reader.topic
         with self._lock:
-            last = intake.leave(reading)
-            if last and self._intakes.get(intake.topic) is intake:
-                del self._intakes[intake.topic]
+            last = shared.leave(reader)
+            if last and self._subscribed.get(shared.topic) is shared:
+                del self._subscribed[shared.topic]
         if last:
-            intake.close()
+            shared.close()
 
 
 def _described(end: EndpointInfo, header: dict[str, str]) -> EndpointInfo:

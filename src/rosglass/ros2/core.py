@@ -52,6 +52,7 @@ class Core(NodeCore[Handle]):
 
     wire = "cdr"
     graph: Graph
+    types: Types
 
     def __init__(
         self,

@@ -10,11 +10,12 @@ from rosglass.comm.core_node import CoreNode
 from rosglass.comm.flags import check_flag
 from rosglass.comm.names import validate_namespace, validate_node_name
 from rosglass.comm.rclpy_names import check_order
+from rosglass.comm.subscription_feed import SubscriptionFeed, find_subscribed_type
 from rosglass.errors import ArgumentError
 from rosglass.ros2.arguments import NO_ARGUMENTS
 from rosglass.ros2.core import Core
+from rosglass.ros2.graph_matching import GraphMatching
 from rosglass.ros2.rcl_services import RclServices
-from rosglass.ros2.reading import Reading, type_if_known
 from rosglass.ros2.service_client import create_service_client
 from rosglass.ros2.service_replier import create_service_server
 from rosglass.ros2.type_fetching import TypeFetcher
@@ -116,13 +117,15 @@ class Ros2Node(CoreNode):
         check_flag(ignore_local, "ignore_local", full)
         subscription = Subscription(
             full,
-            type_if_known(self._core, full, type),
+            find_subscribed_type(self._core, full, type),
             _profile(qos, full),
             executor or self._core.dispatcher,
             callback,
             raw_callback,
         )
-        Reading(self._core, subscription, type, ignore_local)
+        ignored = self._core.local_gids if ignore_local else frozenset[bytes]()
+        matching = GraphMatching(self._core, subscription, type, ignored)
+        self._core.add(SubscriptionFeed(self._core, subscription, matching, ignored))
         return subscription
 
     def create_service_client(

@@ -75,7 +75,7 @@ class TopicTypes:
             return False
         return not self._hash or endpoint.type_hash in self.accepted
 
-    def meet(self, type_hash: str) -> MessageType | None:
+    def find_type(self, type_hash: str) -> MessageType | None:
         """Return the type for samples with an unknown hash; from any thread, at once."""
         ours = self.type
         if ours is not None and not self._hash:

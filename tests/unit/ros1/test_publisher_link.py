@@ -27,7 +27,7 @@ def flood(connect, eventually, monkeypatch):
 
     subscription = cockpit.create_subscription("/flood", "std_msgs/Int32", take, ALL)
     eventually(lambda: subscription.publisher_count() and publisher.subscription_count())
-    (link,) = cockpit._topics._intakes["/flood"].links()
+    (link,) = cockpit._topics.subscribed()["/flood"].links()
     yield publisher, subscription, link, gate, got
     gate.set()
 

@@ -14,8 +14,8 @@ from waiting import eventually
 import rosglass
 from rosglass.comm import ConnectionState, EndpointKind, NodeName
 from rosglass.ros1 import address, farewells
-from rosglass.ros1.intake import Intake
 from rosglass.ros1.publication import Publication
+from rosglass.ros1.topic_subscription import TopicSubscription
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -92,7 +92,7 @@ def test_closing_from_other_threads_at_the_same_time(
 def test_one_that_is_closed_while_the_master_is_told_of_the_one_before(
     master: FakeMaster, node: Ros1Node, create: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    member = Publication if create == "create_publisher" else Intake
+    member = Publication if create == "create_publisher" else TopicSubscription
     offers = master.publishers if create == "create_publisher" else master.subscribers
     first = getattr(node, create)("/a", "std_msgs/Empty")
     eventually(lambda: "/panel" in offers.get("/a", {}))

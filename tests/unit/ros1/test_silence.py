@@ -29,7 +29,7 @@ def test_a_publisher_that_falls_silent_is_a_problem_until_its_next_message(
 
         sending = threading.Thread(target=publish, daemon=True)
         sending.start()
-        (link,) = eventually(cockpit._topics._intakes["/odom"].links)
+        (link,) = eventually(cockpit._topics.subscribed()["/odom"].links)
         eventually(lambda: link._silence._regular >= silence._LOOKS)
         frozen.set()
         sending.join()
@@ -50,7 +50,7 @@ def test_a_latched_message_is_not_missed(connect, eventually, monkeypatch):
     robot.create_publisher("/map", "std_msgs/Int32", LATCHED).publish({"data": 1})
     subscription = cockpit.create_subscription("/map", "std_msgs/Int32")
     assert eventually(subscription.take_latest)
-    (link,) = cockpit._topics._intakes["/map"].links()
+    (link,) = cockpit._topics.subscribed()["/map"].links()
     for _ in range(3):
         link.listen()
     assert not link.silence

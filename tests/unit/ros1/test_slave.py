@@ -126,7 +126,7 @@ def test_unknown_methods_and_publishers_are_harmless(api: Any, node: Ros1Node) -
     ]
     assert api.publisherUpdate("/m", "/any", strange)[0] == 1
     subscription = next(
-        one.readings[0].subscription
+        one.readers[0].feed.subscription
         for topic, one in node._topics.subscribed().items()
         if topic == "/any"
     )

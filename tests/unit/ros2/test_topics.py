@@ -315,7 +315,7 @@ def test_changing_readers_neither_loses_nor_repeats(node, middleware, robot, eve
         got.append((sample.publisher[:1], sample.sent_ns))
     assert got == [(p, n) for p in (b"g", b"u") for n in (1, 2, 3)] + [(b"g", 4), (b"u", 4)]
     # A publisher whose clock is set back later is heard all the same.
-    eventually(lambda: not subscription.source._repeats.guarded)
+    eventually(lambda: not subscription.source._matching._repeats.guarded)
     second.on_sample(HELLO, 10, 2, b"u" * 16, -1, "")
     assert subscription.take() is not None
 

@@ -1,4 +1,4 @@
-"""What a node subscribes to on one topic: one registration, and the publishers' connections."""
+"""A topic that a node subscribes to: one registration, and the publishers' connections."""
 
 from __future__ import annotations
 
@@ -14,39 +14,39 @@ from rosglass.ros1.publisher_link import PublisherLink
 if TYPE_CHECKING:
     from rosglass.ros1.core import Core
     from rosglass.ros1.master import Master
-    from rosglass.ros1.reading import Reading
     from rosglass.ros1.topics import Topics
+    from rosglass.ros1.type_negotiation import TypeNegotiation
 
-__all__ = ["Intake"]
+__all__ = ["TopicSubscription"]
 
 _log = logging.getLogger("rosglass.ros1")
 
 
-class Intake(Member):
+class TopicSubscription(Member):
     """A topic that the node subscribes to, shared by its subscriptions of that topic.
 
     Args:
         core: The node.
         topics: The node's topics.
         topic: Absolute topic name.
-        type_name: What the master is told, ``pkg/Type``; ``*`` for any.
+        type_name: For the master, ``pkg/Type``; ``*`` for any.
 
     Attributes:
-        readings: The subscriptions; replaced, never changed: the loop's thread goes through them
-            for each message.
-        eager: Whether somebody waits for messages.
+        readers: One for each subscription; replaced, never changed: the loop's thread goes through
+            them for each message.
+        eager: Whether messages are waited for.
     """
 
     def __init__(self, core: Core, topics: Topics, topic: str, type_name: str) -> None:
         self.core, self.topic = core, topic
         self.type_name = type_name
-        self.readings: tuple[Reading, ...] = ()
+        self.readers: tuple[TypeNegotiation, ...] = ()
         self.eager = True
         self._topics = topics
         self._lock = threading.Lock()
         self._links: dict[str, PublisherLink] = {}
         self._closed = False
-        #: Which master was told of it, counted from 0, and how often one told of publishers.
+        #: Which master knows it, counted from 0, and how often one has named publishers.
         self._epoch, self._updates = -1, 0
 
     def links(self) -> list[PublisherLink]:
@@ -55,35 +55,36 @@ class Intake(Member):
 
     # -- subscriptions ---------------------------------------------------------------------------
 
-    def join(self, reading: Reading) -> None:
-        """Feed a subscription from now on, with latched messages first; from any thread."""
+    def join(self, reader: TypeNegotiation) -> None:
+        """Hand on messages to a subscription, latched ones first; from any thread."""
         with self._lock:
-            self.readings = (*self.readings, reading)
-        self.core.loop.call(lambda: self._join(reading))
+            self.readers = (*self.readers, reader)
+        self.core.loop.call(lambda: self._join(reader))
 
-    def _join(self, reading: Reading) -> None:
+    def _join(self, reader: TypeNegotiation) -> None:
         for link in self.links():
             if link.connected:
-                reading.meet(link, lambda link=link: self._catch_up(reading, link))  # type: ignore[misc]
+                reader.negotiate_type(link, lambda link=link: self._catch_up(reader, link))  # type: ignore[misc]
         self.attend()
 
-    def _catch_up(self, reading: Reading, link: PublisherLink) -> None:
-        """Give a subscription that came late what it would have got on a connection of its own."""
+    def _catch_up(self, reader: TypeNegotiation, link: PublisherLink) -> None:
+        """Hand on what a connection of the subscription's own would have brought."""
         if link.uri == self.core.uri:
             for data in self._topics.latched(self.topic):
-                reading.take(link, [data], time.time_ns())
+                reader.take(link, [data], time.time_ns())
         elif link.latched is not None:
-            reading.take(link, [link.latched], time.time_ns())
+            reader.take(link, [link.latched], time.time_ns())
+        reader.feed.inform()
 
-    def leave(self, reading: Reading) -> bool:
-        """Feed a subscription no more; return whether it was the last one."""
+    def leave(self, reader: TypeNegotiation) -> bool:
+        """Hand on nothing more to a subscription; return whether it was the last one."""
         with self._lock:
-            self.readings = tuple(one for one in self.readings if one is not reading)
-            return not self.readings
+            self.readers = tuple(one for one in self.readers if one is not reader)
+            return not self.readers
 
     def attend(self) -> None:
-        """Have messages handed on as they come only while somebody waits; from any thread."""
-        eager = any(one.subscription.watched for one in self.readings)
+        """Hand on messages as they come only while they are waited for; from any thread."""
+        eager = any(reader.eager for reader in self.readers)
         if eager != self.eager:
             self.eager = eager
             self.core.loop.call(self._attend)
@@ -99,10 +100,15 @@ class Intake(Member):
 
     # -- publishers, in the loop's thread --------------------------------------------------------
 
-    def greet(self, link: PublisherLink) -> None:
-        """Let the subscriptions know that a publisher is connected; it waits until they do."""
-        readings = list(self.readings)
-        left = len(readings) + 1
+    def inform(self) -> None:
+        """Let the subscriptions' feeds look soon; from any thread."""
+        for reader in self.readers:
+            reader.feed.inform()
+
+    def on_publisher_connected(self, link: PublisherLink) -> None:
+        """Negotiate the type with every subscription, then resume reading."""
+        readers = list(self.readers)
+        left = len(readers) + 1
 
         def decided() -> None:
             nonlocal left
@@ -110,24 +116,24 @@ class Intake(Member):
             if not left:
                 link.resume()
                 link.attend(self.eager)
-                self.core.wake()
+                self.inform()
 
-        for reading in readings:
-            reading.meet(link, decided)
+        for reader in readers:
+            reader.negotiate_type(link, decided)
         decided()
 
-    def part(self, link: PublisherLink) -> None:
-        """Let the subscriptions know that a publisher is not connected any more."""
+    def on_publisher_disconnected(self, link: PublisherLink) -> None:
+        """Let the subscriptions forget a publisher."""
         _log.debug("%s: %s", self.topic, link.problem)
-        for reading in self.readings:
-            reading.part(link)
+        for reader in self.readers:
+            reader.on_publisher_disconnected(link)
         if link.epoch != self._epoch:
             # No master knows it any more: it was kept as long as it sent something.
             self._forget(link)
-        self.core.wake()
+        self.inform()
 
-    def publishers_changed(self, uris: list[str]) -> None:
-        """Connect with who is new, and forget who has gone; from any thread."""
+    def on_publishers_changed(self, uris: list[str]) -> None:
+        """Connect with new publishers, and forget those that have gone; from any thread."""
         self._updates += 1
         self.core.loop.call(lambda: self._take_publishers(uris))
 
@@ -150,13 +156,13 @@ class Intake(Member):
                 self._links[uri] = PublisherLink(self, uri, self._epoch)
             else:
                 known.epoch = self._epoch
-        self.core.wake()
+        self.inform()
 
     def _forget(self, link: PublisherLink) -> None:
         self._links.pop(link.uri, None)
         link.end()
-        for reading in self.readings:
-            reading.part(link)
+        for reader in self.readers:
+            reader.on_publisher_disconnected(link)
 
     # -- as a member -----------------------------------------------------------------------------
 
@@ -192,11 +198,10 @@ class Intake(Member):
         """Let the subscriptions tell what has changed."""
         for link in self.links():
             link.listen()
-        for reading in self.readings:
-            reading.follow(moved, idle)
+        for reader in self.readers:
+            reader.feed.follow(moved, idle)
         if idle:
             # The rate of what comes may be another one now.
-            self.eager = any(one.subscription.watched for one in self.readings)
             self.core.loop.call(self._attend)
 
     def close(self) -> None:
@@ -205,9 +210,9 @@ class Intake(Member):
             if self._closed:
                 return
             self._closed = True
-            readings = self.readings
-        for reading in readings:
-            reading.close()
+            readers = self.readers
+        for reader in readers:
+            reader.feed.close()
         self.core.loop.call(self._end)
         self.core.remove(self)
 
