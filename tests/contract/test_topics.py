@@ -311,6 +311,35 @@ def test_a_publisher_that_pauses_misses_its_deadline(robot, topic, eventually):
     assert len(events) <= count + 1
 
 
+def test_a_publisher_that_comes_and_goes_between_two_looks_is_reported(
+    robot, console, topic, eventually
+):
+    events, held, free = [], threading.Event(), threading.Event()
+    subscription = console.create_subscription(topic, TEXT)
+    subscription.on_matched(
+        lambda e: events.append((e.endpoint.node.full, e.change, e.count, e.total))
+    )
+
+    def hold():
+        held.set()
+        free.wait(60)
+
+    # The thread that looks calls this itself, and looks no more until it returns.
+    console.on_graph_change(hold, executor=IMMEDIATE)
+    try:
+        first = robot.create_publisher(topic, TEXT)
+        eventually(lambda: held.is_set() and subscription.publisher_count())
+        first.close()
+        eventually(lambda: not subscription.publisher_count())
+    finally:
+        free.set()
+    came, went = eventually(lambda: events[1:] and events)
+    assert (came[1:], went[1:]) == ((1, 1, 1), (-1, 0, 1))
+    assert robot.create_publisher(topic, TEXT)
+    eventually(lambda: events[2:])
+    assert events[2][1:] == (1, 1, 2)
+
+
 def test_two_types_on_a_topic_are_a_problem_that_names_both(robot, console, topic, eventually):
     robot.create_publisher(topic, TWIST)
     subscription = console.create_subscription(topic, TEXT)

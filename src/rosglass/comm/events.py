@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 from rosglass.comm.listeners import Listener, Listeners
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable, Iterable
+    from collections.abc import Callable, Hashable, Iterable, Sequence
 
     from rosglass.comm.graph import EndpointInfo
     from rosglass.comm.node import Executor, Handle
@@ -157,6 +157,7 @@ class Appearances(Generic[_E]):
         self,
         endpoints: Iterable[EndpointInfo],
         event: Callable[[EndpointInfo, int, int, int], _E | None],
+        left: Sequence[EndpointInfo] = (),
     ) -> None:
         """Tell everyone the difference to what they were told; always from the same thread.
 
@@ -165,7 +166,22 @@ class Appearances(Generic[_E]):
                 later, such as the node's name.
             event: Called with an endpoint, the change (1 or -1), how many are there now, and how
                 many have appeared in all; returns what to tell, None for nothing.
+            left: Those that left since the last call, in that order. Listeners learn of each that
+                had come since then as well, once.
         """
+        there = list(endpoints)
+        now = {endpoint.gid or endpoint for endpoint in there}
+        gone = {key: one for one in left if (key := one.gid or one) not in now}
+        while gone:
+            self._update([*there, *gone.values()], event)
+            del gone[next(iter(gone))]
+        self._update(there, event)
+
+    def _update(
+        self,
+        endpoints: Iterable[EndpointInfo],
+        event: Callable[[EndpointInfo, int, int, int], _E | None],
+    ) -> None:
         with self._lock:
             for listener in [one for one in self._known if one.closed]:
                 del self._known[listener]

@@ -125,6 +125,24 @@ class Graph:
         self._endpoints: dict[Hashable, EndpointInfo] = {}
         self._by_name: dict[str, dict[Hashable, EndpointInfo]] = {}
         self._by_node: dict[NodeName, dict[Hashable, EndpointInfo]] = {}
+        self._watchers: dict[str, list[Callable[[EndpointInfo], None]]] = {}
+
+    def watch(self, name: str, on_endpoint_removed: Callable[[EndpointInfo], None]) -> None:
+        """Report each endpoint of a topic or service that is removed, however briefly it was there.
+
+        Args:
+            name: Of the topic or service.
+            on_endpoint_removed: Called in the thread that removes it; must return at once.
+        """
+        with self._lock:
+            self._watchers.setdefault(name, []).append(on_endpoint_removed)
+
+    def unwatch(self, name: str, on_endpoint_removed: Callable[[EndpointInfo], None]) -> None:
+        """Take back what :meth:`watch` was given; safe to call twice."""
+        with self._lock:
+            left = [one for one in self._watchers.pop(name, ()) if one != on_endpoint_removed]
+            if left:
+                self._watchers[name] = left
 
     def put_node(self, key: Hashable, node: NodeName) -> None:
         """Add the node known as `key`."""
@@ -158,7 +176,12 @@ class Graph:
     def remove(self, key: Hashable) -> None:
         """Remove the node or endpoint known as `key`, if there is one."""
         with self._lock:
+            endpoint = self._endpoints.get(key)
+            watchers = [] if endpoint is None else self._watchers.get(endpoint.name, []).copy()
             moved = self._remove(key)
+        if endpoint is not None:
+            for on_endpoint_removed in watchers:
+                on_endpoint_removed(endpoint)
         if moved:
             self._changed()
 

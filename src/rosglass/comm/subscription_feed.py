@@ -6,6 +6,7 @@ import logging
 import threading
 import time
 from abc import ABC, abstractmethod
+from collections import deque
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.core import NodeMember
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
 __all__ = ["Problem", "SubscriptionFeed", "TopicMatching", "find_subscribed_type"]
 
 _PUBLISHER = EndpointKind.PUBLISHER
+#: Publishers that left since the last look, and are reported at the next one.
+_MAX_LEFT = 1000
 
 
 def find_subscribed_type(
@@ -154,6 +157,7 @@ class SubscriptionFeed(NodeMember, Source):
         self._lazy: Reader | None = None
         self._closed = False
         self._known: list[EndpointInfo] | None = None
+        self._left: deque[EndpointInfo] = deque(maxlen=_MAX_LEFT)
         self._reported_lost = self._missed = 0
         self._deadline: Watchdog | None = None
         subscription.source, subscription.on_close = self, self._end
@@ -210,6 +214,11 @@ class SubscriptionFeed(NodeMember, Source):
 
     # -- following the graph ---------------------------------------------------------------------
 
+    def on_publisher_left(self, endpoint: EndpointInfo) -> None:
+        """Report a matching publisher that left, even if no look has found it; from any thread."""
+        self._left.append(endpoint)
+        self.inform()
+
     def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - types may be added, too
         """Follow the publishers; now and then look again for a definition that was not found."""
         if self._closed:
@@ -225,8 +234,11 @@ class SubscriptionFeed(NodeMember, Source):
         except Error as error:
             problems = [Problem(str(error))]
         matching = self._matching.find_matching(publishers)
+        left = [self._left.popleft() for _ in range(len(self._left))]
+        if left:
+            self._loss.follow(left)
         self._report_problems(problems, matching or publishers, bool(matching))
-        self._report_events(publishers, matching)
+        self._report_events(publishers, matching, left)
         self.attend()
         if idle:
             self._report_losses()
@@ -265,10 +277,13 @@ class SubscriptionFeed(NodeMember, Source):
     # -- events ----------------------------------------------------------------------------------
 
     def _report_events(
-        self, publishers: Sequence[EndpointInfo], matching: list[EndpointInfo]
+        self,
+        publishers: Sequence[EndpointInfo],
+        matching: list[EndpointInfo],
+        left: Sequence[EndpointInfo],
     ) -> None:
         events = self.subscription.events
-        events.matched.update(matching, Matched)
+        events.matched.update(matching, Matched, left)
         if events.incompatible:
             found = self._matching.find_conflicts(publishers)
             events.incompatible.update(found, conflict_events(found))

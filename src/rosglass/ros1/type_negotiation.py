@@ -156,8 +156,11 @@ class TypeNegotiation(TopicMatching, Reader):
 
     def on_publisher_disconnected(self, link: PublisherLink) -> None:
         """Forget a publisher, which is not connected any more."""
-        for known in (self._accepted, self._refused, self._remarks):
+        accepted = self._accepted.pop(link, None)
+        for known in (self._refused, self._remarks):
             known.pop(link, None)
+        if accepted is not None:
+            self.feed.on_publisher_left(self._endpoint(link, *accepted))
 
     def take(
         self, link: PublisherLink, frames: Sequence[bytes | memoryview], received: int

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 __all__ = ["GraphMatching"]
 
+_PUBLISHER = EndpointKind.PUBLISHER
+
 
 class GraphMatching(TopicMatching):
     """Finds the type and the profile that match a topic's publishers, and reads with them.
@@ -64,6 +66,7 @@ class GraphMatching(TopicMatching):
         """Decide on the profile, and read as soon as the type is known."""
         self._feed = feed
         self._subscription.set_qos(self._wanted.for_subscription(self._offers(publishers)))
+        self._core.graph.watch(self._topic, self._on_endpoint_removed)
         if self._types.type is not None:
             self._read(self._types.type)
 
@@ -118,9 +121,18 @@ class GraphMatching(TopicMatching):
         if reader is not None:
             reader.close()
         self._liveness.close()
+        self._core.graph.unwatch(self._topic, self._on_endpoint_removed)
 
     def _inform(self) -> None:
         self._feed.inform()
+
+    def _on_endpoint_removed(self, endpoint: EndpointInfo) -> None:
+        if endpoint.kind is not _PUBLISHER or not self.find_matching([endpoint]):
+            return
+        # The node's own publishers that are closed are no longer among its identities.
+        ignores_own = self._ignored is self._core.local_gids
+        if not (ignores_own and endpoint.node == self._core.name):
+            self._feed.on_publisher_left(endpoint)
 
     # -- quality of service ----------------------------------------------------------------------
 

@@ -44,6 +44,23 @@ def test_who_comes_and_goes_is_told_with_counts():
     ]
 
 
+def test_who_came_and_went_since_the_last_look_is_told():
+    appearances = Appearances()
+    events, _ = told(appearances)
+    known = endpoint("known", b"k")
+    appearances.update([known], Matched, [A])
+    appearances.update([B], Matched, [A, known, A, B])
+    assert events == [
+        ("known", 1, 1, 1),
+        ("a", 1, 2, 2),
+        ("a", -1, 1, 2),
+        ("b", 1, 2, 3),
+        ("a", 1, 3, 4),
+        ("a", -1, 2, 4),
+        ("known", -1, 1, 4),
+    ]
+
+
 def test_those_who_are_there_are_told_to_each_new_listener_once():
     appearances = Appearances()
     first, _ = told(appearances)
