@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import threading
 
 import pytest
 from waiting import nothing_happens
 
 import rosglass
-from rosglass import QoS
-from rosglass.comm import IMMEDIATE, NodeName, Sample
+from rosglass import Duration, QoS
+from rosglass.comm import IMMEDIATE, Matched, NodeName, Sample
 
 TEXT, TWIST, IMAGE = "std_msgs/msg/String", "geometry_msgs/msg/Twist", "sensor_msgs/msg/Image"
 HEADER = "std_msgs/msg/Header"
@@ -247,16 +248,20 @@ def test_ignore_local_leaves_out_what_this_node_publishes(robot, console, topic,
     assert received == ["other"]
 
 
-def test_publishers_and_subscriptions_that_come_and_go_are_reported(
-    robot, console, topic, eventually
-):
-    counts = []
+def test_publishers_that_come_and_go_are_reported(connect, robot, console, topic, eventually):
+    events = []
     subscription = console.create_subscription(topic, TEXT)
-    subscription.on_matched(lambda event: counts.append(event.count))
-    publisher = robot.create_publisher(topic, TEXT)
-    eventually(lambda: counts == [1], lambda: counts)
-    publisher.close()
-    eventually(lambda: counts == [1, 0], lambda: counts)
+    subscription.on_matched(lambda e: events.append((e.change, e.count, e.total)))
+    first = robot.create_publisher(topic, TEXT)
+    eventually(lambda: events == [(1, 1, 1)], lambda: events)
+    assert connect("wrong").create_publisher(topic, TWIST)
+    assert connect("second").create_publisher(topic, TEXT)
+    eventually(lambda: events[1:] == [(1, 2, 2)], lambda: events)
+    eventually(lambda: "geometry_msgs" in subscription.problem, lambda: subscription.problem)
+    assert subscription.publisher_count() == 2
+    first.close()
+    eventually(lambda: events[2:] == [(-1, 1, 2)], lambda: events)
+    subscription.close()
     assert subscription.publisher_count() == 0
 
 
@@ -293,6 +298,8 @@ def test_a_publisher_without_subscriptions_hints_at_a_name_that_is_alike(
     )
     console.create_subscription(f"{topic}/cmd_vle", TEXT)
     eventually(lambda: publisher.hint == "")
+    publisher.close()
+    assert publisher.hint == ""
 
 
 def test_a_publisher_that_pauses_misses_its_deadline(robot, topic, eventually):
@@ -309,6 +316,14 @@ def test_a_publisher_that_pauses_misses_its_deadline(robot, topic, eventually):
     count = len(events)
     nothing_happens(0.12)
     assert len(events) <= count + 1
+
+
+def test_publishers_that_are_there_already_are_reported_first(link, eventually):
+    _, subscription = link()
+    for _ in range(2):
+        events = []
+        subscription.on_matched(lambda e, told=events: told.append((e.change, e.count)))
+        eventually(lambda told=events: told == [(1, 1)])
 
 
 def test_a_publisher_that_comes_and_goes_between_two_looks_is_reported(
@@ -338,6 +353,87 @@ def test_a_publisher_that_comes_and_goes_between_two_looks_is_reported(
     assert robot.create_publisher(topic, TEXT)
     eventually(lambda: events[2:])
     assert events[2][1:] == (1, 1, 2)
+
+
+def test_a_publisher_is_alive_while_it_is_there(robot, console, topic, eventually):
+    events = []
+    subscription = console.create_subscription(topic, TEXT)
+    subscription.on_liveliness_change(lambda e: events.append((e.change, e.alive, e.not_alive)))
+    publisher = robot.create_publisher(topic, TEXT)
+    eventually(lambda: events == [(1, 1, 0)], lambda: events)
+    publisher.close()
+    eventually(lambda: events[1:] == [(-1, 0, 0)], lambda: events)
+
+
+def test_a_deadline_that_passes_without_message_is_reported(robot, console, topic, eventually):
+    qos = QoS(deadline=Duration.from_seconds(0.2))
+    subscription = console.create_subscription(topic, TEXT, qos=qos)
+    events = []
+    subscription.on_deadline_missed(events.append)
+    subscription.on_matched(events.append)
+    assert robot.create_publisher(topic, TEXT, qos)
+    eventually(lambda: len(events) >= 3, lambda: events)
+    matched, first, second = events[:3]
+    assert isinstance(matched, Matched), "time runs from the moment that a publisher matches"
+    assert (first.total, second.total) == (first.change, first.change + second.change)
+
+
+def test_a_subscription_says_which_publisher_left(robot, console, topic, eventually, caplog):
+    subscription = console.create_subscription(topic, TEXT)
+    problems = []
+    subscription.on_problem_change(problems.append)
+    publisher = robot.create_publisher(topic, TEXT)
+    eventually(subscription.publisher_count)
+    # Over DDS, a publisher is seen before its node's name is.
+    eventually(lambda: [end.node.full for end in console.publishers(topic)] == ["/robot"])
+    assert subscription.problem == ""
+    publisher.close()
+    left = re.compile(r"nobody has published it since \d\d:\d\d:\d\d, when /robot left")
+    told = eventually(lambda: left.fullmatch(subscription.problem), lambda: subscription.problem)
+    assert [r for r in caplog.records if r.levelname == "WARNING"] == []
+    assert robot.create_publisher(topic, TEXT)
+    eventually(lambda: not subscription.problem)
+    eventually(lambda: problems[-2:] == [told.group(), ""], lambda: problems)
+
+
+def test_a_publisher_of_ones_own_is_not_missed(robot, topic, eventually):
+    subscription = robot.create_subscription(topic, TEXT)
+    counts = []
+    subscription.on_matched(lambda event: counts.append(event.count))
+    publisher = robot.create_publisher(topic, TEXT)
+    eventually(lambda: counts == [1], lambda: counts)
+    publisher.close()
+    eventually(lambda: counts == [1, 0], lambda: counts)
+    assert "left" not in subscription.problem
+
+
+def test_hints_at_topics_that_were_meant(robot, console, topic, eventually):
+    name = f"{topic}_lidar".strip("/")
+    published = robot.create_publisher(f"{topic}/front/{name}", TEXT)
+    subscription = console.create_subscription(f"/{name}", TEXT)
+    hint = f"nobody publishes /{name}; did you mean {topic}/front/{name}?"
+    eventually(lambda: subscription.hint == hint, lambda: subscription.hint)
+    assert subscription.problem == ""
+    assert console.create_subscription(published.topic).hint == ""
+    subscription.close()
+    assert subscription.hint == ""
+
+
+def test_waiting_in_vain_says_why(robot, console, topic, eventually):
+    with pytest.raises(rosglass.TimeoutError, match=f"{topic}: no message within 0.01 s: nobody"):
+        console.wait_for_message(topic, timeout=0.01)
+    robot.create_publisher(topic, TEXT)
+    eventually(lambda: console.publishers(topic))
+    with pytest.raises(rosglass.TimeoutError, match="it is published, but nothing came"):
+        console.wait_for_message(topic, TEXT, timeout=0.01)
+
+
+def test_waiting_ends_with_the_node(console, topic):
+    later = threading.Timer(0.05, console.close)
+    later.start()
+    with pytest.raises(rosglass.NodeClosedError):
+        console.wait_for_message(topic, TEXT)
+    later.join()
 
 
 def test_two_types_on_a_topic_are_a_problem_that_names_both(robot, console, topic, eventually):

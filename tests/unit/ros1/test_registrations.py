@@ -254,13 +254,6 @@ def test_the_graph_is_told_and_changes_are(master: FakeMaster, node: Ros1Node) -
     eventually(lambda: "/scan" not in node.topics())
 
 
-def test_misspelled_topics_are_pointed_out(master: FakeMaster, node: Ros1Node) -> None:
-    master.publishers["/robot/scan"] = {"/laser": "http://127.0.0.1:1/"}
-    subscription = node.create_subscription("/scan")
-    eventually(lambda: "/robot/scan" in node.topics())
-    assert subscription.hint == "nobody publishes /scan; did you mean /robot/scan?"
-
-
 def test_a_publisher_that_is_registered_but_gone_is_named(
     master: FakeMaster, node: Ros1Node
 ) -> None:

@@ -9,7 +9,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
-from waiting import eventually, nothing_happens
+from waiting import nothing_happens
 
 import rosglass
 from rosglass import Duration, QoS
@@ -18,11 +18,9 @@ from rosglass.comm import (
     ConnectionState,
     DeadlineMissed,
     Durability,
-    EndpointInfo,
     EndpointKind,
     Liveliness,
     LivelinessLost,
-    NodeName,
     Reliability,
     SamplesLost,
 )
@@ -68,24 +66,6 @@ def asker(middleware):
 
 
 # -- who matches ---------------------------------------------------------------------------------
-
-
-def test_a_subscription_tells_which_publishers_match(node, middleware, robot, eventually):
-    first = robot(node="first")
-    subscription = node.create_subscription("/t", STRING)
-    events = []
-    subscription.on_matched(events.append)
-    eventually(lambda: events)
-    robot("/t", TWIST, node="wrong")
-    robot(node="second")
-    eventually(lambda: len(events) == 2)
-    assert subscription.publisher_count() == 2
-    middleware.graph.remove(first)
-    eventually(lambda: len(events) == 3)
-    told = [(e.endpoint.node.name, e.change, e.count, e.total) for e in events]
-    assert told == [("first", 1, 1, 1), ("second", 1, 2, 2), ("first", -1, 1, 2)]
-    subscription.close()
-    assert subscription.publisher_count() == 0
 
 
 def test_a_publisher_tells_which_subscriptions_match(node, middleware, asker, eventually):
@@ -201,40 +181,10 @@ def test_a_subscription_says_who_left_and_when_the_connection_is_lost(
     assert never.problem == ""
 
 
-def test_nobody_misses_what_the_node_itself_published(node, middleware, eventually):
-    subscription = node.create_subscription("/t", STRING)
-    own = EndpointInfo(PUBLISHER, "/t", STRING, NodeName("/arm", "cockpit"))
-    middleware.graph.put_endpoint("own", own)
-    counts = []
-    subscription.on_matched(lambda event: counts.append(event.count), IMMEDIATE)
-    eventually(lambda: counts == [1])
-    middleware.graph.remove("own")
-    eventually(lambda: counts == [1, 0])
-    assert subscription.problem == ""
-
-
 @pytest.mark.parametrize("create", ["create_subscription", "create_publisher"])
 def test_a_profile_that_is_none_is_refused_by_topic(node, create):
     with pytest.raises(rosglass.ArgumentError, match=r"^/arm/t: qos: .*preset\('sensor_data'\)"):
         getattr(node, create)("t", STRING, qos="sensor_data")
-
-
-def test_hints_at_names_that_were_meant(node, robot, asker, eventually):
-    robot("/scan")
-    robot("/robot/camera/image")
-    asker("/cmd_vel")
-    subscription = node.create_subscription("/scna", STRING)
-    assert subscription.hint == "nobody publishes /scna; did you mean /scan?"
-    assert subscription.problem == ""
-    other = node.create_subscription("/image", STRING)
-    assert other.hint == "nobody publishes /image; did you mean /robot/camera/image?"
-    assert node.create_subscription("/odom").hint == "nobody publishes /odom"
-    assert node.create_subscription("/scan").hint == ""
-    publisher = node.create_publisher("/cmd_vle", STRING)
-    assert publisher.hint == "nobody subscribes to /cmd_vle; did you mean /cmd_vel?"
-    publisher.close()
-    subscription.close()
-    assert (publisher.hint, subscription.hint) == ("", "")
 
 
 # -- what is available ---------------------------------------------------------------------------
@@ -729,38 +679,3 @@ def test_what_the_node_publishes_itself_can_be_left_out(node, middleware):
     publisher.close()
     middleware.readers[0].receive(HELLO, gid=own)
     assert subscription.statistics().received == 2, "that identity is somebody else's now"
-
-
-# -- one message ---------------------------------------------------------------------------------
-
-
-def test_waiting_for_one_message(node, middleware, robot):
-    robot(qos=QoS.latched())
-
-    def feed():
-        eventually(lambda: middleware.readers)
-        middleware.readers[0].receive(HELLO)
-
-    thread = threading.Thread(target=feed)
-    thread.start()
-    assert node.wait_for_message("/t", STRING, 5).data == "hello"
-    thread.join()
-    assert middleware.readers[0].info.qos.durability is Durability.TRANSIENT_LOCAL
-    assert middleware.readers[0].closed
-
-
-def test_waiting_in_vain_says_why(node, robot):
-    robot("/scan")
-    with pytest.raises(rosglass.TimeoutError, match=r"/scna: no message within 0.01 s: nobody pub"):
-        node.wait_for_message("/scna", timeout=0.01)
-    with pytest.raises(rosglass.TimeoutError, match="it is published, but nothing came"):
-        node.wait_for_message("/scan", STRING, timeout=0.01)
-
-
-def test_waiting_ends_with_the_node(middleware):
-    node = Ros2Node(middleware, "fake://", "cockpit")
-    later = threading.Timer(0.05, node.close)
-    later.start()
-    with pytest.raises(rosglass.NodeClosedError):
-        node.wait_for_message("/t", STRING)
-    later.join()
