@@ -94,10 +94,10 @@ class MemoryPublisher(Publisher):
 
     def send(self, subscription: Subscription, data: bytes, sequence: int) -> None:
         if subscription.type is None:
-            subscription.set_type(self.type)
+            subscription._type = self.type
         now = Time.now().nanoseconds
         sent = now - self.held_back
-        subscription.deliver(Sample(data, "cdr", self.type, now, sent, b"me", sequence))
+        subscription._inbox.put(Sample(data, "cdr", self.type, now, sent, b"me", sequence))
 
     def look(self) -> None:
         """Tell who listens to the topic."""
@@ -166,7 +166,7 @@ class MemoryNode(Node):
             self.world.subscriptions.remove(subscription)
             self.world.changed()
 
-        subscription.on_close = leave
+        subscription._on_close = leave
         self.world.subscriptions.append(subscription)
         self.world.changed()
         latched = subscription.qos.durability is Durability.TRANSIENT_LOCAL

@@ -112,6 +112,6 @@ def test_a_profile_that_clashes_is_a_problem_on_both_sides(
     assert root.offered() == ""
     clash = "incompatible: reliable requested, best effort offered"
     monkeypatch.setattr(type(running.world.publishers[0]), "problem", clash)
-    running.world.subscriptions[0].set_problem(clash)
+    running.world.subscriptions[0]._set_problem(clash)
     wait(lambda: root.offered() == root.asked() == clash)
     assert root.property("told") == 1

@@ -467,10 +467,10 @@ def deliver(running: Any, sent: float, received: float, text: str = "x") -> None
     """Let the robot's message arrive; times in seconds before now."""
     (sub,) = running.world.subscriptions
     kind = load_type(TEXT)
-    sub.set_type(kind)
+    sub._type = kind
     now = time.time_ns()
     stamps = (now - int(received * 1e9), now - int(sent * 1e9))
-    sub.deliver(Sample(kind.encode({"data": text}), "cdr", kind, *stamps, b"robot", -1))
+    sub._inbox.put(Sample(kind.encode({"data": text}), "cdr", kind, *stamps, b"robot", -1))
 
 
 def test_what_a_silent_link_kept_back_is_shown_but_not_as_live(running: Any, wait: Any) -> None:
@@ -492,8 +492,8 @@ def test_what_nobody_can_decode_is_not_shown(running: Any, wait: Any, caplog: An
     sub = root.property("sub")
     wait(lambda: sub.property("subscribed"))
     (received,) = running.world.subscriptions
-    received.set_problem("/robot publishes p/msg/Secret, which cannot be decoded")
-    received.deliver(Sample(b"....", "cdr", OpaqueType("p/msg/Secret"), 1, 1, b"robot", 1))
+    received._set_problem("/robot publishes p/msg/Secret, which cannot be decoded")
+    received._inbox.put(Sample(b"....", "cdr", OpaqueType("p/msg/Secret"), 1, 1, b"robot", 1))
     wait(lambda: "cannot be decoded" in sub.property("problem"))
     assert root.property("shown") == "none"
     assert sub.property("stale")

@@ -135,7 +135,7 @@ class LocalWorld:
                 self._subscriptions.remove(pair)
             self.changed()
 
-        subscription.on_close = end
+        subscription._on_close = end
         if self.ros == 1 or subscription.qos.durability is Durability.TRANSIENT_LOCAL:
             for sample in kept[-subscription.qos.depth :]:
                 _hand_on(sample, subscription)
@@ -293,7 +293,7 @@ class LocalNode(Node):
         subscription = Subscription(
             name, kind, profile, executor or self.world.dispatcher, callback, raw_callback
         )
-        subscription.source = _LocalSource(self.world, name)
+        subscription._source = _LocalSource(self.world, name)
         self.world.add_subscription(self, subscription)
         return subscription
 
@@ -407,11 +407,11 @@ def _profile(qos: QoS | int) -> QoS:
 def _hand_on(sample: Sample, subscription: Subscription) -> None:
     wanted, kind = subscription.type, sample.type
     if wanted is None:
-        subscription.set_type(kind)
+        subscription._type = kind
     elif wanted.name != kind.name:
-        subscription.set_problem(f"this is {kind.name} here, not {wanted.name}")
+        subscription._set_problem(f"this is {kind.name} here, not {wanted.name}")
         return
-    if subscription.decodes and isinstance(kind, OpaqueType):
-        subscription.set_problem(kind.reason)
+    if subscription._decodes and isinstance(kind, OpaqueType):
+        subscription._set_problem(kind.reason)
         return
-    subscription.deliver(sample)
+    subscription._inbox.put(sample)

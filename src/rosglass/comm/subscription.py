@@ -51,19 +51,13 @@ _SLICE = 0.2
 class Subscription(Handle):
     """Receives the messages of one topic.
 
-    Worlds create it, call `deliver` from their threads, and set `source` and `on_close`. Once
-    closed, it has nothing more to take: :attr:`closed` tells a polling loop when to end.
+    Once closed, it has nothing more to take: :attr:`closed` tells a polling loop when to end.
 
     ``for sample in subscription`` and ``async for sample in subscription`` wait for each sample and
     end when the subscription is closed.
 
     Attributes:
         topic: Absolute topic name.
-        deliver: Called with each received sample, from any thread; for worlds.
-        deliver_many: The same with samples that came together, at least one; for worlds.
-        source: What fills it; for worlds.
-        on_close: Called once when it is closed; for worlds.
-        events: Who is told about what; for worlds.
     """
 
     def __init__(
@@ -85,9 +79,10 @@ class Subscription(Handle):
         if not isinstance(executor, Executor):
             raise ConversionError("executor", executor, "a rosglass.comm.Executor", topic)
         self.topic = topic
-        self.on_close = on_close
-        self.source = Source()
-        self.events = SubscriptionEvents(topic)
+        # What has an underscore is also for the feed, which fills and closes it.
+        self._on_close = on_close
+        self._source = Source()
+        self._events = SubscriptionEvents(topic)
         self._qos, self._type, self._executor = qos, message_type, executor
         self._called = callback is not None or raw_callback is not None
         self._decodes = callback is not None and raw_callback is None
@@ -102,7 +97,6 @@ class Subscription(Handle):
             self._inbox: Inbox = ImmediateInbox(topic, qos, call, callback)
         else:
             self._inbox = Inbox(topic, qos, executor, call, callback)
-        self.deliver, self.deliver_many = self._inbox.put, self._inbox.put_many
 
     # -- what it is ------------------------------------------------------------------------------
 
@@ -128,7 +122,7 @@ class Subscription(Handle):
     @property
     def hint(self) -> str:
         """What may be wrong when nobody publishes the topic, e.g. a name much like it."""
-        return "" if self.closed else self.source.hint()
+        return "" if self.closed else self._source.hint()
 
     @property
     def closed(self) -> bool:
@@ -141,68 +135,18 @@ class Subscription(Handle):
 
     def publisher_count(self) -> int:
         """Return how many publishers match this subscription now; 0 after closing."""
-        return 0 if self.closed else self.source.publisher_count()
-
-    # -- for worlds ------------------------------------------------------------------------------
-
-    @property
-    def decodes(self) -> bool:
-        """Whether its callback wants messages: bytes without definition are of no use to it."""
-        return self._decodes
-
-    @property
-    def watched(self) -> bool:
-        """Whether somebody waits for samples, to take them or to be called, or did so just now."""
-        recent = time.monotonic() - self._watched_at < _MEMORY
-        return (self._called and not self._patient) or self._waiting > 0 or recent
-
-    @property
-    def waiting(self) -> int:
-        """How many samples wait to be taken, or for their callback."""
-        return self._inbox.waiting
-
-    @property
-    def last_arrival(self) -> float:
-        """When the last sample came, by :func:`time.monotonic`; minus infinity before the first."""
-        return self._inbox.last
-
-    def set_type(self, message_type: MessageType) -> None:
-        """Take the type that was discovered; for worlds."""
-        self._type = message_type
-
-    def set_qos(self, qos: QoS) -> None:
-        """Take the profile that was decided on; for worlds."""
-        self._qos = qos
-
-    def set_problem(
-        self, problem: str, level: int = logging.WARNING, logged: str | None = None
-    ) -> None:
-        """Say why nothing can be received; for worlds. Logged once for each new problem.
-
-        Args:
-            problem: Why, in words; empty when all is well.
-            level: Of what is logged.
-            logged: What of it is logged, where others log the rest; None for all.
-        """
-        logged = problem if logged is None else logged
-        if logged != self._logged:
-            self._logged = logged
-            if logged:
-                _log.log(level, "%s: %s", self.topic, logged)
-        if problem != self._problem:
-            self._problem = problem
-            self.events.problem.notify(problem)
+        return 0 if self.closed else self._source.publisher_count()
 
     # -- taking ----------------------------------------------------------------------------------
 
     def take(self) -> Sample | None:
         """Return the oldest waiting sample, or None."""
-        self.source.refresh()
+        self._source.refresh()
         return self._inbox.pop()
 
     def take_latest(self) -> Sample | None:
         """Return the newest waiting sample and forget the older ones (they count as dropped)."""
-        self.source.refresh()
+        self._source.refresh()
         return self._inbox.pop_latest()
 
     def wait(self, timeout: float | None = None) -> Sample | None:
@@ -282,7 +226,7 @@ class Subscription(Handle):
         check_flag(patient, "patient", self.topic)
         if patient != self._patient:
             self._patient = patient
-            self.source.inform()
+            self._source.inform()
 
     def set_inbox_limit(self, limit: int) -> None:
         """Bound the memory of an inbox that keeps all; 256 MiB unless set.
@@ -300,8 +244,8 @@ class Subscription(Handle):
 
     def statistics(self) -> Statistics:
         """Return counts and rates as of now."""
-        self.source.refresh()
-        return self._inbox.statistics(self.source.lost())
+        self._source.refresh()
+        return self._inbox.statistics(self._source.lost())
 
     def lateness(self, sample: Sample) -> Duration:
         """Return how much longer a sample took than the fastest of its publisher.
@@ -331,7 +275,7 @@ class Subscription(Handle):
         Raises:
             ConversionError: One of the arguments is not what it should be.
         """
-        return self._inform(self.events.matched.add(callback, executor or self._executor))
+        return self._inform(self._events.matched.add(callback, executor or self._executor))
 
     def on_incompatible_qos(
         self, callback: Callable[[IncompatibleQoS], None], executor: Executor | None = None
@@ -340,7 +284,7 @@ class Subscription(Handle):
 
         Those that are there already are told first; arguments as for :meth:`on_matched`.
         """
-        return self._inform(self.events.incompatible.add(callback, executor or self._executor))
+        return self._inform(self._events.incompatible.add(callback, executor or self._executor))
 
     def on_deadline_missed(
         self, callback: Callable[[DeadlineMissed], None], executor: Executor | None = None
@@ -349,7 +293,7 @@ class Subscription(Handle):
 
         Time runs from the moment that a publisher matches. Arguments as for :meth:`on_matched`.
         """
-        return self._inform(self.events.deadline.add(callback, executor or self._executor))
+        return self._inform(self._events.deadline.add(callback, executor or self._executor))
 
     def on_liveliness_change(
         self, callback: Callable[[LivelinessChanged], None], executor: Executor | None = None
@@ -359,7 +303,7 @@ class Subscription(Handle):
         A publisher is alive while it is seen; one that promises to show its liveliness itself
         (manual by topic), while it does so in time. Arguments as for :meth:`on_matched`.
         """
-        return self._inform(self.events.liveliness.add(callback, executor or self._executor))
+        return self._inform(self._events.liveliness.add(callback, executor or self._executor))
 
     def on_samples_lost(
         self, callback: Callable[[SamplesLost], None], executor: Executor | None = None
@@ -368,7 +312,7 @@ class Subscription(Handle):
 
         What a full inbox drops is no loss of this kind: :meth:`statistics` counts it.
         """
-        return self._inform(self.events.lost.add(callback, executor or self._executor))
+        return self._inform(self._events.lost.add(callback, executor or self._executor))
 
     def on_problem_change(
         self, callback: Callable[[str], None], executor: Executor | None = None
@@ -377,7 +321,7 @@ class Subscription(Handle):
 
         Arguments as for :meth:`on_matched`.
         """
-        return self._inform(self.events.problem.add(callback, executor or self._executor))
+        return self._inform(self._events.problem.add(callback, executor or self._executor))
 
     # -- the end ---------------------------------------------------------------------------------
 
@@ -385,14 +329,39 @@ class Subscription(Handle):
         """Stop receiving; waiting samples are forgotten. Safe to call twice, from any thread."""
         if not self._inbox.close():
             return
-        self.events.clear()
-        if self.on_close is not None:
-            self.on_close()
+        self._events.clear()
+        if self._on_close is not None:
+            self._on_close()
 
     # -- inside ----------------------------------------------------------------------------------
 
+    @property
+    def _watched(self) -> bool:
+        """Whether samples are waited for, to be taken or called back with, or were just now."""
+        recent = time.monotonic() - self._watched_at < _MEMORY
+        return (self._called and not self._patient) or self._waiting > 0 or recent
+
+    def _set_problem(
+        self, problem: str, level: int = logging.WARNING, logged: str | None = None
+    ) -> None:
+        """Take why nothing can be received, and log it once.
+
+        Args:
+            problem: Why, in words; empty when all is well.
+            level: Of what is logged.
+            logged: What of it is logged, where others log the rest; None for all.
+        """
+        logged = problem if logged is None else logged
+        if logged != self._logged:
+            self._logged = logged
+            if logged:
+                _log.log(level, "%s: %s", self.topic, logged)
+        if problem != self._problem:
+            self._problem = problem
+            self._events.problem.notify(problem)
+
     def _inform(self, handle: Handle) -> Handle:
-        self.source.inform()
+        self._source.inform()
         return handle
 
     def _watch(self, change: int) -> None:
@@ -400,7 +369,7 @@ class Subscription(Handle):
             self._waiting += change
             self._watched_at = time.monotonic()
         if change > 0:
-            self.source.attend()
+            self._source.attend()
 
 
 def _decoding(callback: Callable[[Message], None]) -> Callable[[Sample], None]:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from rosglass.comm.core import NodeCore
     from rosglass.comm.graph import EndpointInfo, NodeName, Status
+    from rosglass.comm.qos import QoS
     from rosglass.comm.subscription import Subscription
     from rosglass.messages import MessageType
     from rosglass.wires.base import Reader
@@ -139,6 +140,10 @@ class SubscriptionFeed(NodeMember, Source):
 
     Attributes:
         subscription: As given.
+        topic: Absolute topic name.
+        decodes: Whether its callback wants messages: bytes without definition are of no use to it.
+        deliver: Takes a received sample, from any thread.
+        deliver_many: Takes samples that came together, at least one.
     """
 
     def __init__(
@@ -148,7 +153,10 @@ class SubscriptionFeed(NodeMember, Source):
         matching: TopicMatching,
         ignored: AbstractSet[bytes] = frozenset(),
     ) -> None:
-        self.subscription = subscription
+        self.subscription, self.topic = subscription, subscription.topic
+        self.decodes = subscription._decodes
+        self._inbox, self._events = subscription._inbox, subscription._events
+        self.deliver, self.deliver_many = self._inbox.put, self._inbox.put_many
         self._core, self._matching, self._ignored = core, matching, ignored
         self._loss = PublisherLossMonitor(core.name, core.status)
         self._attention = threading.Lock()
@@ -160,10 +168,35 @@ class SubscriptionFeed(NodeMember, Source):
         self._left: deque[EndpointInfo] = deque(maxlen=_MAX_LEFT)
         self._reported_lost = self._missed = 0
         self._deadline: Watchdog | None = None
-        subscription.source, subscription.on_close = self, self._end
+        subscription._source, subscription._on_close = self, self._end
         matching.open(self, self._publishers())
         self.attend()
         self.inform()
+
+    # -- what the wire's protocol decides --------------------------------------------------------
+
+    @property
+    def type(self) -> MessageType | None:
+        """The type to receive; None while it is open."""
+        return self.subscription.type
+
+    @property
+    def qos(self) -> QoS:
+        """The profile to ask for."""
+        return self.subscription.qos
+
+    @property
+    def waiting(self) -> int:
+        """How many samples wait to be taken, or for their callback."""
+        return self._inbox.waiting
+
+    def set_type(self, message_type: MessageType) -> None:
+        """Take the type that was discovered."""
+        self.subscription._type = message_type
+
+    def set_qos(self, qos: QoS) -> None:
+        """Take the profile that was decided on."""
+        self.subscription._qos = qos
 
     # -- what the subscription asks --------------------------------------------------------------
 
@@ -175,7 +208,7 @@ class SubscriptionFeed(NodeMember, Source):
         """Say what may be wrong when the topic has no publisher; empty when it has one."""
         if self._publishers() or self.publisher_count():
             return ""
-        topic, graph = self.subscription.topic, self._core.graph
+        topic, graph = self.topic, self._core.graph
         published = [name for name in graph.topics() if graph.endpoints(_PUBLISHER, name)]
         return f"nobody publishes {topic}{similar(topic, published)}"
 
@@ -187,7 +220,7 @@ class SubscriptionFeed(NodeMember, Source):
         while self._unattended and self._attention.acquire(False):
             try:
                 self._unattended = False
-                reader, eager = self._matching.reader, self.subscription.watched
+                reader, eager = self._matching.reader, self.subscription._watched
                 if reader is None or eager == (reader is not self._lazy):
                     continue
                 self._lazy = None if eager else reader
@@ -256,7 +289,7 @@ class SubscriptionFeed(NodeMember, Source):
         self._core.remove(self)
 
     def _publishers(self) -> list[EndpointInfo]:
-        found: list[EndpointInfo] = self._core.graph.endpoints(_PUBLISHER, self.subscription.topic)
+        found: list[EndpointInfo] = self._core.graph.endpoints(_PUBLISHER, self.topic)
         if self._ignored:
             found = [one for one in found if one.gid not in self._ignored]
         return found
@@ -268,7 +301,7 @@ class SubscriptionFeed(NodeMember, Source):
         if not (received and self._matching.outlives_discovery):
             # A publisher that leaves is no mistake of anybody's.
             problems = problems + [Problem(text, logging.INFO) for text in losses]
-        self.subscription.set_problem(
+        self.subscription._set_problem(
             _joined(problems),
             max((problem.level for problem in problems), default=logging.INFO),
             _joined([problem for problem in problems if problem.logged]),
@@ -282,7 +315,7 @@ class SubscriptionFeed(NodeMember, Source):
         matching: list[EndpointInfo],
         left: Sequence[EndpointInfo],
     ) -> None:
-        events = self.subscription.events
+        events = self._events
         events.matched.update(matching, Matched, left)
         if events.incompatible:
             found = self._matching.find_conflicts(publishers)
@@ -298,8 +331,8 @@ class SubscriptionFeed(NodeMember, Source):
         self._watch_deadline(bool(matching))
 
     def _watch_deadline(self, published: bool) -> None:
-        limit = self.subscription.qos.deadline
-        listened = published and bool(self.subscription.events.deadline)
+        limit = self.qos.deadline
+        listened = published and bool(self._events.deadline)
         wanted = limit is not None and listened and not self._closed
         if self._deadline is not None and not (wanted and self._deadline.limit == limit):
             self._deadline.close()
@@ -311,14 +344,14 @@ class SubscriptionFeed(NodeMember, Source):
 
     def _last_arrival(self) -> float:
         self.refresh()
-        return self.subscription.last_arrival
+        return self._inbox.last
 
     def _on_deadline_missed(self, count: int) -> None:
         self._missed += count
-        self.subscription.events.deadline.notify(DeadlineMissed(count, self._missed))
+        self._events.deadline.notify(DeadlineMissed(count, self._missed))
 
     def _report_losses(self) -> None:
-        events = self.subscription.events
+        events = self._events
         if not events.lost:
             return
         total = self.lost()

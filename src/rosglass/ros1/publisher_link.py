@@ -196,7 +196,7 @@ class PublisherLink:
 
     def _apply_backpressure(self) -> None:
         """Read nothing for a moment if callbacks are behind: reading takes time from them."""
-        behind = max((reader.waiting for reader in self.subscription.readers), default=0)
+        behind = max((reader.feed.waiting for reader in self.subscription.readers), default=0)
         connection = self._connection
         if behind > _BEHIND and connection is not None:
             connection.pause(reading=False)

@@ -98,7 +98,7 @@ class Topics:
                 name = ros1_name(type_name) if type_name else name
                 shared = self._subscribed[topic] = TopicSubscription(self._core, self, topic, name)
             matching = TypeNegotiation(
-                self._core, shared, subscription, type_name, ignore_local, self._end_subscription
+                self._core, shared, type_name, ignore_local, self._end_subscription
             )
             SubscriptionFeed(self._core, subscription, matching)
         if new:

@@ -19,7 +19,6 @@ from rosglass.wires.base import Reader
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from rosglass.comm import Subscription
     from rosglass.comm.subscription_feed import SubscriptionFeed
     from rosglass.messages import MessageType
     from rosglass.ros1.core import Core
@@ -37,7 +36,6 @@ class TypeNegotiation(TopicMatching, Reader):
     Args:
         core: The node it belongs to.
         topic: The node's connections for the topic.
-        subscription: The subscription.
         type_name: The type that is asked for when there is no definition of it here.
         ignore_local: Whether to leave out what this node publishes itself.
         on_close: Called once when the subscription is closed.
@@ -56,19 +54,18 @@ class TypeNegotiation(TopicMatching, Reader):
         self,
         core: Core,
         topic: TopicSubscription,
-        subscription: Subscription,
         type_name: str,
         ignore_local: bool,
         on_close: Callable[[TypeNegotiation], None],
     ) -> None:
         self.topic, self.eager = topic, True
-        self._core, self._subscription, self._on_close = core, subscription, on_close
+        self._core, self._on_close = core, on_close
         self._ignored = core.uri if ignore_local else ""
         #: The type of each publisher that is understood, and what is wrong with the others.
         self._accepted: dict[PublisherLink, tuple[MessageType, bytes]] = {}
         self._refused: dict[PublisherLink, str] = {}
         self._remarks: dict[PublisherLink, str] = {}
-        self._fixed = subscription.type
+        self._fixed: MessageType | None = None
         self._name = join_name(type_name) if type_name else ""
         self._closed = False
 
@@ -126,7 +123,7 @@ class TypeNegotiation(TopicMatching, Reader):
             kind = self._core.types.learn(name, md5, text)
         except (TypeNotFoundError, DefinitionError, InvalidNameError) as error:
             reason = str(error)
-            if not self._subscription.decodes:
+            if not self.feed.decodes:
                 kind = opaque(name, md5, text, reason)
 
         def take() -> None:
@@ -137,12 +134,12 @@ class TypeNegotiation(TopicMatching, Reader):
         self._core.loop.call(take)
 
     def _take_type(self, link: PublisherLink, kind: MessageType | None, reason: str) -> None:
-        current = self._subscription.type
+        current = self.feed.type
         if kind is None:
             self._refused[link] = reason
             return
         if self._fixed is None and (current is None or not self._accepted):
-            self._subscription.set_type(kind)
+            self.feed.set_type(kind)
         elif self._fixed is None and current is not None and kind.name != current.name:
             self._refused[link] = (
                 f"{link.name} publishes {self.topic.topic} as {kind.name}, others as "
@@ -173,7 +170,7 @@ class TypeNegotiation(TopicMatching, Reader):
             make = tuple.__new__
             if len(frames) == 1:
                 sample = make(Sample, (frames[0], "ros1", kind, received, None, who, -1))
-                self._subscription.deliver(sample)
+                self.feed.deliver(sample)
                 return
             given = zip(
                 frames,
@@ -185,12 +182,7 @@ class TypeNegotiation(TopicMatching, Reader):
                 repeat(-1),
                 strict=False,
             )
-            self._subscription.deliver_many(list(map(make, repeat(Sample), given)))
-
-    @property
-    def waiting(self) -> int:
-        """How many messages wait to be taken, or for their callback."""
-        return self._subscription.waiting
+            self.feed.deliver_many(list(map(make, repeat(Sample), given)))
 
     # -- as a reader -----------------------------------------------------------------------------
 
@@ -218,8 +210,8 @@ class TypeNegotiation(TopicMatching, Reader):
         publishers: Sequence[EndpointInfo],  # noqa: ARG002 - they offer no profile
     ) -> None:
         """Decide on the profile, and receive from those that are connected already."""
-        self.feed, self.reader = feed, self
-        self._subscription.set_qos(self._subscription.qos.for_subscription([]))
+        self.feed, self.reader, self._fixed = feed, self, feed.type
+        feed.set_qos(feed.qos.for_subscription([]))
         self.topic.join(self)
 
     def update(

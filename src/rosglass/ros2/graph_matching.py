@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from collections.abc import Set as AbstractSet
 
-    from rosglass.comm import QoS, Subscription
+    from rosglass.comm import QoS
     from rosglass.comm.subscription_feed import SubscriptionFeed
     from rosglass.messages import MessageType
     from rosglass.ros2.core import Core
@@ -32,7 +32,6 @@ class GraphMatching(TopicMatching):
 
     Args:
         core: The node it belongs to.
-        subscription: The subscription.
         wanted: Type or type name it was created with; None to take what is published.
         ignored: Identities of publishers that are left out.
     """
@@ -40,32 +39,26 @@ class GraphMatching(TopicMatching):
     def __init__(
         self,
         core: Core,
-        subscription: Subscription,
         wanted: MessageType | str | None,
         ignored: AbstractSet[bytes],
     ) -> None:
-        self._core, self._subscription, self._ignored = core, subscription, ignored
-        self._topic, self._wanted = subscription.topic, subscription.qos
-        self._types = TopicTypes(
-            subscription.topic,
-            core.types,
-            wanted,
-            subscription.type,
-            not subscription.decodes,
-            self._inform,
-        )
+        self._core, self._type, self._ignored = core, wanted, ignored
         self._repeats = Repeats()
-        self._liveness = Liveness(core.timers, self._repeats, self._inform)
         self._lock = threading.Lock()
         self._closed = False
         self._alone = True
         self._lost_before = 0
         self._feed: SubscriptionFeed
+        self._types: TopicTypes
 
     def open(self, feed: SubscriptionFeed, publishers: Sequence[EndpointInfo]) -> None:
         """Decide on the profile, and read as soon as the type is known."""
-        self._feed = feed
-        self._subscription.set_qos(self._wanted.for_subscription(self._offers(publishers)))
+        self._feed, self._topic, self._wanted = feed, feed.topic, feed.qos
+        self._liveness = Liveness(self._core.timers, self._repeats, feed.inform)
+        self._types = TopicTypes(
+            feed.topic, self._core.types, self._type, feed.type, not feed.decodes, feed.inform
+        )
+        feed.set_qos(self._wanted.for_subscription(self._offers(publishers)))
         self._core.graph.watch(self._topic, self._on_endpoint_removed)
         if self._types.type is not None:
             self._read(self._types.type)
@@ -77,8 +70,8 @@ class GraphMatching(TopicMatching):
         problems = self._types.problems
         if ours is not None:
             profile = self._profile(publishers)
-            if changed or profile != self._subscription.qos or self.reader is None:
-                self._subscription.set_qos(profile)
+            if changed or profile != self._feed.qos or self.reader is None:
+                self._feed.set_qos(profile)
                 self._read(ours)
             elif idle:
                 self._repeats.guarded = False
@@ -88,7 +81,7 @@ class GraphMatching(TopicMatching):
     def find_matching(self, publishers: Sequence[EndpointInfo]) -> list[EndpointInfo]:
         """Return the publishers whose type is understood, and whose profile matches."""
         understood = [p for p in publishers if self._types.accepts(p)]
-        qos, middleware = self._subscription.qos, self._core.middleware
+        qos, middleware = self._feed.qos, self._core.middleware
         if not middleware.matches_qos:
             return understood
         return [p for p in understood if not conflicts(middleware, p, qos, p.qos)]
@@ -97,7 +90,7 @@ class GraphMatching(TopicMatching):
         self, publishers: Sequence[EndpointInfo]
     ) -> dict[EndpointInfo, dict[str, str]]:
         """Return what those publishers offer too little of whose type is understood."""
-        qos, middleware = self._subscription.qos, self._core.middleware
+        qos, middleware = self._feed.qos, self._core.middleware
         found = {
             p: conflicts(middleware, p, qos, p.qos) for p in publishers if self._types.accepts(p)
         }
@@ -123,9 +116,6 @@ class GraphMatching(TopicMatching):
         self._liveness.close()
         self._core.graph.unwatch(self._topic, self._on_endpoint_removed)
 
-    def _inform(self) -> None:
-        self._feed.inform()
-
     def _on_endpoint_removed(self, endpoint: EndpointInfo) -> None:
         if endpoint.kind is not _PUBLISHER or not self.find_matching([endpoint]):
             return
@@ -138,7 +128,7 @@ class GraphMatching(TopicMatching):
 
     def _profile(self, publishers: Sequence[EndpointInfo]) -> QoS:
         """Return the profile to ask for: the one in use, unless a publisher does not match it."""
-        current = self._subscription.qos
+        current = self._feed.qos
         if self._wanted.is_decided:
             return current
         offers = self._offers(publishers)
@@ -158,7 +148,7 @@ class GraphMatching(TopicMatching):
             if self._core.middleware.matches_qos
             else "it is received without that guarantee"
         )
-        qos = self._subscription.qos
+        qos = self._feed.qos
         problems = []
         for publisher, found in self.find_conflicts(publishers).items():
             remedy = "; ask for no more than it offers" if qos.conflicts(publisher.qos) else ""
@@ -172,14 +162,14 @@ class GraphMatching(TopicMatching):
 
     def _read(self, message_type: MessageType) -> None:
         """Receive samples of `message_type` from now on, instead of any before."""
-        self._subscription.set_type(message_type)
+        self._feed.set_type(message_type)
         self._repeats.guarded = self.reader is not None
         endpoint = EndpointInfo(
             EndpointKind.SUBSCRIPTION,
             self._topic,
             message_type.name,
             self._core.name,
-            self._subscription.qos,
+            self._feed.qos,
             message_type.rihs01,
         )
         reader = self._core.middleware.create_reader(endpoint, self._receiver())
@@ -198,7 +188,7 @@ class GraphMatching(TopicMatching):
         """Return what takes the samples; every line of it is paid for by each sample."""
         accepted, find_type = self._types.accepted, self._types.find_type
         ignored = self._ignored
-        seen, deliver = self._repeats.seen, self._subscription.deliver
+        seen, deliver = self._repeats.seen, self._feed.deliver
         # As Sample(...) does, in half the time.
         make = tuple.__new__
 

@@ -124,7 +124,7 @@ class Ros2Node(CoreNode):
             raw_callback,
         )
         ignored = self._core.local_gids if ignore_local else frozenset[bytes]()
-        matching = GraphMatching(self._core, subscription, type, ignored)
+        matching = GraphMatching(self._core, type, ignored)
         self._core.add(SubscriptionFeed(self._core, subscription, matching, ignored))
         return subscription
 

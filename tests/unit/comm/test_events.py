@@ -104,9 +104,9 @@ def test_a_problem_is_told_when_it_changes():
     sub = Subscription("/t", None, QoS(), IMMEDIATE)
     sub.on_problem_change(seen.append)
     for problem in ("one", "one", "two", "", ""):
-        sub.set_problem(problem)
+        sub._set_problem(problem)
     sub.close()
-    sub.set_problem("three")
+    sub._set_problem("three")
     assert seen == ["one", "two", ""]
 
 

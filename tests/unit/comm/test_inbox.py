@@ -16,6 +16,11 @@ from rosglass.comm import IMMEDIATE, Dispatcher, History, Sample, Subscription
 KEEP_ALL = QoS(history=History.KEEP_ALL)
 
 
+def put(sub, sample):
+    """Let a sample arrive."""
+    sub._inbox.put(sample)
+
+
 def sample(data=b"x", sequence=1):
     return Sample(data, "cdr", None, 1, 1, b"p", sequence)
 
@@ -31,7 +36,7 @@ def test_keep_all_is_bounded_by_bytes_counts_what_it_drops_and_complains_once(ca
     sub = subscription()
     sub.set_inbox_limit(10_000)
     for number in range(100):
-        sub.deliver(sample(bytes(1000), number))
+        put(sub, sample(bytes(1000), number))
     waiting = []
     while (taken := sub.take()) is not None:
         waiting.append(taken.sequence)
@@ -50,7 +55,7 @@ def test_the_slow_callback_is_named(caplog):
     sub = subscription(executor=dispatcher, raw_callback=much_too_slow)
     sub.set_inbox_limit(2000)
     for _ in range(10):
-        sub.deliver(sample(bytes(1000)))
+        put(sub, sample(bytes(1000)))
     go_on.set()
     dispatcher.close()
     assert "much_too_slow is too slow" in caplog.text
@@ -61,7 +66,7 @@ def test_a_slow_callback_lets_others_have_their_turn_and_goes_on_with_the_newest
         order.append(f"slow {given.sequence}")
         if len(order) == 1:
             for number in range(5, 9):
-                sub.deliver(sample(sequence=number))
+                put(sub, sample(sequence=number))
         time.sleep(0.02)
 
     order = []
@@ -69,7 +74,7 @@ def test_a_slow_callback_lets_others_have_their_turn_and_goes_on_with_the_newest
     dispatcher.post(lambda: gate.wait(30))
     sub = subscription(QoS(4), dispatcher, raw_callback=slow)
     for number in range(1, 5):
-        sub.deliver(sample(sequence=number))
+        put(sub, sample(sequence=number))
     dispatcher.post(lambda: order.append("other"))
     gate.set()
     eventually(lambda: len(order) == 6)
@@ -81,20 +86,20 @@ def test_a_slow_callback_lets_others_have_their_turn_and_goes_on_with_the_newest
 def test_one_message_beyond_the_limit_is_kept_all_the_same():
     sub = subscription()
     sub.set_inbox_limit(100)
-    sub.deliver(sample(bytes(1000)))
+    put(sub, sample(bytes(1000)))
     assert sub.take() is not None
 
 
 def test_a_smaller_limit_holds_at_once_and_taking_makes_room():
     sub = subscription()
     for _ in range(10):
-        sub.deliver(sample(bytes(1000)))
+        put(sub, sample(bytes(1000)))
     sub.set_inbox_limit(3000)
     assert sub.statistics().dropped == 8
     assert sub.take_latest() is not None
     assert sub.statistics().dropped == 9
     for _ in range(2):
-        sub.deliver(sample(bytes(1000)))
+        put(sub, sample(bytes(1000)))
     assert sub.statistics().dropped == 9
 
 
@@ -125,7 +130,7 @@ def test_samples_from_many_threads_are_called_back_with_one_at_a_time_each_once(
         threads = [
             threading.Thread(
                 target=lambda start=start: [
-                    sub.deliver(sample(sequence=n)) for n in range(start, start + 500)
+                    put(sub, sample(sequence=n)) for n in range(start, start + 500)
                 ]
             )
             for start in range(0, 2000, 500)
@@ -153,11 +158,11 @@ def test_an_immediate_callback_that_publishes_to_itself_gets_what_fits_and_count
     def callback(got):
         if got.sequence == 0:
             for number in range(1, 6):
-                sub.deliver(sample(sequence=number))
+                put(sub, sample(sequence=number))
         seen.append(got.sequence)
 
     sub = subscription(QoS(depth=3), raw_callback=callback)
-    sub.deliver(sample(sequence=0))
+    put(sub, sample(sequence=0))
     assert seen == [0, 3, 4, 5]
     assert (sub.statistics().received, sub.statistics().dropped) == (6, 2)
 
@@ -172,8 +177,8 @@ def test_an_interrupted_immediate_callback_does_not_end_the_subscription():
 
     sub = subscription(raw_callback=callback)
     with pytest.raises(KeyboardInterrupt):
-        sub.deliver(sample())
-    sub.deliver(sample())
+        put(sub, sample())
+    put(sub, sample())
     assert len(calls) == 2
 
 
@@ -185,7 +190,7 @@ def test_iterating_yields_samples_until_the_subscription_is_closed():
 
     def feed():
         for number in range(3):
-            sub.deliver(sample(sequence=number))
+            put(sub, sample(sequence=number))
         eventually(lambda: taken[2:])
         sub.close()
 
@@ -213,7 +218,13 @@ def test_asynchronous_iteration():
         task = asyncio.create_task(collect())
         await asyncio.sleep(0.02)
         for number in range(3):
-            threading.Thread(target=sub.deliver, args=(sample(sequence=number),)).start()
+            threading.Thread(
+                target=put,
+                args=(
+                    sub,
+                    sample(sequence=number),
+                ),
+            ).start()
             await asyncio.sleep(0.01)
         return await asyncio.wait_for(task, 30)
 
@@ -235,7 +246,7 @@ def test_a_task_that_was_cancelled_leaves_nothing_behind():
             await task
 
     asyncio.run(run())
-    sub.deliver(sample())  # the loop has ended
+    put(sub, sample())  # the loop has ended
     assert sub.take() is not None
 
 
@@ -249,7 +260,7 @@ def test_several_threads_wait_and_each_sample_goes_to_one_of_them():
         thread.start()
     time.sleep(0.02)
     for number in range(4):
-        sub.deliver(sample(sequence=number))
+        put(sub, sample(sequence=number))
     for thread in threads:
         thread.join()
     assert sorted(taken) == [0, 1, 2, 3]
@@ -273,12 +284,12 @@ def test_who_waits_is_who_watches(monkeypatch):
     clock = [100.0]
     monkeypatch.setattr("rosglass.comm.subscription.time.monotonic", lambda: clock[0])
     sub = subscription()
-    assert not sub.watched
+    assert not sub._watched
     assert sub.wait(0) is None
-    assert sub.watched, "who polls comes back soon"
+    assert sub._watched, "who polls comes back soon"
     clock[0] += 1.5
-    assert not sub.watched
-    assert subscription(raw_callback=id).watched
+    assert not sub._watched
+    assert subscription(raw_callback=id)._watched
 
 
 # -- rates ---------------------------------------------------------------------------------------
@@ -291,7 +302,7 @@ def test_rates_hold_for_samples_that_come_some_at_a_time(monkeypatch):
     for _ in range(30):
         clock[0] += 0.1
         for _ in range(100):
-            sub.deliver(sample(bytes(10)))
+            put(sub, sample(bytes(10)))
     now = sub.statistics()
     assert now.frequency == pytest.approx(1000, rel=0.01)
     assert now.bandwidth == pytest.approx(10_000, rel=0.01)
@@ -305,7 +316,7 @@ def test_rates_fall_at_once_when_samples_stop(monkeypatch, rate):
     sub = subscription(QoS(depth=1))
     for _ in range(3 * rate):
         clock[0] += 1 / rate
-        sub.deliver(sample(bytes(10)))
+        put(sub, sample(bytes(10)))
     assert sub.statistics().frequency == pytest.approx(rate, rel=0.01)
     clock[0] += max(0.04, 1 / rate)
     assert sub.statistics().frequency > rate / 2, "one that is a little late is no silence"
@@ -326,6 +337,6 @@ def test_rates_are_taken_anew_after_a_silence(monkeypatch):
         clock[0] += silence
         for _ in range(5):
             clock[0] += 0.1
-            sub.deliver(sample(bytes(10)))
+            put(sub, sample(bytes(10)))
         assert sub.statistics().frequency == pytest.approx(10)
         assert sub.statistics().bandwidth == pytest.approx(100)

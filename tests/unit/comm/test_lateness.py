@@ -12,6 +12,11 @@ MS = 1_000_000
 S = 1000 * MS
 
 
+def put(sub, sample):
+    """Let a sample arrive."""
+    sub._inbox.put(sample)
+
+
 @pytest.fixture
 def offset(monkeypatch):
     """The system's clock against one that nobody sets, in nanoseconds."""
@@ -98,7 +103,7 @@ def test_subscriptions_tell_latency_and_lateness(offset):
     assert sub.statistics().latency is None
     assert sub.statistics().lateness is None
     live = Sample(b"x", "cdr", None, 1_000 * MS, 998 * MS, P, 1)
-    sub.deliver(live)
+    put(sub, live)
     assert sub.statistics().latency == Duration(2 * MS)
     assert sub.statistics().lateness == Duration()
     late = live._replace(received_ns=5_000 * MS, sent_ns=2_000 * MS)

@@ -8,6 +8,11 @@ from rosglass import QoS
 from rosglass.comm import IMMEDIATE, Executor, History, Sample, Subscription
 
 
+def put(sub, sample):
+    """Let a sample arrive."""
+    sub._inbox.put(sample)
+
+
 class Manual(Executor):
     """Runs jobs when told to."""
 
@@ -44,7 +49,7 @@ def subscription(executor=IMMEDIATE, **kwargs):
 
 def feed(target, *texts):
     for text in texts:
-        target.deliver(sample(text))
+        put(target, sample(text))
 
 
 def test_the_inbox_keeps_the_newest_and_counts_what_it_drops():
@@ -193,7 +198,7 @@ def test_frequency_and_bandwidth_fall_when_samples_stop(monkeypatch):
 
 def test_a_problem_is_logged_once_and_goes_away():
     sub = subscription()
-    sub.set_problem("no type")
+    sub._set_problem("no type")
     assert sub.problem == "no type"
-    sub.set_problem("")
+    sub._set_problem("")
     assert sub.problem == ""

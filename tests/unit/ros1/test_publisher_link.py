@@ -34,17 +34,18 @@ def flood(connect, eventually, monkeypatch):
 
 def test_reading_makes_way_for_callbacks_that_are_behind(flood, eventually, monkeypatch):
     monkeypatch.setattr(publisher_link, "_BREATH", 3600.0)
-    publisher, subscription, link, _, _ = flood
+    publisher, _, link, _, _ = flood
     sent = iter(range(10_000))
     eventually(lambda: publisher.publish({"data": next(sent)}) or not link._connection._reading)
-    waiting = subscription.waiting
+    (reader,) = link.subscription.readers
+    waiting = reader.feed.waiting
     assert waiting > 10
     publisher.publish({"data": -1})
     for _ in range(3):  # the loop has looked at its sockets meanwhile
         looked = threading.Event()
         link._core.loop.call(looked.set)
         assert looked.wait(30)
-    assert subscription.waiting == waiting
+    assert reader.feed.waiting == waiting
 
 
 def test_what_was_left_in_the_socket_comes_when_callbacks_have_caught_up(

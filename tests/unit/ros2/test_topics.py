@@ -265,7 +265,7 @@ def test_changing_readers_neither_loses_nor_repeats(node, middleware, robot, eve
         got.append((sample.publisher[:1], sample.sent_ns))
     assert got == [(p, n) for p in (b"g", b"u") for n in (1, 2, 3)] + [(b"g", 4), (b"u", 4)]
     # A publisher whose clock is set back later is heard all the same.
-    eventually(lambda: not subscription.source._matching._repeats.guarded)
+    eventually(lambda: not subscription._source._matching._repeats.guarded)
     second.on_sample(HELLO, 10, 2, b"u" * 16, -1, "")
     assert subscription.take() is not None
 
@@ -292,7 +292,7 @@ def test_a_deadline_that_passes_without_message_is_told(node, middleware, robot,
         time.sleep(0.005)
     assert len(events) <= settled + 2, "six more would have come without messages"
     middleware.graph.remove(key)
-    eventually(lambda: subscription.source._deadline is None)
+    eventually(lambda: subscription._source._deadline is None)
 
 
 def test_manual_liveliness_is_lost_once_for_each_silence(node, middleware, eventually):

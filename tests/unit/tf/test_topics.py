@@ -91,7 +91,7 @@ class Node:
     def deliver(self, number: int, publisher: bytes = b"gid") -> None:
         topic, data = self.sent[number]
         sample = Sample(data, self.wire, self.type, 0, None, publisher)
-        self.subscriptions[topic].deliver(sample)
+        self.subscriptions[topic]._inbox.put(sample)
 
 
 def place(child: str, sec: int = 5) -> Transform:
