@@ -16,7 +16,7 @@ LONG = "x" * 100_000
 def test_values_of_any_size_are_shown_in_short(name: str) -> None:
     kind = getattr(errors, name)
     more: tuple[str, ...] = ("is wrong",) if kind is errors.DecodeError else ()
-    more = (LONG, "a number") if kind is errors.ConversionError else more
+    more = (LONG, "a number") if issubclass(kind, errors.ConversionError) else more
     told = str(kind(f"/topic: {LONG!r} is no number; give one", *more))
     assert len(told) < 1000
     assert "xxx... (10000" in told
