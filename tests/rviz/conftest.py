@@ -8,7 +8,6 @@ import os
 import socket
 import subprocess
 import sys
-import time
 import xmlrpc.client
 from contextlib import closing, suppress
 from importlib.util import find_spec
@@ -16,11 +15,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import eventually
 
 from rosglass.demo.processes import VirtualScreen
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+
+    from qt_waiting import QtWaiting
 
     from rosglass.rviz import Application
 
@@ -83,14 +85,14 @@ def master(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         stderr=subprocess.DEVNULL,
     )
     uri = f"http://127.0.0.1:{port}"
-    until = time.monotonic() + 30
-    while time.monotonic() < until:
+
+    def answers() -> bool:
         with suppress(OSError, xmlrpc.client.Error), xmlrpc.client.ServerProxy(uri) as proxy:
             proxy.getPid("/test")
-            break
-        time.sleep(0.05)
-    else:
-        pytest.fail("rosmaster does not answer")
+            return True
+        return False
+
+    eventually(answers, "an answer of rosmaster")
     yield uri
     server.kill()
     server.wait()
@@ -145,22 +147,25 @@ def as_found() -> Iterator[None]:
 
 
 @pytest.fixture
-def wait(app: Application) -> Callable[..., None]:
-    """Run the event loop until a condition holds; without one, for some milliseconds."""
-    from rosglass.qt import QtCore, send_deferred_deletes
+def wait(app: Application) -> QtWaiting:
+    """Runs the event loop until a condition holds, or RViz has begun some frames."""
+    from qt_waiting import QtWaiting
 
-    def wait_until(condition: Callable[[], Any] | int, timeout: float = 30.0) -> None:
-        fixed = isinstance(condition, int)
-        until = time.monotonic() + (condition / 1000 if isinstance(condition, int) else timeout)
-        while fixed or not condition():  # type: ignore[operator]
-            if time.monotonic() > until:
-                assert fixed, "did not happen in time"
-                return
-            app.qt.processEvents(QtCore.QEventLoop.AllEvents, 10)
-            send_deferred_deletes()
-            time.sleep(0.001)
+    return QtWaiting(app.window.before_frame)
 
-    return wait_until
+
+@pytest.fixture
+def rviz_notices_changes(app: Application) -> Callable[[], bool]:
+    """Return whether RViz takes what happens for a change of the file: a second after loading."""
+    from rosglass.rviz.host import pyqt
+
+    def notices() -> bool:
+        timers = app.window.frame.findChildren(pyqt().QTimer)
+        after_loading = [t for t in timers if t.isSingleShot() and t.interval() == 1000]
+        assert len(after_loading) == 1
+        return not after_loading[0].isActive()
+
+    return notices
 
 
 @pytest.fixture
@@ -173,28 +178,17 @@ def drawn(app: Application) -> Iterator[list[Any]]:
 
 
 @pytest.fixture
-def frames(app: Application, wait: Callable[..., None]) -> Callable[[int], None]:
-    """Wait for some frames of RViz."""
-
-    def frames(count: int) -> None:
-        seen: list[int] = []
-        slot = lambda: seen.append(1)  # noqa: E731
-        app.window.before_frame.connect(slot)
-        wait(lambda: len(seen) >= count)
-        app.window.before_frame.disconnect(slot)
-
-    return frames
+def frames(wait: QtWaiting) -> Callable[[int], None]:
+    """See :meth:`QtWaiting.frames`."""
+    return wait.frames
 
 
 @pytest.fixture
-def grab(app: Application, wait: Callable[..., None]) -> Callable[[], Any]:
+def grab(app: Application, frames: Callable[[int], None]) -> Callable[[], Any]:
     """Return a picture of the 3D view after RViz has drawn two more frames; QImage."""
 
     def grab() -> Any:
-        frames: list[int] = []
-        count = frames.append
-        app.window.before_frame.connect(lambda: count(1))
-        wait(lambda: len(frames) >= 3)
+        frames(3)
         view = app.window.panel
         handle = app.qt.primaryScreen()
         return handle.grabWindow(view.winId()).toImage()
@@ -205,7 +199,7 @@ def grab(app: Application, wait: Callable[..., None]) -> Callable[[], Any]:
 class Hand:
     """A mouse and a keyboard, in units of the 3D view."""
 
-    def __init__(self, app: Any, wait: Callable[..., None]) -> None:
+    def __init__(self, app: Any, wait: QtWaiting) -> None:
         self.app, self.wait, self.panel = app, wait, app.window.panel
         self._held: dict[tuple[str, str], None] = {}
 
@@ -216,7 +210,7 @@ class Hand:
                 self._held[act.replace("down", "up"), what] = None
             self._held.pop((act, what), None)
         subprocess.run(["xdotool", *told], check=True, capture_output=True)
-        self.wait(60)
+        self.wait.frames(2)
 
     def let_go(self) -> None:
         """Release what is held, which later tests would meet."""
@@ -291,7 +285,7 @@ def steered(app: Any, wait: Callable[..., None]) -> Iterator[Any]:
     view.settings.load({})
     view.reset()
     app.window.manager.setFixedFrame("map")
-    wait(50)
+    wait.frames(2)
 
 
 @pytest.fixture
@@ -309,16 +303,14 @@ def eye(app: Any) -> Callable[[], tuple[float, float, float]]:
 
 
 @pytest.fixture
-def show(app: Any, wait: Callable[..., None], tmp_path: Path) -> Callable[..., Any]:
+def show(app: Any, frames: Callable[[int], None], tmp_path: Path) -> Callable[..., Any]:
     """Show QML text over the 3D view; returns its root."""
 
     def show(text: str, name: str = "Test", **options: Any) -> Any:
         file = tmp_path / f"{name}.qml"
         file.write_text(IMPORTS + text)
         overlay = app.add_qml(file, **options)
-        drawn: list[int] = []
-        app.window.before_frame.connect(lambda: drawn.append(1))
-        wait(lambda: len(drawn) > 2)
+        frames(3)
         return overlay._root
 
     return show
@@ -477,7 +469,7 @@ def displays(app: Any, wait: Callable[..., None]) -> Any:
     for display in displays.all:
         if display.exists:
             displays.remove(display)
-    wait(20)
+    wait.frames(1)
 
 
 @pytest.fixture
@@ -490,9 +482,7 @@ def qml(app: Any, wait: Callable[..., None], tmp_path: Path) -> Callable[..., Qm
         file = tmp_path / f"{name}.qml"
         file.write_text("import QtQuick 2.15\n" + text)
         overlay = app.add_qml(file, **options)
-        frames: list[int] = []
-        app.window.before_frame.connect(lambda: frames.append(1))
-        wait(lambda: len(frames) > 2)
+        wait.frames(3)
         return Qml(overlay, wait)
 
     return show

@@ -162,7 +162,9 @@ def test_a_second_rviz_is_refused(app: Any) -> None:
         type(app)()
 
 
-def test_a_window_that_is_closed_can_be_told_no(app: Any, wait: Any) -> None:
+def test_a_window_that_is_closed_can_be_told_no(
+    app: Any, wait: Any, rviz_notices_changes: Any
+) -> None:
     from rosglass.qt import QtCore
     from rosglass.rviz.qt5 import QtWidgets
 
@@ -175,7 +177,7 @@ def test_a_window_that_is_closed_can_be_told_no(app: Any, wait: Any) -> None:
         asked.append(box.text())
         box.button(QtWidgets.QMessageBox.Cancel).click()
 
-    wait(1200)  # RViz takes nothing for a change within a second after loading
+    wait(rviz_notices_changes)  # RViz takes nothing for a change within a second after loading
     app.window.widget.setWindowModified(True)
     QtCore.QTimer.singleShot(300, say_no)
     assert not app.window.widget.close()

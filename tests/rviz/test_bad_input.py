@@ -174,7 +174,7 @@ def test_objects_may_go_while_they_handle_an_event(
     grab()
     for x in (90, 250, 450):
         assert press(x, 290)
-        wait(30)
+        wait.frames(1)
         # There is nothing any more.
         assert not press(x, 290)
     wait(lambda: overlay.root.property("gone") == 2)
@@ -267,7 +267,7 @@ def test_an_overlay_may_be_removed_while_it_is_loaded(
     file.write_text(f"{IMPORTS}Item {{ Component.onCompleted: remover.remove() }}")
     assert not overlay.reload()
     assert list(app.overlays) == []
-    wait(50)
+    wait.frames(2)
     # While parts are made in the background.
     (tmp_path / "Part.qml").write_text(
         f"{IMPORTS}Column {{ Repeater {{ model: 50; Button {{}} }} }}"
@@ -278,9 +278,9 @@ def test_an_overlay_may_be_removed_while_it_is_loaded(
             "Loader { asynchronous: true; sourceComponent: Column { Repeater { model: 200\n"
             "Button {} } } } }"
         )
-        wait(pause)
+        wait.nothing_happens(pause / 1000)
         app.overlays.remove(passing)
-        wait(20)
+        wait.frames(1)
     goes_on()
 
 

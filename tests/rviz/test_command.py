@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import eventually
 
 from rosglass.demo.processes import VirtualScreen
 
@@ -41,11 +42,12 @@ class Program:
         return self._log.read_text()
 
     def wait_for(self, text: str) -> None:
-        until = time.monotonic() + PATIENCE
-        while text not in self.output:
-            assert self.process.poll() is None, self.output
-            assert time.monotonic() < until, self.output
-            time.sleep(0.02)
+        def is_there() -> bool:
+            found = text in self.output
+            assert found or self.process.poll() is None, self.output
+            return found
+
+        eventually(is_there, lambda: self.output, timeout=PATIENCE)
 
     def end(self, number: int = signal.SIGINT) -> int:
         started = time.monotonic()
@@ -344,10 +346,7 @@ def test_ends_when_its_screen_or_window_is_gone(
     with VirtualScreen() as screen:
         program = start("--name", "rviz_lost", "--overlay", file, DISPLAY=screen.display)
         program.wait_for("up")
-        until = time.monotonic() + PATIENCE
-        while not nodes(master) >= {"/rviz_lost", "/its_overlay"}:
-            assert time.monotonic() < until
-            time.sleep(0.05)
+        eventually(lambda: nodes(master) >= {"/rviz_lost", "/its_overlay"}, timeout=PATIENCE)
         happens(screen)
         # A crash would be told as a negative number.
         assert program.process.wait(PATIENCE) == 1, program.output

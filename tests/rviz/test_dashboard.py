@@ -70,7 +70,7 @@ def robot(master: str) -> Iterator[subprocess.Popen[bytes]]:
 def dashboard(app: Any, wait: Any, robot: subprocess.Popen[bytes]) -> Dashboard:
     app.load_config(FOLDER / "figure1.rviz")
     dashboard = Dashboard(app.add_qml(FOLDER / "Dashboard.qml")._root)
-    wait(lambda: live(dashboard), 60.0)
+    wait(lambda: live(dashboard), timeout=60.0)
     return dashboard
 
 
@@ -122,7 +122,7 @@ def test_the_stop_is_operated_by_keyboard_and_shows_the_focus(
     wait(ring.isVisible)
     wait(lambda: "hold, or Enter, to release" in dashboard.seen())
     hand.key("Return")
-    wait(1000)
+    wait.nothing_happens(1)
     assert stop.property("stopped"), "a short press does not release"
     hand.do("keydown", "Return")
     wait(lambda: not stop.property("stopped"))

@@ -36,7 +36,7 @@ def entries(app: Any, wait: Callable[..., None]) -> Iterator[Any]:
     for entry in app.entries:
         app.entries.remove(entry)
     app.overlays.close()
-    wait(50)
+    wait.frames(2)
 
 
 def only(entries: Any) -> Any:
@@ -121,7 +121,7 @@ def test_remove_duplicate_and_rename_by_the_panel(
     wait(lambda: len(list(entries)) == 1)
     only(entries).overlay.properties.properties["Speed"].set(1.75)
     panel.select("Dashboard")
-    wait(50)
+    wait.frames(2)
     panel.click("Duplicate")
     wait(lambda: len(list(app.overlays)) == 2)
     first, second = entries
@@ -131,7 +131,7 @@ def test_remove_duplicate_and_rename_by_the_panel(
     wait(lambda: second.overlay.name == "Second")
     gone = second.overlay
     panel.select("Second")
-    wait(50)
+    wait.frames(2)
     panel.click("Remove")
     wait(lambda: gone not in list(app.overlays))
     assert list(entries) == [first]
@@ -334,7 +334,7 @@ def test_an_overlay_that_loads_another_config_in_its_own_click(
     )
     entries.add_qml(str(file))
     wait(lambda: only(entries).overlay.loaded)
-    wait(300)
+    wait.frames(3)
     hand.click(100, 100)
     wait(lambda: not list(app.overlays) and not list(entries))
     assert app.window.config == str(empty)

@@ -50,11 +50,11 @@ def place(panel: Any, name: str) -> int:
 
 
 def test_dragging_an_entry_changes_which_is_above(
-    app: Any, squares: Any, panel: Any, wait: Any, seen: Any
+    app: Any, squares: Any, panel: Any, wait: Any, seen: Any, rviz_notices_changes: Any
 ) -> None:
     assert seen() == BLUE
     # RViz takes what happens within a second after loading for a part of it.
-    wait(1100)
+    wait(rviz_notices_changes)
     app.window.widget.setWindowModified(False)
     panel.drag(("Blue",), place(panel, "Red"))
     wait(lambda: order(app) == ["Blue", "Red"])
@@ -62,7 +62,7 @@ def test_dragging_an_entry_changes_which_is_above(
     assert app.window.modified
     # What a program brings to the front stays there until the user drags something.
     app.overlays.to_front(squares[1])
-    wait(100)
+    wait.frames(2)
     assert order(app) == ["Red", "Blue"]
     panel.drag(("Red",), place(panel, "Blue"))
     # It has been there before; two at once would be none.
@@ -210,7 +210,7 @@ def test_a_widget_that_comes_after_the_file_has_what_was_saved(
     app.overlays.remove(overlay)
     wait(lambda: not list(app.entries))
     app.load_config(saved)
-    wait(100)
+    wait.frames(3)
     assert list(app.overlays) == []
     again = styled()
     assert (again.style_sheet, again.opacity) == (lime, 0.5)
@@ -235,10 +235,10 @@ def test_a_style_sheet_that_is_not_there_is_told(
 
 
 def test_what_a_file_would_keep_marks_rviz_as_changed(
-    app: Any, squares: Any, panel: Any, wait: Any, tmp_path: Path
+    app: Any, squares: Any, panel: Any, wait: Any, tmp_path: Path, rviz_notices_changes: Any
 ) -> None:
     # RViz takes what happens within a second after loading for a part of it.
-    wait(1100)
+    wait(rviz_notices_changes)
     overlay = squares[0]
     speed = overlay.properties.registerFloatProperty("Speed", 1.0)
     file = tmp_path / "saved.rviz"
@@ -255,7 +255,7 @@ def test_what_a_file_would_keep_marks_rviz_as_changed(
     ]
     for number, change in enumerate(changes):
         app.save_config(file)
-        wait(20)
+        wait.frames(1)
         assert not app.window.modified, number
         assert "*" not in window.windowTitle().replace("[*]", "")
         change()
@@ -263,12 +263,12 @@ def test_what_a_file_would_keep_marks_rviz_as_changed(
         # Qt shows a star in its place.
         assert "[*]" in window.windowTitle()
     # The same values anew are no change.
-    wait(100)
+    wait.frames(3)
     app.save_config(file)
     overlay.properties.set_config({"tab": 3})
     speed.set(7.5)
     overlay.z = 3
-    wait(100)
+    wait.frames(3)
     assert not app.window.modified
 
 

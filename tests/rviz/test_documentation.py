@@ -85,7 +85,7 @@ def test_the_examples_run(
 ) -> None:
     said = {member: run(example) for member, example in TABLES[object_name].items()}
     assert {member: text for member, text in said.items() if text} == {}
-    wait(50)
+    wait.frames(2)
     assert [r.getMessage() for r in caplog.records if "no member" in r.getMessage()] == []
     app.window.fullscreen = app.window.bare.on = False
     app.fixed_frame = "map"
@@ -116,5 +116,5 @@ def test_interfaces_of_the_page_run(
     file = tmp_path / "Example.qml"
     file.write_text(text)
     overlay = app.add_qml(file)
-    wait(100)
+    wait.frames(3)
     assert overlay.problem == ""

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import eventually, nothing_happens
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -30,13 +31,6 @@ from rosglass.rviz.qt5 import QtGui
 app = QtGui.QGuiApplication([])
 app.primaryScreen().grabWindow(0).save(sys.argv[1])
 """
-
-
-def wait_until(condition: Callable[[], Any], what: Callable[[], Any]) -> None:
-    until = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < until, what()
-        time.sleep(0.05)
 
 
 class Robot:
@@ -195,14 +189,16 @@ def test_an_operator_sees_stops_and_commands_the_robot(robot: Robot, rviz: Rviz)
                 before[name] = now
         return live == set(PICTURES)
 
-    wait_until(look, lambda: f"live: {live}; {rviz.output}")
-    wait_until(lambda: robot.stopped is False and robot.speed > 0.1, lambda: robot.told)
+    eventually(look, lambda: f"live: {live}; {rviz.output}", timeout=PATIENCE)
+    eventually(
+        lambda: robot.stopped is False and robot.speed > 0.1, lambda: robot.told, timeout=PATIENCE
+    )
 
     rviz.click(STOP)
-    wait_until(lambda: robot.stopped and robot.speed < 0.01, rviz.evidence(robot))
+    eventually(lambda: robot.stopped and robot.speed < 0.01, rviz.evidence(robot), timeout=PATIENCE)
     # A click does not release it, a long press does.
     rviz.click(STOP)
-    time.sleep(1.0)
+    nothing_happens(1.0)
     assert robot.stopped
 
     def released() -> bool:
@@ -213,11 +209,11 @@ def test_an_operator_sees_stops_and_commands_the_robot(robot: Robot, rviz: Rviz)
         time.sleep(2.0)
         return robot.stopped is False
 
-    wait_until(released, rviz.evidence(robot))
+    eventually(released, rviz.evidence(robot), timeout=PATIENCE)
 
     rviz.click(BEHAVIOURS)
     rviz.click(FLIPPERS_UP)
-    wait_until(lambda: min(robot.flippers) > 1.0, lambda: robot.flippers)
+    eventually(lambda: min(robot.flippers) > 1.0, lambda: robot.flippers, timeout=PATIENCE)
 
     started = time.monotonic()
     rviz.process.send_signal(signal.SIGINT)

@@ -143,7 +143,7 @@ def test_combo_box_and_menu_open_in_the_overlay(hand: Any, show: Any) -> None:
     hand.click(90, 300)
     hand.wait(lambda: not root.property("open"))
     hand.click(340, 40)
-    hand.wait(300)
+    hand.wait.nothing_happens(0.3)
     hand.click(340, 80)
     assert root.property("chosen") == "first"
 
@@ -205,7 +205,7 @@ def test_cursor_is_the_items_and_then_the_tools(hand: Any, app: Any, show: Any) 
     assert tools != QtCore.Qt.PointingHandCursor
     hand.move(50, 50)
     assert app.window.panel.cursor().shape() == QtCore.Qt.PointingHandCursor
-    hand.wait(150)
+    hand.wait.frames(4)
     assert app.window.panel.cursor().shape() == QtCore.Qt.PointingHandCursor
     hand.move(300, 300)
     assert app.window.panel.cursor().shape() == tools
@@ -344,7 +344,7 @@ def test_touch_works_buttons_and_leaves_the_rest(hand: Any, app: Any, show: Any,
         for point in points[1:]:
             touch().move(0, point, panel).commit()
         touch().release(0, points[-1], panel).commit()
-        hand.wait(50)
+        hand.wait.frames(2)
 
     yaw = view("Yaw")
     stroke((60, 40))

@@ -93,7 +93,7 @@ def left(wait: Callable[..., None], before: Counter[str]) -> dict[str, int]:
 
 def counted(wait: Callable[..., None]) -> Counter[str]:
     """Return how many objects of our own classes, and of Qt's, there are."""
-    wait(100)
+    wait.frames(3)
     gc.collect()
     names = (f"{type(item).__module__}.{type(item).__name__}" for item in gc.get_objects())
     return Counter(name for name in names if name.startswith(("rosglass.", "PySide2.")))
@@ -131,11 +131,11 @@ def test_reloads_leave_no_object(app: Any, file: Path, wait: Callable[..., None]
     overlay = app.add_qml(file)
     for _ in range(3):
         assert overlay.reload()
-        wait(20)
+        wait.frames(1)
     before = counted(wait)
     for _ in range(10):
         assert overlay.reload()
-        wait(20)
+        wait.frames(1)
     assert left(wait, before) == {}
 
 

@@ -120,7 +120,7 @@ def finger(app: Any, hand: Any) -> Callable[..., None]:
         device = shiboken2.wrapInstance(address, QTouchDevice)
         sequence = QTest.touchEvent(panel, device, False)
         getattr(sequence, what)(0, QtCore.QPoint(round(x), round(y)), panel).commit()
-        hand.wait(20)
+        hand.wait.frames(1)
 
     return touch
 
@@ -201,7 +201,7 @@ def test_widgets_are_let_go_of(hand: Any, app: Any) -> None:
 
     stick = Stick()
     app.add(WidgetOverlay(stick, "Stick"))
-    hand.wait(200)
+    hand.wait.frames(3)
     for button, code in ((1, 1), (3, 2), (2, 4)):
         hand.move(200, 200)
         hand.press(button)

@@ -30,7 +30,7 @@ def test_popups_are_above_and_the_pressed_one_above_the_others(hand: Any, app: A
     low, middle, high = (app.add(Popup(label(), name)) for name in ("low", "middle", "high"))
     for number, popup in enumerate((low, middle, high)):
         popup.move(150 + 60 * number, 200)
-    hand.wait(200)
+    hand.wait.frames(3)
     clicked: list[str] = []
     for popup in (low, middle, high):
         popup.content.clicked.connect(lambda _=0, name=popup.name: clicked.append(name))
@@ -50,7 +50,7 @@ def test_modal_popup_blocks_what_is_below(hand: Any, app: Any, view: Any) -> Non
     button.clicked.connect(below.append)
     app.add(WidgetOverlay(button, "Below"))
     popup = app.add(Popup(label(), "Modal", modal=True))
-    hand.wait(200)
+    hand.wait.frames(3)
     yaw, distance = view("Yaw"), view("Distance")
     hand.drag(400, 400, 500, 400)
     hand.click(50, 30)
@@ -66,7 +66,7 @@ def test_modeless_popup_leaves_the_rest_alone(hand: Any, app: Any, view: Any) ->
     from rosglass.rviz.popup import Popup
 
     app.add(Popup(label(), "Modeless"))
-    hand.wait(200)
+    hand.wait.frames(3)
     yaw = view("Yaw")
     hand.drag(400, 500, 500, 500)
     assert view("Yaw") != yaw
@@ -79,7 +79,7 @@ def test_press_beside_dismisses(hand: Any, app: Any) -> None:
     popup.move(200, 200)
     told: list[int] = []
     popup.dismissed.connect(lambda: told.append(1))
-    hand.wait(200)
+    hand.wait.frames(3)
     hand.click(200, 200)
     assert popup.visible
     hand.click(400, 400)
@@ -102,7 +102,7 @@ def test_anchor_is_at_the_place(hand: Any, app: Any, anchor: str, corner: Any) -
 
     popup = app.add(Popup(label(), "Anchored", anchor=Anchor[anchor]))
     popup.move(300, 200)
-    hand.wait(200)
+    hand.wait.frames(3)
     box = popup.content.geometry()
     assert (box.x(), box.y()) == corner
     popup.move(1e4, -50)
@@ -143,7 +143,7 @@ def test_dialog_is_moved_by_its_title_and_tells_its_button(hand: Any, app: Any) 
     from rosglass.rviz.dialog import Button, message
 
     dialog = app.add(message("Title", "Really?", buttons=Button.YES | Button.NO))
-    hand.wait(200)
+    hand.wait.frames(3)
     told: list[Any] = []
     dialog.clicked.connect(told.append)
     box = dialog.content.geometry()
@@ -262,7 +262,7 @@ def test_popup_follows_a_moving_frame(hand: Any, app: Any, master: str, caplog: 
     hand.wait(lambda: popup.problem == "where the frame 'popup_test' is was not told for 3 s")
     assert popup.content.isVisible()
     assert (live, there_is_grey(popup)) == (False, True)
-    hand.wait(200)
+    hand.wait.frames(3)
     assert caplog.text.count("popup Robot: where the frame 'popup_test' is") == 1
     # It can be operated all the same.
     clicked: list[str] = []
@@ -281,7 +281,7 @@ def test_modal_popup_is_seen_wherever_its_point_is(hand: Any, app: Any) -> None:
     popup = app.add(Popup(label(), "Question", modal=True))
     x, y, z = Camera(app.window).eye
     popup.follow(app.rviz.trackers, (2 * x, 2 * y, 2 * z))
-    hand.wait(200)
+    hand.wait.frames(3)
     assert popup.content.isVisible()
     assert (popup.content.geometry().center() - popup.root.rect().center()).manhattanLength() < 4
 
@@ -300,7 +300,7 @@ def test_popup_may_be_removed_by_its_own_button(hand: Any, app: Any, view: Any) 
     def remove(popup: Any) -> None:
         app.overlays.remove(popup)
 
-    hand.wait(200)
+    hand.wait.frames(3)
     assert app.overlays.input.focused is above
     # The lower one is covered, and gets its turn when the upper one has gone.
     hand.click(170, 180)

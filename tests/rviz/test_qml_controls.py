@@ -119,7 +119,7 @@ def test_two_fingers_pinch(hand: Any, app: Any, show: Any, view: Any) -> None:
         for number, x in enumerate(places):
             getattr(sequence, what)(number, QtCore.QPoint(x, 150), panel)
         sequence.commit()
-        hand.wait(20)
+        hand.wait.frames(1)
 
     fingers("press", 120, 180)
     for way in (5, 15, 30, 45, 60):

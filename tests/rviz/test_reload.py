@@ -46,7 +46,7 @@ def mouse(app: Any, wait: Callable[..., None]) -> Callable[..., bool]:
         which, button, buttons = kinds[kind]
         event = QtGui.QMouseEvent(which, at, at, at, button, buttons, QtCore.Qt.NoModifier)
         taken = app.overlays.input.eventFilter(app.window.panel, event)
-        wait(20)
+        wait.frames(1)
         return bool(taken)
 
     return mouse
@@ -270,7 +270,7 @@ def test_watched_files_may_come_later(
     overlay = show("Item {", watch=True)
     assert not overlay.loaded
     assert overlay.problem
-    wait(300)
+    wait.nothing_happens(0.3)
     assert caplog.text.count(overlay.problem) == 1
     file.unlink()
     wait(lambda: "there is no such file" in overlay.problem)
@@ -289,7 +289,7 @@ def test_watching_begins_and_ends_at_run_time(show: Any, file: Path, wait: Any) 
     root = overlay.root
     overlay.watch = False
     file.write_text(IMPORTS + BLUE_UI + "\n")
-    wait(300)
+    wait.nothing_happens(0.3)
     assert overlay.root is root
 
 
@@ -415,7 +415,7 @@ def test_reloads_leave_nothing_behind(show: Any, file: Path, wait: Any, grab: An
         gone.append(overlay.root)
         file.write_text(IMPORTS + text % number)
         assert overlay.reload()
-        wait(15)
+        wait.frames(1)
 
     for number in range(60):
         cycle(number)

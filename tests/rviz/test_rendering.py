@@ -417,7 +417,7 @@ def test_overlays_that_come_and_go_leave_nothing_behind(
         overlay.scale = 0.7
         frames(1)
         app.overlays.remove(overlay)
-        wait(5)
+        wait.frames(1)
 
     for number in range(5):
         cycle(number)
@@ -451,7 +451,7 @@ def test_camera_pictures_are_drawn(app: Any, show: Any, grab: Any, wait: Any, ma
 
         def arrived() -> bool:
             publisher.publish(image)
-            wait(50)
+            wait.frames(2)
             return colour(grab(), 50, 40) == (255, 128, 0)
 
         wait(arrived)

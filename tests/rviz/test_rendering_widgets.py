@@ -48,7 +48,7 @@ def lights(
 
         def count(self) -> list[int]:
             frames(3)
-            wait(30)
+            wait.frames(1)
             frames(2)
             counts = [light.painted for light in self.lights]
             for light in self.lights:

@@ -7,12 +7,12 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import eventually
 
 from rosglass.errors import Error
 
@@ -47,13 +47,6 @@ def gone(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
     except OSError:
         return True
-
-
-def wait_until(condition: Callable[[], Any], what: str) -> None:
-    until = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < until, what
-        time.sleep(0.05)
 
 
 @pytest.fixture
@@ -97,12 +90,16 @@ def test_it_takes_a_picture_and_ends(demo: Any, tmp_path: Path) -> None:
 )
 def test_nothing_outlives_it(demo: Any, number: signal.Signals, programs: int) -> None:
     process = demo(600)
-    wait_until(lambda: len(children(process.pid)) >= programs, f"it starts {programs} programs")
+    eventually(
+        lambda: len(children(process.pid)) >= programs,
+        f"it starts {programs} programs",
+        timeout=PATIENCE,
+    )
     started = children(process.pid)
     process.send_signal(number)
     expected = -number if number is signal.SIGKILL else 128 + number
     assert process.wait(PATIENCE) == expected
-    wait_until(lambda: all(map(gone, started)), "programs are left behind")
+    eventually(lambda: all(map(gone, started)), "programs are left behind", timeout=PATIENCE)
 
 
 def test_without_a_master_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -157,7 +157,7 @@ def test_displays_removed_by_the_user(app: Any, displays: Any, qml: Any, wait: A
     handle.disconnect()
     handle.getParent().takeChild(handle)
     as_pyside(handle, QtCore.QObject).deleteLater()
-    wait(20)
+    wait.frames(1)
     assert not again.exists
     assert again.status.level == "error"
 
@@ -299,7 +299,7 @@ def test_trackers_end_with_their_objects(app: Any, qml: Any, wait: Any) -> None:
     here = qml()
     before = len(app.rviz.trackers)
     here.run("for (let i = 0; i < 20; i++) rviz.createPositionTracker(i, 0, 0)")
-    wait(20)
+    wait.frames(1)
     here.overlay.engine.collectGarbage()
     wait(lambda: len(app.rviz.trackers) <= before + 1)
 
@@ -441,12 +441,12 @@ def test_overlays_that_come_and_go(app: Any, tools: Any, qml: Any, wait: Any) ->
         app.overlays.remove(here.overlay)
         tools.add("rviz/Measure")
         tools.remove(tools.find("rviz/Measure"))
-        wait(20)
+        wait.frames(1)
     # From within its own JavaScript.
     here = qml("Item { signal end; onEnd: rviz.toolManager.removeTool(0) }")
     tools.removed.connect(lambda tool: app.overlays.remove(here.overlay))
     here.root.end.emit()
-    wait(50)
+    wait.frames(2)
     assert here.overlay not in list(app.overlays)
 
 

@@ -82,7 +82,7 @@ def test_told_once_for_each_place_and_still_after_collecting(
         root.setProperty("again", count)
         overlay.engine.collectGarbage()
         gc.collect()
-        wait(5)
+        wait.frames(1)
     assert len([line for line in said() if "fixedFrme" in line]) == 1
     assert "did you mean mode" in root.write()
 

@@ -81,7 +81,7 @@ def test_the_dialog_for_a_new_tool(
     assert dialog() is None
     wait(lambda: tried)
     wait(lambda: dialog() is None)
-    wait(100)
+    wait.frames(3)
     added = root.property("told")
     added = added.toVariant() if hasattr(added, "toVariant") else added
     if chosen is None:
@@ -165,8 +165,8 @@ def test_keys_select_tools(
     tools.remove(again)
     wait(lambda: tools.current is tools.all[0])
     hand.key("m")
-    wait(100)
+    wait.frames(3)
     assert tools.current is tools.all[0]
     hand.key("i")
-    wait(100)
+    wait.frames(3)
     assert tools.current.shortcut_key == "i"

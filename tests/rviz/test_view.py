@@ -48,12 +48,12 @@ def test_2d_shows_as_much_as_3d_did(app: Any, view: Any, wait: Callable[..., Non
 
     steep = 1e-3
     view.move_eye_and_focus((2 - 10 * steep, 1, 10), (2, 1, 0), animate=False)
-    wait(200)
+    wait.frames(6)
     camera, point = Camera(app.window), (3.0, 2.0, 0.0)
     camera.update()
     before = camera.project(point)
     view.set_mode(1, animate=False)
-    wait(200)
+    wait.frames(6)
     camera.update()
     assert near(camera.project(point)[:2], before[:2], 3.0)
 
@@ -65,7 +65,7 @@ def test_other_views_make_place_and_nothing_crashes_rviz(
     # Two views in one event had RViz's panel touch the first one, which was gone.
     for kind in ("rviz/TopDownOrtho", "rviz/FPS", "rviz/ThirdPersonFollower", "rviz/FPS"):
         manager.setCurrentViewControllerType(kind)
-    wait(200)
+    wait.frames(6)
     assert near(view.eye, eye())
     view.move_eye((5, 6, 7))
     wait(lambda: near(eye(), (5, 6, 7)))
@@ -73,7 +73,7 @@ def test_other_views_make_place_and_nothing_crashes_rviz(
     view.set_mode(1)
     manager.setCurrentViewControllerType("rviz/FPS")
     assert not view.is_moving
-    wait(100)
+    wait.frames(3)
     assert manager.getCurrent().getClassId() == "rviz/FPS"
 
 
@@ -105,7 +105,7 @@ def test_who_moves_the_camera_otherwise_ends_our_movement(
 ) -> None:
     view.settings.animation_duration = 60.0
     view.move_eye((50, 50, 50))
-    wait(100)
+    wait.frames(3)
     app.window.manager.getViewManager().getCurrent().subProp("Yaw").setValue(1.0)
     wait(lambda: not view.is_moving)
     app.window.manager.setFixedFrame("map")
@@ -125,7 +125,7 @@ def test_a_config_that_is_loaded_ends_movement_and_tracking(
     view.move_eye((50, 50, 50))
     app.load_config(file)
     assert not view.is_moving
-    wait(100)
+    wait.frames(3)
     assert view.tracked_frame == ""
     assert view.mode == 0
     assert near(view.eye, (4, 0, 3))
@@ -148,18 +148,18 @@ def test_arrow_keys_shift_the_view_and_ctrl_d_changes_the_mode(
     QTest.keyPress(panel, Qt.Key_Up)
     wait(lambda: view.focus.x < start.x - 0.5)
     QTest.keyRelease(panel, Qt.Key_Up)
-    wait(50)
+    wait.frames(2)
     stopped = view.focus
-    wait(200)
+    wait.frames(6)
     assert near(view.focus, stopped, 1e-6)
     assert near(stopped[1:], start[1:])
     QTest.keyPress(panel, Qt.Key_Left)
     wait(lambda: view.focus.y < stopped.y - 0.5)
     # Who goes elsewhere with a key down does not leave the camera running.
     panel.clearFocus()
-    wait(50)
+    wait.frames(2)
     stopped = view.focus
-    wait(200)
+    wait.frames(6)
     assert near(view.focus, stopped, 1e-6)
     QTest.keyClick(panel, Qt.Key_D, Qt.ControlModifier)
     assert view.mode == 1

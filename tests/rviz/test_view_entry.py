@@ -39,7 +39,7 @@ def settings(app: Any, wait: Callable[..., None]) -> Iterator[Any]:
     app.view_entry.shown = False
     app.view.settings.by_program.clear()
     app.view.settings.load({})
-    wait(50)
+    wait.frames(2)
 
 
 def displays(app: Any) -> dict[str, Any]:
@@ -157,7 +157,7 @@ def test_duplicated_and_removed_by_the_panel(
         found = [model.index(row, 0) for row in range(model.rowCount())]
         at = next(index for index in found if index.data().startswith("View Controller"))
         tree.selectionModel().setCurrentIndex(at, flags.ClearAndSelect | flags.Rows)
-        wait(50)
+        wait.frames(2)
         panel = tree.parent()
         while not panel.findChildren(qt.QPushButton):
             panel = panel.parent()
@@ -173,7 +173,7 @@ def test_duplicated_and_removed_by_the_panel(
     assert both[0].subProp("Movement Speed").getValue() == 8.0
     click("Remove")
     wait(lambda: len(app.view_entry._shown) == 1)
-    wait(50)
+    wait.frames(2)
     assert settings.speed == 8.0
     click("Remove")
     wait(lambda: settings.speed == 4.0)

@@ -66,7 +66,7 @@ def test_shift_doubles_the_speed_whenever_it_is_pressed(
     hand.do("keyup", "Up", "keyup", "shift")
     assert set(steps) == {(0.8, 0.0)}
     steps.clear()
-    wait(200)
+    wait.frames(6)
     assert steps == []
 
 
@@ -74,7 +74,7 @@ def test_other_keys_with_arrows_are_not_ours(
     hand: Any, steps: list[tuple[float, float]], wait: Callable[..., None]
 ) -> None:
     hand.key("ctrl+Up", "alt+Up")
-    wait(200)
+    wait.frames(6)
     assert steps == []
 
 
@@ -92,11 +92,11 @@ def test_a_text_field_keeps_its_keys(
     # Who takes the keys ends what they did to the camera.
     hand.click(120, 40)
     wait(lambda: root.property("active"))
-    wait(100)
+    wait.frames(3)
     steps.clear()
     hand.do("keyup", "Up")
     hand.key("End", "Left", "shift+Left", "Up", "Down", "ctrl+d")
-    wait(200)
+    wait.frames(6)
     assert steps == []
     assert steered.mode == 0
     hand.key("x")
@@ -119,7 +119,7 @@ def test_a_widget_s_field_keeps_its_keys(
     field = QtWidgets.QLineEdit("abcd")
     field.setFixedSize(200, 40)
     app.add(WidgetOverlay(field, "Field"))
-    wait(200)
+    wait.frames(6)
     hand.click(120, 20)
     wait(field.hasFocus)
     hand.key("End", "Left", "Up", "x", "ctrl+d")
@@ -135,10 +135,10 @@ def test_without_keyboard_navigation_keys_are_rviz_s(
     wait(lambda: steps != [])
     # A key that is down as it is switched off does not go on.
     steered.settings.keys = False
-    wait(100)
+    wait.frames(3)
     steps.clear()
     hand.do("keyup", "Up")
     hand.key("Up", "ctrl+d")
-    wait(200)
+    wait.frames(6)
     assert steps == []
     assert steered.mode == 0

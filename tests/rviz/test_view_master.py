@@ -6,10 +6,10 @@ import os
 import socket
 import subprocess
 import sys
-import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import eventually
 
 from rosglass.errors import ConnectionLostError
 
@@ -81,9 +81,7 @@ def test_the_services_come_back_without_a_restart(rviz: Any, address: tuple[str,
                 "hector_rviz_plugins/msg/ViewMode",
                 lambda message, heard=heard: heard.append(message.mode),
             )
-            end = time.monotonic() + PATIENCE
-            while mode not in heard and time.monotonic() < end:
-                time.sleep(0.05)
+            eventually(lambda mode=mode, heard=heard: mode in heard, timeout=PATIENCE)
             assert heard[-1] == mode
         start()
     assert rviz.poll() is None

@@ -73,7 +73,7 @@ def run(
         "function onMoved() { told.push('moved') } } }"
     )
     overlay = app.add_qml(file)
-    wait(100)
+    wait.frames(3)
     engine = overlay.engine
     engine.globalObject().setProperty("rviz", engine.newQObject(overlay.properties))
     engine.globalObject().setProperty("root", engine.newQObject(overlay._root))
@@ -118,7 +118,7 @@ def test_frames_that_there_are_are_told(
 def test_what_the_operator_sets_is_told(
     run: Any, app: Any, steered: Any, wait: Callable[..., None]
 ) -> None:
-    wait(50)
+    wait.frames(2)
     run("root.told = []")
     app.view_entry.shown = True
     (entry,) = app.view_entry._shown
@@ -133,7 +133,7 @@ def test_what_the_operator_sets_is_told(
 def test_the_view_is_read_once_per_frame(
     run: Any, app: Any, steered: Any, monkeypatch: pytest.MonkeyPatch, wait: Callable[..., None]
 ) -> None:
-    wait(300)
+    wait.frames(9)
     reads, frames = [], []
     read = steered._current.read
     monkeypatch.setattr(steered._current, "read", lambda: reads.append(1) or read())

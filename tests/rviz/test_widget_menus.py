@@ -9,6 +9,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import eventually
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -65,7 +66,7 @@ def panel(app: Any, hand: Any) -> Any:
             menu.popup(self.custom.mapToGlobal(at))
 
     overlay = app.add(Panel())
-    hand.wait(200)
+    hand.wait.frames(6)
     return overlay
 
 
@@ -80,9 +81,7 @@ def act(hand: Any) -> Callable[..., None]:
         def go() -> None:
             for step in steps:
                 if callable(step):
-                    until = time.monotonic() + 20
-                    while not step() and time.monotonic() < until:
-                        time.sleep(0.02)
+                    eventually(step)
                     continue
                 kind, *words = step
                 if kind == "at":
@@ -94,7 +93,7 @@ def act(hand: Any) -> Callable[..., None]:
 
         thread = threading.Thread(target=go)
         thread.start()
-        hand.wait(lambda: not thread.is_alive(), 60.0)
+        hand.wait(lambda: not thread.is_alive(), timeout=60.0)
 
     return run
 

@@ -42,7 +42,7 @@ def panel(app: Any, hand: Any) -> Any:
             self.clicks += 1
 
     overlay = app.add(Panel())
-    hand.wait(200)
+    hand.wait.frames(6)
     return overlay
 
 
