@@ -7,7 +7,6 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,11 +21,13 @@ if find_spec("PySide6") is None:
     os.environ.setdefault("ROSGLASS_QT", "pyside2")
 
 from memory_world import MemoryWorld
+from waiting import eventually
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from PySide6.QtCore import QCoreApplication, QObject
+    from qt_waiting import QtWaiting
 
     from rosglass.comm import Node
     from rosglass.qml import Session
@@ -56,28 +57,11 @@ def app(platform: dict[str, str]) -> QCoreApplication:
 
 
 @pytest.fixture
-def wait(app: QCoreApplication) -> Callable[..., None]:
-    """Run the event loop until a condition holds; without one, for some milliseconds."""
-    from rosglass.qt import QtCore, send_deferred_deletes
+def wait(app: QCoreApplication) -> QtWaiting:
+    """Runs the event loop until a condition holds, a signal has come, or nothing is left to do."""
+    from qt_waiting import QtWaiting
 
-    def turn() -> None:
-        app.processEvents(QtCore.QEventLoop.ProcessEventsFlag.AllEvents, 10)
-        # They otherwise wait for exec().
-        send_deferred_deletes()
-        time.sleep(0.001)
-
-    def wait_until(condition: Callable[[], Any] | int, timeout: float = 30.0) -> None:
-        if isinstance(condition, int):
-            timeout, until = condition / 1000, time.monotonic() + condition / 1000
-            while time.monotonic() < until:
-                turn()
-            return
-        until = time.monotonic() + timeout
-        while not condition():
-            assert time.monotonic() < until, "did not happen in time"
-            turn()
-
-    return wait_until
+    return QtWaiting()
 
 
 class Bench:
@@ -216,7 +200,7 @@ def live(app: QCoreApplication, url: str, tmp_path: Path, wait: Any) -> Iterator
     install(engine, session)
     made = Bench(session, engine, RealWorld(url), tmp_path)
     session.init("ui")
-    wait(lambda: session.state == "connected", 30)
+    wait(lambda: session.state == "connected")
     yield made
     made.close()
     made.robot.close()
@@ -271,15 +255,17 @@ class Program:
 
     def until(self, text: str, timeout: float = 30.0) -> str:
         """Wait until a line with `text` is written and return it; later calls want later lines."""
-        until = time.monotonic() + timeout
-        while True:
+
+        def line() -> str:
+            is_over = self._process.poll() is not None and not self._reader.is_alive()
             for at, line in enumerate(self.lines):
                 if text in line:
                     del self.lines[: at + 1]
                     return line
-            assert time.monotonic() < until, f"no {text!r} in:\n{self.text}"
-            assert self._process.poll() is None or self._reader.is_alive(), self.text
-            time.sleep(0.01)
+            assert not is_over, self.text
+            return ""
+
+        return str(eventually(line, lambda: f"no {text!r} in:\n{self.text}", timeout=timeout))
 
     def end(self, timeout: float = 30.0) -> int:
         """Wait for its end and return the exit code."""

@@ -66,5 +66,5 @@ class Client:
         return None if not text else json.loads(text)
 
     def until(self, kind: str) -> list[Any]:
-        self.wait(lambda: self.of(kind), 30)
+        self.wait(lambda: self.of(kind))
         return self.of(kind)[-1]

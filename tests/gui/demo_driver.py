@@ -88,13 +88,14 @@ class CockpitProcess:
 
     def until(self, item: str, name: str, wanted: Any = True, timeout: float = 30.0) -> float:
         """Wait until a property has a value; returns how long it took, seconds."""
+        from waiting import eventually  # this file is a program as well, without tests' paths
+
         begin = time.monotonic()
-        while (value := self.get(item, name)) != wanted:
-            waited = time.monotonic() - begin
-            assert waited < timeout, (
-                f"{item}.{name} is {value!r}, not {wanted!r}, after {waited:.1f} s"
-            )
-            time.sleep(0.02)
+        eventually(
+            lambda: self.get(item, name) == wanted,
+            lambda: f"{item}.{name} is {self.get(item, name)!r}, not {wanted!r}",
+            timeout=timeout,
+        )
         return time.monotonic() - begin
 
     def complaints(self) -> list[str]:

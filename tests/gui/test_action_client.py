@@ -87,7 +87,7 @@ def test_a_goal(client: Client, counter: Counter, wait: Any) -> None:
 
 def test_a_goal_waits_for_the_server(client: Client, counter: Counter, wait: Any) -> None:
     client.run("send(3)")
-    wait(300)
+    wait.nothing_happens(0.3)
     counter.offer()
     assert client.until("result")[:3] == [True, 4, 3]
 
@@ -146,7 +146,7 @@ def test_cancelling_until_a_time(live: Bench, counter: Counter, wait: Any) -> No
     wait(root.ready)
     root.one()
     wait(lambda: root.both() == "2,0")
-    wait(20)  # the clocks of goals have milliseconds
+    wait.nothing_happens(0.02)  # the clocks of goals have milliseconds
     root.two()
     wait(lambda: root.both() == "2,2")
     root.cancel()
@@ -312,10 +312,10 @@ def test_the_robot_goes_away(client: Client, counter: Counter, wait: Any) -> Non
     closing = threading.Thread(target=counter.server.close)
     closing.start()
     assert client.until("result")[1] == 6
-    wait(lambda: not client.run("client.ready"), 30)
+    wait(lambda: not client.run("client.ready"))
     closing.join(30)
     counter.offer()
-    wait(lambda: client.run("client.ready"), 30)
+    wait(lambda: client.run("client.ready"))
     client.run("log = []; send(3)")
     assert client.until("result")[1] == 4
 
@@ -333,7 +333,7 @@ def test_the_interface_shuts_down_and_starts_again(
     assert "shut down" in told[3]
     assert client.run("[handle.isActive, client.ready]") == [False, False]
     live.session.init("ui")
-    wait(lambda: client.run("client.ready"), 30)
+    wait(lambda: client.run("client.ready"))
     client.run("log = []; send(3)")
     assert client.until("result")[1] == 4
 
@@ -347,9 +347,9 @@ def test_the_type_is_the_servers(live: Bench, counter: Counter, wait: Any) -> No
                 function (r) { count = r.result.sequence.length })
         }
     """)
-    wait(100)
+    wait.settled(live.session)
     counter.offer()
-    wait(lambda: root.property("count") == 6, 30)
+    wait(lambda: root.property("count") == 6)
 
 
 def test_a_goal_nobody_will_hear_of_any_more(client: Client, counter: Counter, wait: Any) -> None:
@@ -383,7 +383,7 @@ def test_nobody_holds_the_client(live: Bench, counter: Counter, wait: Any) -> No
     wait(lambda: counter.server.goals)
     for _ in range(3):
         live.engine.collectGarbage()
-        wait(20)
+        wait.settled(live.session)
     counter.go.set()
     wait(lambda: root.property("count") == 3)
 
@@ -404,7 +404,7 @@ def test_the_engine_goes_away_while_a_goal_runs(
     client.run("send(50)")
     client.until("feedback")
     engine.deleteLater()
-    wait(300)
+    wait.nothing_happens(0.3)
     assert counter.server.goals
     assert live.session.state == "connected"
     assert "internal error" not in caplog.text

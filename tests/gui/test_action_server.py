@@ -35,14 +35,14 @@ class Robot:
         self.feedback: list[list[int]] = []
 
     def send(self, order: int) -> ClientGoal:
-        self.wait(lambda: self.client.ready, 30)
+        self.wait(lambda: self.client.ready)
         goal: ClientGoal = self.client.send_goal(
             {"order": order}, on_feedback=lambda m: self.feedback.append(list(m.sequence))
         )
         return goal
 
     def end(self, goal: ClientGoal) -> tuple[GoalStatus, list[int]]:
-        self.wait(goal.done.done, 30)
+        self.wait(goal.done.done)
         end = goal.done.result()
         return end.status, list(end.result.sequence)
 
@@ -186,7 +186,7 @@ def test_a_refused_cancel(live: Bench, robot: Robot, wait: Any) -> None:
     wait(lambda: run(root, "Boolean(handle)"))
     goal.cancel()
     wait(lambda: root.property("asked"))
-    wait(100)
+    wait.nothing_happens(0.1)
     assert run(root, "handle.isCancelRequested") is False
     run(root, "handle.succeed({sequence: [1]})")
     assert robot.end(goal) == (SUCCEEDED, [1])
@@ -211,15 +211,15 @@ def test_withdrawing_ends_the_goals(live: Bench, robot: Robot, wait: Any) -> Non
     run(root, "server.enabled = false")
     assert robot.end(goal)[0] is ABORTED
     wait(lambda: run(root, "[handle.isActive, server.ready]") == [False, False])
-    wait(lambda: not robot.client.ready, 30)
+    wait(lambda: not robot.client.ready)
     run(root, "handle = null; server.enabled = true")
     goal = robot.send(6)
     wait(lambda: run(root, "Boolean(handle)"))
     live.session.shutdown()
-    wait(goal.done.done, 30)
+    wait(goal.done.done)
     wait(lambda: run(root, "handle.isActive") is False)
     live.session.init("ui")
-    wait(lambda: run(root, "server.ready"), 30)
+    wait(lambda: run(root, "server.ready"))
     goal = robot.send(7)
     wait(lambda: run(root, "handle.goal.order") == 7)
     run(root, "handle.succeed()")
@@ -246,7 +246,7 @@ def test_an_engine_that_goes_away_ends_the_goals(
     root.deleteLater()
     engine.deleteLater()
     assert robot.end(goal)[0] is ABORTED
-    wait(100)
+    wait.settled(live.session)
     assert "callback failed" not in caplog.text
 
 

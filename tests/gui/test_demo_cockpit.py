@@ -19,6 +19,7 @@ pytest.importorskip("PySide6.QtMultimedia", reason="the cockpit needs the extra 
 zenoh = pytest.importorskip("zenoh", reason="the cockpit needs the extra `zenoh`")
 
 from demo_driver import SIZE, CockpitProcess  # noqa: E402
+from waiting import eventually, nothing_happens  # noqa: E402
 
 from rosglass.demo import framecode  # noqa: E402
 from rosglass.demo.camera import CODE_POSITION, HEIGHT, WIDTH  # noqa: E402
@@ -167,13 +168,12 @@ def test_everything_else_arrives(cockpit: CockpitProcess) -> None:
 def test_a_key_drives_and_letting_go_stops(cockpit: CockpitProcess, robot: RobotSide) -> None:
     start = robot.x
     cockpit.key("press", "Key_W")
-    robot.until(lambda: robot.speed > 0.3)
-    time.sleep(0.3)
+    robot.until(lambda: robot.x > start + 0.1 and sum(c[1] > 0 for c in robot.commands) > 5)
     cockpit.key("release", "Key_W")
     released = time.monotonic()
     robot.until(lambda: robot.speed == 0.0)
     assert robot.x > start + 0.1
-    time.sleep(0.6)
+    nothing_happens(0.6)
     moving = [c for c in robot.commands if c[1] > 0]
     zeros = [c for c in robot.commands if c[1] == c[2] == 0]
     assert len(moving) > 5, robot.commands
@@ -249,7 +249,7 @@ def test_another_window_in_front_stops_the_robot(cockpit: CockpitProcess, robot:
     robot.until(lambda: robot.speed == 0.0)
     cockpit.cover(False)
     cockpit.until("cockpit", "inFront")
-    time.sleep(0.3)
+    nothing_happens(0.3)
     assert robot.commands[-1][1:] == (0.0, 0.0), "a key pressed before does not count any more"
 
 
@@ -268,14 +268,14 @@ def test_the_emergency_stop_stops_and_stays(
     # Pressing harder does not help.
     cockpit.key("release", "Key_W")
     cockpit.key("press", "Key_W")
-    time.sleep(0.4)
+    nothing_happens(0.4)
     assert robot.speed == 0.0
     assert cockpit.get("speed", "refused")
     cockpit.key("release", "Key_W")
     cockpit.mouse("press", "unlock", 0.5, 0.5)
     time.sleep(0.2)
     cockpit.mouse("release", "unlock", 0.5, 0.5)
-    time.sleep(0.3)
+    nothing_happens(0.3)
     assert robot.stopped, "a short click does not release"
     cockpit.mouse("press", "unlock", 0.5, 0.5)
     robot.until(lambda: robot.stopped is False)
@@ -293,7 +293,7 @@ def test_the_emergency_stop_is_released_by_a_key_that_is_held(
     cockpit.key("press", key)
     time.sleep(0.2)
     cockpit.key("release", key)
-    time.sleep(0.8)
+    nothing_happens(0.8)
     assert robot.stopped, "a short press does not release"
     # As X11 repeats a key that is held down.
     cockpit.key("press", key)
@@ -357,13 +357,13 @@ def test_diagnostics_are_merged_worst_first_and_counted(
     def shown() -> list[str]:
         return [state["name"] for state in cockpit.get("diagnostics", "states")]
 
-    end = time.monotonic() + 30
-    while shown()[:2] != ["zoom", "track"] or len(shown()) != 27:
-        assert time.monotonic() < end, shown()
+    def is_shown() -> bool:
         # One right after the other: none may take the other's place.
         arm.publish({"status": [*parts, broken]})
         base.publish({"status": [worn]})
-        time.sleep(0.05)
+        return shown()[:2] == ["zoom", "track"] and len(shown()) == 27
+
+    eventually(is_shown, shown)
     assert cockpit.get("diagnostics", "note") == "1 error, 1 warning"
     hidden = cockpit.get("diagnostics", "hidden")
     assert 0 < hidden < 27
@@ -424,14 +424,12 @@ def test_a_stop_by_somebody_else_is_shown_and_not_undone(
     cockpit: CockpitProcess, robot: RobotSide
 ) -> None:
     other = robot.node.create_publisher("/emergency_stop", "std_msgs/msg/Bool")
-    deadline = time.monotonic() + 30
-    while not other.subscription_count() and time.monotonic() < deadline:
-        time.sleep(0.02)
+    eventually(other.subscription_count)
     time.sleep(1.0)  # sooner after a release of ours, it would be said to be held
     other.publish(data=True)
     cockpit.until("stop", "stopped")
     assert cockpit.get("confirmation", "text") == "by someone else"
-    time.sleep(0.5)
+    nothing_happens(0.5)
     assert robot.stopped
     cockpit.call("stop", "release")
     cockpit.until("stop", "stopped", False)
@@ -462,8 +460,9 @@ def test_a_killed_robot_is_seen_within_a_second_and_recovers_by_itself(
     assert spread[top].mean() < 0.6 * was[top].mean(), "the old picture has lost its colours"
     edge = grab(cockpit, tmp_path / "edge.png", "frame")[1:5, 50:-50].astype(int)
     assert edge[..., 0].mean() > edge[..., 2].mean() + 80, "a red frame"
-    time.sleep(1.2)
-    assert float(cockpit.get("noSignalText", "text").split()[2]) > 1.0, "its age is told"
+    eventually(
+        lambda: float(cockpit.get("noSignalText", "text").split()[2]) > 1.0, "its age is shown"
+    )
 
     robot.restart()
     cockpit.until("camera", "live", timeout=30)
@@ -486,7 +485,7 @@ def test_a_robot_that_comes_back_does_not_drive_by_itself(
     robot.restart()
     cockpit.until("camera", "live", timeout=30)
     cockpit.until("drive", "obstacle", "")
-    time.sleep(0.3)
+    nothing_happens(0.3)
     assert cockpit.get("drive", "held")
     assert not cockpit.get("drive", "active")
     assert robot.speed == 0.0

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from waiting import eventually
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -62,10 +63,7 @@ def alive(pid: int) -> bool:
 
 
 def wait_gone(pids: list[int], timeout: float) -> None:
-    end = time.monotonic() + timeout
-    while left := [pid for pid in pids if alive(pid)]:
-        assert time.monotonic() < end, f"still running: {left}"
-        time.sleep(0.05)
+    eventually(lambda: not any(map(alive, pids)), timeout=timeout)
 
 
 def children(pid: int) -> list[int]:
@@ -143,11 +141,8 @@ def test_a_second_demo_says_that_there_is_a_robot_already(
         me.create_subscription(
             "/odom", "nav_msgs/msg/Odometry", lambda _: came.append(time.monotonic())
         )
-        end = time.monotonic() + 30
         # One that starts at the same time has the same right to the name.
-        while not came or came[-1] - came[0] < 6:
-            assert time.monotonic() < end
-            time.sleep(0.05)
+        eventually(lambda: came and came[-1] - came[0] >= 6)
         second = start(tmp_path, "demo", "--url", url, "--seconds", "60")
         output, _ = second.communicate(timeout=60)
         assert second.returncode == 1, output

@@ -50,7 +50,7 @@ def test_a_repeat_is_neither_a_release_nor_a_press(
     for _ in range(5):
         keys.lift(W)
         assert not keys.press(W)
-        wait(25)
+        wait.nothing_happens(0.025)
     assert lifted == []
     keys.lift(A)
     wait(lambda: lifted)
@@ -67,7 +67,7 @@ def test_a_hiccup_does_not_turn_a_repeat_into_a_release(
     time.sleep(0.1)
     QCoreApplication.processEvents()
     assert not keys.press(W)
-    wait(60)
+    wait.nothing_happens(0.06)
     assert lifted == []
 
 
@@ -80,6 +80,6 @@ def test_a_key_pressed_before_does_not_count_until_it_was_let_go(
         keys.lift(W)
         assert not keys.press(W)
     keys.lift(W)
-    wait(60)
+    wait.nothing_happens(0.06)
     assert lifted == []
     assert keys.press(W)

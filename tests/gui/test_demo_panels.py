@@ -91,7 +91,7 @@ def test_setting_the_clock_silences_no_part(running: Any, wait: Callable[..., No
     assert parts.root.levels() == "0,0"
     # A part that says no more is silent all the same.
     clock.milliseconds -= 7_200_000
-    wait(lambda: parts.root.levels() == "3,3", 30)
+    wait(lambda: parts.root.levels() == "3,3")
 
 
 def test_a_picture_that_stands_still_ages_when_the_clock_is_set_back(

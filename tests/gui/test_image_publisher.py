@@ -62,7 +62,7 @@ class Robot:
         return found
 
     def picture(self, found: list[Any]) -> np.ndarray:
-        self.wait(lambda: found, 30)
+        self.wait(lambda: found)
         return pixels(found[-1])
 
 
@@ -149,7 +149,7 @@ def test_camera_info_has_the_stamp_of_its_picture(
         window(f'frameId: "eye"; cameraInfo: ({{ {name}: {matrix}, distortion_model: "none" }})'),
         IMPORTS,
     )
-    wait(lambda: infos and found, 30)
+    wait(lambda: infos and found)
 
     def common() -> set[int]:
         return {m.header.stamp.nanoseconds for m in infos} & {
@@ -170,25 +170,25 @@ def test_nothing_is_drawn_for_nobody(live: Bench, robot: Robot, wait: Any) -> No
         window("rate: 50", "function lazy() { pub.always = false }"),
         IMPORTS,
     )
-    wait(lambda: "/panel/image" in live.robot.topics(), 30)
+    wait(lambda: "/panel/image" in live.robot.topics())
     live.load(
         window('rate: 50; topic: "/elsewhere"').replace('topic: "/panel/image";', ""), IMPORTS
     )
-    wait(lambda: len(other) > 5, 30)
+    wait(lambda: len(other) > 5)
     assert root.state() == "false,false,0,"
     assert root.publish() is False
     found = robot.listen("/panel/image", IMAGE)
-    wait(lambda: found, 30)
+    wait(lambda: found)
     wait(lambda: root.state().startswith("true,true"))
 
 
 def test_always_and_only_when_told(live: Bench, robot: Robot, wait: Any) -> None:
     root: Any = live.load(window("rate: 0; always: true"), IMPORTS)
-    wait(lambda: root.publish() is True, 30)
+    wait(lambda: root.publish() is True)
     wait(lambda: root.state().startswith("true"))
     wait(lambda: root.state() == "false,false,0,")
     found = robot.listen("/panel/image", IMAGE)
-    wait(lambda: found or not root.publish(), 30)
+    wait(lambda: found or not root.publish())
 
 
 def test_what_comes_too_fast_is_dropped_and_the_newest_sent(
@@ -202,7 +202,7 @@ def test_what_comes_too_fast_is_dropped_and_the_newest_sent(
         ),
         IMPORTS,
     )
-    wait(lambda: root.publish() and found, 30)
+    wait(lambda: root.publish() and found)
     wait(lambda: root.burst() >= 8)
     before = len(found)
     wait(lambda: len(found) > before)
@@ -231,10 +231,10 @@ def test_changes_while_it_runs(live: Bench, robot: Robot, wait: Any) -> None:
     wait(lambda: "no source" in root.problem())
     root.disable()
     wait(lambda: root.state() == "false,false,0,")
-    wait(lambda: not live.robot.publishers("/other"), 30)
+    wait(lambda: not live.robot.publishers("/other"))
     live.session.shutdown()
     live.session.init("again")
-    wait(lambda: live.session.state == "connected", 30)
+    wait(lambda: live.session.state == "connected")
     assert root.state() == "false,false,0,"
 
 
@@ -274,7 +274,7 @@ def test_problems_are_told(live: Bench, robot: Robot, wait: Any, setting: str, t
         if given.startswith(name + ":"):
             text = text.replace(given, "")
     root: Any = live.load(text, IMPORTS)
-    wait(lambda: told in root.problem(), 30)
+    wait(lambda: told in root.problem())
 
 
 def test_what_is_in_no_window_has_no_picture(live: Bench, wait: Any) -> None:
@@ -289,7 +289,7 @@ def test_what_is_in_no_window_has_no_picture(live: Bench, wait: Any) -> None:
         """,
         "import QtQuick 2.15",
     )
-    wait(lambda: "in no window that is shown" in root.problem(), 30)
+    wait(lambda: "in no window that is shown" in root.problem())
 
 
 def test_a_screen_with_large_pixels(
@@ -306,7 +306,7 @@ def test_a_screen_with_large_pixels(
     found: list[Any] = []
     with node, node.create_subscription("/panel/image", IMAGE, found.append):
         program = start("run", file, "--url", url, display=screen, QT_SCALE_FACTOR="2")
-        wait(lambda: found, 30)
+        wait(lambda: found)
         picture = pixels(found[-1])
         assert picture.shape[:2] == (96, 128)
         assert near(picture[16, 64], (40, 50, 230))

@@ -114,7 +114,7 @@ def test_a_view_changes_without_a_gap(running: Any, camera: Any, wait: Any) -> N
     sub = root.property("sub0")
     show(running, camera, wait, root, quarters())
     sub.setProperty("rotation", 180)
-    wait(100)
+    wait.nothing_happens(0.1)
     assert seen(root) is not None
     assert not sub.property("stale")
     assert len(running.world.subscriptions) == 1
@@ -250,7 +250,7 @@ class TestDepth:
         sub.setProperty("colorMap", "rainbow")
         wait(lambda: "'rainbow' is unknown" in sub.property("problem"))
         camera.publish(self.depths())
-        wait(100)
+        wait.nothing_happens(0.1)
         np.testing.assert_array_equal(seen(root), before)
         sub.setProperty("colorMap", "viridis")
         wait(lambda: sub.property("problem") == "")
@@ -354,7 +354,7 @@ class TestThrottle:
         until = time.monotonic() + 10
         while seen(root) is not None:
             camera.publish(old)
-            wait(20)
+            wait.nothing_happens(0.02)
             assert time.monotonic() < until, "it was shown as live again and again"
         assert sub.property("stale")
 
@@ -367,7 +367,7 @@ class TestThrottle:
         until = time.monotonic() + 5
         while time.monotonic() < until and filming.count:
             assert seen(root) is not None or time.monotonic() > until
-            wait(20)
+            wait.nothing_happens(0.02)
         filming.stop()
         wait(lambda: seen(root) is None and sub.property("stale"))
 
@@ -400,7 +400,7 @@ class TestPlayback:
         sub = root.property("sub0")
         show(running, camera, wait, root, quarters())
         sub.pause()
-        wait(50)
+        wait.settled(running.session)
         sub.stop()
         assert (sub.property("playbackState"), sub.property("enabled")) == (0, False)
         wait(lambda: seen(root) is None)

@@ -7,11 +7,11 @@ import os
 import subprocess
 import sys
 import threading
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import eventually
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -59,12 +59,14 @@ class Talk:
 
 
 def until(condition: Callable[[], Any], *programs: Talk) -> None:
-    end = time.monotonic() + 40
-    while not condition():
-        told = [program.errors[-20:] for program in programs]
-        assert time.monotonic() < end, told
-        assert all(program.process.poll() is None for program in programs), told
-        time.sleep(0.05)
+    def is_true() -> bool:
+        assert all(program.process.poll() is None for program in programs), said()
+        return condition()
+
+    def said() -> list[list[str]]:
+        return [program.errors[-20:] for program in programs]
+
+    eventually(is_true, said, timeout=40)
 
 
 @pytest.fixture

@@ -119,16 +119,16 @@ def test_no_restart_of_a_robot_leaves_a_wrong_value(
             wait(lambda: "has no parameter 'max_speed'" in root.problem())
             assert root.seen().startswith("[false,null"), root.seen()
         else:
-            wait(random.Random(count).randrange(1000))
+            wait.nothing_happens(random.Random(count).random())
         robot.command("declare")
         expected = f"[true,{value:g},{highest:g},{value:g}]"
-        wait(lambda expected=expected: root.seen() == expected, 60)
+        wait(lambda expected=expected: root.seen() == expected, timeout=60)
         assert root.problem() == ""
         if killed:
             robot.kill()
         else:
             robot.command("end")
-            wait(lambda: root.seen().startswith("[false"), 60)
+            wait(lambda: root.seen().startswith("[false"), timeout=60)
             robot.kill()
     for value, highest, slider in json.loads(root.history()):
         assert value == slider <= highest

@@ -76,7 +76,7 @@ def test_nothing_grows_old_while_time_stands_still(live: Bench, drive: Path, wai
     wait(lambda: root.stale() == "false,false,false")
     root.pause()
     wait(root.paused)
-    wait(1500)
+    wait.nothing_happens(1.5)
     assert root.stale() == "false,false,false"
     root.seek(8)
     wait(lambda: root.stale() == "true,true,true")

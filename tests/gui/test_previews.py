@@ -72,9 +72,9 @@ def cameras(live: Any) -> Iterator[Cameras]:
 def test_a_robot_sends_only_what_is_shown(live: Any, cameras: Cameras, wait: Any) -> None:
     root = live.load(PREVIEWS, "import QtQuick 2.15")
     subs = [root.property(f"sub{i}") for i in range(COUNT)]
-    wait(lambda: len(live.session.streams) == COUNT, 30)
+    wait(lambda: len(live.session.streams) == COUNT)
     streams = [stream.stream for stream in live.session.streams.values()]
-    wait(lambda: all(stream.statistics().shown >= 3 for stream in streams), 60)
+    wait(lambda: all(stream.statistics().shown >= 3 for stream in streams), timeout=60)
     sent, unwatched = cameras.sent, cameras.unwatched
     before = [stream.statistics() for stream in streams]
     wait(
@@ -82,7 +82,7 @@ def test_a_robot_sends_only_what_is_shown(live: Any, cameras: Cameras, wait: Any
             stream.statistics().shown >= last.shown + 4
             for stream, last in zip(streams, before, strict=True)
         ),
-        60,
+        timeout=60,
     )
     # Most of the time the robot has nobody to compress and send for.
     assert cameras.unwatched - unwatched > (cameras.sent - sent) / 2
@@ -93,4 +93,4 @@ def test_a_robot_sends_only_what_is_shown(live: Any, cameras: Cameras, wait: Any
     assert all(sub.property("subscribed") for sub in subs)
     # A viewer that wants all gets all, at once.
     subs[0].setProperty("throttleRate", 0)
-    wait(lambda: subs[0].property("framerate") > 8, 30)
+    wait(lambda: subs[0].property("framerate") > 8)

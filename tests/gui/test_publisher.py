@@ -71,7 +71,7 @@ def test_what_does_not_fit_throws_and_is_logged_once_by_qt(
     (record,) = told()
     assert record.pathname.endswith(".qml")
     assert record.lineno == 14
-    wait(50)
+    wait.settled(running.session)
     assert not received
 
 
@@ -152,7 +152,7 @@ def test_a_publisher_that_is_let_go_sends_what_it_holds(
     root.once()
     for _ in range(5):
         root.collect()
-        wait(20)
+        wait.nothing_happens(0.02)  # its worker is held up
     go.set()
     wait(lambda: received)
     assert received[0].linear.x == 7
@@ -190,7 +190,7 @@ def test_who_asked_for_a_node_is_told_nothing(
     monkeypatch.setattr("rosglass.qml.session._FORGOTTEN", 0)
     root = load(running)
     wait(lambda: root.property("advertised") == 1)
-    wait(50)
+    wait.settled(running.session)
     assert "no node was asked for" not in caplog.text
 
 
@@ -216,7 +216,7 @@ def test_a_publisher_lives_as_long_as_javascript_holds_it(running: Any, wait: An
     wait(lambda: len(running.world.publishers) == 1)
     gc.collect()
     running.engine.collectGarbage()
-    wait(100)
+    wait.settled(running.session)
     assert len(running.world.publishers) == 1
     root.drop()
     wait(lambda: not running.world.publishers)
@@ -291,7 +291,7 @@ def test_keep_all_never_waits_on_the_gui_thread(running: Any, wait: Any) -> None
     running.world.publishers[0].publish_serialized = lambda data: threads.append(
         threading.current_thread()
     )
-    wait(50)
+    wait.settled(running.session)
     root.send()
     wait(lambda: threads)
     assert threads[0] is not threading.main_thread()
@@ -328,7 +328,7 @@ def test_a_topic_without_subscribers_is_named_with_the_near_name(
         assert told.levelno == logging.WARNING
         assert "/cmd_vell: nobody subscribes to this topic; did you mean /cmd_vel?" in told.message
     else:
-        wait(200)
+        wait.nothing_happens(0.2)
         assert "nobody subscribes" not in caplog.text
 
 

@@ -82,7 +82,7 @@ def view(app: Any, url: str, wait: Any) -> Iterator[Any]:
     yield made
     made.close()
     made.deleteLater()
-    wait(20)
+    wait.settled(session)
     session.close()
 
 
@@ -91,7 +91,7 @@ def test_dragging_drives_and_letting_go_stops(robot: Robot, view: Any, wait: Any
 
     test, point, left = optional("QtTest").QTest, QtCore.QPoint, QtCore.Qt.MouseButton.LeftButton
     wait(lambda: robot.node.publishers("/cmd_vel"))
-    wait(100)
+    wait(view.isExposed)
     test.mousePress(view, left, pos=point(200, 240))
     wait(lambda: robot.commands)
     test.mouseMove(view, point(200, 195))
@@ -105,7 +105,7 @@ def test_dragging_drives_and_letting_go_stops(robot: Robot, view: Any, wait: Any
     test.mouseRelease(view, left, pos=point(20, 290))
     wait(lambda: robot.commands[-1] == (0.0, 0.0))
     count = len(robot.commands)
-    wait(200)
+    wait.nothing_happens(0.2)
     assert len(robot.commands) == count
 
 
@@ -114,7 +114,7 @@ def test_the_button_switches_the_lamp(robot: Robot, view: Any, wait: Any) -> Non
 
     test, point, left = optional("QtTest").QTest, QtCore.QPoint, QtCore.Qt.MouseButton.LeftButton
     wait(lambda: robot.node.publishers("/flashlight"))
-    wait(100)
+    wait(view.isExposed)
     for expected in (True, False):
         test.mouseClick(view, left, pos=point(20, 290))
         wait(lambda expected=expected: robot.lamp[-1:] == [expected])

@@ -106,7 +106,7 @@ def test_watching_a_recording_instead_of_the_robot(
     assert root.position() == pytest.approx(3.0)
     wait(lambda: root.seconds() == 1_700_000_003)
     root.setFile("")
-    wait(lambda: live.session.url == robot and live.session.state == "connected", 30)
+    wait(lambda: live.session.url == robot and live.session.state == "connected")
     assert root.state() == "false,false,0.0"
 
 
@@ -143,9 +143,9 @@ def test_a_paused_recording_shows_the_moment_it_is_paused_at(
     wait(lambda: root.last() not in ("", "0"))
     root.pause()
     wait(lambda: root.state() == "true,false,9.0")
-    wait(300)
+    wait.nothing_happens(0.3)
     age = root.age()
-    wait(1500)
+    wait.nothing_happens(1.5)
     assert not root.stale()
     assert root.age() == age
     # Where the topic has nothing, what is shown is of another moment.
@@ -168,15 +168,15 @@ def test_a_paused_recording_shows_the_moment_it_is_paused_at(
 
 def test_ages_follow_slow_time_but_not_fast_time(live: Bench, drive: Path, wait: Any) -> None:
     root = panel(live, f'file: "{drive}"; rate: 0.05; loop: true')
-    wait(lambda: root.last() == "1", 30)
+    wait(lambda: root.last() == "1")
     # Messages come every two seconds, which is a tenth of a second of the recording.
-    seen = [(wait(50), root.stale(), root.age())[1:] for _ in range(60)]
+    seen = [(wait.nothing_happens(0.05), root.stale(), root.age())[1:] for _ in range(60)]
     assert not any(stale for stale, _ in seen)
     assert max(age for _, age in seen) < 0.5
     steady: Any = live.session.steady
     root.setRate(1000)
     before, began = steady(), time.monotonic()
-    wait(200)
+    wait.nothing_happens(0.2)
     distance = steady() - before
     # The recording begins again many times meanwhile, by its three seconds each.
     assert distance % 3 < time.monotonic() - began + 0.5
@@ -195,7 +195,7 @@ def test_the_robot_is_back_when_the_element_is_gone(live: Bench, drive: Path, wa
     """)
     wait(root.ready)
     root.leave()
-    wait(lambda: live.session.url == robot and live.session.state == "connected", 30)
+    wait(lambda: live.session.url == robot and live.session.state == "connected")
 
 
 def test_of_two_recordings_the_newer_wish_wins(
@@ -260,17 +260,17 @@ def test_to_the_robot_only_when_told(live: Bench, drive: Path, wait: Any) -> Non
     live.robot.create_subscription("/other", STRING, lambda m: other.append(m.data))
     robot = live.session.url
     root = panel(live, f'file: "{drive}"; toRobot: true; rate: 5; topics: ["/chatter"]')
-    wait(lambda: root.state() == "true,false,3.0", 30)
-    wait(lambda: live.robot.publishers("/chatter"), 30)
-    wait(300)
+    wait(lambda: root.state() == "true,false,3.0")
+    wait(lambda: live.robot.publishers("/chatter"))
+    wait.nothing_happens(0.3)
     assert got == []
     root.play()
-    wait(lambda: got and got[-1] == "30", 30)
+    wait(lambda: got and got[-1] == "30")
     assert other == []
     assert live.session.url == robot
     wait(lambda: root.property("ends") == 1)
     root.setFile("")
-    wait(lambda: not live.robot.publishers("/chatter"), 30)
+    wait(lambda: not live.robot.publishers("/chatter"))
 
 
 def test_commands_do_not_go_on_after_an_outage(
@@ -286,7 +286,7 @@ def test_commands_do_not_go_on_after_an_outage(
     assert "paused" in caplog.text
     node.set_status(ConnectionState.CONNECTED)
     wait(lambda: running.session.state == "connected")
-    wait(300)
+    wait.nothing_happens(0.3)
     assert root.state() == "true,false,3.0"
     root.play()
     wait(lambda: root.state() == "true,true,3.0")

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import threading
-import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import eventually
 
 if TYPE_CHECKING:
     from conftest import Bench
@@ -170,7 +170,7 @@ def test_calls_that_wait_within_each_other_leave_the_stop_button_alive(
         }
     """)
     wait(root.ready)
-    observing = threading.Thread(target=lambda: (_until(lambda: heard), go.set()))
+    observing = threading.Thread(target=lambda: (eventually(lambda: heard), go.set()))
     observing.start()
     root.start()
     wait(lambda: root.property("depth") == 0 and root.given())
@@ -179,9 +179,3 @@ def test_calls_that_wait_within_each_other_leave_the_stop_button_alive(
     assert 10 < root.property("deepest") < 50
     assert root.refused() > 300
     assert "not waited for" in caplog.text
-
-
-def _until(condition: Any) -> None:
-    until = time.monotonic() + 30
-    while not condition() and time.monotonic() < until:
-        time.sleep(0.01)

@@ -65,7 +65,7 @@ def test_before_init(bench: Any) -> None:
 
 def test_life(bench: Any, wait: Any) -> None:
     root = bench.load(LOG)
-    wait(20)
+    wait.settled(bench.session)
     script = """Ros2.init('ui');
         return [Ros2.isInitialized(), Ros2.ok(), Ros2.getName(), Ros2.getNamespace()]"""
     assert bench.run(script) == [True, True, "ui", "/"]
@@ -256,7 +256,7 @@ def test_engines_share_a_session_and_may_go_first(running: Any, wait: Any, tmp_p
     other.load('QtObject { property QtObject s: Subscription { topic: "/t" } }')
     engine.deleteLater()
     del engine, other
-    wait(200)
+    wait.settled(running.session)
     assert running.run("return Ros2.getName()") == "ui"
 
 
@@ -274,7 +274,7 @@ def test_a_node_made_in_python_can_be_used(bench: Any, wait: Any) -> None:
     bench.session.adopt(node)
     assert bench.run("return [Ros2.getName(), Ros2.connectionState]") == ["mine", "connected"]
     bench.session.shutdown()
-    wait(50)
+    wait.settled(bench.session)
     assert not node.closed
 
 
@@ -393,7 +393,7 @@ def test_a_graph_that_is_there_already_and_one_that_is_gone_are_told(bench: Any,
             function names() { return topics.join() }
         }
     """)
-    wait(50)
+    wait.settled(bench.session)
     bench.session.init("ui")
     wait(lambda: "/chatter" in root.names())
     bench.session.shutdown()

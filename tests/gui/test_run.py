@@ -7,6 +7,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import nothing_happens
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -284,7 +285,7 @@ def test_without_watch_nothing_is_reloaded(start: Any, file: Path) -> None:
     program = start("run", file)
     program.until("up 200")
     file.write_text(GOOD.replace("200", "201"))
-    time.sleep(0.5)
+    nothing_happens(0.5)
     assert "201" not in program.text
 
 

@@ -11,6 +11,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import nothing_happens
 
 import rosglass
 
@@ -200,7 +201,7 @@ def test_reloading_waits_for_a_blocked_call(start: Any, file: Path, url: str) ->
             )
         )
         # Longer than it takes to notice the change.
-        time.sleep(0.5)
+        nothing_happens(0.5)
         assert "reloaded" not in program.text
         answer.set()
         program.until("returned", 40)

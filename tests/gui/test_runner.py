@@ -66,7 +66,7 @@ def test_reload_keeps_the_node_and_collects_the_old_interface(
     for title, name in (("two", "blue"), ("three", "lime")):
         file.write_text(UI % (title, name))
         assert runner.reload()
-        wait(200)
+        wait.settled(runner.session)
         assert runner.session.node is node
         assert runner.window is window
         assert window.title() == title
@@ -77,18 +77,18 @@ def test_reload_keeps_the_node_and_collects_the_old_interface(
 def test_errors_are_shown_over_the_last_good_interface(
     runner: Runner, file: Path, wait: Any, caplog: Any
 ) -> None:
-    wait(50)
+    wait.settled(runner.session)
     before = colour(runner)
     file.write_text((UI % ("bad", "blue")).replace("implicitWidth", "implicitWitdh"))
     assert not runner.reload()
-    wait(50)
+    wait.settled(runner.session)
     assert runner.window.title() == "one"
     assert f"{file}:8:5: " in caplog.text
     covered = colour(runner)
     assert covered != before
     file.write_text(UI % ("good", "red"))
     assert runner.reload()
-    wait(50)
+    wait.settled(runner.session)
     assert colour(runner) == before
 
 
@@ -98,18 +98,18 @@ def test_roots_may_change_between_item_and_window(runner: Runner, file: Path, wa
     window = window.replace("implicitWidth: 300; implicitHeight: 200", "")
     file.write_text(window % ("window", "red"))
     assert runner.reload()
-    wait(50)
+    wait.settled(runner.session)
     assert runner.window is not first
     assert runner.window.title() == "window"
     assert runner.window.isVisible()
     assert not is_alive(first)
     file.write_text(window % ("window 2", "blue"))
     assert runner.reload()
-    wait(50)
+    wait.settled(runner.session)
     assert (runner.window.title(), colour(runner)) == ("window 2", "#0000ff")
     file.write_text(UI % ("item", "lime"))
     assert runner.reload()
-    wait(50)
+    wait.settled(runner.session)
     assert (runner.window.title(), colour(runner)) == ("item", "#00ff00")
 
 
@@ -165,17 +165,17 @@ def overlays(runner: Runner) -> int:
 def test_several_windows(runner: Runner, file: Path, wait: Any, caplog: Any) -> None:
     file.write_text(WINDOWS)
     assert runner.reload()
-    wait(100)
+    wait.settled(runner.session)
     assert titles(runner) == ["first", "hidden", "second"]
     assert runner.window.title() in {"first", "second"}
     old = {window.title(): window for window in runner.windows()}
     old["second"].setGeometry(150, 160, 333, 222)
-    wait(50)
+    wait.settled(runner.session)
     node = runner.session.node
     # With errors all windows stay, and all tell.
     file.write_text(WINDOWS.replace("height: 100", "heigth: 100"))
     assert not runner.reload()
-    wait(50)
+    wait.settled(runner.session)
     assert titles(runner) == ["first", "hidden", "second"]
     assert overlays(runner) == 3
     file.write_text(WINDOWS.replace("width: 200", "width: 240"))
@@ -190,7 +190,7 @@ def test_several_windows(runner: Runner, file: Path, wait: Any, caplog: Any) -> 
     assert [w.title() for w in runner.windows() if w.isVisible()].count("hidden") == 0
     file.write_text(UI % ("alone", "red"))
     assert runner.reload()
-    wait(100)
+    wait.settled(runner.session)
     assert titles(runner) == ["alone"]
 
 
@@ -207,7 +207,7 @@ def test_windows_within_a_window(runner: Runner, file: Path, wait: Any) -> None:
     )
     for _ in range(2):
         assert runner.reload()
-        wait(100)
+        wait.settled(runner.session)
         assert titles(runner) == ["inner", "outer"]
         assert runner.window.title() == "outer"
 
@@ -217,7 +217,7 @@ def test_a_root_without_windows_may_get_one_later(
 ) -> None:
     file.write_text("import QtQml 2.15\nQtObject {}")
     assert runner.reload()
-    wait(50)
+    wait.settled(runner.session)
     assert runner.window is None
     assert runner.grab().isNull()
     assert "shows no window" in caplog.text
@@ -225,7 +225,7 @@ def test_a_root_without_windows_may_get_one_later(
     assert not runner.reload()
     file.write_text(UI % ("back", "red"))
     assert runner.reload()
-    wait(50)
+    wait.settled(runner.session)
     assert runner.window.title() == "back"
 
 
@@ -241,12 +241,12 @@ def test_errors_at_run_time_do_not_stop_a_reload(
             broken.replace("Ros2.shutdown()", '{ Ros2.shutdown(); throw new Error("end") }')
         )
         assert runner.reload()
-        wait(50)
+        wait.settled(runner.session)
         assert runner.window.title() == "broken"
     # Reloading quickly, one before the former has been taken down, keeps the node, too.
     for _ in range(3):
         assert runner.reload()
-    wait(200)
+    wait(lambda: not runner.session.holding)
     assert runner.session.node is node
     assert not runner.session.holding
     wait(lambda: len(world.publishers) == 1)
@@ -386,7 +386,7 @@ def test_a_kiosk_stays_open_and_hides_the_pointer(
     optional("QtTest").QTest.mouseMove(window, QtCore.QPoint(30, 40))
     wait(lambda: app.overrideCursor() is None)
     window.close()
-    wait(50)
+    wait.settled(session)
     assert window.isVisible()
     # Reloading with another kind of root closes the old window all the same.
     text = UI.replace("Rectangle", "Window").replace("property string title", "title")
@@ -395,7 +395,7 @@ def test_a_kiosk_stays_open_and_hides_the_pointer(
     wait(lambda: not is_alive(window))
     assert runner.window.visibility() == runner.window.Visibility.FullScreen
     runner.window.close()
-    wait(50)
+    wait.settled(session)
     assert runner.window.isVisible()
     runner.close()
     assert app.overrideCursor() is None

@@ -52,7 +52,7 @@ def test_requests_wait_for_a_server(live: Bench, wait: Any) -> None:
                 client.sendRequestAsync({}, function (r) { answer = r.message })
         }
     """)
-    wait(300)
+    wait.nothing_happens(0.3)
     live.robot.create_service_server(
         "/late", "std_srvs/srv/Trigger", lambda request: {"message": "here"}
     )
@@ -95,7 +95,7 @@ def test_a_request_does_not_outlast_its_server(live: Bench, wait: Any, monkeypat
     """)
     wait(root.ready)
     root.send()
-    wait(500)
+    wait.nothing_happens(0.5)
     # A server that is there may take as long as it likes.
     assert root.property("rejected") == ""
     root.property("client")._on_ready(False)

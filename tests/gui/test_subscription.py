@@ -107,7 +107,7 @@ def test_type_is_discovered_and_signals_come_in_order(running: Any, chat: Any, w
 def test_elements_made_before_init_work_after_it(bench: Any, wait: Any) -> None:
     publisher = bench.robot.create_publisher("/ui/chat", TEXT)
     root = load(bench, 'topic: "chat"; throttleRate: 0')
-    wait(50)
+    wait.settled(bench.session)
     assert not root.property("sub").property("subscribed")
     bench.session.init("node", "/ui")
     wait(lambda: root.property("sub").property("subscribed"))
@@ -133,7 +133,7 @@ def test_throttle_rate_zero_delivers_every_message(
         publisher.publish(data=str(i))
     root = load(running, f'topic: "/chat"; throttleRate: 0; {properties}')
     wait(lambda: len(texts(root)) == len(expected))
-    wait(50)
+    wait.settled(running.session)
     assert texts(root) == expected
 
 
@@ -145,7 +145,7 @@ def test_throttling_shows_the_first_at_once_and_then_the_newest(
     started = time.monotonic()
     for i in range(20):
         chat.publish(data=str(i))
-        wait(10)
+        wait.nothing_happens(0.01)
     assert texts(root)[0] == "0"
     wait(lambda: texts(root)[-1] == "19")
     assert len(texts(root)) <= (time.monotonic() - started) * 5 + 2
@@ -174,7 +174,7 @@ def test_disabled_drops_what_arrives_and_says_stale(running: Any, chat: Any, wai
     chat.publish(data="b")
     sub.setProperty("qos", None)
     sub.setProperty("queueSize", 4)
-    wait(100)
+    wait.settled(running.session)
     assert root.property("shown") == "a"
     assert not sub.property("subscribed")
     sub.setProperty("enabled", True)
@@ -345,7 +345,7 @@ class TestStale:
         wait(lambda: sub.property("stale"))
         running.session.node.set_status(ConnectionState.LOST, "gone")
         running.session.node.set_status(ConnectionState.CONNECTED)
-        wait(100)
+        wait.nothing_happens(0.3)
         assert sub.property("stale")
 
     def test_default(self, running: Any) -> None:
@@ -385,7 +385,7 @@ def test_malformed_messages_are_refused_and_the_good_one_stays(
     wait(lambda: root.property("shown") == "good")
     for _ in range(5):
         chat.publish_serialized(b"\0\1\0\0\xff\xff\0\0ab")
-        wait(10)
+        wait.settled(running.session)
     wait(lambda: "malformed" in sub.property("problem"))
     assert root.property("shown") == "good"
     assert sum("malformed" in r.getMessage() for r in caplog.records) == 1
@@ -530,7 +530,7 @@ def test_a_successor_that_has_said_nothing_is_not_trusted(live: Any, wait: Any) 
     robot = live.world.connect(None, "robot")
     successor = robot.create_publisher("/armed", TEXT, latched)
     wait(lambda: sub.getPublisherCount() == 1)
-    wait(300)
+    wait.nothing_happens(0.3)
     assert sub.property("stale")
     successor.publish(data="armed")
     wait(lambda: not sub.property("stale"))
@@ -550,7 +550,7 @@ def test_a_topic_that_nobody_publishes_is_told(
         wait(lambda: text in caplog.text)
     else:
         wait(lambda: root.property("subscribed"))
-        wait(200)
+        wait.nothing_happens(0.2)
         assert "nobody publishes" not in caplog.text
 
 

@@ -131,7 +131,7 @@ def test_what_a_dead_robot_left_behind_is_stale(live: Bench, robot: Robot, wait:
         }
     """)
     wait(page.valid)
-    wait(200)
+    wait.nothing_happens(0.2)
     assert page.seenLive() == 0
 
 
@@ -155,7 +155,7 @@ def test_static_transforms_stay_fresh(live: Bench, robot: Robot, wait: Any) -> N
         }
     """)
     wait(lambda: root.shown() == "true,false,-1,0.5")
-    wait(500)
+    wait.nothing_happens(0.5)
     assert root.shown() == "true,false,-1,0.5"
 
 
@@ -175,12 +175,12 @@ def test_enabled_frames_and_rate(live: Bench, robot: Robot, wait: Any) -> None:
     """)
     wait(root.valid)
     before = root.property("n")
-    wait(1000)
+    wait.nothing_happens(1)
     assert root.property("n") - before <= 8
     root.disable()
-    wait(50)
+    wait.settled(live.session)
     before = root.property("n")
-    wait(300)
+    wait.nothing_happens(0.3)
     assert root.property("n") == before
     root.other()
     root.enable()
@@ -200,7 +200,7 @@ def test_lookups(live: Bench, robot: Robot, wait: Any) -> None:
     missing = live.run('return TfTransformListener.lookUpTransform("map", "moon")')
     assert (missing["valid"], missing["exception"]) == (False, "LookupException")
     assert "moon" in missing["message"]
-    wait(300)
+    wait.nothing_happens(0.3)
     full = live.run("""
         const then = new Date(Date.now() - 100)
         return TfTransformListener.lookUpTransform("base", then, "base", Ros2.now(), "map", 5000)
