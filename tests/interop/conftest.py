@@ -18,24 +18,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
 
-def wait_for(
-    condition: Callable[[], Any], timeout: float = 30.0, what: str | Callable[[], str] = ""
-) -> Any:
-    """Return the first true value of `condition`, which must come within `timeout` seconds.
-
-    `what` says what was waited for; called, when it can be, only if that did not come.
-    """
-    deadline = time.monotonic() + timeout
-    while True:
-        value = condition()
-        if value:
-            return value
-        if time.monotonic() >= deadline:
-            told = what() if callable(what) else what
-            pytest.fail(f"not within {timeout} s: {told or condition}")
-        time.sleep(0.01)
-
-
 class Process:
     """A process that prints one JSON object per line; everything else it prints is kept."""
 
@@ -96,12 +78,6 @@ class Process:
         self.popen.kill()
         self.popen.wait()
         self._reader.join(5)
-
-
-@pytest.fixture(name="wait_for", scope="session")
-def wait_for_fixture() -> Callable[..., Any]:
-    """See :func:`wait_for`."""
-    return wait_for
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,7 @@ import itertools
 import threading
 
 import pytest
+from waiting import eventually
 
 import rosglass
 from rosglass.bridge import survey
@@ -26,7 +27,7 @@ def served(bridge, rospy_peer):
     rospy_peer.call("stop_action_server", name="/count")
 
 
-def test_an_action_of_ros1(served, connect, wait_for):
+def test_an_action_of_ros1(served, connect):
     client = connect("ros2", "client").create_action_client("/count")
     assert client.wait_for_server(30)
     assert client.type.name == "actionlib/action/Test"
@@ -37,7 +38,7 @@ def test_an_action_of_ros1(served, connect, wait_for):
     )  # fmt: skip
     status, result = goal.result(30)
     assert (status, result.result) == (GoalStatus.SUCCEEDED, 5)
-    wait_for(lambda: heard == [0, 1, 2, 3, 4], what=lambda: str(heard))
+    eventually(lambda: heard == [0, 1, 2, 3, 4], what=lambda: str(heard))
     assert GoalStatus.EXECUTING in states
     status, result = client.send_goal({"goal": -1}).result(30)
     assert (status, result.result) == (GoalStatus.ABORTED, -1)
@@ -66,13 +67,13 @@ def test_a_server_that_does_not_decide_holds_up_nobody(served, connect):
     assert slow.result(30).status is GoalStatus.CANCELED
 
 
-def test_what_is_cancelled_when_the_bridge_ends(served, connect, rospy_peer, wait_for):
+def test_what_is_cancelled_when_the_bridge_ends(served, connect, rospy_peer):
     client = connect("ros2", "client").create_action_client("/count")
     first = threading.Event()
     goal = client.send_goal({"goal": 10_000}, on_feedback=lambda _: first.set(), timeout=30)
     assert first.wait(30)
     watcher = connect("ros1", "watcher").create_subscription("/count/result")
-    wait_for(watcher.publisher_count)
+    eventually(watcher.publisher_count)
     served.close()
     assert watcher.wait(30).message().status.text == "stopped"
     with contextlib.suppress(rosglass.ConnectionLostError):  # it left before it was asked
@@ -132,23 +133,23 @@ def test_an_action_of_ros2_is_cancelled(offered, rospy_peer):
     assert result < 10_000
 
 
-def test_all_takes_actions_as_such(bridge, connect, rospy_peer, wait_for):
+def test_all_takes_actions_as_such(bridge, connect, rospy_peer):
     """Their topics in ROS 1 are not relayed as well, and others of such names are."""
     rospy_peer.call("action_server", name="/both")
     connect("ros1", "talker").create_publisher("/other/status", "std_msgs/String")
     made = bridge(["*"], ["*"], ["*"])
-    wait_for(lambda: {"/both", "/other/status"} <= {one.name for one in made.status().relays})
+    eventually(lambda: {"/both", "/other/status"} <= {one.name for one in made.status().relays})
     names = [one.name for one in made.status().relays]
     assert not [name for name in names if name.startswith("/both/")]
-    wait_for(lambda: ", 1 action: " in made.status().line())
+    eventually(lambda: ", 1 action: " in made.status().line())
     rospy_peer.call("stop_action_server", name="/both")
-    wait_for(lambda: "/both" not in [one.name for one in made.status().relays])
+    eventually(lambda: "/both" not in [one.name for one in made.status().relays])
 
 
-def test_survey_shows_actions(connect, rospy_peer, wait_for):
+def test_survey_shows_actions(connect, rospy_peer):
     rospy_peer.call("action_server", name="/seen")
     one, two = connect("ros1", "survey_one"), connect("ros2", "survey_two")
-    wait_for(lambda: "/seen" in one.actions())
+    eventually(lambda: "/seen" in one.actions())
     (found,) = survey(one, two, [], [], ["/seen"])
     assert (found.kind, found.type, found.direction) == ("action", "actionlib/action/Test", "->")
     assert found.notes == ("ROS 2 has no such type of its own",)

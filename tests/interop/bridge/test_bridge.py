@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import time
 from concurrent.futures import Future
 
 import pytest
+from waiting import eventually, nothing_happens
 
 import rosglass
 from rosglass import Library, ServiceError
@@ -21,13 +21,13 @@ def relays(bridge):
     return {(one.name, one.direction): one for one in bridge.status().relays}
 
 
-def test_from_ros1(bridge, connect, rospy_peer, wait_for):
+def test_from_ros1(bridge, connect, rospy_peer):
     bridge(["/talk_one"])
     listener = connect("ros2", "listener").create_subscription(
         "/talk_one", STRING, qos=QoS(depth=100)
     )
     rospy_peer.call("publish", topic="/talk_one", type="std_msgs/String")
-    wait_for(lambda: rospy_peer.call("connections", topic="/talk_one"), what="the bridge is away")
+    eventually(lambda: rospy_peer.call("connections", topic="/talk_one"), what="the bridge is away")
     for number in range(20):
         rospy_peer.call(
             "publish", topic="/talk_one", type="std_msgs/String", value={"data": f"ü{number}"}
@@ -36,21 +36,21 @@ def test_from_ros1(bridge, connect, rospy_peer, wait_for):
     assert found == [f"ü{number}" for number in range(20)]
 
 
-def test_to_ros1(bridge, connect, rospy_peer, wait_for):
+def test_to_ros1(bridge, connect, rospy_peer):
     made = bridge(["/talk_two"])
     talker = connect("ros2", "talker").create_publisher("/talk_two", "geometry_msgs/PoseStamped")
     rospy_peer.call("subscribe", topic="/talk_two", type="geometry_msgs/PoseStamped")
-    wait_for(talker.subscription_count, what="the bridge is away")
+    eventually(talker.subscription_count, what="the bridge is away")
     stamp = {"sec": 12, "nanosec": 34}
     talker.publish(header={"stamp": stamp, "frame_id": "map"}, pose={"position": {"x": 1.5}})
     value = rospy_peer.event("received")["value"]
     assert value["header"] == {"seq": 0, "stamp": {"secs": 12, "nsecs": 34}, "frame_id": "map"}
     assert value["pose"]["position"]["x"] == 1.5
-    wait_for(lambda: relays(made)["/talk_two", "<-"].count == 1)
+    eventually(lambda: relays(made)["/talk_two", "<-"].count == 1)
 
 
 @pytest.mark.parametrize("way", ["->", "<-"])
-def test_pictures(bridge, connect, rospy_peer, wait_for, way):
+def test_pictures(bridge, connect, rospy_peer, way):
     name = "/picture_there" if way == "->" else "/picture_back"
     bridge(["/picture_*"])
     node = connect("ros2", "viewer")
@@ -65,13 +65,13 @@ def test_pictures(bridge, connect, rospy_peer, wait_for, way):
     else:
         camera = node.create_publisher(name, IMAGE)
         rospy_peer.call("subscribe", topic=name, type="sensor_msgs/Image")
-        wait_for(camera.subscription_count)
+        eventually(camera.subscription_count)
         camera.publish(shape | {"data": bytes([7]) * 6_220_800})
         value = rospy_peer.event("received")["value"]
         assert (value["width"], value["data"][0]) == (1920, 6_220_800)
 
 
-def test_latched_both_ways(bridge, connect, rospy_peer, wait_for):
+def test_latched_both_ways(bridge, connect, rospy_peer):
     made = bridge(["/map_*"])
     rospy_peer.call(
         "publish", topic="/map_one", type="std_msgs/String", value={"data": "one"}, latch=True
@@ -79,9 +79,9 @@ def test_latched_both_ways(bridge, connect, rospy_peer, wait_for):
     node = connect("ros2", "walls")
     keeper = node.create_publisher("/map_two", STRING, QoS.latched())
     keeper.publish(data="two")
-    wait_for(lambda: {("/map_one", "->"), ("/map_two", "<-")} <= relays(made).keys())
-    wait_for(lambda: node.publishers("/map_one"))
-    wait_for(lambda: all(one.count for one in made.status().relays))
+    eventually(lambda: {("/map_one", "->"), ("/map_two", "<-")} <= relays(made).keys())
+    eventually(lambda: node.publishers("/map_one"))
+    eventually(lambda: all(one.count for one in made.status().relays))
     (end,) = node.publishers("/map_one")
     assert end.qos.durability is Durability.TRANSIENT_LOCAL
     late = node.create_subscription("/map_one", STRING, qos=QoS.latched())
@@ -90,25 +90,25 @@ def test_latched_both_ways(bridge, connect, rospy_peer, wait_for):
     assert rospy_peer.event("received")["value"] == {"data": "two"}
     # What is latched goes with whoever published it.
     keeper.close()
-    wait_for(lambda: ("/map_two", "<-") not in relays(made))
+    eventually(lambda: ("/map_two", "<-") not in relays(made))
     ours = connect("ros1", "latecomer").create_subscription("/map_two", STRING)
     assert ours.wait(0.5) is None
 
 
-def test_several_latched_publishers_stay_apart(bridge, connect, wait_for):
+def test_several_latched_publishers_stay_apart(bridge, connect):
     made = bridge(["/tf_static"])
     texts = [f"frame {number}" for number in range(3)]
     for number, text in enumerate(texts):
         node = connect("ros2", f"broadcaster{number}")
         keeper = node.create_publisher("/tf_static", "tf2_msgs/TFMessage", QoS.latched())
         keeper.publish(transforms=[{"child_frame_id": text}])
-    wait_for(lambda: made.status().count == 3, what=lambda: str(made.status()))
+    eventually(lambda: made.status().count == 3, what=lambda: str(made.status()))
     late = connect("ros1", "late").create_subscription("/tf_static")
     found = {late.wait(30).message().transforms[0].child_frame_id for _ in range(3)}
     assert found == set(texts)
 
 
-def test_nothing_comes_back(bridge, connect, wait_for):
+def test_nothing_comes_back(bridge, connect):
     """Two bridges beside each other: each message arrives once, nowhere twice."""
     first, second = bridge(["*"]), bridge(["*"])
     one, two = connect("ros1", "echo_one"), connect("ros2", "echo_two")
@@ -122,9 +122,9 @@ def test_nothing_comes_back(bridge, connect, wait_for):
             for way in ("->", "<-")
         ]
 
-    wait_for(lambda: relaying() == [1, 1], 20, what=lambda: str(relaying()))
-    wait_for(lambda: all(end.subscription_count() >= 2 for end in ends))
-    time.sleep(1)  # what must not happen needs time to happen
+    eventually(lambda: relaying() == [1, 1], timeout=20, what=lambda: str(relaying()))
+    eventually(lambda: all(end.subscription_count() >= 2 for end in ends))
+    nothing_happens(1)
     for number in range(10):
         ends[0].publish(data=f"one {number}")
         ends[1].publish(data=f"two {number}")
@@ -135,27 +135,27 @@ def test_nothing_comes_back(bridge, connect, wait_for):
         assert ear.wait(0.7) is None
 
 
-def test_another_bridge_takes_over(bridge, connect, wait_for):
+def test_another_bridge_takes_over(bridge, connect):
     first = bridge(["/shared"])
     one, two = connect("ros1", "share_one"), connect("ros2", "share_two")
     talker = one.create_publisher("/shared", STRING)
     listener = two.create_subscription("/shared", STRING)
-    wait_for(lambda: relays(first))
-    wait_for(lambda: two.publishers("/shared"))
+    eventually(lambda: relays(first))
+    eventually(lambda: two.publishers("/shared"))
     second = bridge(["/shared"])
-    time.sleep(2.5)  # by then it would have begun
+    nothing_happens(2.5)  # by then it would have begun
     assert not relays(second)
     first.close()
-    wait_for(lambda: relays(second))
+    eventually(lambda: relays(second))
 
     def heard():
         talker.publish(data="again")
         return listener.wait(0.1)
 
-    wait_for(heard)
+    eventually(heard)
 
 
-def test_directions_and_names(bridge, connect, wait_for):
+def test_directions_and_names(bridge, connect):
     made = bridge(["/left->/right", "/stop<-"])
     one, two = connect("ros1", "named_one"), connect("ros2", "named_two")
     talkers = [
@@ -163,30 +163,30 @@ def test_directions_and_names(bridge, connect, wait_for):
         for node, topic in ((one, "/left"), (two, "/right"), (one, "/stop"), (two, "/stop"))
     ]
     listener = two.create_subscription("/right", STRING)
-    wait_for(lambda: set(relays(made)) == {("/left", "->"), ("/stop", "<-")})
+    eventually(lambda: set(relays(made)) == {("/left", "->"), ("/stop", "<-")})
     assert relays(made)["/left", "->"].other == "/right"
 
     def heard():
         talkers[0].publish(data="over")
         return listener.wait(0.1)
 
-    assert wait_for(heard).message().data == "over"
+    assert eventually(heard).message().data == "over"
 
 
-def test_a_type_given_beforehand(bridge, connect, wait_for):
+def test_a_type_given_beforehand(bridge, connect):
     """Not even the first message is missed."""
     bridge(["/cmd->"], types={"/cmd": "geometry_msgs/Twist"})
     listener = connect("ros2", "wheels").create_subscription("/cmd", "geometry_msgs/msg/Twist")
-    wait_for(listener.publisher_count)
+    eventually(listener.publisher_count)
     one = connect("ros1", "stick")
-    wait_for(lambda: one.subscriptions("/cmd"))
+    eventually(lambda: one.subscriptions("/cmd"))
     talker = one.create_publisher("/cmd", "geometry_msgs/Twist")
-    wait_for(talker.subscription_count)
+    eventually(talker.subscription_count)
     talker.publish(linear={"x": 0.5})
     assert listener.wait(30).message().linear.x == 0.5
 
 
-def test_services_of_ros1(bridge, connect, rospy_peer, wait_for):
+def test_services_of_ros1(bridge, connect, rospy_peer):
     made = bridge(services=["/arm/*"])
     for service, fails in (("/arm/set", ""), ("/arm/broken", "refusal")):
         rospy_peer.call(
@@ -204,7 +204,7 @@ def test_services_of_ros1(bridge, connect, rospy_peer, wait_for):
     broken = node.create_service_client("/arm/broken", "std_srvs/srv/SetBool")
     with pytest.raises(ServiceError, match="not homed"):
         broken.call({"data": True}, timeout=30)
-    wait_for(lambda: relays(made)["/arm/broken", "->"].refused == 1)
+    eventually(lambda: relays(made)["/arm/broken", "->"].refused == 1)
     rospy_peer.call("unserve", service="/arm/set")
     rospy_peer.call("unserve", service="/arm/broken")
 
@@ -223,57 +223,57 @@ def test_services_of_ros2(bridge, connect, rospy_peer):
     assert "within 1 s" in told
 
 
-def test_a_service_that_both_offer_is_left_alone(bridge, connect, wait_for):
+def test_a_service_that_both_offer_is_left_alone(bridge, connect):
     one, two = connect("ros1", "offer_one"), connect("ros2", "offer_two")
     for node in (one, two):
         node.create_service_server("/both", "std_srvs/Trigger", lambda _: {"success": True})
-    wait_for(lambda: one.service_servers("/both") and two.service_servers("/both"))
+    eventually(lambda: one.service_servers("/both") and two.service_servers("/both"))
     made = bridge(services=["/both"])
-    wait_for(lambda: len(made.status().relays) == 2)
+    eventually(lambda: len(made.status().relays) == 2)
     for relay in made.status().relays:
         assert "offers it there already" in relay.problem
     assert one.create_service_client("/both").call().success
 
 
-def test_what_does_not_fit_is_refused_and_told(bridge, connect, wait_for, caplog):
+def test_what_does_not_fit_is_refused_and_told(bridge, connect, caplog):
     made = bridge(["/late"])
     talker = connect("ros2", "past").create_publisher("/late", "std_msgs/msg/Header")
     listener = connect("ros1", "present").create_subscription("/late")
-    wait_for(talker.subscription_count)
+    eventually(talker.subscription_count)
     for _ in range(3):
         talker.publish(stamp={"sec": -1})
-    wait_for(lambda: relays(made)["/late", "<-"].refused == 3)
+    eventually(lambda: relays(made)["/late", "<-"].refused == 3)
     assert "stamp.sec" in relays(made)["/late", "<-"].problem
     assert caplog.text.count("a message is not relayed") == 1
     talker.publish(frame_id="fine")
     assert listener.wait(30).message().frame_id == "fine"
 
 
-def test_survey(connect, rospy_peer, wait_for):
+def test_survey(connect, rospy_peer):
     one, two = connect("ros1", "survey_one"), connect("ros2", "survey_two")
     rospy_peer.call("publish", topic="/seen/one", type="std_msgs/Time")
     connect("ros2", "seen").create_publisher("/seen/two", "visualization_msgs/msg/Marker")
-    wait_for(lambda: one.publishers("/seen/one") and two.publishers("/seen/two"))
+    eventually(lambda: one.publishers("/seen/one") and two.publishers("/seen/two"))
     found = {entry.name: entry for entry in survey(one, two, ["/seen/*"], ["/seen/*"])}
     assert found["/seen/one"].other_type == "builtin_interfaces/msg/Time"
     assert found["/seen/one"].direction == "->"
     assert "mesh_file" in found["/seen/two"].notes[0]
 
 
-def test_an_unused_topic_costs_nothing(bridge, connect, wait_for):
+def test_an_unused_topic_costs_nothing(bridge, connect):
     made = bridge(["/heavy"])
     one, two = connect("ros1", "heavy_one"), connect("ros2", "heavy_two")
     talker = one.create_publisher("/heavy", STRING)
-    wait_for(lambda: two.publishers("/heavy"))
-    wait_for(lambda: talker.subscription_count() == 0)
+    eventually(lambda: two.publishers("/heavy"))
+    eventually(lambda: talker.subscription_count() == 0)
     listener = two.create_subscription("/heavy", STRING)
-    wait_for(talker.subscription_count)
+    eventually(talker.subscription_count)
     talker.publish(data="wanted")
     assert listener.wait(30).message().data == "wanted"
-    wait_for(lambda: relays(made)["/heavy", "->"].count == 1)
+    eventually(lambda: relays(made)["/heavy", "->"].count == 1)
 
 
-def test_the_master_restarts(bridge, connect, start_master, start_rospy, wait_for):
+def test_the_master_restarts(bridge, connect, start_master, start_rospy):
     master = start_master()
     url = f"{master.url}?ip=127.0.0.1"
     bridge(["/steady"], urls=(url, ""))
@@ -298,10 +298,10 @@ def test_the_master_restarts(bridge, connect, start_master, start_rospy, wait_fo
         sample = listener.wait(0.5)
         return sample is not None and sample.message().data == "new"
 
-    wait_for(heard)
+    eventually(heard)
 
 
-def test_the_router_restarts(bridge, connect, rospy_peer, free_port, wait_for):
+def test_the_router_restarts(bridge, connect, rospy_peer, free_port):
     where = f"tcp/127.0.0.1:{free_port}"
     with Router(where) as router:
         bridge(["/lasting"], urls=("", router.url))
@@ -337,7 +337,7 @@ def test_a_ros2_client_that_is_not_ours(bridge, start_peer, router, rospy_peer, 
     rospy_peer.call("unpublish", topic="/told")
 
 
-def test_a_chain_of_bridges(bridge, connect, start_master, wait_for):
+def test_a_chain_of_bridges(bridge, connect, start_master):
     """What one bridge brings is not its own to those who go on to a third world."""
     far = f"{start_master().url}?ip=127.0.0.1"
     bridge(["*"])
@@ -349,11 +349,11 @@ def test_a_chain_of_bridges(bridge, connect, start_master, wait_for):
         talker.publish(data="far away")
         return listener.wait(0.1)
 
-    assert wait_for(heard, 30).message().data == "far away"
+    assert eventually(heard, timeout=30).message().data == "far away"
 
 
 @pytest.mark.parametrize("kind", ["ros1", "dds"])
-def test_other_pairs_of_worlds(bridge, connect, router, request, wait_for, kind):
+def test_other_pairs_of_worlds(bridge, connect, router, request, kind):
     """Between worlds of one ROS messages pass as they are, those of unknown types, too."""
     if kind == "ros1":
         ours, other = "", f"{request.getfixturevalue('start_master')().url}?ip=127.0.0.1"
@@ -375,13 +375,13 @@ def test_other_pairs_of_worlds(bridge, connect, router, request, wait_for, kind)
         talker.publish(number=7, words=["a", "b"])
         return listener.wait(0.1)
 
-    found = wait_for(heard, 30).message()
+    found = eventually(heard, timeout=30).message()
     assert (found.number, list(found.words)) == (7, ["a", "b"])
     client = near.create_service_client("/pair/go", "std_srvs/srv/Trigger")
     assert client.call(timeout=30).message == "gone"
 
 
-def test_from_ros1_to_dds(bridge, connect, rospy_peer, dds_domain, wait_for):
+def test_from_ros1_to_dds(bridge, connect, rospy_peer, dds_domain):
     pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
     url = f"dds://?domain={dds_domain}"
     bridge(["/far/*"], ["/far/*"], urls=("", url))
@@ -398,7 +398,7 @@ def test_from_ros1_to_dds(bridge, connect, rospy_peer, dds_domain, wait_for):
     assert told == {"success": False, "message": "gone"}
 
 
-def test_a_publisher_comes_back_with_another_type(bridge, connect, wait_for):
+def test_a_publisher_comes_back_with_another_type(bridge, connect):
     made = bridge(["/changed"])
     two = connect("ros2", "changed_two")
     listeners = {
@@ -413,39 +413,39 @@ def test_a_publisher_comes_back_with_another_type(bridge, connect, wait_for):
             talker.publish(value)
             return listeners[name].wait(0.1)
 
-        wait_for(heard, 30, what=lambda: str(made.status()))
+        eventually(heard, timeout=30, what=lambda: str(made.status()))
         talker.close()
 
 
-def test_a_type_that_cannot_be_is_told_once(bridge, connect, wait_for, caplog):
+def test_a_type_that_cannot_be_is_told_once(bridge, connect, caplog):
     made = bridge(["/case"])
     kind = MessageType.from_text("own_msgs/msg/Case", "int8 a\nint8 A\n", ros=1)
     talker = connect("ros1", "case").create_publisher("/case", kind)
-    wait_for(lambda: made.status().relays and made.status().relays[0].problem)
+    eventually(lambda: made.status().relays and made.status().relays[0].problem)
     assert "differ only in case" in made.status().relays[0].problem
-    wait_for(lambda: talker.subscription_count() == 0)
-    time.sleep(1)
+    eventually(lambda: talker.subscription_count() == 0)
+    nothing_happens(1)
     assert caplog.text.count("differ only in case") == 1
 
 
-def test_closing(bridge, connect, wait_for):
+def test_closing(bridge, connect):
     """In any order, twice, with the worlds gone."""
     made = bridge(["*"], ["*"])
     one, two = connect("ros1", "close_one"), connect("ros2", "close_two")
     one.create_publisher("/closing", STRING).publish(data="x")
     two.create_service_server("/closing/go", "std_srvs/srv/Trigger", lambda _: {})
-    wait_for(lambda: ("/closing", "->") in relays(made) and ("/closing/go", "<-") in relays(made))
-    wait_for(lambda: one.service_servers("/closing/go"))
+    eventually(lambda: ("/closing", "->") in relays(made) and ("/closing/go", "<-") in relays(made))
+    eventually(lambda: one.service_servers("/closing/go"))
     made.close()
     made.close()
-    wait_for(lambda: not one.service_servers("/closing/go"))
+    eventually(lambda: not one.service_servers("/closing/go"))
     other = bridge(["*"], ["*"])
     for side in other._sides:
         side.node.close()
     other.close()
 
 
-def test_the_version_in_use_is_taken(bridge, connect, router, wait_for):
+def test_the_version_in_use_is_taken(bridge, connect, router):
     """Humble's Range has no variance, Jazzy's has: who is there must understand it."""
     bridge(["/sonar"])
     node = rosglass.connect(router.url, "humble", library=Library(distribution="humble"))
@@ -453,29 +453,29 @@ def test_the_version_in_use_is_taken(bridge, connect, router, wait_for):
         listener = node.create_subscription("/sonar", "sensor_msgs/msg/Range")
         assert listener.type.rihs01 != rosglass.load("sensor_msgs/msg/Range").rihs01
         talker = connect("ros1", "sonar").create_publisher("/sonar", "sensor_msgs/Range")
-        wait_for(talker.subscription_count)
+        eventually(talker.subscription_count)
 
         def heard():
             talker.publish(range=1.5)
             return listener.wait(0.1)
 
-        assert wait_for(heard, 15, what=lambda: listener.problem).message().range == 1.5
+        assert eventually(heard, timeout=15, what=lambda: listener.problem).message().range == 1.5
 
 
-def test_one_thousand_messages_a_second(bridge, connect, wait_for):
+def test_one_thousand_messages_a_second(bridge, connect):
     """Nothing of a burst gets lost, and the order stays."""
     made = bridge(["/burst"])
     talker = connect("ros1", "burst").create_publisher("/burst", STRING, QoS(depth=2000))
     listener = connect("ros2", "burst_two").create_subscription(
         "/burst", STRING, qos=QoS(depth=2000)
     )
-    wait_for(lambda: talker.subscription_count() and listener.publisher_count())
+    eventually(lambda: talker.subscription_count() and listener.publisher_count())
 
     def heard():
         talker.publish(data="first")
         return listener.wait(0.2)
 
-    wait_for(heard)
+    eventually(heard)
     while listener.wait(0.5):
         pass
     for number in range(1000):
@@ -493,13 +493,13 @@ def test_a_single_command_from_the_shell(bridge, connect, tool):
     assert listener.wait(0.5) is None
 
 
-def test_a_service_called_from_the_shell(bridge, connect, tool, wait_for):
+def test_a_service_called_from_the_shell(bridge, connect, tool):
     bridge(services=["*"])
     server = connect("ros2", "shell_server")
     server.create_service_server(
         "/shell/set", "std_srvs/srv/SetBool", lambda asked: {"success": asked.data, "message": "ok"}
     )
-    wait_for(lambda: "/shell/set" in tool("rosservice", "list"))
+    eventually(lambda: "/shell/set" in tool("rosservice", "list"))
     assert tool("rosservice", "type", "/shell/set").strip() == "std_srvs/SetBool"
     told = tool("rosservice", "call", "/shell/set", "true")
     assert "success: True" in told

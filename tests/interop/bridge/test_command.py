@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from waiting import eventually
 
 STRING = "std_msgs/msg/String"
 COMMAND = (sys.executable, "-m", "rosglass.cli", "bridge")
@@ -24,7 +25,7 @@ def run(*arguments, status=0):
     return done
 
 
-def test_it_relays_until_it_is_ended(master, router, connect, start_program, wait_for):
+def test_it_relays_until_it_is_ended(master, router, connect, start_program):
     one, two = connect("ros1", "cli_one"), connect("ros2", "cli_two")
     talker = one.create_publisher("/cli", STRING)
     listener = two.create_subscription("/cli", STRING)
@@ -35,20 +36,20 @@ def test_it_relays_until_it_is_ended(master, router, connect, start_program, wai
         talker.publish(data="from ROS 1")
         return listener.wait(0.1)
 
-    assert wait_for(heard, 30).message().data == "from ROS 1"
-    wait_for(lambda: any("1 topic, 0 services" in line for line in process.output))
+    assert eventually(heard, timeout=30).message().data == "from ROS 1"
+    eventually(lambda: any("1 topic, 0 services" in line for line in process.output))
     process.popen.send_signal(signal.SIGINT)
     assert process.popen.wait(30) == 130
     process.end()
     assert any("/cli -> [std_msgs/String]" in line for line in process.output)
 
 
-def test_it_lists_what_maps(master, router, connect, wait_for):
+def test_it_lists_what_maps(master, router, connect):
     one, two = connect("ros1", "list_one"), connect("ros2", "list_two")
     one.create_publisher("/list/logs", "rosgraph_msgs/Log")
     two.create_publisher("/list/markers", "visualization_msgs/msg/Marker")
     two.create_service_server("/list/go", "std_srvs/srv/Trigger", lambda _: {})
-    wait_for(lambda: one.topics().get("/list/logs"))
+    eventually(lambda: one.topics().get("/list/logs"))
     urls = (f"{master.url}?ip=127.0.0.1", router.url)
     asked = ("--list", "--topic", "/list/*", "--service", "/list/*")
     found = {one["name"]: one for one in json.loads(run(*urls, *asked, "--json").stdout)}
@@ -75,15 +76,15 @@ def test_nonsense(arguments, told):
     assert told in done.stderr
 
 
-def test_what_is_nowhere_is_told(master, router, connect, start_program, wait_for):
+def test_what_is_nowhere_is_told(master, router, connect, start_program):
     two = connect("ros2", "two")
     two.create_publisher("/odometry", STRING)
     command = (*COMMAND, f"{master.url}?ip=127.0.0.1", router.url, "--topic", "/odometri")
     process = start_program(*command, env=dict(os.environ))
     told = "/odometri ->: nobody publishes it; did you mean /odometry?"
-    wait_for(lambda: any(told in line for line in process.output))
+    eventually(lambda: any(told in line for line in process.output))
     two.create_publisher("/odometri", STRING)
-    wait_for(lambda: any("/odometri ->: well again" in line for line in process.output))
+    eventually(lambda: any("/odometri ->: well again" in line for line in process.output))
 
 
 def test_nobody_answers(router, free_port):

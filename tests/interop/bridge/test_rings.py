@@ -7,6 +7,7 @@ import sys
 import time
 
 import pytest
+from waiting import eventually
 
 from rosglass.bridge import Bridge
 from rosglass.comm import QoS
@@ -20,7 +21,7 @@ def problems(*bridges):
     return [one.problem for bridge in bridges for one in bridge.status().relays if one.problem]
 
 
-def test_three_worlds_in_a_ring(bridge, connect, start_master, wait_for):
+def test_three_worlds_in_a_ring(bridge, connect, start_master):
     """A message gets everywhere, nowhere twice, and a service is not kept alive by itself."""
     third = f"{start_master().url}?ip=127.0.0.1"
     rules = (["/ring->"], ["/ask->"])
@@ -42,8 +43,8 @@ def test_three_worlds_in_a_ring(bridge, connect, start_master, wait_for):
         talker.publish(data="hello?")
         return ears[2].wait(0.1)
 
-    wait_for(arrives)
-    wait_for(lambda: sum("form a ring" in told for told in problems(*made)) == 2,
+    eventually(arrives)
+    eventually(lambda: sum("form a ring" in told for told in problems(*made)) == 2,
              what=lambda: str([one.status() for one in made]))  # fmt: skip
     time.sleep(1)  # what is on its way
     for ear in ears:
@@ -58,10 +59,10 @@ def test_three_worlds_in_a_ring(bridge, connect, start_master, wait_for):
     client = three.create_service_client("/ask", "std_srvs/Trigger")
     assert client.call(timeout=30).message == "yes"
     server.close()
-    wait_for(lambda: not any(node.service_servers("/ask") for node in (one, two, three)))
+    eventually(lambda: not any(node.service_servers("/ask") for node in (one, two, three)))
 
 
-def test_two_commands_there_and_back(master, router, connect, start_program, wait_for):
+def test_two_commands_there_and_back(master, router, connect, start_program):
     """Two bridges between the same worlds, one each way, whatever they are called."""
     url = f"{master.url}?ip=127.0.0.1"
     command = (sys.executable, "-m", "rosglass.cli", "bridge", "--topic", "/circle->")
@@ -77,8 +78,8 @@ def test_two_commands_there_and_back(master, router, connect, start_program, wai
             sample = ears[1 - number].wait(0.1)
             return sample is not None
 
-        wait_for(crosses)
-    wait_for(lambda: all(talker.subscription_count() == 2 for talker in talkers))
+        eventually(crosses)
+    eventually(lambda: all(talker.subscription_count() == 2 for talker in talkers))
     time.sleep(1)  # what is on its way
     for ear in ears:
         while ear.wait(0.0) is not None:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import eventually
 
 import rosglass
 
@@ -182,9 +183,7 @@ def connect(request: pytest.FixtureRequest) -> Iterator[Callable[..., Node]]:
         node = rosglass.connect(where, name, namespace, **more)
         nodes.append(node)
         if wait:
-            request.getfixturevalue("wait_for")(
-                lambda: node.status().state.value == "connected", what=lambda: str(node.status())
-            )
+            eventually(lambda: node.status().state.value == "connected", node.status)
         return node
 
     yield connect

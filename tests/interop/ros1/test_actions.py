@@ -7,6 +7,7 @@ import os
 import signal
 
 import pytest
+from waiting import eventually
 
 import rosglass
 from rosglass.comm import GoalStatus, Time
@@ -80,7 +81,7 @@ def ended(peer, key):
 
 
 @BOTH
-def test_a_goal_succeeds(client, which, wait_for):
+def test_a_goal_succeeds(client, which):
     feedback, states, statuses = [], [], []
     goal = client.send_goal(
         {"goal": 5},
@@ -96,7 +97,7 @@ def test_a_goal_succeeds(client, which, wait_for):
     assert goal.accepted == goal.stamp
     assert goal.server == f"/{which}_peer"
     assert goal.id_text.startswith("/us-")
-    wait_for(lambda: CommState.DONE in states)
+    eventually(lambda: CommState.DONE in states)
     rest = [state for state in states if state is not CommState.PENDING]
     assert rest == [CommState.ACTIVE, CommState.WAITING_FOR_RESULT, CommState.DONE]
     assert statuses == [GoalStatus.EXECUTING, GoalStatus.SUCCEEDED]
@@ -121,16 +122,16 @@ def test_a_goal_is_rejected_with_a_text(client):
 
 
 @BOTH
-def test_a_goal_is_preempted(client, wait_for):
+def test_a_goal_is_preempted(client):
     states = []
     goal = client.send_goal({"goal": 1000}, on_comm_state_change=states.append)
-    wait_for(lambda: goal.feedback is not None)
+    eventually(lambda: goal.feedback is not None)
     assert goal.cancel().result(30).accepted == (goal.id,)
     status, result = goal.result(30)
     assert status is GoalStatus.CANCELED
     assert 0 <= result.result < 1000
     assert (goal.terminal_state, goal.text) == (TerminalState.PREEMPTED, "stopped")
-    wait_for(lambda: CommState.DONE in states)
+    eventually(lambda: CommState.DONE in states)
     assert states[-4:] == [
         CommState.WAITING_FOR_CANCEL_ACK,
         CommState.PREEMPTING,
@@ -140,9 +141,9 @@ def test_a_goal_is_preempted(client, wait_for):
 
 
 @BOTH
-def test_a_goal_is_recalled(client, wait_for):
+def test_a_goal_is_recalled(client):
     goal = client.send_goal({"goal": -2})
-    wait_for(lambda: goal.comm_state is CommState.PENDING)
+    eventually(lambda: goal.comm_state is CommState.PENDING)
     assert goal.accepted is None
     assert goal.cancel().result(30).accepted == (goal.id,)
     status, result = goal.result(30)
@@ -152,9 +153,9 @@ def test_a_goal_is_recalled(client, wait_for):
 
 
 @BOTH
-def test_goals_are_cancelled_until_a_time_and_all(client, wait_for):
+def test_goals_are_cancelled_until_a_time_and_all(client):
     goals = [client.send_goal({"goal": 1000 + number}) for number in range(4)]
-    wait_for(lambda: all(goal.status is GoalStatus.EXECUTING for goal in goals))
+    eventually(lambda: all(goal.status is GoalStatus.EXECUTING for goal in goals))
     first = client.cancel_before(goals[1].stamp).result(30)
     assert set(first.accepted) == {goals[0].id, goals[1].id}
     for goal in goals[:2]:
@@ -168,13 +169,13 @@ def test_goals_are_cancelled_until_a_time_and_all(client, wait_for):
 
 
 @BOTH
-def test_a_goal_that_is_resent_is_executed_once(client, wait_for):
+def test_a_goal_that_is_resent_is_executed_once(client):
     feedback = []
     goal = client.send_goal({"goal": 20}, on_feedback=lambda each: feedback.append(each.feedback))
-    wait_for(lambda: feedback)
+    eventually(lambda: feedback)
     goal.resend()
     assert goal.result(30).result.result == 20
-    wait_for(lambda: feedback == list(range(20)))
+    eventually(lambda: feedback == list(range(20)))
     with pytest.raises(rosglass.Error, match="send a new goal"):
         goal.resend()
 
@@ -207,13 +208,11 @@ def test_a_type_that_is_not_known_here_is_learned_from_a_server_in_python(
     assert client.type.name == "actionlib/action/Test"
 
 
-def test_a_type_that_is_not_known_here_is_learned_from_other_clients(
-    roscpp_peer, name, connect, wait_for
-):
+def test_a_type_that_is_not_known_here_is_learned_from_other_clients(roscpp_peer, name, connect):
     client = connect("us", library=Library(WithoutActionlib())).create_action_client(name)
     roscpp_peer.call("action_server", name=name)
     goal = client.send_goal({"goal": 3})
-    wait_for(lambda: "no definition of actionlib/TestGoal is known" in client.problem)
+    eventually(lambda: "no definition of actionlib/TestGoal is known" in client.problem)
     assert roscpp_peer.call("wait_for_server", name=name) is True
     assert goal.result(30).result.result == 3, client.problem
 
@@ -232,27 +231,27 @@ def test_a_goal_sent_before_its_server_is_there_waits(peer, name, connect):
 
 
 @BOTH
-def test_a_simple_server_preempts_goals_for_newer_ones(peer, name, connect, wait_for):
+def test_a_simple_server_preempts_goals_for_newer_ones(peer, name, connect):
     peer.call("simple_action_server", name=name)
     client = connect("us").create_action_client(name, TYPE)
     old = client.send_goal({"goal": 1000})
-    wait_for(lambda: old.feedback is not None)
+    eventually(lambda: old.feedback is not None)
     new = client.send_goal({"goal": 3})
     assert old.result(30).status is GoalStatus.CANCELED
     assert new.result(30).result.result == 3
 
 
-def test_readiness_comes_and_goes(rospy_peer, name, connect, wait_for):
+def test_readiness_comes_and_goes(rospy_peer, name, connect):
     client = connect("us").create_action_client(name, TYPE)
     told = []
     client.on_ready_change(told.append)
     assert client.wait_for_server(0.2) is False
     rospy_peer.call("action_server", name=name)
-    wait_for(lambda: told == [True])
+    eventually(lambda: told == [True])
     goal = client.send_goal({"goal": 2000})
-    wait_for(lambda: goal.feedback is not None)
+    eventually(lambda: goal.feedback is not None)
     rospy_peer.call("stop_action_server", name=name)
-    wait_for(lambda: told == [True, False])
+    eventually(lambda: told == [True, False])
     with pytest.raises(ConnectionLostError, match="went away before goal"):
         goal.result(30)
     assert goal.terminal_state is TerminalState.LOST
@@ -351,11 +350,11 @@ def test_closing_our_server_aborts_its_goals(server, peer, name):
     assert end["terminal"] in ("ABORTED", "PREEMPTED")
 
 
-def test_rostopic_sees_and_drives_our_server(connect, tool, start_tool, name, wait_for):
+def test_rostopic_sees_and_drives_our_server(connect, tool, start_tool, name):
     node = connect("us")
     server = node.create_action_server(name, TYPE, work)
     words = ("goal", "cancel", "status", "result", "feedback")
-    wait_for(lambda: node.topics().keys() >= {f"{name}/{word}" for word in words})
+    eventually(lambda: node.topics().keys() >= {f"{name}/{word}" for word in words})
     listed = tool("rostopic", "list", "-v")
     assert f" * {name}/goal [actionlib/TestActionGoal] 1 subscriber" in listed
     assert f" * {name}/cancel [actionlib_msgs/GoalID] 1 subscriber" in listed
@@ -363,15 +362,15 @@ def test_rostopic_sees_and_drives_our_server(connect, tool, start_tool, name, wa
     assert f" * {name}/result [actionlib/TestActionResult] 1 publisher" in listed
     assert f" * {name}/feedback [actionlib/TestActionFeedback] 1 publisher" in listed
     start_tool("rostopic", "pub", f"{name}/goal", "actionlib/TestActionGoal", "goal: {goal: 1000}")
-    goal = wait_for(lambda: server.goals and server.goals[0])
+    goal = eventually(lambda: server.goals and server.goals[0])
     assert goal.id_text.startswith("/us-")  # rostopic leaves that to the server
     assert goal.accepted > Time()
     tool("rostopic", "pub", "-1", f"{name}/cancel", "actionlib_msgs/GoalID", "{}", timeout=30)
-    wait_for(lambda: goal.status is GoalStatus.CANCELED)
+    eventually(lambda: goal.status is GoalStatus.CANCELED)
     assert node.actions()[name] == ["actionlib/action/Test"]
 
 
-def test_parameters_of_actionlib_hold_for_our_server(connect, master, name, wait_for):
+def test_parameters_of_actionlib_hold_for_our_server(connect, master, name):
     master.call("setParam", f"{name}/status_frequency", 50.0)
     master.call("setParam", f"{name}/status_list_timeout", 0.5)
     node = connect("us")
@@ -381,8 +380,8 @@ def test_parameters_of_actionlib_hold_for_our_server(connect, master, name, wait
     client = connect("other").create_action_client(name, TYPE)
     assert client.send_goal({"goal": 1}).result(30).result.result == 1
     begun = len(seen)
-    wait_for(lambda: len(seen) > begun + 25)
-    wait_for(lambda: not seen[-1].status_list)
+    eventually(lambda: len(seen) > begun + 25)
+    eventually(lambda: not seen[-1].status_list)
     assert not server.problem
 
 
@@ -390,12 +389,12 @@ def test_parameters_of_actionlib_hold_for_our_server(connect, master, name, wait
 
 
 @BOTH
-def test_a_server_killed_in_mid_goal_loses_it(which, request, connect, name, wait_for):
+def test_a_server_killed_in_mid_goal_loses_it(which, request, connect, name):
     peer = request.getfixturevalue(f"start_{which}")(f"{which}_victim_{next(numbers)}")
     peer.call("action_server", name=name)
     client = connect("us").create_action_client(name, TYPE)
     goal = client.send_goal({"goal": 100000})
-    wait_for(lambda: goal.feedback is not None)
+    eventually(lambda: goal.feedback is not None)
     peer.end()
     with pytest.raises(ConnectionLostError, match="went away before goal"):
         goal.result(30)
@@ -405,14 +404,14 @@ def test_a_server_killed_in_mid_goal_loses_it(which, request, connect, name, wai
 
 
 @BOTH
-def test_a_server_that_hangs_loses_its_goals(which, request, connect, name, wait_for, monkeypatch):
+def test_a_server_that_hangs_loses_its_goals(which, request, connect, name, monkeypatch):
     monkeypatch.setattr("rosglass.ros1.action_client._SILENCE", 1.0)
     monkeypatch.setattr("rosglass.ros1.action_client._ANSWER", 1.0)
     peer = request.getfixturevalue(f"start_{which}")(f"{which}_frozen_{next(numbers)}")
     peer.call("action_server", name=name)
     client = connect("us").create_action_client(name, TYPE)
     goal = client.send_goal({"goal": 100000})
-    wait_for(lambda: goal.feedback is not None)
+    eventually(lambda: goal.feedback is not None)
     os.kill(peer.pid, signal.SIGSTOP)
     try:
         with pytest.raises(ConnectionLostError, match=r"fell silent .* before goal"):
@@ -424,12 +423,12 @@ def test_a_server_that_hangs_loses_its_goals(which, request, connect, name, wait
     assert client.cancel_all().result(30).accepted == (goal.id,)
 
 
-def test_a_server_that_is_restarted_does_not_know_its_goals(start_rospy, connect, name, wait_for):
+def test_a_server_that_is_restarted_does_not_know_its_goals(start_rospy, connect, name):
     peer = start_rospy("phoenix")
     peer.call("action_server", name=name)
     client = connect("us").create_action_client(name, TYPE)
     goal = client.send_goal({"goal": 100000})
-    wait_for(lambda: goal.feedback is not None)
+    eventually(lambda: goal.feedback is not None)
     peer.end()
     peer = start_rospy("phoenix")
     peer.call("action_server", name=name)
@@ -438,7 +437,7 @@ def test_a_server_that_is_restarted_does_not_know_its_goals(start_rospy, connect
     assert client.send_goal({"goal": 2}, timeout=20).result(30).result.result == 2
 
 
-def test_a_goal_outlives_its_master(start_master, start_rospy, connect, name, wait_for):
+def test_a_goal_outlives_its_master(start_master, start_rospy, connect, name):
     master = start_master()
     peer = start_rospy("survivor", master=master)
     peer.call("action_server", name=name)
@@ -447,18 +446,18 @@ def test_a_goal_outlives_its_master(start_master, start_rospy, connect, name, wa
     done = client.send_goal({"goal": 1})
     assert done.result(30).result.result == 1
     goal = client.send_goal({"goal": 300})  # six seconds
-    wait_for(lambda: goal.feedback is not None)
+    eventually(lambda: goal.feedback is not None)
     master.kill()
-    wait_for(lambda: node.status().state.value == "lost")
+    eventually(lambda: node.status().state.value == "lost")
     master.start()
-    wait_for(lambda: node.status().state.value == "connected")
+    eventually(lambda: node.status().state.value == "connected")
     assert goal.result(30).result.result == 300
 
 
 @BOTH
-def test_a_client_closed_in_mid_goal_leaves_it_to_the_server(client, peer, name, connect, wait_for):
+def test_a_client_closed_in_mid_goal_leaves_it_to_the_server(client, peer, name, connect):
     goal = client.send_goal({"goal": 100})
-    wait_for(lambda: goal.feedback is not None)
+    eventually(lambda: goal.feedback is not None)
     client.close()
     client.close()
     with pytest.raises(NodeClosedError, match="which goes on"):
@@ -468,6 +467,6 @@ def test_a_client_closed_in_mid_goal_leaves_it_to_the_server(client, peer, name,
     other = connect("other")
     results = []
     other.create_subscription(f"{name}/result", callback=results.append)
-    ended = wait_for(lambda: results and results[0])
+    ended = eventually(lambda: results and results[0])
     assert ended.status.goal_id.id == goal.id_text
     assert ended.result.result == 100

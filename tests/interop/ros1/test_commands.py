@@ -119,7 +119,7 @@ def test_topic_pub(run, robot, given):
     assert received["topic"] == "/cmd_vel"
 
 
-def test_a_latched_topic_pub_stays_until_ctrl_c(start_command, tool, wait_for):
+def test_a_latched_topic_pub_stays_until_ctrl_c(start_command, tool):
     process = start_command("topic", "pub", "/plan", "std_msgs/String", "{data: left}", "-r",
                             "0.01", "--qos", "latched")  # fmt: skip
     assert process.stdout.readline().startswith("1: ")

@@ -6,26 +6,27 @@ import logging
 from pathlib import Path
 
 import pytest
+from waiting import eventually
 
 #: The node that roscore starts beside the master.
 ROSOUT = "/usr/lib/rosout/rosout"
 
 
 @pytest.fixture
-def node(connect, wait_for):
+def node(connect):
     node = connect("cockpit", "/ops")
-    wait_for(lambda: "/ops/cockpit/set_logger_level" in node.services())
+    eventually(lambda: "/ops/cockpit/set_logger_level" in node.services())
     return node
 
 
-def test_rostopic_echo_shows_what_we_log(node, start_tool, wait_for):
+def test_rostopic_echo_shows_what_we_log(node, start_tool):
     echo = start_tool("rostopic", "echo", "/rosout")
 
     def is_shown():
         node.logger.warning("battery at %d %%: Grüße", 5)
         return "---\n" in echo.output
 
-    wait_for(is_shown, 20, lambda: "".join(echo.output))
+    eventually(is_shown, timeout=20, what=lambda: "".join(echo.output))
     told = "".join(echo.output)
     assert "level: 4\n" in told
     assert 'name: "/ops/cockpit"\n' in told
@@ -67,7 +68,7 @@ def test_rosservice_and_rosconsole_see_and_set_our_levels(node, tool):
 @pytest.mark.parametrize(
     ("kind", "logger", "plan"), [("rospy", "rosout", {"level": "info"}), ("roscpp", "ros", {})]
 )
-def test_we_hear_the_log_and_see_the_levels_of_others(node, request, wait_for, kind, logger, plan):
+def test_we_hear_the_log_and_see_the_levels_of_others(node, request, kind, logger, plan):
     peer = request.getfixturevalue(f"{kind}_peer")
     heard: list = []
     node.create_subscription("/rosout", None, heard.append, 100)
@@ -76,7 +77,7 @@ def test_we_hear_the_log_and_see_the_levels_of_others(node, request, wait_for, k
         peer.call("log", text=text, **plan)
         return any(m.msg == text and m.name == f"/{kind}_peer" for m in heard)
 
-    wait_for(lambda: hears("hello"))
+    eventually(lambda: hears("hello"))
     first = next(m for m in heard if m.msg == "hello")
     assert first.level == 2
     assert first.file.endswith((".py", ".cpp"))
@@ -96,28 +97,28 @@ def test_we_set_the_levels_of_others(node, rospy_peer):
 
 
 @pytest.mark.parametrize("start", ["start_rospy", "start_roscpp"])
-def test_our_clock_follows_and_theirs_follows_ours(start_master, connect, request, wait_for, start):
+def test_our_clock_follows_and_theirs_follows_ours(start_master, connect, request, start):
     master = start_master()
     start_peer = request.getfixturevalue(start)
     node = connect("cockpit", url=master.url)
     before = node.clock.is_simulated
     master.call("setParam", "/use_sim_time", True)
-    wait_for(lambda: node.clock.is_simulated)
+    eventually(lambda: node.clock.is_simulated)
     assert not before
     clock = node.create_publisher("/clock", "rosgraph_msgs/Clock")
     peer = start_peer(f"follower_{start}", master=master)
-    wait_for(lambda: clock.subscription_count() == 2)
+    eventually(lambda: clock.subscription_count() == 2)
     clock.publish(clock={"secs": 100, "nsecs": 500_000_000})
-    wait_for(lambda: node.now().seconds == 100.5)
+    eventually(lambda: node.now().seconds == 100.5)
     stamp = 100.5 if start == "start_roscpp" else {"secs": 100, "nsecs": 500_000_000}
-    wait_for(lambda: peer.call("now") == stamp)
+    eventually(lambda: peer.call("now") == stamp)
 
 
-def test_a_rospy_publisher_of_clock_drives_our_timers(start_master, connect, start_rospy, wait_for):
+def test_a_rospy_publisher_of_clock_drives_our_timers(start_master, connect, start_rospy):
     master = start_master()
     master.call("setParam", "/use_sim_time", True)
     node = connect("cockpit", url=master.url)
-    wait_for(lambda: node.clock.is_simulated)
+    eventually(lambda: node.clock.is_simulated)
     jumps: list = []
     node.clock.on_jump(jumps.append)
     fired: list[float] = []
@@ -127,26 +128,26 @@ def test_a_rospy_publisher_of_clock_drives_our_timers(start_master, connect, sta
     def tick(secs: float) -> None:
         value = {"clock": {"secs": int(secs), "nsecs": int(secs % 1 * 1e9)}}
         gazebo.call("publish", topic="/clock", type="rosgraph_msgs/Clock", value=value)
-        wait_for(lambda: node.now().seconds == secs)
+        eventually(lambda: node.now().seconds == secs)
 
-    wait_for(lambda: gazebo.call("connections", topic="/clock") == 2)
+    eventually(lambda: gazebo.call("connections", topic="/clock") == 2)
     tick(10)
     node.create_timer(1.0, lambda: fired.append(node.now().seconds))
     tick(10.5)
     tick(11)
-    wait_for(lambda: fired == [11.0])
+    eventually(lambda: fired == [11.0])
     tick(5)
-    wait_for(lambda: any(jump.delta.seconds < 0 for jump in jumps))
+    eventually(lambda: any(jump.delta.seconds < 0 for jump in jumps))
     gazebo.end()  # the simulation is killed: time stands still
     assert node.now().seconds == 5.0
 
 
-def test_roscores_own_node_collects_our_log(start_master, start_program, connect, wait_for):
+def test_roscores_own_node_collects_our_log(start_master, start_program, connect):
     master = start_master()
     if not Path(ROSOUT).exists():
         pytest.skip("the node rosout is not installed: sudo apt-get install rosout")
     start_program(ROSOUT, "__name:=rosout", env=master.env())
-    wait_for(lambda: ["/rosout", ["/rosout"]] in master.call("getSystemState")[1])
+    eventually(lambda: ["/rosout", ["/rosout"]] in master.call("getSystemState")[1])
     node = connect("cockpit", url=master.url)
     listener = node.create_subscription("/rosout_agg", None)
 
@@ -154,7 +155,7 @@ def test_roscores_own_node_collects_our_log(start_master, start_program, connect
         node.logger.info("knock")
         return listener.wait(0.2) is not None
 
-    wait_for(knock)
+    eventually(knock)
     node.logger.error("motor stalled")
     message = listener.wait(30).message()
     while message.msg == "knock":

@@ -5,19 +5,20 @@ from __future__ import annotations
 import threading
 
 import pytest
+from waiting import eventually
 
 from rosglass.comm import EndpointKind, NodeName
 
 
-def test_nodes_topics_and_services_come_and_go(connect, start_rospy, start_roscpp, wait_for):
+def test_nodes_topics_and_services_come_and_go(connect, start_rospy, start_roscpp):
     node = connect("panel", "/ops")
     changed = threading.Event()
     node.on_graph_change(changed.set)
     peer, other = start_rospy("camera"), start_roscpp("base")
     peer.call("publish", topic="/image", type="sensor_msgs/Image")
     peer.call("subscribe", topic="/words", type="*", tell=False)
-    wait_for(lambda: {"/image", "/words"} <= node.topics().keys())
-    wait_for(lambda: {NodeName("/", "camera"), NodeName("/", "base")} <= set(node.nodes()))
+    eventually(lambda: {"/image", "/words"} <= node.topics().keys())
+    eventually(lambda: {NodeName("/", "camera"), NodeName("/", "base")} <= set(node.nodes()))
     assert changed.is_set()
     assert NodeName("/ops", "panel") in node.nodes()  # although it has registered nothing
     assert node.topics()["/image"] == ["sensor_msgs/msg/Image"]
@@ -35,16 +36,16 @@ def test_nodes_topics_and_services_come_and_go(connect, start_rospy, start_roscp
     # The type is known as soon as somebody tells it.
     changed.clear()
     other_words = connect("talker").create_publisher("/words", "std_msgs/String")
-    wait_for(lambda: node.topics()["/words"] == ["std_msgs/msg/String"])
-    wait_for(changed.is_set)
+    eventually(lambda: node.topics()["/words"] == ["std_msgs/msg/String"])
+    eventually(changed.is_set)
     other_words.close()
     peer.call("unpublish", topic="/image")
-    wait_for(lambda: "/image" not in node.topics())
+    eventually(lambda: "/image" not in node.topics())
     other.end()
 
 
 def test_a_node_that_was_killed_stays_until_it_is_cleaned_up_and_is_named(
-    connect, start_rospy, tool, wait_for
+    connect, start_rospy, tool
 ):
     node = connect("panel")
     peer = start_rospy("doomed")
@@ -52,13 +53,13 @@ def test_a_node_that_was_killed_stays_until_it_is_cleaned_up_and_is_named(
     subscription = node.create_subscription("/pulse")
     subscription.wait(30)
     peer.end()
-    wait_for(lambda: subscription.publisher_count() == 0)
-    wait_for(lambda: "Connection refused" in subscription.problem)
+    eventually(lambda: subscription.publisher_count() == 0)
+    eventually(lambda: "Connection refused" in subscription.problem)
     assert NodeName("/", "doomed") in node.nodes()  # as `rosnode list` has it
     assert "/doomed" in tool("rosnode", "list")
     assert "/doomed" in tool("rosnode", "cleanup", stdin="y\n")
-    wait_for(lambda: NodeName("/", "doomed") not in node.nodes())
-    wait_for(lambda: "refused" not in subscription.problem, what=lambda: subscription.problem)
+    eventually(lambda: NodeName("/", "doomed") not in node.nodes())
+    eventually(lambda: "refused" not in subscription.problem, what=lambda: subscription.problem)
     # Whoever takes its place is found.
     again = start_rospy("doomed")
     again.call("publish", topic="/pulse", type="std_msgs/Empty", value={}, rate=20, count=0)
@@ -68,14 +69,14 @@ def test_a_node_that_was_killed_stays_until_it_is_cleaned_up_and_is_named(
     again.end()
 
 
-def test_rosnode_tells_our_connections_by_node_and_port(connect, start_rospy, tool, wait_for):
+def test_rosnode_tells_our_connections_by_node_and_port(connect, start_rospy, tool):
     node, peer = connect("panel"), start_rospy("peer")
     publisher = node.create_publisher("/out", "std_msgs/Empty")
     subscription = node.create_subscription("/in", "std_msgs/Empty")
     peer.call("subscribe", topic="/out", type="std_msgs/Empty", tell=False)
     peer.call("publish", topic="/in", type="std_msgs/Empty")
-    wait_for(publisher.subscription_count)
-    wait_for(subscription.publisher_count)
+    eventually(publisher.subscription_count)
+    eventually(subscription.publisher_count)
     told = tool("rosnode", "info", "/panel")
     inbound, outbound = (
         told.partition(f"* topic: {topic}\n")[2].splitlines()[:3] for topic in ("/in", "/out")
@@ -89,16 +90,16 @@ def test_rosnode_tells_our_connections_by_node_and_port(connect, start_rospy, to
     peer.end()
 
 
-def test_udp_is_refused_and_tcp_taken_in_its_place(connect, roscpp_peer, wait_for):
+def test_udp_is_refused_and_tcp_taken_in_its_place(connect, roscpp_peer):
     node = connect("panel")
     publisher = node.create_publisher("/by_udp", "std_msgs/String")
     roscpp_peer.call("subscribe_udp", topic="/by_udp", fallback=True)
-    wait_for(publisher.subscription_count)
+    eventually(publisher.subscription_count)
     publisher.publish(data="by TCP")
     assert roscpp_peer.event("udp") == "by TCP"
     only = node.create_publisher("/only", "std_msgs/String")
     roscpp_peer.call("subscribe_udp", topic="/only", fallback=False)
-    wait_for(lambda: node.subscriptions("/only"))
+    eventually(lambda: node.subscriptions("/only"))
     only.publish(data="nobody hears it")
     assert roscpp_peer.call("udp_sources", topic="/only") == 0
     assert only.subscription_count() == 0
@@ -106,7 +107,7 @@ def test_udp_is_refused_and_tcp_taken_in_its_place(connect, roscpp_peer, wait_fo
 
 
 @pytest.mark.parametrize("kind", ["geometry_msgs/PoseStamped", "sensor_msgs/LaserScan"])
-def test_we_relay_what_we_need_not_know(connect, rospy_peer, wait_for, kind):
+def test_we_relay_what_we_need_not_know(connect, rospy_peer, kind):
     node = connect("relay")
     passed = []
     topic = f"/{kind.replace('/', '_')}"
@@ -130,25 +131,23 @@ def test_we_relay_what_we_need_not_know(connect, rospy_peer, wait_for, kind):
     source.close()
 
 
-def test_a_relay_of_rospy_that_names_no_type_is_understood_when_we_give_one(
-    connect, rospy_peer, wait_for
-):
+def test_a_relay_of_rospy_that_names_no_type_is_understood_when_we_give_one(connect, rospy_peer):
     node = connect("panel")
     source = node.create_publisher("/relayed/in", "std_msgs/String")
     rospy_peer.call("relay", source="/relayed/in", target="/relayed/out")
     typed = node.create_subscription("/relayed/out", "std_msgs/String")
     untyped = node.create_subscription("/relayed/out")
-    wait_for(source.subscription_count)
-    wait_for(typed.publisher_count)
+    eventually(source.subscription_count)
+    eventually(typed.publisher_count)
 
     def relayed():
         # rospy tells a subscriber that it is connected, and sends it what comes a moment later.
         source.publish(data="whatever")
         return typed.wait(0.5)
 
-    assert wait_for(relayed).message().data == "whatever"
+    assert eventually(relayed).message().data == "whatever"
     # With the type known for the topic, or not: it must not stay silent without a reason.
-    wait_for(lambda: untyped.problem or untyped.type)
+    eventually(lambda: untyped.problem or untyped.type)
     if untyped.type is None:
         assert "does not say what it publishes on /relayed/out" in untyped.problem
         assert "give the type" in untyped.problem

@@ -10,6 +10,7 @@ from operator import le
 from pathlib import Path
 
 import pytest
+from waiting import eventually
 
 import rosglass
 from rosglass.comm import ConnectionState
@@ -28,7 +29,7 @@ def registered(master, topic):
 
 
 def test_a_restarted_master_learns_of_us_and_messages_go_on_meanwhile(
-    own_master, connect, start_rospy, wait_for
+    own_master, connect, start_rospy
 ):
     peer = start_rospy("peer", master=own_master)
     node = connect("panel", url=own_master.url)
@@ -38,7 +39,7 @@ def test_a_restarted_master_learns_of_us_and_messages_go_on_meanwhile(
     peer.call("subscribe", topic="/commands", type="std_msgs/Int32", tell=False)
     peer.call("publish", topic="/words", type="std_msgs/String", value={"data": "w"}, rate=50,
               count=0)  # fmt: skip
-    wait_for(commands.subscription_count)
+    eventually(commands.subscription_count)
     words.wait(30)
     joined = []
     words.on_matched(joined.append)
@@ -48,21 +49,21 @@ def test_a_restarted_master_learns_of_us_and_messages_go_on_meanwhile(
         before = peer.call("count", topic="/commands")
         for number in range(count):
             commands.publish(data=number)
-        wait_for(lambda: peer.call("count", topic="/commands") == before + count)
+        eventually(lambda: peer.call("count", topic="/commands") == before + count)
         while words.take() is not None:
             pass
         words.wait(30)
 
     go_on(3)
     own_master.kill()
-    wait_for(lambda: node.status().state is ConnectionState.LOST)
+    eventually(lambda: node.status().state is ConnectionState.LOST)
     assert "does not answer" in node.status().detail
     go_on(3)
     own_master.start()
-    wait_for(lambda: registered(own_master, "/commands")[0] == ["/panel"])
-    wait_for(lambda: registered(own_master, "/words")[1] == ["/panel"])
-    wait_for(lambda: dict(own_master.call("getSystemState")[2]).get("/reset") == ["/panel"])
-    wait_for(lambda: node.status().state is ConnectionState.CONNECTED)
+    eventually(lambda: registered(own_master, "/commands")[0] == ["/panel"])
+    eventually(lambda: registered(own_master, "/words")[1] == ["/panel"])
+    eventually(lambda: dict(own_master.call("getSystemState")[2]).get("/reset") == ["/panel"])
+    eventually(lambda: node.status().state is ConnectionState.CONNECTED)
     go_on(3)
     # rospy does not register again: its connections are the ones from before.
     assert registered(own_master, "/words")[0] == []
@@ -74,33 +75,33 @@ def test_a_restarted_master_learns_of_us_and_messages_go_on_meanwhile(
     late = connect("late", url=own_master.url)
     late.create_publisher("/words", "std_msgs/String")
     receiver = late.create_subscription("/commands")
-    wait_for(lambda: words.publisher_count() == 2)
-    wait_for(lambda: commands.subscription_count() == 2)
+    eventually(lambda: words.publisher_count() == 2)
+    eventually(lambda: commands.subscription_count() == 2)
     commands.publish(data=7)
     assert receiver.wait(30).message().data == 7
 
 
-def test_a_master_that_starts_late_is_found(own_master, connect, tool, wait_for):
+def test_a_master_that_starts_late_is_found(own_master, connect, tool):
     own_master.kill()
     node = connect("early", url=own_master.url, wait=False)
     told = []
     node.on_status_change(told.append)
     publisher = node.create_publisher("/early", "std_msgs/Empty")
     subscription = node.create_subscription("/early")
-    wait_for(lambda: "Connection refused" in node.status().detail)
+    eventually(lambda: "Connection refused" in node.status().detail)
     assert node.status().state is ConnectionState.CONNECTING
     own_master.start()
-    wait_for(lambda: told and told[-1].state is ConnectionState.CONNECTED)
-    wait_for(publisher.subscription_count)
+    eventually(lambda: told and told[-1].state is ConnectionState.CONNECTED)
+    eventually(publisher.subscription_count)
     publisher.publish()
     subscription.wait(30)
 
 
-def test_a_master_that_hangs_holds_up_neither_topics_nor_closing(own_master, connect, wait_for):
+def test_a_master_that_hangs_holds_up_neither_topics_nor_closing(own_master, connect):
     one, two = connect("one", url=own_master.url), connect("two", url=own_master.url)
     publisher = one.create_publisher("/count", "std_msgs/Int32")
     subscription = two.create_subscription("/count")
-    wait_for(publisher.subscription_count)
+    eventually(publisher.subscription_count)
     pid = own_master._process.pid
     os.kill(pid, signal.SIGSTOP)
     try:
@@ -109,8 +110,8 @@ def test_a_master_that_hangs_holds_up_neither_topics_nor_closing(own_master, con
         left = []
         publisher.on_matched(left.append)
         subscription.close()  # its connection ends at once, whatever the master does
-        wait_for(lambda: [event.change for event in left] == [1, -1])
-        wait_for(lambda: one.status().state is ConnectionState.LOST)
+        eventually(lambda: [event.change for event in left] == [1, -1])
+        eventually(lambda: one.status().state is ConnectionState.LOST)
         assert "no answer in time" in one.status().detail
         new = connect("three", url=own_master.url, wait=False)
         for node in (new, two, one):
@@ -121,10 +122,10 @@ def test_a_master_that_hangs_holds_up_neither_topics_nor_closing(own_master, con
     finally:
         os.kill(pid, signal.SIGCONT)
     # Once it answers again, it learns who has left meanwhile.
-    wait_for(lambda: registered(own_master, "/count") == ([], []), 30)
+    eventually(lambda: registered(own_master, "/count") == ([], []), timeout=30)
 
 
-def test_closing_while_connecting_leaves_nothing_behind(own_master, connect, wait_for):
+def test_closing_while_connecting_leaves_nothing_behind(own_master, connect):
     for delay in [0.0, 0.001, 0.002, 0.003, 0.005, 0.01, 0.02, 0.03] * 4:
         node = connect("hasty", url=own_master.url, wait=False)
         node.create_publisher("/hasty", "std_msgs/Empty")
@@ -135,7 +136,7 @@ def test_closing_while_connecting_leaves_nothing_behind(own_master, connect, wai
     assert [part for part in own_master.call("getSystemState") if part] == []
 
 
-def test_many_nodes_come_and_go_without_a_trace(own_master, connect, wait_for):
+def test_many_nodes_come_and_go_without_a_trace(own_master, connect):
     def cycle():
         node = rosglass.connect(f"{own_master.url}?ip=127.0.0.1", "brief")
         publisher = node.create_publisher("/brief", "std_msgs/Empty")
@@ -152,81 +153,79 @@ def test_many_nodes_come_and_go_without_a_trace(own_master, connect, wait_for):
     before = traces()
     for _ in range(300):
         cycle()
-    wait_for(lambda: all(map(le, traces(), before)), what=lambda: f"{before} became {traces()}")
+    eventually(lambda: all(map(le, traces(), before)), what=lambda: f"{before} became {traces()}")
     assert [part for part in own_master.call("getSystemState") if part] == []
 
 
-def test_the_master_is_told_again_of_what_it_forgot_alone(own_master, connect, wait_for):
+def test_the_master_is_told_again_of_what_it_forgot_alone(own_master, connect):
     node = connect("panel", url=own_master.url)
     node.create_publisher("/one", "std_msgs/Empty")
     node.create_publisher("/two", "std_msgs/Empty")
     node.create_subscription("/three", "std_msgs/Empty")
-    wait_for(lambda: registered(own_master, "/three")[1])
+    eventually(lambda: registered(own_master, "/three")[1])
     # As `rosnode cleanup` does when a node seems to be gone for a moment.
     api = own_master.call("lookupNode", "/panel")
     own_master.call("unregisterPublisher", "/one", api, caller="/panel")
     own_master.call("unregisterSubscriber", "/three", api, caller="/panel")
-    wait_for(lambda: registered(own_master, "/one")[0] == ["/panel"])
-    wait_for(lambda: registered(own_master, "/three")[1] == ["/panel"])
+    eventually(lambda: registered(own_master, "/one")[0] == ["/panel"])
+    eventually(lambda: registered(own_master, "/three")[1] == ["/panel"])
     assert registered(own_master, "/two")[0] == ["/panel"]
 
 
-def test_publishers_are_found_though_the_master_cannot_call_us(own_master, connect, wait_for):
+def test_publishers_are_found_though_the_master_cannot_call_us(own_master, connect):
     node = connect("behind_a_firewall", url=own_master.url)
     subscription = node.create_subscription("/talk")
-    wait_for(lambda: registered(own_master, "/talk")[1])
+    eventually(lambda: registered(own_master, "/talk")[1])
     # Its API is not served any more: calls of the master's get lost.
     core = node._core
     door = core._doors[1]
     core.loop.call(door.end)
     core._api.close()
-    wait_for(lambda: door._listener.fileno() < 0)
+    eventually(lambda: door._listener.fileno() < 0)
     talker = connect("talker", url=own_master.url)
     publisher = talker.create_publisher("/talk", "std_msgs/Int32")
-    wait_for(publisher.subscription_count)
+    eventually(publisher.subscription_count)
     publisher.publish(data=3)
     assert subscription.wait(30).message().data == 3
 
 
 @pytest.mark.parametrize("peer", ["rosglass", "rospy", "roscpp"])
-def test_the_older_of_two_nodes_of_a_name_ends(own_master, connect, request, wait_for, peer):
+def test_the_older_of_two_nodes_of_a_name_ends(own_master, connect, request, peer):
     older = connect("twin", url=own_master.url)
     told, done = [], threading.Event()
     older.on_status_change(lambda status: (told.append(status), done.set()))
     older.create_publisher("/old", "std_msgs/Empty")
-    wait_for(lambda: registered(own_master, "/old")[0])
+    eventually(lambda: registered(own_master, "/old")[0])
     if peer == "rosglass":
         newer = connect("twin", url=own_master.url)
         newer.create_publisher("/new", "std_msgs/Empty")
     else:
         start = request.getfixturevalue(f"start_{peer}")
         newer = start("twin", master=own_master)
-    wait_for(lambda: older.status().state is ConnectionState.CLOSED)
+    eventually(lambda: older.status().state is ConnectionState.CLOSED)
     done.wait(30)
     assert told[-1] == older.status()
     assert "same name" in told[-1].detail or "has the name /twin now" in told[-1].detail
     with pytest.raises(rosglass.NodeClosedError, match="/twin is closed"):
         older.create_publisher("/late", "std_msgs/Empty")
     if peer == "rosglass":
-        wait_for(lambda: registered(own_master, "/new")[0] == ["/twin"])
+        eventually(lambda: registered(own_master, "/new")[0] == ["/twin"])
         assert newer.status().state is ConnectionState.CONNECTED
-    wait_for(lambda: registered(own_master, "/old")[0] == [])
+    eventually(lambda: registered(own_master, "/old")[0] == [])
 
 
-def test_a_node_ends_although_the_master_cannot_tell_it_that_its_name_is_taken(
-    own_master, connect, wait_for
-):
+def test_a_node_ends_although_the_master_cannot_tell_it_that_its_name_is_taken(own_master, connect):
     older = connect("twin", url=own_master.url)
     older.create_publisher("/old", "std_msgs/Empty")
-    wait_for(lambda: registered(own_master, "/old")[0])
+    eventually(lambda: registered(own_master, "/old")[0])
     core = older._core
     door = core._doors[1]
     core.loop.call(door.end)
     core._api.close()
-    wait_for(lambda: door._listener.fileno() < 0)
+    eventually(lambda: door._listener.fileno() < 0)
     newer = connect("twin", url=own_master.url)
     newer.create_publisher("/new", "std_msgs/Empty")
-    wait_for(lambda: older.status().state is ConnectionState.CLOSED)
+    eventually(lambda: older.status().state is ConnectionState.CLOSED)
     assert f"{newer._core.uri} has the name /twin now" in older.status().detail
     assert newer.status().state is ConnectionState.CONNECTED
 
@@ -274,9 +273,7 @@ print('{"done": true}', flush=True)
 """
 
 
-def test_a_fork_keeps_nothing_alive_and_an_end_without_closing_leaves_nothing(
-    own_master, start, wait_for
-):
+def test_a_fork_keeps_nothing_alive_and_an_end_without_closing_leaves_nothing(own_master, start):
     process = start("-c", _FORK, f"{own_master.url}?ip=127.0.0.1")
     assert process.event("done")
     assert process.popen.wait(30) == 0

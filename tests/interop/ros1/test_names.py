@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 
 import pytest
+from waiting import eventually
 
 import rosglass
 
@@ -39,7 +40,7 @@ def test_names_are_what_rospy_makes_of_them(case, connect, start_rospy, monkeypa
 
 
 def test_remapped_topics_services_and_parameters_are_the_ones_that_others_see(
-    connect, tool, wait_for, master
+    connect, tool, master
 ):
     node = connect(
         "panel",
@@ -48,21 +49,21 @@ def test_remapped_topics_services_and_parameters_are_the_ones_that_others_see(
     publisher = node.create_publisher("words", "std_msgs/String", rosglass.QoS.latched())
     publisher.publish(data="hello")
     node.create_service_server("reset", "std_srvs/Empty", lambda _: None)
-    wait_for(lambda: "/ops/again" in node.services())
+    eventually(lambda: "/ops/again" in node.services())
     assert tool("rostopic", "echo", "-n1", "-p", "/said").splitlines()[1].endswith(",hello")
     assert tool("rosservice", "call", "/ops/again").strip() == ""
     assert tool("rosnode", "list").split().count("/ops/panel") == 1
-    wait_for(lambda: "/ops/panel/speed" in tool("rosparam", "list"))
+    eventually(lambda: "/ops/panel/speed" in tool("rosparam", "list"))
     assert tool("rosparam", "get", "/ops/panel/speed").strip() == "1.5"
 
 
-def test_private_parameters_of_the_command_line_are_rospys(connect, start_rospy, wait_for, master):
+def test_private_parameters_of_the_command_line_are_rospys(connect, start_rospy, master):
     values = {"a": "1", "b": "[1, two]", "c": "'1'", "d": "{x: {y: 1.5}}", "e": "true", "f/g": "x"}
     arguments = [f"_{name}:={value}" for name, value in values.items()]
     peer = start_rospy("theirs", *arguments)
     node = connect("ours", arguments=arguments)
     parameters = dict.fromkeys(values)
-    wait_for(lambda: master.call("hasParam", "/ours/f/g"))
+    eventually(lambda: master.call("hasParam", "/ours/f/g"))
     for name in parameters:
         assert master.call("getParam", f"/ours/{name}") == peer.call("private", name=name)
     assert node.status().detail == ""
@@ -78,9 +79,7 @@ def test_private_parameters_of_the_command_line_are_rospys(connect, start_rospy,
         ([], {"ROS_HOSTNAME": "localhost", "ROS_IP": "127.0.0.2"}, "localhost"),
     ],
 )
-def test_we_are_reached_where_we_say(
-    arguments, env, host, start_rospy, monkeypatch, master, wait_for
-):
+def test_we_are_reached_where_we_say(arguments, env, host, start_rospy, monkeypatch, master):
     for name in ("ROS_IP", "ROS_HOSTNAME"):
         monkeypatch.delenv(name, raising=False)
     for name, value in env.items():
@@ -88,7 +87,7 @@ def test_we_are_reached_where_we_say(
     with rosglass.connect(master.url, "placed", arguments=arguments) as node:
         publisher = node.create_publisher("/placed", "std_msgs/Int32", rosglass.QoS.latched())
         publisher.publish(data=4)
-        wait_for(lambda: node.publishers("/placed"))
+        eventually(lambda: node.publishers("/placed"))
         assert master.call("lookupNode", "/placed").startswith(f"http://{host}:")
         peer = start_rospy("visitor")
         peer.call("subscribe", topic="/placed", type="std_msgs/Int32")
@@ -96,22 +95,20 @@ def test_we_are_reached_where_we_say(
         peer.end()
 
 
-def test_without_being_told_we_announce_what_others_reach(
-    start_rospy, monkeypatch, master, wait_for
-):
+def test_without_being_told_we_announce_what_others_reach(start_rospy, monkeypatch, master):
     for name in ("ROS_IP", "ROS_HOSTNAME"):
         monkeypatch.delenv(name, raising=False)
     with rosglass.connect(master.url, "found") as node:
         publisher = node.create_publisher("/found", "std_msgs/Int32", rosglass.QoS.latched())
         publisher.publish(data=5)
-        wait_for(lambda: node.publishers("/found"))
+        eventually(lambda: node.publishers("/found"))
         peer = start_rospy("visitor")
         peer.call("subscribe", topic="/found", type="std_msgs/Int32")
         assert peer.event("received")["value"] == {"data": 5}
         peer.end()
 
 
-def test_the_master_of_the_command_line_and_fixed_ports(start_master, wait_for):
+def test_the_master_of_the_command_line_and_fixed_ports(start_master):
     master = start_master()
     with socket.socket() as one, socket.socket() as two:
         for probe in (one, two):
@@ -124,14 +121,14 @@ def test_the_master_of_the_command_line_and_fixed_ports(start_master, wait_for):
     )
     with node:
         node.create_publisher("/fixed", "std_msgs/Empty")
-        wait_for(lambda: node.publishers("/fixed"))
+        eventually(lambda: node.publishers("/fixed"))
         assert master.call("lookupNode", "/fixed") == f"http://127.0.0.1:{api}/"
         assert node._core.address == ("127.0.0.1", port)
 
 
-def test_nodes_without_a_name_do_not_end_each_other(connect, master, wait_for):
+def test_nodes_without_a_name_do_not_end_each_other(connect, master):
     nodes = [connect(None) for _ in range(5)]
     for number, node in enumerate(nodes):
         node.create_publisher(f"/number{number}", "std_msgs/Empty")
-    wait_for(lambda: all(node.publishers(f"/number{n}") for n, node in enumerate(nodes)))
+    eventually(lambda: all(node.publishers(f"/number{n}") for n, node in enumerate(nodes)))
     assert [node.status().state.value for node in nodes] == ["connected"] * 5

@@ -8,6 +8,7 @@ import socket
 from typing import Any
 
 import pytest
+from waiting import eventually
 
 
 @pytest.fixture(scope="module")
@@ -33,9 +34,9 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def test_topic_info_says_what_it_cannot_know(run, master, connect, wait_for, free_port):
+def test_topic_info_says_what_it_cannot_know(run, master, connect, free_port):
     connect("listener").create_subscription("/never")
-    wait_for(lambda: ["/never", ["/listener"]] in master.call("getSystemState")[1])
+    eventually(lambda: ["/never", ["/listener"]] in master.call("getSystemState")[1])
     code, out, _ = run("topic", "info", "/never")
     assert (code, out.splitlines()[0]) == (0, "/never [unknown (nobody publishes it)]")
     assert "/never [unknown]" in run("topic", "list", "-t")[1].splitlines()
@@ -73,14 +74,14 @@ def test_pinging_what_does_not_answer(run, master, free_port):
     master.call("unregisterPublisher", "/stale", gone, caller="/dead")
 
 
-def test_kill(run, start_rospy, connect, wait_for):
+def test_kill(run, start_rospy, connect):
     start_rospy("victim").call("publish", topic="/left", type="std_msgs/Empty")
     ours = connect("ours")
     ours.create_publisher("/ours/left", "std_msgs/Empty")
-    wait_for(lambda: "/ours/left" in ours.topics() and "/left" in ours.topics())
+    eventually(lambda: "/ours/left" in ours.topics() and "/left" in ours.topics())
     code, out, err = run("node", "kill", "/victim", "ours")
     assert (code, out, err) == (0, "/victim has ended\n/ours has ended\n", "")
-    wait_for(lambda: ours.status().state.value == "closed")
+    eventually(lambda: ours.status().state.value == "closed")
     code, out, err = run("node", "kill", "/victim", "--json")
     assert (code, json.loads(out)) == (1, {"killed": [], "failed": ["/victim"]})
     assert "there is no node /victim" in err

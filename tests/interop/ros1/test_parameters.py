@@ -6,6 +6,7 @@ import math
 import time
 
 import pytest
+from waiting import eventually
 
 from rosglass.comm import ParameterType
 from rosglass.errors import ConnectionLostError, ParameterError
@@ -40,7 +41,7 @@ def test_rosparam_reads_what_we_set(server, tool, value, printed):
     assert server.get("/t/value") == value
 
 
-def test_rosparam_lists_and_deletes_ours_and_we_see_what_it_sets(server, tool, wait_for):
+def test_rosparam_lists_and_deletes_ours_and_we_see_what_it_sets(server, tool):
     server.set("/l", {"a": 1, "b": {"c": 2}})
     assert tool("rosparam", "list", "/l").split() == ["/l/a", "/l/b/c"]
     assert server.names("/l") == ["/l/a", "/l/b/c"]
@@ -48,11 +49,11 @@ def test_rosparam_lists_and_deletes_ours_and_we_see_what_it_sets(server, tool, w
     subscription = server.subscribe("/l", told.append)
     assert subscription.wait(30)
     tool("rosparam", "set", "/l/b/c", "[1, 2]")
-    wait_for(lambda: told and told[-1] == {"a": 1, "b": {"c": [1, 2]}})
+    eventually(lambda: told and told[-1] == {"a": 1, "b": {"c": [1, 2]}})
     tool("rosparam", "set", "/l", "5")
-    wait_for(lambda: told[-1] == 5)
+    eventually(lambda: told[-1] == 5)
     tool("rosparam", "delete", "/l")
-    wait_for(lambda: told[-1] is None)
+    eventually(lambda: told[-1] is None)
     assert "not set" in tool("rosparam", "get", "/l", status=1)
 
 
@@ -74,25 +75,25 @@ def test_files_go_both_ways(server, tool, tmp_path):
     assert server.get("/back") == server.get("/theirs")
 
 
-def test_rospy_reads_and_sets_with_us(server, node, rospy_peer, wait_for):
+def test_rospy_reads_and_sets_with_us(server, node, rospy_peer):
     server.set("/py/a", 1)
     assert rospy_peer.call("get_param", name="/py/a", cached=True) == [1, "int"]
     server.set("/py/a", 2.0)
-    wait_for(lambda: rospy_peer.call("get_param", name="/py/a", cached=True) == [2.0, "float"])
+    eventually(lambda: rospy_peer.call("get_param", name="/py/a", cached=True) == [2.0, "float"])
     told: list[object] = []
     subscription = server.subscribe("/py", told.append)
     assert subscription.wait(30)
     rospy_peer.call("set_param", name="/py/b", value={"c": [True, "x"]})
-    wait_for(lambda: subscription.value == {"a": 2.0, "b": {"c": [True, "x"]}})
+    eventually(lambda: subscription.value == {"a": 2.0, "b": {"c": [True, "x"]}})
     rospy_peer.call("delete_param", name="/py/a")
-    wait_for(lambda: "a" not in subscription.value)
+    eventually(lambda: "a" not in subscription.value)
     server.set("/gain", {"p": 1})
     assert rospy_peer.call("search_param", name="gain/p") == server.search("gain/p") == "/gain/p"
     node.parameters.set({"mine": 5})
     assert rospy_peer.call("get_param", name="/ops/cockpit/mine") == [5, "int"]
 
 
-def test_roscpp_reads_and_sets_with_us(server, roscpp_peer, wait_for):
+def test_roscpp_reads_and_sets_with_us(server, roscpp_peer):
     server.set("/cpp/a", [1, 2.5, "x <&>"])
     assert roscpp_peer.call("get_param", name="/cpp/a") == (
         "<value><array><data><value><i4>1</i4></value><value><double>2.5</double></value>"
@@ -104,17 +105,18 @@ def test_roscpp_reads_and_sets_with_us(server, roscpp_peer, wait_for):
     value = "<value><i4>{}</i4></value>"
     assert roscpp_peer.call("get_param", name="/cpp/b", cached=True) == value.format(1)
     server.set("/cpp/b", -7)
-    wait_for(
-        lambda: roscpp_peer.call("get_param", name="/cpp/b", cached=True) == value.format(-7), 20
+    eventually(
+        lambda: roscpp_peer.call("get_param", name="/cpp/b", cached=True) == value.format(-7),
+        timeout=20,
     )
     subscription = server.subscribe("/cpp/c")
     assert subscription.wait(30)
     roscpp_peer.call("set_param", name="/cpp/c", text="<Grüße>")
-    wait_for(lambda: subscription.value == "<Grüße>")
+    eventually(lambda: subscription.value == "<Grüße>")
     roscpp_peer.call("set_param", name="/cpp/c", real=0.1)
-    wait_for(lambda: subscription.value == 0.1)
+    eventually(lambda: subscription.value == 0.1)
     roscpp_peer.call("set_param", name="/cpp/c", items=[3, 4])
-    wait_for(lambda: subscription.value == [3, 4])
+    eventually(lambda: subscription.value == [3, 4])
 
 
 def test_parameters_on_our_command_line_are_there_for_others(connect, rospy_peer):
@@ -123,7 +125,7 @@ def test_parameters_on_our_command_line_are_there_for_others(connect, rospy_peer
     assert rospy_peer.call("get_param", name="/left/arm/joints") == [["a", "b"], "list"]
 
 
-def test_another_nodes_parameters_are_seen_through_a_client(node, rospy_peer, wait_for):
+def test_another_nodes_parameters_are_seen_through_a_client(node, rospy_peer):
     rospy_peer.call("set_param", name="~speed", value=1.5)
     rospy_peer.call("set_param", name="~arm", value={"joints": ["a", "b"]})
     with node.create_parameter_client("/rospy_peer") as client:
@@ -133,11 +135,11 @@ def test_another_nodes_parameters_are_seen_through_a_client(node, rospy_peer, wa
         assert client.describe()["arm/joints"].type is ParameterType.STRING_ARRAY
         events: list = []
         client.watch(events.append)
-        wait_for(lambda: node.parameter_server.subscribe("/rospy_peer").wait(30))
+        eventually(lambda: node.parameter_server.subscribe("/rospy_peer").wait(30))
         assert client.set({"speed": 2.5})["speed"].successful
         assert rospy_peer.call("get_param", name="~speed") == [2.5, "float"]
         rospy_peer.call("delete_param", name="~arm")
-        wait_for(lambda: len(events) == 2)
+        eventually(lambda: len(events) == 2)
         assert events[0].changed == {"speed": 2.5}
         assert events[1].deleted == ("arm/joints",)
 
@@ -148,14 +150,14 @@ def test_a_parameter_that_is_missing_is_told_with_similar_ones(server):
         server.get("/robot/max_sped")
 
 
-def test_a_master_that_is_killed_and_one_that_follows(start_master, connect, start_rospy, wait_for):
+def test_a_master_that_is_killed_and_one_that_follows(start_master, connect, start_rospy):
     master = start_master()
     node = connect("watcher", url=master.url)
     server = node.parameter_server
     server.set("/a", 1)
     told: list[object] = []
     server.subscribe("/a", told.append)
-    wait_for(lambda: told == [1])
+    eventually(lambda: told == [1])
     master.kill()
     began = time.monotonic()
     with pytest.raises(ConnectionLostError, match=str(master.port)):
@@ -166,6 +168,6 @@ def test_a_master_that_is_killed_and_one_that_follows(start_master, connect, sta
     assert time.monotonic() - began < 5
     assert told == [1]
     master.start()
-    wait_for(lambda: told == [1, None])
+    eventually(lambda: told == [1, None])
     start_rospy("setter", master=master).call("set_param", name="/a", value="new")
-    wait_for(lambda: told == [1, None, "new"])
+    eventually(lambda: told == [1, None, "new"])

@@ -12,6 +12,7 @@ import pytest
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag1 import Reader, Writer
+from waiting import eventually
 
 import rosglass
 from rosglass.bags import Player, Recorder, open_bag
@@ -27,7 +28,7 @@ CELLS = {"info": {"width": 2, "height": 1, "resolution": 0.25}, "data": [-1, 100
 
 
 @pytest.fixture(params=["a.mcap", "a.bag", "lz4.bag", "bz2.bag"])
-def recording(request, connect, rospy_peer, tmp_path, wait_for) -> Path:
+def recording(request, connect, rospy_peer, tmp_path) -> Path:
     """Five texts of rospy, then five of ours, and a map from before."""
     rospy_peer.call("publish", topic="/map", type=GRID, value=CELLS, latch=True)
     rospy_peer.call("publish", topic="/words", type=STRING)
@@ -36,17 +37,17 @@ def recording(request, connect, rospy_peer, tmp_path, wait_for) -> Path:
     path = tmp_path / request.param
     compression = request.param.partition(".")[0].replace("a", "")
     with Recorder(ears, path, ["/words", "/map"], compression=compression) as recorder:
-        wait_for(ours.subscription_count)
-        wait_for(lambda: rospy_peer.call("connections", topic="/words"))
+        eventually(ours.subscription_count)
+        eventually(lambda: rospy_peer.call("connections", topic="/words"))
         for number in range(5):
             value = {"data": f"rospy {number}"}
             rospy_peer.call("publish", topic="/words", type=STRING, value=value)
             time.sleep(0.05)
-        wait_for(lambda: recorder.status().messages == 6)
+        eventually(lambda: recorder.status().messages == 6)
         for number in range(5):
             ours.publish(data=f"ours {number}")
             time.sleep(0.05)
-        wait_for(lambda: recorder.status().messages == 11)
+        eventually(lambda: recorder.status().messages == 11)
     status = recorder.status()
     assert status.topics == {"/map": 1, "/words": 10}
     assert not status.dropped
@@ -108,13 +109,13 @@ def test_recordings_are_read_by_others_and_by_us(recording, tool):
     assert found == texts
 
 
-def test_a_recording_plays_to_rospy_as_it_was(recording, connect, rospy_peer, wait_for):
+def test_a_recording_plays_to_rospy_as_it_was(recording, connect, rospy_peer):
     node = connect("player")
     rospy_peer.call("subscribe", topic="/words", type=STRING)
     with open_bag(recording) as bag, Player(node, bag, delay=0, paused=True) as player:
         assert not player.problems
         # rospy counts connections that it is still making: the player's side tells.
-        wait_for(node.create_publisher("/words", STRING).subscription_count)
+        eventually(node.create_publisher("/words", STRING).subscription_count)
         player.resume()
         told = [rospy_peer.event("received") for _ in range(10)]
         # The map was sent before rospy asks for it.
@@ -132,12 +133,12 @@ def test_a_recording_plays_to_rospy_as_it_was(recording, connect, rospy_peer, wa
         rospy_peer.call("unsubscribe", topic=topic)
 
 
-def test_rosbag_plays_our_recording_to_us(connect, rospy_peer, tmp_path, wait_for, start_tool):
+def test_rosbag_plays_our_recording_to_us(connect, rospy_peer, tmp_path, start_tool):
     robot, ears = connect("robot"), connect("ears")
     ours = robot.create_publisher("/again", STRING, rosglass.QoS.latched())
     ours.publish(data="once")
     with Recorder(ears, tmp_path / "again.bag", ["/again"]) as recorder:
-        wait_for(lambda: recorder.status().messages)
+        eventually(lambda: recorder.status().messages)
     robot.close()
     start_tool("rosbag", "play", "--quiet", "--keep-alive", str(tmp_path / "again.bag"))
     assert ears.create_subscription("/again").wait(30).message().data == "once"
@@ -191,16 +192,16 @@ def test_the_clock_of_a_recording_drives_rospy(connect, start_master, start_rosp
 @pytest.mark.parametrize("name", ["sealed.bag", "sealed.mcap"])
 @pytest.mark.parametrize("text", ["", "what is this?\n", "uint8 other\n"])
 def test_what_comes_without_its_definition_is_kept_and_played_as_bytes(
-    name, text, connect, tmp_path, wait_for
+    name, text, connect, tmp_path
 ):
     kind = OpaqueType("sealed_msgs/msg/Box", "a" * 32, text=text, ros=1)
     robot, ears = connect("robot"), connect("ears")
     secret = robot.create_publisher("/sealed", kind, rosglass.QoS.latched())
     path = tmp_path / name
     with Recorder(ears, path, ["/sealed"]) as recorder:
-        wait_for(secret.subscription_count)
+        eventually(secret.subscription_count)
         secret.publish_serialized(b"\x01\x02")
-        wait_for(lambda: recorder.status().messages, what=lambda: str(recorder.status()))
+        eventually(lambda: recorder.status().messages, what=lambda: str(recorder.status()))
     secret.close()
     if path.suffix == ".bag":
         with Reader(path) as reader:
@@ -218,7 +219,7 @@ def test_what_comes_without_its_definition_is_kept_and_played_as_bytes(
     assert (sample.data, sample.type.md5) == (b"\x01\x02", "a" * 32)
 
 
-def test_rosbag_mends_a_recording_that_was_killed(connect, tmp_path, wait_for, master, tool):
+def test_rosbag_mends_a_recording_that_was_killed(connect, tmp_path, master, tool):
     publisher = connect("robot").create_publisher("/steady", STRING)
     path = tmp_path / "killed.bag"
     command = [sys.executable, "-m", "rosglass", "record", "/steady", "-o", str(path)]
@@ -226,13 +227,13 @@ def test_rosbag_mends_a_recording_that_was_killed(connect, tmp_path, wait_for, m
         [*command, "--url", f"{master.url}?ip=127.0.0.1"], stdout=subprocess.DEVNULL
     )
     try:
-        wait_for(publisher.subscription_count)
+        eventually(publisher.subscription_count)
 
         def written():
             publisher.publish(data="x" * 100)
             return path.exists() and path.stat().st_size > 10_000
 
-        wait_for(written, 20, "the second that may be lost to have passed")
+        eventually(written, timeout=20, what="the second that may be lost to have passed")
     finally:
         process.kill()
         process.wait()
@@ -248,17 +249,17 @@ def test_rosbag_mends_a_recording_that_was_killed(connect, tmp_path, wait_for, m
         assert len(list(bag.messages())) == channel.count
 
 
-def test_all_topics_are_recorded_whatever_their_names(connect, start_master, tmp_path, wait_for):
+def test_all_topics_are_recorded_whatever_their_names(connect, start_master, tmp_path):
     url = start_master().url
     robot, ears = connect("robot", "/left_arm", url=url), connect("ears", url=url)
     private = robot.create_publisher("~_state", STRING)
     with Recorder(ears, tmp_path / "all", exclude="/rosout.*") as recorder:
-        wait_for(private.subscription_count)
+        eventually(private.subscription_count)
         private.publish(data="a")
         late = robot.create_publisher("late", "std_msgs/Empty")
-        wait_for(late.subscription_count)
+        eventually(late.subscription_count)
         late.publish()
-        wait_for(lambda: recorder.status().messages == 2, what=lambda: str(recorder.status()))
+        eventually(lambda: recorder.status().messages == 2, what=lambda: str(recorder.status()))
     assert recorder.status().topics == {"/left_arm/late": 1, "/left_arm/robot/_state": 1}
 
 

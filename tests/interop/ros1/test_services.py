@@ -8,6 +8,7 @@ import time
 from concurrent.futures import Future
 
 import pytest
+from waiting import eventually
 
 import rosglass
 
@@ -136,9 +137,7 @@ def test_a_call_ends_when_its_time_is_over_and_others_go_on(peer, node, name, pe
     assert client.call(timeout=20).message == "oo"
 
 
-def test_a_server_that_is_killed_in_mid_call_and_started_again(
-    start_peer, node, name, persistent, wait_for
-):
+def test_a_server_that_is_killed_in_mid_call_and_started_again(start_peer, node, name, persistent):
     node_name = f"fragile{next(_numbers)}"
     peer = start_peer(node_name)
     peer.call("serve", service=name, type=BOOL, returns=DONE, delay=60.0)
@@ -148,16 +147,16 @@ def test_a_server_that_is_killed_in_mid_call_and_started_again(
     peer.end()
     with pytest.raises(rosglass.ConnectionLostError, match="may have carried it out or not"):
         call.result(30)
-    wait_for(lambda: not client.ready, what=lambda: client.problem)
-    wait_for(lambda: f"/{node_name} offers it at rosrpc://" in client.problem)
+    eventually(lambda: not client.ready, what=lambda: client.problem)
+    eventually(lambda: f"/{node_name} offers it at rosrpc://" in client.problem)
     waiting = client.call_async({"data": True}, timeout=50)
     again = start_peer(node_name)
     again.call("serve", service=name, type=BOOL, returns=DONE)
     assert waiting.result(30).message == "oo"
-    wait_for(lambda: client.ready and client.problem == "", what=lambda: client.problem)
+    eventually(lambda: client.ready and client.problem == "", what=lambda: client.problem)
 
 
-def test_readiness_follows_their_server(peer, node, name, wait_for):
+def test_readiness_follows_their_server(peer, node, name):
     client = node.create_service_client(name, BOOL)
     told = []
     client.on_ready_change(told.append)
@@ -165,13 +164,13 @@ def test_readiness_follows_their_server(peer, node, name, wait_for):
     peer.call("serve", service=name, type=BOOL, returns=DONE)
     assert client.wait_for_server(30)
     peer.call("unserve", service=name)
-    wait_for(lambda: told == [True, False], what=lambda: f"{told} {client.problem}")
+    eventually(lambda: told == [True, False], what=lambda: f"{told} {client.problem}")
     assert f"no server offers {name}" in client.problem
 
 
-def test_the_graph_shows_services_with_types(peer, node, name, wait_for):
+def test_the_graph_shows_services_with_types(peer, node, name):
     peer.call("serve", service=name, type=BOOL, returns=DONE)
-    wait_for(lambda: node.services().get(name) == ["std_srvs/srv/SetBool"])
+    eventually(lambda: node.services().get(name) == ["std_srvs/srv/SetBool"])
     (info,) = node.service_servers(name)
     assert info.type_hash == rosglass.load(BOOL, ros=1).md5
     assert info.node.name.endswith("_peer")
@@ -254,7 +253,7 @@ def test_large_ones_of_ours_are_whole(connect, rospy_peer):
     assert found["map"]["data"] == data
 
 
-def test_a_service_moves_from_us_to_them_and_back(connect, peer, node, name, wait_for):
+def test_a_service_moves_from_us_to_them_and_back(connect, peer, node, name):
     robot = connect("robot")
     server = robot.create_service_server(
         name, BOOL, lambda _: {"success": False, "message": "ours"}
@@ -262,19 +261,19 @@ def test_a_service_moves_from_us_to_them_and_back(connect, peer, node, name, wai
     client = node.create_service_client(name, BOOL)
     assert client.call().message == "ours"
     peer.call("serve", service=name, type=BOOL, returns=DONE)
-    wait_for(lambda: client.call().message == "oo")
-    wait_for(lambda: f"offers {name} now" in server.problem, what=lambda: server.problem)
+    eventually(lambda: client.call().message == "oo")
+    eventually(lambda: f"offers {name} now" in server.problem, what=lambda: server.problem)
     peer.call("unserve", service=name)
-    wait_for(lambda: server.problem == "", what=lambda: server.problem)
+    eventually(lambda: server.problem == "", what=lambda: server.problem)
     assert client.call(timeout=30).message == "ours"
 
 
 # -- the commands --------------------------------------------------------------------------------
 
 
-def test_rosservice_lists_describes_and_calls_ours(ours, tool, wait_for):
+def test_rosservice_lists_describes_and_calls_ours(ours, tool):
     name, seen = ours
-    wait_for(lambda: name in tool("rosservice", "list").split())
+    eventually(lambda: name in tool("rosservice", "list").split())
     info = dict(line.split(": ", 1) for line in tool("rosservice", "info", name).splitlines())
     assert (info["Node"], info["Type"], info["Args"]) == ("/robot", BOOL, "data")
     assert info["URI"] == tool("rosservice", "uri", name).strip()
@@ -286,22 +285,22 @@ def test_rosservice_lists_describes_and_calls_ours(ours, tool, wait_for):
     assert seen == [True]
 
 
-def test_rosservice_prints_our_failure(connect, tool, name, wait_for):
+def test_rosservice_prints_our_failure(connect, tool, name):
     def answer(request):
         raise rosglass.ServiceError("not homed")
 
     with connect("robot").create_service_server(name, TRIGGER, answer):
-        wait_for(lambda: name in tool("rosservice", "list").split())
+        eventually(lambda: name in tool("rosservice", "list").split())
         told = tool("rosservice", "call", name, status=None)
     assert "service cannot process request: not homed" in told
 
 
-def test_rosnode_shows_our_services(ours, tool, wait_for):
+def test_rosnode_shows_our_services(ours, tool):
     name, _ = ours
-    wait_for(lambda: f"* {name}" in tool("rosnode", "info", "/robot"))
+    eventually(lambda: f"* {name}" in tool("rosnode", "info", "/robot"))
 
 
-def test_a_master_that_is_killed_and_started_again(start_master, start_rospy, connect, wait_for):
+def test_a_master_that_is_killed_and_started_again(start_master, start_rospy, connect):
     master = start_master()
     robot = connect("robot", url=master.url)
     console = connect("console", url=master.url)
@@ -312,7 +311,7 @@ def test_a_master_that_is_killed_and_started_again(start_master, start_rospy, co
     time.sleep(1.5)
     assert client.call(timeout=30).message == "ours", "it is called where it was"
     master.start()
-    wait_for(lambda: ["/ours", ["/robot"]] in master.call("getSystemState")[2])
+    eventually(lambda: ["/ours", ["/robot"]] in master.call("getSystemState")[2])
     assert client.call(timeout=30).message == "ours"
     late = start_rospy("late", master=master)
     assert late.call("call", service="/ours", type=BOOL)[0]["message"] == "ours"

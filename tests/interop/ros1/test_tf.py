@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from waiting import eventually
 
 from rosglass.comm import Time
 from rosglass.tf import (
@@ -31,7 +32,7 @@ def place(parent: str, child: str, x: float, sec: int = 5) -> Transform:
     return Transform((x, 0.0, 0.0), LEFT, Time.from_parts(sec, 250), parent, child)
 
 
-def test_a_robot_that_sends(connect: Any, rospy_peer: Any, wait_for: Any) -> None:
+def test_a_robot_that_sends(connect: Any, rospy_peer: Any) -> None:
     static = [place("base", "camera", 1.0).to_dict(1), place("base", "lidar", 2.0).to_dict(1)]
     rospy_peer.call("tf_send", transforms=static, static=True)
     listener = TransformListener(connect("cockpit"))
@@ -45,7 +46,7 @@ def test_a_robot_that_sends(connect: Any, rospy_peer: Any, wait_for: Any) -> Non
         rospy_peer.call("tf_send", transforms=moving)
         return promise.done()
 
-    wait_for(found_meanwhile)
+    eventually(found_meanwhile)
     found = promise.result(30)
     assert found.translation == pytest.approx((3, 1, 0))
     assert found.rotation == pytest.approx((0, 0, 1, 0))
@@ -57,7 +58,7 @@ def test_a_robot_that_sends(connect: Any, rospy_peer: Any, wait_for: Any) -> Non
     listener.close()
 
 
-def test_a_robot_that_listens(connect: Any, rospy_peer: Any, wait_for: Any) -> None:
+def test_a_robot_that_listens(connect: Any, rospy_peer: Any) -> None:
     node = connect("driver")
     fixed = StaticTransformBroadcaster(node)
     fixed.send_transform(place("odom", "wheel", 1.0))
@@ -72,14 +73,12 @@ def test_a_robot_that_listens(connect: Any, rospy_peer: Any, wait_for: Any) -> N
         moving.send_transform(place("world", "odom", 1.0, next(numbers)))
         return rospy_peer.event(f"answer {asked}", 0.05, otherwise=None)
 
-    value = wait_for(answer)
+    value = eventually(answer)
     assert "error" not in value, value
     assert value["value"]["transform"]["translation"]["y"] == pytest.approx(4)
 
 
-def test_several_broadcasters_are_heard_by_who_comes_late(
-    connect: Any, start_rospy: Any, wait_for: Any
-) -> None:
+def test_several_broadcasters_are_heard_by_who_comes_late(connect: Any, start_rospy: Any) -> None:
     node = connect("several")
     first, second = StaticTransformBroadcaster(node), StaticTransformBroadcaster(node)
     first.send_transform(place("base", "left", 1.0))
@@ -93,7 +92,7 @@ def test_several_broadcasters_are_heard_by_who_comes_late(
         buffer.wait_for_transform("right", "left", timeout=30)
 
 
-def test_the_old_message_and_a_namespace(connect: Any, rospy_peer: Any, wait_for: Any) -> None:
+def test_the_old_message_and_a_namespace(connect: Any, rospy_peer: Any) -> None:
     node = connect("cockpit")
     first = TransformListener(node)
     second = TransformListener(node, namespace="/robot2/")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from waiting import eventually
 
 import rosglass
 
@@ -12,16 +13,18 @@ def node(connect):
     return connect("cockpit", "/ops")
 
 
-def lines_of(process, count, wait_for):
+def lines_of(process, count):
     """Return what a command has printed once that is so many lines."""
-    wait_for(lambda: len(process.output) >= count, 20, lambda: "".join(process.output))
+    eventually(
+        lambda: len(process.output) >= count, timeout=20, what=lambda: "".join(process.output)
+    )
     return "".join(process.output)
 
 
-def test_rostopic_list_and_info_show_our_topics(node, tool, wait_for, master):
+def test_rostopic_list_and_info_show_our_topics(node, tool, master):
     node.create_publisher("speed", "std_msgs/Float64")
     node.create_subscription("orders", "std_msgs/String")
-    wait_for(lambda: "/ops/orders" in node.topics())
+    eventually(lambda: "/ops/orders" in node.topics())
     listed = tool("rostopic", "list", "-v")
     assert "* /ops/speed [std_msgs/Float64] 1 publisher" in listed
     assert "* /ops/orders [std_msgs/String] 1 subscriber" in listed
@@ -41,7 +44,7 @@ def test_rostopic_echo_prints_what_we_publish(node, tool):
     assert tool("rostopic", "echo", "-n1", "/ops/pose/pose/position/x") == "1.5\n---\n"
 
 
-def test_rostopic_hz_and_bw_measure_us(node, start_tool, wait_for):
+def test_rostopic_hz_and_bw_measure_us(node, start_tool):
     publisher = node.create_publisher("fast", "std_msgs/String")
     rate, bandwidth = (
         start_tool("rostopic", "hz", "/ops/fast"),
@@ -53,7 +56,7 @@ def test_rostopic_hz_and_bw_measure_us(node, start_tool, wait_for):
         told = "".join(rate.output), "".join(bandwidth.output)
         return "average rate: " in told[0] and "average: " in told[1]
 
-    wait_for(measured, 20, lambda: "".join(rate.output + bandwidth.output))
+    eventually(measured, timeout=20, what=lambda: "".join(rate.output + bandwidth.output))
 
 
 def test_rostopic_pub_reaches_us(node, start_tool):
@@ -71,13 +74,13 @@ def test_a_latched_rostopic_pub_reaches_us(node, start_tool):
     assert node.create_subscription("plan", "std_msgs/Int32").wait(30).message().data == 7
 
 
-def test_rosnode_lists_pings_and_shows_our_node(node, tool, wait_for):
+def test_rosnode_lists_pings_and_shows_our_node(node, tool):
     publisher = node.create_publisher("speed", "std_msgs/Float64")
     node.create_subscription("commands", "std_msgs/String")
     reader = node.create_subscription("speed")
-    wait_for(publisher.subscription_count)
-    wait_for(reader.publisher_count)
-    wait_for(lambda: "/ops/commands" in node.topics())
+    eventually(publisher.subscription_count)
+    eventually(reader.publisher_count)
+    eventually(lambda: "/ops/commands" in node.topics())
     assert "/ops/cockpit" in tool("rosnode", "list").splitlines()
     assert "xmlrpc reply from http://127.0.0.1:" in tool(
         "rosnode", "ping", "-c", "1", "/ops/cockpit"
@@ -92,29 +95,29 @@ def test_rosnode_lists_pings_and_shows_our_node(node, tool, wait_for):
     assert "* direction: inbound" in told
 
 
-def test_rosnode_kill_ends_our_node_only(connect, tool, wait_for):
+def test_rosnode_kill_ends_our_node_only(connect, tool):
     victim, other = connect("victim"), connect("other")
     victim.create_publisher("/left", "std_msgs/Empty")
     other.create_publisher("/right", "std_msgs/Empty")
-    wait_for(lambda: "/left" in other.topics())
+    eventually(lambda: "/left" in other.topics())
     assert "killed" in tool("rosnode", "kill", "/victim")
-    wait_for(lambda: victim.status().state.value == "closed")
-    wait_for(lambda: "/left" not in other.topics())
+    eventually(lambda: victim.status().state.value == "closed")
+    eventually(lambda: "/left" not in other.topics())
     assert other.status().state.value == "connected"
 
 
-def test_rosnode_cleanup_finds_nothing_of_a_closed_node(connect, tool, wait_for):
+def test_rosnode_cleanup_finds_nothing_of_a_closed_node(connect, tool):
     node, other = connect("short"), connect("watcher")
     node.create_publisher("/gone", "std_msgs/Empty")
     node.create_subscription("/gone_too", "std_msgs/Empty")
-    wait_for(lambda: "/gone" in other.topics())
+    eventually(lambda: "/gone" in other.topics())
     node.close()
-    wait_for(lambda: "/gone" not in other.topics())
+    eventually(lambda: "/gone" not in other.topics())
     assert "/short" not in tool("rosnode", "list")
     tool("rosnode", "cleanup", stdin="y\n")
 
 
-def test_rosbag_records_us_and_plays_to_us(node, start_tool, tool, tmp_path, wait_for):
+def test_rosbag_records_us_and_plays_to_us(node, start_tool, tool, tmp_path):
     words = node.create_publisher("words", "std_msgs/String")
     map_ = node.create_publisher("map", "nav_msgs/OccupancyGrid", rosglass.QoS.latched())
     grid = {"info": {"width": 2, "height": 1, "resolution": 0.25}, "data": [-1, 100]}
@@ -122,7 +125,7 @@ def test_rosbag_records_us_and_plays_to_us(node, start_tool, tool, tmp_path, wai
     bag = tmp_path / "ours.bag"
     # It ends by itself with the fifth message of each.
     recorder = start_tool("rosbag", "record", "-l", "5", "-O", str(bag), "/ops/words", "/ops/map")
-    wait_for(lambda: words.subscription_count() and map_.subscription_count())
+    eventually(lambda: words.subscription_count() and map_.subscription_count())
     for number in range(5):
         words.publish(data=f"word {number}")
         if number:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import zlib
 
 import pytest
+from waiting import eventually
 
 import rosglass
 from rosglass.messages.text import plain
@@ -193,11 +194,11 @@ def test_roscpp_and_we_exchange_the_same_bytes(kind, connect, roscpp_peer):
     assert plain(sample.message().to_dict()) == numbered(value)
 
 
-def test_our_messages_are_numbered_as_rospy_numbers_its_own(connect, rospy_peer, wait_for):
+def test_our_messages_are_numbered_as_rospy_numbers_its_own(connect, rospy_peer):
     name, topic = "geometry_msgs/PoseStamped", "/numbered"
     publisher = connect("counter").create_publisher(topic, name)
     rospy_peer.call("subscribe", topic=topic, type=name)
-    wait_for(publisher.subscription_count)
+    eventually(publisher.subscription_count)
     message = publisher.type(header={"seq": 40})
     for _ in range(3):
         publisher.publish(message)
@@ -281,7 +282,7 @@ def test_only_the_last_message_of_a_latched_peer_comes(which, connect, rospy_pee
 
 @pytest.mark.parametrize("which", ["rospy", "roscpp"])
 def test_peers_get_our_last_latched_message_and_nothing_of_a_volatile_one(
-    which, connect, rospy_peer, roscpp_peer, wait_for
+    which, connect, rospy_peer, roscpp_peer
 ):
     peer = rospy_peer if which == "rospy" else roscpp_peer
     node = connect("early")
@@ -294,7 +295,7 @@ def test_peers_get_our_last_latched_message_and_nothing_of_a_volatile_one(
         volatile.publish(data=text)
     for publisher in (volatile, latched):
         peer.call("subscribe", topic=publisher.topic, type="std_msgs/String")
-        wait_for(publisher.subscription_count, what="the peer's connection")
+        eventually(publisher.subscription_count, what="the peer's connection")
     received = peer.event("received")
     shown = {"data": "second"} if which == "rospy" else "second"
     assert (received["topic"], received["value"]) == (latched.topic, shown)
@@ -304,9 +305,7 @@ def test_peers_get_our_last_latched_message_and_nothing_of_a_volatile_one(
 
 
 @pytest.mark.parametrize("which", ["rospy", "roscpp"])
-def test_a_thousand_messages_come_in_order_and_complete(
-    which, connect, rospy_peer, roscpp_peer, wait_for
-):
+def test_a_thousand_messages_come_in_order_and_complete(which, connect, rospy_peer, roscpp_peer):
     topic, kind = f"/many/{which}", "geometry_msgs/PointStamped"
     node = connect("counter")
     subscription = node.create_subscription(topic, kind, qos=2000)
@@ -318,7 +317,7 @@ def test_a_thousand_messages_come_in_order_and_complete(
         ask = roscpp_type(kind) | {"data": data, "count": 1000, "rate": 2000, "queue": 2000}
         roscpp_peer.call("publish", topic=topic, queue=2000, **roscpp_type(kind))
     peer = rospy_peer if which == "rospy" else roscpp_peer
-    wait_for(lambda: peer.call("connections", topic=topic), what="our connection at the peer")
+    eventually(lambda: peer.call("connections", topic=topic), what="our connection at the peer")
     peer.call("publish", topic=topic, **ask)
     numbers = []
     while len(numbers) < 1000:

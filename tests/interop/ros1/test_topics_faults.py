@@ -12,6 +12,7 @@ import xmlrpc.client
 from pathlib import Path
 
 import pytest
+from waiting import eventually
 
 import rosglass
 from rosglass.comm import IMMEDIATE
@@ -38,7 +39,7 @@ def answer_of(sock):
     return parse_header(sock.recv(size, socket.MSG_WAITALL))
 
 
-def test_a_publisher_that_is_killed_is_told_of_and_replaced(connect, start_rospy, wait_for):
+def test_a_publisher_that_is_killed_is_told_of_and_replaced(connect, start_rospy):
     node = connect("follower")
     subscription = node.create_subscription("/killed", STRING)
     plan = {"topic": "/killed", "type": STRING, "rate": 50, "count": 0}
@@ -46,7 +47,7 @@ def test_a_publisher_that_is_killed_is_told_of_and_replaced(connect, start_rospy
     first.call("publish", value={"data": "first"}, **plan)
     assert subscription.wait(30).message().data == "first"
     first.end()
-    wait_for(
+    eventually(
         lambda: (
             "/killed was lost" in subscription.problem
             or "cannot be received" in subscription.problem
@@ -55,12 +56,12 @@ def test_a_publisher_that_is_killed_is_told_of_and_replaced(connect, start_rospy
     assert subscription.publisher_count() == 0
     second = start_rospy("killed")  # the same name on other ports
     second.call("publish", value={"data": "second"}, **plan)
-    wait_for(lambda: (s := subscription.wait(1)) and s.message().data == "second")
-    wait_for(lambda: not subscription.problem, what=lambda: subscription.problem)
+    eventually(lambda: (s := subscription.wait(1)) and s.message().data == "second")
+    eventually(lambda: not subscription.problem, what=lambda: subscription.problem)
 
 
 def test_messages_flow_on_while_the_master_is_killed_and_restarted(
-    start_master, connect, start_rospy, wait_for
+    start_master, connect, start_rospy
 ):
     master = start_master()
     node = connect("steady", url=master.url)
@@ -69,23 +70,23 @@ def test_messages_flow_on_while_the_master_is_killed_and_restarted(
     subscription = node.create_subscription("/a", STRING)
     assert subscription.wait(30)
     master.kill()
-    wait_for(lambda: node.status().state.value == "lost")
+    eventually(lambda: node.status().state.value == "lost")
     for _ in range(20):
         assert subscription.wait(30)
     assert subscription.problem == ""
     master.start()
-    wait_for(lambda: node.status().state.value == "connected")
+    eventually(lambda: node.status().state.value == "connected")
     # rospy does not register again: the new master never names it, and we keep it all the same.
-    wait_for(lambda: ["/a", ["/steady"]] in master.call("getSystemState")[1])
+    eventually(lambda: ["/a", ["/steady"]] in master.call("getSystemState")[1])
     other = connect("newcomer", url=master.url)
     publisher = other.create_publisher("/a", STRING)
-    wait_for(lambda: subscription.publisher_count() == 2)
+    eventually(lambda: subscription.publisher_count() == 2)
     publisher.publish(data="new")
-    wait_for(lambda: (s := subscription.wait(1)) and s.message().data == "new")
+    eventually(lambda: (s := subscription.wait(1)) and s.message().data == "new")
     assert subscription.publisher_count() == 2
 
 
-def test_subscribers_that_come_and_go_between_two_looks_are_not_missed(connect, wait_for):
+def test_subscribers_that_come_and_go_between_two_looks_are_not_missed(connect):
     node = connect("busy")
     publisher = node.create_publisher("/brief", STRING)
     changes, late, held, go_on = [], [], threading.Event(), threading.Event()
@@ -101,48 +102,48 @@ def test_subscribers_that_come_and_go_between_two_looks_are_not_missed(connect, 
         assert held.wait(30)
         for _ in range(3):
             with dial(node, "/brief", md5sum="*", type="*"):
-                wait_for(lambda: publisher.subscription_count() == 2)
-            wait_for(lambda: publisher.subscription_count() == 1)
+                eventually(lambda: publisher.subscription_count() == 2)
+            eventually(lambda: publisher.subscription_count() == 1)
         go_on.set()
-        wait_for(lambda: len(changes) == 7, what=lambda: changes)
+        eventually(lambda: len(changes) == 7, what=lambda: changes)
         # The look that reports it has been; whoever listens from now on is told first who is there.
         held.clear(), go_on.clear()
         with dial(node, "/brief", md5sum="*", type="*"):
             assert held.wait(30)
             publisher.on_matched(lambda event: late.append((event.change, event.count)))
-        wait_for(lambda: publisher.subscription_count() == 1)
+        eventually(lambda: publisher.subscription_count() == 1)
         go_on.set()
-        wait_for(lambda: len(changes) == 9, what=lambda: changes)
-    wait_for(lambda: len(changes) == 10, what=lambda: changes)
-    wait_for(lambda: len(late) == 4, what=lambda: late)
+        eventually(lambda: len(changes) == 9, what=lambda: changes)
+    eventually(lambda: len(changes) == 10, what=lambda: changes)
+    eventually(lambda: len(late) == 4, what=lambda: late)
     assert late == [(1, 1), (1, 2), (-1, 1), (-1, 0)]
     assert changes == [(1, 1), *4 * [(1, 2), (-1, 1)], (-1, 0)]
 
 
-def test_a_slow_subscriber_is_told_of_and_holds_up_nobody(connect, wait_for):
+def test_a_slow_subscriber_is_told_of_and_holds_up_nobody(connect):
     node, other = connect("fast"), connect("listener")
     publisher = node.create_publisher("/fast", "std_msgs/UInt8MultiArray", 5)
     slow = dial(node, "/fast", md5sum="*", type="*")
     got = []
     other.create_subscription("/fast", raw_callback=got.append, executor=IMMEDIATE)
-    wait_for(lambda: publisher.subscription_count() == 2)
+    eventually(lambda: publisher.subscription_count() == 2)
     data = publisher.type.encode({"data": bytes(1_000_000)})
     for number in range(60):
         publisher.publish_serialized(data)
-        wait_for(lambda wanted=number: len(got) > wanted)
+        eventually(lambda wanted=number: len(got) > wanted)
     assert publisher.dropped >= 40
     assert all(link.waiting() <= 6 for link in node._topics.published()["/fast"].links())
-    wait_for(lambda: "/raw is too slow" in publisher.problem)
+    eventually(lambda: "/raw is too slow" in publisher.problem)
     slow.close()
-    wait_for(lambda: publisher.problem == "" and publisher.subscription_count() == 1)
+    eventually(lambda: publisher.problem == "" and publisher.subscription_count() == 1)
 
 
 @pytest.mark.parametrize("garbage", [b"\xff" * 100, b"GET / HTTP/1.1\r\n\r\n", b"\0" * 4])
-def test_garbage_is_hung_up_on_and_others_go_on(garbage, connect, wait_for):
+def test_garbage_is_hung_up_on_and_others_go_on(garbage, connect):
     node = connect("robust")
     publisher = node.create_publisher("/robust", STRING)
     subscription = node.create_subscription("/robust")
-    wait_for(lambda: publisher.subscription_count() == 1)
+    eventually(lambda: publisher.subscription_count() == 1)
     with dial(node, "/robust") as sock:
         sock.sendall(garbage)
         assert sock.recv(10) == b""
@@ -159,29 +160,29 @@ def test_garbage_is_hung_up_on_and_others_go_on(garbage, connect, wait_for):
         ({"topic": "/nowhere", "md5sum": "*"}, "does not publish /nowhere"),
     ],
 )
-def test_a_header_that_will_not_do_is_refused_by_name(fields, told, connect, wait_for):
+def test_a_header_that_will_not_do_is_refused_by_name(fields, told, connect):
     node = connect("strict")
     publisher = node.create_publisher("/strict", STRING)
     with dial(node, "/strict", **fields) as sock:
         assert told in answer_of(sock)["error"]
         assert sock.recv(10) == b""
     if "topic" not in fields:
-        wait_for(lambda: told in publisher.problem)
+        eventually(lambda: told in publisher.problem)
 
 
-def test_an_md5_mismatch_names_both_definitions(connect, wait_for):
+def test_an_md5_mismatch_names_both_definitions(connect):
     node, other = connect("ours"), connect("theirs")
     theirs = MessageType.from_text("test_msgs/msg/Other", "int32 theirs\n", ros=1)
     ours = MessageType.from_text("test_msgs/msg/Other", "int32 ours\n", ros=1)
     other.create_publisher("/mismatch", theirs)
     subscription = node.create_subscription("/mismatch", ours)
-    told = wait_for(lambda: subscription.problem)
+    told = eventually(lambda: subscription.problem)
     for part in (theirs.md5, ours.md5, "int32 theirs", "int32 ours", "/theirs"):
         assert part in told
     assert subscription.publisher_count() == 0
 
 
-def test_what_nobody_can_define_is_passed_on_as_it_came(connect, wait_for):
+def test_what_nobody_can_define_is_passed_on_as_it_came(connect):
     source, relay, sink = connect("source"), connect("relay"), connect("sink")
     secret = OpaqueType("secret_msgs/Thing", "a" * 32, text="no definition {", ros=1)
     sent = source.create_publisher("/secret", secret, rosglass.QoS.latched())
@@ -196,7 +197,7 @@ def test_what_nobody_can_define_is_passed_on_as_it_came(connect, wait_for):
         relay.create_publisher("/nothing", OpaqueType("secret_msgs/Thing", ros=1))
 
 
-def test_each_latched_publisher_of_a_node_is_heard_by_who_comes_late(connect, wait_for):
+def test_each_latched_publisher_of_a_node_is_heard_by_who_comes_late(connect):
     node = connect("static")
     first = node.create_publisher("/static", STRING, rosglass.QoS.latched())
     second = node.create_publisher("/static", STRING, rosglass.QoS.latched())
@@ -210,7 +211,7 @@ def test_each_latched_publisher_of_a_node_is_heard_by_who_comes_late(connect, wa
     assert connect("later").create_subscription("/static").wait(30).message().data == "b"
 
 
-def test_creating_and_closing_a_thousand_times_leaves_nothing(connect, wait_for):
+def test_creating_and_closing_a_thousand_times_leaves_nothing(connect):
     node = connect("busy")
     publisher = node.create_publisher("/busy", STRING)
 
@@ -225,7 +226,7 @@ def test_creating_and_closing_a_thousand_times_leaves_nothing(connect, wait_for)
 
     for _ in range(20):
         cycle()
-    wait_for(lambda: publisher.subscription_count() == 0)
+    eventually(lambda: publisher.subscription_count() == 0)
     time.sleep(6)  # threads for errands end after 5 s without any
 
     def alive():
@@ -238,20 +239,20 @@ def test_creating_and_closing_a_thousand_times_leaves_nothing(connect, wait_for)
     for number in range(1000):
         cycle()
         if number % 50 == 49:
-            wait_for(lambda: publisher.subscription_count() == 0, 30)
-    wait_for(
+            eventually(lambda: publisher.subscription_count() == 0, timeout=30)
+    eventually(
         lambda: all(now <= then for now, then in zip(things(), before, strict=True)),
-        30,
+        timeout=30,
         what=lambda: f"{things()}, {before} before",
     )
 
-    wait_for(
+    eventually(
         lambda: all(now < then + 20 for now, then in zip(alive(), alive_before, strict=True)),
         what=lambda: f"{alive()} readings and connections, {alive_before} before",
     )
     # What was closed and made again is registered at last.
     subscription = node.create_subscription("/busy")
-    wait_for(lambda: publisher.subscription_count() == 1)
+    eventually(lambda: publisher.subscription_count() == 1)
     publisher.publish(data="x")
     assert subscription.wait(30)
 
@@ -270,7 +271,7 @@ def test_closing_while_connecting(connect, start_master):
     publisher.close()
 
 
-def test_an_immediate_callback_may_publish_and_close(connect, wait_for):
+def test_an_immediate_callback_may_publish_and_close(connect):
     node = connect("reflex")
     out = node.create_publisher("/reflex/out", STRING)
     back = node.create_subscription("/reflex/out")
@@ -284,28 +285,28 @@ def test_an_immediate_callback_may_publish_and_close(connect, wait_for):
 
     source = connect("stimulus").create_publisher("/reflex/in", STRING)
     subscription = node.create_subscription("/reflex/in", raw_callback=reflex, executor=IMMEDIATE)
-    wait_for(lambda: source.subscription_count() and out.subscription_count())
+    eventually(lambda: source.subscription_count() and out.subscription_count())
     source.publish(data="now")
     assert back.wait(30).message().data == "now"
-    wait_for(lambda: source.subscription_count() == 0)
+    eventually(lambda: source.subscription_count() == 0)
     assert len(got) == 1
 
 
-def test_a_host_name_that_is_unknown_is_told_with_the_remedy(connect, master, wait_for):
+def test_a_host_name_that_is_unknown_is_told_with_the_remedy(connect, master):
     node = connect("lost")
     subscription = node.create_subscription("/unknown_host")
-    wait_for(lambda: ["/unknown_host", ["/lost"]] in master.call("getSystemState")[1])
+    eventually(lambda: ["/unknown_host", ["/lost"]] in master.call("getSystemState")[1])
     master.call("registerPublisher", "/unknown_host", STRING, "http://no-such-host.invalid:1/")
-    told = wait_for(lambda: subscription.problem)
+    told = eventually(lambda: subscription.problem)
     assert "no-such-host.invalid" in told
     assert "ROS_HOSTNAME" in told
 
 
-def test_a_fork_does_not_publish_or_steal_messages(connect, wait_for):
+def test_a_fork_does_not_publish_or_steal_messages(connect):
     node = connect("forked")
     publisher = node.create_publisher("/forked", STRING)
     subscription = node.create_subscription("/forked")
-    wait_for(lambda: publisher.subscription_count() == 1)
+    eventually(lambda: publisher.subscription_count() == 1)
     publisher.publish(data="before")
     child = os.fork()
     if child == 0:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from waiting import eventually
+
 import rosglass
 from rosglass.interfaces import Library
 
@@ -16,7 +18,7 @@ int8 a
 """
 
 
-def test_a_type_that_only_rospy_has_is_fetched(connect, start_rospy, wait_for):
+def test_a_type_that_only_rospy_has_is_fetched(connect, start_rospy):
     peer = start_rospy("owner")
     value = {"state": 2, "part": {"a": -1}}
     md5 = peer.call("publish_own", topic="/state", type=STATE, text=TEXT, value=value, latch=True)
@@ -25,7 +27,7 @@ def test_a_type_that_only_rospy_has_is_fetched(connect, start_rospy, wait_for):
     assert (found.name, found.md5) == ("my_robot/msg/State", md5)
     assert found.definition.text.startswith("# How it does.")
     assert node.fetch_type("my_robot/msg/State", hash=md5, node="/owner") == found
-    wait_for(lambda: peer.call("connections", topic="/state") == 0)
+    eventually(lambda: peer.call("connections", topic="/state") == 0)
     (end,) = node.ask_publishers("/state", 30)
     assert (end.type_hash, end.qos) == (md5, rosglass.QoS.latched())
     assert node.create_subscription("/state", STATE).wait(30).message().part.a == -1

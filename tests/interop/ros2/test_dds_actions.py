@@ -8,6 +8,7 @@ import os
 from pathlib import Path
 
 import pytest
+from waiting import eventually
 
 from rosglass.comm import GoalStatus
 
@@ -55,7 +56,7 @@ def test_we_send_goals_to_dora(dds_connect, run_dora):
     process.end()
 
 
-def test_dora_sends_us_goals(dds_connect, run_dora, wait_for):
+def test_dora_sends_us_goals(dds_connect, run_dora):
     node = dds_connect("robot")
     ended = []
 
@@ -72,7 +73,7 @@ def test_dora_sends_us_goals(dds_connect, run_dora, wait_for):
     assert process.event("status") == "succeeded"
     assert process.event("rejected") == 5000
     assert process.event("cancelled") == 0
-    wait_for(lambda: len(ended) == 2)
+    eventually(lambda: len(ended) == 2)
     assert ended[0] == (False, 5)
     assert ended[1][0]
     assert ended[1][1] < 100

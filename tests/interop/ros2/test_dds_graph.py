@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import eventually, nothing_happens
 
 import rosglass
 from rosglass.comm import ConnectionState, Durability, Duration, NodeName, QoS, Reliability
@@ -77,11 +78,11 @@ def seen_of_cyclone(node: Any) -> set[str]:
 
 
 @pytest.mark.parametrize("width", [16, 24])
-def test_we_see_the_nodes_of_cyclone_dds(cyclone, dds_connect, wait_for, width):
+def test_we_see_the_nodes_of_cyclone_dds(cyclone, dds_connect, width):
     node = dds_connect("cockpit")
     cyclone(width=width, **NODES)
-    wait_for(lambda: node.nodes() == [NodeName("/", "cockpit"), ADDER, TALKER], what=node.nodes())
-    wait_for(lambda: len(node.endpoints(TALKER)) == 2 and node.endpoints(ADDER))
+    eventually(lambda: node.nodes() == [NodeName("/", "cockpit"), ADDER, TALKER], what=node.nodes())
+    eventually(lambda: len(node.endpoints(TALKER)) == 2 and node.endpoints(ADDER))
     topics = node.topics()
     assert "Square" not in "".join(topics)
     assert (topics["/chatter"], topics["/heard"]) == ([STRING], [STRING])
@@ -96,28 +97,28 @@ def test_we_see_the_nodes_of_cyclone_dds(cyclone, dds_connect, wait_for, width):
     assert [end.name for end in node.endpoints("/cyclone/adder")] == ["/add"]
 
 
-def test_who_leaves_is_gone_at_once(cyclone, dds_connect, wait_for):
+def test_who_leaves_is_gone_at_once(cyclone, dds_connect):
     node = dds_connect("cockpit")
     peer = cyclone(**NODES)
-    wait_for(lambda: node.publishers("/chatter"))
+    eventually(lambda: node.publishers("/chatter"))
     assert node.status().state is ConnectionState.CONNECTED
     peer.ask(quit=True)
-    wait_for(lambda: node.status().state is ConnectionState.LOST)
-    wait_for(lambda: not seen_of_cyclone(node))
+    eventually(lambda: node.status().state is ConnectionState.LOST)
+    eventually(lambda: not seen_of_cyclone(node))
     assert node.nodes() == [NodeName("/", "cockpit")]
 
 
-def test_who_is_killed_is_gone_with_the_lease(cyclone, dds_connect, wait_for):
+def test_who_is_killed_is_gone_with_the_lease(cyclone, dds_connect):
     node = dds_connect("cockpit")
     peer = cyclone(SHORT_LEASE, **NODES)
-    wait_for(lambda: node.publishers("/chatter"))
+    eventually(lambda: node.publishers("/chatter"))
     peer.end()
-    wait_for(lambda: node.nodes() == [NodeName("/", "cockpit")])
-    wait_for(lambda: not seen_of_cyclone(node))
+    eventually(lambda: node.nodes() == [NodeName("/", "cockpit")])
+    eventually(lambda: not seen_of_cyclone(node))
     assert node.status().state is ConnectionState.LOST
 
 
-def test_others_see_our_nodes_by_plain_cyclone_dds(cyclone, dds_connect, wait_for):
+def test_others_see_our_nodes_by_plain_cyclone_dds(cyclone, dds_connect):
     observer = cyclone(observe=True)
     node = dds_connect("cockpit", namespace="/ours")
     publisher = node.create_publisher("chatter", STRING, QoS.latched())
@@ -150,7 +151,7 @@ def test_others_see_our_nodes_by_plain_cyclone_dds(cyclone, dds_connect, wait_fo
     told(reader=True, writer=False)
     subscription.close()
     told(reader=False, writer=False)
-    wait_for(lambda: not {"/ours/chatter", "/heard"} & set(node.topics()))
+    eventually(lambda: not {"/ours/chatter", "/heard"} & set(node.topics()))
 
 
 @pytest.mark.parametrize("kind", ["writer", "reader"])
@@ -189,45 +190,41 @@ def test_humble_sees_our_nodes_too(cyclone, dds_connect, choice):
     event(observer, "info", lambda info: gid in gids_of(info, "//cockpit")["readers"])
 
 
-def test_nodes_of_one_process_see_each_other(dds_connect, wait_for):
+def test_nodes_of_one_process_see_each_other(dds_connect):
     one, two = dds_connect("one"), dds_connect("two", namespace="/ns")
     one.create_publisher("/chatter", STRING)
     two.create_subscription("/chatter", STRING)
     nodes = [NodeName("/", "one"), NodeName("/ns", "two")]
     for node in (one, two):
-        wait_for(lambda node=node: node.nodes() == nodes)
-        wait_for(lambda node=node: [end.node for end in node.publishers("/chatter")] == nodes[:1])
-        wait_for(lambda node=node: [e.node for e in node.subscriptions("/chatter")] == nodes[1:])
+        eventually(lambda node=node: node.nodes() == nodes)
+        eventually(lambda node=node: [end.node for end in node.publishers("/chatter")] == nodes[:1])
+        eventually(lambda node=node: [e.node for e in node.subscriptions("/chatter")] == nodes[1:])
     one.close()
-    wait_for(lambda: two.nodes() == nodes[1:])
-    wait_for(lambda: not two.publishers("/chatter"))
+    eventually(lambda: two.nodes() == nodes[1:])
+    eventually(lambda: not two.publishers("/chatter"))
 
 
-def test_the_nodes_of_other_processes_change_without_asking(cyclone, dds_connect, wait_for):
+def test_the_nodes_of_other_processes_change_without_asking(cyclone, dds_connect):
     node = dds_connect("cockpit")
     seen = []
     node.on_graph_change(lambda: seen.append(node.nodes()))
     cyclone(**NODES)
-    wait_for(lambda: any(TALKER in nodes for nodes in seen))
+    eventually(lambda: any(TALKER in nodes for nodes in seen))
 
 
-def test_rubbish_from_one_peer_is_named_once_and_disturbs_nobody(
-    cyclone, dds_connect, wait_for, caplog
-):
+def test_rubbish_from_one_peer_is_named_once_and_disturbs_nobody(cyclone, dds_connect, caplog):
     node = dds_connect("cockpit")
     cyclone(rubbish=True)
     cyclone(**NODES)
-    wait_for(lambda: len(node.endpoints(TALKER)) == 2)
-    wait_for(lambda: [line for line in caplog.messages if "says of its nodes" in line])
-    time.sleep(0.2)
+    eventually(lambda: len(node.endpoints(TALKER)) == 2)
+    eventually(lambda: [line for line in caplog.messages if "says of its nodes" in line])
+    nothing_happens(0.2)
     complaints = [line for line in caplog.messages if "says of its nodes" in line]
     assert len(complaints) == 1
     assert "rmw_dds_common/msg/ParticipantEntitiesInfo" in complaints[0]
 
 
-def test_without_multicast_the_programs_of_this_machine_find_each_other(
-    start, dds_domain, wait_for
-):
+def test_without_multicast_the_programs_of_this_machine_find_each_other(start, dds_domain):
     # In a domain of its own: a process has one configuration for a domain.
     url = f"dds://?domain={dds_domain % 101 + 1}&range=localhost"
     code = (
@@ -236,7 +233,7 @@ def test_without_multicast_the_programs_of_this_machine_find_each_other(
     )
     start("-c", code).event("ready")
     with rosglass.connect(url, "cockpit") as node:
-        wait_for(lambda: NodeName("/", "peer") in node.nodes())
+        eventually(lambda: NodeName("/", "peer") in node.nodes())
 
 
 def test_with_discovery_off_nobody_is_seen(cyclone, dds_domain):
@@ -253,18 +250,18 @@ def test_with_discovery_off_nobody_is_seen(cyclone, dds_domain):
 
 
 @pytest.mark.skipif(importlib.util.find_spec("dora") is None, reason="dora-rs is not installed")
-def test_we_see_the_node_of_dora(start, interfaces, dds_domain, dds_connect, wait_for):
+def test_we_see_the_node_of_dora(start, interfaces, dds_domain, dds_connect):
     plan = {"domain": dds_domain, "interfaces": str(interfaces)}
     plan |= {"publish": {"/from/string": STRING}, "subscribe": {"/to/string": STRING}}
     env = os.environ | {"ROS_DOMAIN_ID": str(dds_domain), "AMENT_PREFIX_PATH": str(interfaces)}
     start(str(PEERS / "dora_dds_peer.py"), json.dumps(plan), env=env).event("ready")
     node = dds_connect("cockpit")
     dora = NodeName("/dora", "dora_node")
-    wait_for(lambda: node.nodes() == [NodeName("/", "cockpit"), dora])
-    wait_for(lambda: [end.node for end in node.publishers("/from/string")] == [dora])
-    wait_for(lambda: [end.node for end in node.subscriptions("/to/string")] == [dora])
+    eventually(lambda: node.nodes() == [NodeName("/", "cockpit"), dora])
+    eventually(lambda: [end.node for end in node.publishers("/from/string")] == [dora])
+    eventually(lambda: [end.node for end in node.subscriptions("/to/string")] == [dora])
     assert node.topics()["/from/string"] == [STRING]
-    wait_for(lambda: "/dora/dora_node/get_parameters" in node.services())
+    eventually(lambda: "/dora/dora_node/get_parameters" in node.services())
     assert node.services()["/dora/dora_node/get_parameters"] == ["rcl_interfaces/srv/GetParameters"]
     assert [end.node for end in node.service_servers("/dora/dora_node/get_parameters")] == [dora]
 
@@ -288,10 +285,10 @@ def fastdds(fastdds_program, start_program, dds_domain):
     process.end()
 
 
-def test_what_fast_dds_has_shows_under_its_participant(fastdds, dds_connect, wait_for):
+def test_what_fast_dds_has_shows_under_its_participant(fastdds, dds_connect):
     node = dds_connect("cockpit")
-    wait_for(lambda: "/add" in node.services() and "/to/fast" in node.topics())
-    wait_for(lambda: node.publishers("/from/fast"))
+    eventually(lambda: "/add" in node.services() and "/to/fast" in node.topics())
+    eventually(lambda: node.publishers("/from/fast"))
     (publisher,) = node.publishers("/from/fast")
     (subscription,) = node.subscriptions("/to/fast")
     (server,) = node.service_servers("/add")

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from waiting import eventually, nothing_happens
 
 import rosglass
 from rosglass.comm import IMMEDIATE, History, QoS
@@ -146,7 +147,7 @@ for _ in range(4):
     assert used[-1] - used[1] < 5_000_000, used
 
 
-def test_closing_while_samples_arrive(dds_connect, wait_for):
+def test_closing_while_samples_arrive(dds_connect):
     talker, stop = dds_connect("talker"), threading.Event()
     publisher = talker.create_publisher("/flood", STRING)
     count = [0]
@@ -169,7 +170,7 @@ def test_closing_while_samples_arrive(dds_connect, wait_for):
                 for _ in range(3)
             ]
             before = count[0]
-            wait_for(lambda least=before + 10: count[0] > least, what="samples")
+            eventually(lambda least=before + 10: count[0] > least, what="samples")
             if number % 3:
                 made[0].close()
             node.close()
@@ -179,7 +180,7 @@ def test_closing_while_samples_arrive(dds_connect, wait_for):
     assert not thread.is_alive()
 
 
-def test_a_subscription_can_be_closed_from_its_own_callback(dds_connect, wait_for):
+def test_a_subscription_can_be_closed_from_its_own_callback(dds_connect):
     node = dds_connect("once")
     heard: list[str] = []
 
@@ -193,33 +194,33 @@ def test_a_subscription_can_be_closed_from_its_own_callback(dds_connect, wait_fo
     publisher = node.create_publisher("/t", STRING, KEEP_ALL)
     for number in range(100):
         publisher.publish(data=str(number))
-    wait_for(lambda: heard)
-    time.sleep(0.1)
+    eventually(lambda: heard)
+    nothing_happens(0.1)
     assert heard == ["0"]
 
 
-def test_a_node_can_be_closed_from_a_callback(dds_connect, wait_for):
+def test_a_node_can_be_closed_from_a_callback(dds_connect):
     talker, node = dds_connect("talker"), dds_connect("quits")
     node.create_subscription("/t", STRING, raw_callback=lambda _: node.close(), executor=IMMEDIATE)
     publisher = talker.create_publisher("/t", STRING)
-    wait_for(publisher.subscription_count)
+    eventually(publisher.subscription_count)
     threads = resources()[0]
 
     def gone() -> bool:
         publisher.publish(data="x")
         return resources()[0] < threads
 
-    wait_for(gone, what="the node's threads to end")
+    eventually(gone, what="the node's threads to end")
     with pytest.raises(NodeClosedError):
         node.create_publisher("/t", STRING)
 
 
 @pytest.fixture
-def stuck(dds_connect, dds_domain, wait_for):
+def stuck(dds_connect, dds_domain):
     """A publisher whose only reader does not answer any more, but has not left either."""
     reader = program(f"node.create_subscription('/big', '{IMAGE}')\ntime.sleep(60)", dds_domain)
     publisher = dds_connect("talker").create_publisher("/big", IMAGE, KEEP_ALL)
-    wait_for(publisher.subscription_count)
+    eventually(publisher.subscription_count)
     time.sleep(0.2)
     reader.send_signal(signal.SIGSTOP)
     yield publisher
@@ -227,7 +228,7 @@ def stuck(dds_connect, dds_domain, wait_for):
     reader.wait()
 
 
-def test_a_publisher_that_waits_for_its_readers_stops_nobody_and_can_be_closed(stuck, wait_for):
+def test_a_publisher_that_waits_for_its_readers_stops_nobody_and_can_be_closed(stuck):
     raised: list[Error] = []
     sent = [0]
 
@@ -245,10 +246,10 @@ def test_a_publisher_that_waits_for_its_readers_stops_nobody_and_can_be_closed(s
 
     def waits() -> bool:
         before = sent[0]
-        time.sleep(0.3)
+        nothing_happens(0.3)
         return sent[0] == before
 
-    wait_for(waits, what="the publisher to wait")
+    eventually(waits, what="the publisher to wait")
     began = time.monotonic()
     for _ in range(20):
         time.sleep(0.005)

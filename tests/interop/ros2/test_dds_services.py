@@ -19,6 +19,8 @@ from rosglass.interfaces import Library
 
 pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
 
+from waiting import eventually
+
 from rosglass.wires.dds import cyclone_origins
 from rosglass.wires.dds.replier import DdsReplier
 from rosglass.wires.dds.requester import DdsRequester
@@ -154,7 +156,7 @@ def test_a_peer_calls_us_with_a_megabyte_each_way(peer, node, types):
             assert call_us(peer, "/blob", size=size) == [True]
 
 
-def test_a_peer_that_calls_us_is_killed(start_services, peer, node, types, wait_for):
+def test_a_peer_that_calls_us_is_killed(start_services, peer, node, types):
     """Its reply reaches nobody, and the others' do."""
     requests: list[Any] = []
 
@@ -168,7 +170,7 @@ def test_a_peer_that_calls_us_is_killed(start_services, peer, node, types, wait_
     with node.create_service_server("/slow", types[ADD], serve):
         doomed = start_services(peer.kind, "doomed", ())
         doomed.ask(call="/slow", sums=[[-1, 0]])
-        wait_for(lambda: requests)
+        eventually(lambda: requests)
         doomed.end()
         requests[0].set_result({"sum": 0})
         own = ready(node.create_service_client("/slow", types[ADD]))
@@ -222,9 +224,7 @@ def test_two_of_our_clients_in_one_process_get_their_own_replies(node, dds_conne
     assert [call.result(30).sum for call, _ in calls] == [wanted for _, wanted in calls]
 
 
-def test_what_is_taken_while_it_is_received_does_not_stay(
-    start_services, node, types, wait_for, monkeypatch
-):
+def test_what_is_taken_while_it_is_received_does_not_stay(start_services, node, types, monkeypatch):
     """The library keeps its samples until they are taken again, and keeps only some."""
     before = set(cyclone_origins._readers)
     taken: list[bool] = []
@@ -249,18 +249,20 @@ def test_what_is_taken_while_it_is_received_does_not_stay(
     assert peer.event("answers") == [n + 1 for n in range(200)]
     kept = [cyclone_origins._readers[new] for new in cyclone_origins._readers.keys() - before]
     assert len(kept) >= 2
-    wait_for(lambda: len(taken) >= 600 and not any(each._noted for each in kept), what="the taking")
+    eventually(
+        lambda: len(taken) >= 600 and not any(each._noted for each in kept), what="the taking"
+    )
     assert taken.count(True) > 100
     peer.end()
 
 
-def test_servers_that_exclude_each_other_are_named(start_services, node, types, wait_for):
+def test_servers_that_exclude_each_other_are_named(start_services, node, types):
     """Fast DDS's way and Cyclone DDS's cannot both be served by one request."""
     first = start_services("cyclone", "twice", ["add"])
     client = ready(node.create_service_client("/twice/add", types[ADD]))
     assert client.call({"a": 1, "b": 2}).sum == 3
     second = start_services("fastdds", "twice", ["add"])
-    wait_for(lambda: "exclude each other" in client.problem, what="the conflict")
+    eventually(lambda: "exclude each other" in client.problem, what="the conflict")
     assert "(Fast DDS)" in client.problem
     assert client.call({"a": 3, "b": 4}).sum == 7
     assert second.event("got") == [3, 4]
@@ -277,54 +279,50 @@ def impatient(monkeypatch):
     monkeypatch.setattr("rosglass.ros2.service_client._GRACE_S", 0.1)
 
 
-def cut_off(server: Any, wait_for: Any, until: Any) -> None:
+def cut_off(server: Any, until: Any) -> None:
     """Let a program say nothing, as when its link is down, until something holds."""
     os.kill(server.pid, signal.SIGSTOP)
     try:
-        wait_for(until, what="its absence")
+        eventually(until, what="its absence")
     finally:
         os.kill(server.pid, signal.SIGCONT)
 
 
-def test_a_server_that_was_cut_off_in_a_call_and_is_back(
-    start_services, node, types, wait_for, impatient
-):
+def test_a_server_that_was_cut_off_in_a_call_and_is_back(start_services, node, types, impatient):
     """Its answer may have been lost meanwhile: nobody waits for it for ever."""
     server = start_services("cyclone", "away", ["add"], config=SHORT_LEASE)
     client = ready(node.create_service_client("/away/add", types[ADD]))
     call = client.call_async({"a": -1}, timeout=None)
     assert server.event("got") == [-1, 0]
-    cut_off(server, wait_for, lambda: not client.ready)
+    cut_off(server, lambda: not client.ready)
     with pytest.raises(rosglass.ConnectionLostError, match="may have carried it out or not"):
         call.result(30)
     assert ready(client).call({"a": 1, "b": 2}).sum == 3
     server.end()
 
 
-def test_a_server_that_was_cut_off_shortly_still_answers(start_services, node, types, wait_for):
+def test_a_server_that_was_cut_off_shortly_still_answers(start_services, node, types):
     server = start_services("rosglass", "slow", ["add"], config=SHORT_LEASE)
     client = ready(node.create_service_client("/slow/add", types[ADD]))
     call = client.call_async({"a": LATER, "b": 1}, timeout=None)
     assert server.event("got") == [LATER, 1]
-    cut_off(server, wait_for, lambda: not client.ready)
+    cut_off(server, lambda: not client.ready)
     ready(client)
     server.ask(finish=True)
     assert call.result(30).sum == LATER + 1
     server.end()
 
 
-def test_a_call_goes_on_as_long_as_one_of_its_servers_stays(
-    start_services, node, types, wait_for, impatient
-):
+def test_a_call_goes_on_as_long_as_one_of_its_servers_stays(start_services, node, types, impatient):
     one, two = (start_services("cyclone", "both", ["add"], config=SHORT_LEASE) for _ in range(2))
     client = node.create_service_client("/both/add", types[ADD])
-    wait_for(lambda: len(client.server_ids()) == 2, what="two servers")
-    wait_for(lambda: "offer" in client.problem, what="two servers")
+    eventually(lambda: len(client.server_ids()) == 2, what="two servers")
+    eventually(lambda: "offer" in client.problem, what="two servers")
     ready(client)
     call = client.call_async({"a": -1}, timeout=None)
     assert one.event("got") == two.event("got") == [-1, 0]
-    cut_off(one, wait_for, lambda: len(client.server_ids()) == 1)
-    wait_for(lambda: len(client.server_ids()) == 2, what="the return of the first")
+    cut_off(one, lambda: len(client.server_ids()) == 1)
+    eventually(lambda: len(client.server_ids()) == 2, what="the return of the first")
     with pytest.raises(rosglass.TimeoutError):
         call.result(1.5)
     # The one that is back never asked again: the call ends with the other.
@@ -353,22 +351,20 @@ def test_a_server_killed_in_a_call_is_told_and_its_successor_called(
     server.end()
 
 
-def test_rubbish_is_named_once_and_disturbs_nobody(
-    node, types, caplog, start, dds_domain, wait_for
-):
+def test_rubbish_is_named_once_and_disturbs_nobody(node, types, caplog, start, dds_domain):
     plan = {"domain": dds_domain, "requests": "/strict", "replies": "/odd"}
     server = node.create_service_server("/strict", types[ADD], lambda r: {"sum": r.a + r.b})
     client = node.create_service_client("/odd", types[ADD])
     with caplog.at_level(logging.WARNING, "rosglass"):
         rubbish = start(str(PEERS / "dds_rubbish_peer.py"), json.dumps(plan))
         rubbish.event("sent")
-        wait_for(lambda: "too short for its header" in caplog.text)
+        eventually(lambda: "too short for its header" in caplog.text)
         own = ready(node.create_service_client("/strict", types[ADD]))
         assert own.call({"a": 1, "b": 2}).sum == 3
         call = client.call_async({"a": 1}, timeout=1)
         with pytest.raises(rosglass.TimeoutError):
             call.result(5)
-        wait_for(lambda: "ignoring a reply" in caplog.text)
+        eventually(lambda: "ignoring a reply" in caplog.text)
     messages = [record.getMessage() for record in caplog.records]
     assert sum("ignoring a request" in text for text in messages) == 1
     assert sum("ignoring a reply" in text for text in messages) == 1
@@ -386,7 +382,7 @@ def test_replies_to_what_nobody_asked_are_taken_by_nobody(node, types, start, dd
     peer.end()
 
 
-def test_a_reply_from_the_main_thread_goes_out(node, types, peer, wait_for):
+def test_a_reply_from_the_main_thread_goes_out(node, types, peer):
     """Where a signal's exception must not end up in Cyclone DDS."""
     waiting: list[Any] = []
 
@@ -397,7 +393,7 @@ def test_a_reply_from_the_main_thread_goes_out(node, types, peer, wait_for):
 
     with node.create_service_server("/patient", types[ADD], serve):
         peer.ask(call="/patient", sums=[[41, 0]])
-        wait_for(lambda: waiting)
+        eventually(lambda: waiting)
         promised, a = waiting[0]
         assert threading.current_thread() is threading.main_thread()
         promised.set_result({"sum": a + 1})

@@ -10,12 +10,12 @@ import logging
 import os
 import re
 import threading
-import time
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import eventually
 
 import rosglass
 from rosglass.comm import ParameterDescriptor, Range
@@ -234,11 +234,12 @@ class Reader:
             expected = ast.literal_eval(remark)
         except (SyntaxError, ValueError):
             return
-        deadline = time.monotonic() + 30
-        while not _is(value, expected) and time.monotonic() < deadline:
-            time.sleep(0.05)  # what is known of the robot grows
-            value = self._evaluate(statement)
-        assert _is(value, expected), f"{where}: {value!r} is not {expected!r}"
+        if not _is(value, expected):  # what is known of the robot grows
+            seen = [value]
+            eventually(
+                lambda: seen.append(self._evaluate(statement)) or _is(seen[-1], expected),
+                lambda: f"{where}: {seen[-1]!r} is not {expected!r}",
+            )
 
     def _evaluate(self, statement: ast.stmt) -> Any:
         flags = ast.PyCF_ALLOW_TOP_LEVEL_AWAIT
@@ -328,10 +329,8 @@ class World:
 
     def _drive(self) -> None:
         """Drive until something of it is recorded."""
-        deadline = time.monotonic() + 30
-        while not self._names["recorder"].status().messages:
-            assert time.monotonic() < deadline, self._names["recorder"].status()
-            time.sleep(0.01)
+        recorder = self._names["recorder"]
+        eventually(lambda: recorder.status().messages, recorder.status)
 
     def close(self) -> None:
         for node in self.nodes:

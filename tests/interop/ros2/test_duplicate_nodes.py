@@ -9,6 +9,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import eventually
 
 import rosglass
 
@@ -42,20 +43,13 @@ def join(url: str) -> Iterator[Callable[[str], Node]]:
         node.close()
 
 
-def wait_for(condition: Callable[[], Any], timeout: float = 30.0) -> None:
-    until = time.monotonic() + timeout
-    while not condition():
-        assert time.monotonic() < until, "did not happen in time"
-        time.sleep(0.02)
-
-
 def test_the_graph_counts_nodes_of_one_name(join: Callable[[str], Node]) -> None:
     me, robot, twin = join("me"), join("robot"), join("robot")
-    wait_for(lambda: me.duplicate_nodes() == {"/robot": 2})
+    eventually(lambda: me.duplicate_nodes() == {"/robot": 2})
     assert [str(node) for node in me.nodes()].count("/robot") == 1
-    wait_for(lambda: robot.duplicate_nodes() == {"/robot": 2})
+    eventually(lambda: robot.duplicate_nodes() == {"/robot": 2})
     twin.close()
-    wait_for(lambda: me.duplicate_nodes() == {})
+    eventually(lambda: me.duplicate_nodes() == {})
 
 
 def test_commands_warn(url: str, join: Callable[[str], Node], run_command: Any) -> None:
@@ -77,13 +71,13 @@ def test_a_second_robot_leaves_and_says_why(url: str) -> None:
     )  # fmt: skip
     try:
         with rosglass.connect(url, "me") as me:
-            wait_for(lambda: me.publishers("/odom"))
+            eventually(lambda: me.publishers("/odom"))
             # By then, the first is here to stay.
             came: list[float] = []
             me.create_subscription(
                 "/odom", "nav_msgs/msg/Odometry", lambda _: came.append(time.monotonic())
             )
-            wait_for(lambda: came and came[-1] - came[0] > 6, 60)
+            eventually(lambda: came and came[-1] - came[0] > 6, timeout=60)
             second = subprocess.run(
                 [*COMMAND, "robot", "--url", url, "--fps", "5"],
                 env=environment, capture_output=True, text=True, timeout=90, check=False,
@@ -91,7 +85,7 @@ def test_a_second_robot_leaves_and_says_why(url: str) -> None:
             assert second.returncode == 3, second.stderr
             assert "a robot called /robot is on" in second.stderr
             assert "rosglass demo --no-robot" in second.stderr
-            wait_for(lambda: me.duplicate_nodes() == {})
+            eventually(lambda: me.duplicate_nodes() == {})
             assert first.poll() is None
     finally:
         first.kill()
@@ -107,14 +101,14 @@ def test_of_two_robots_that_start_together_one_stays(url: str) -> None:
         for _ in range(2)
     ]  # fmt: skip
     try:
-        wait_for(lambda: any(robot.poll() is not None for robot in robots), 60)
+        eventually(lambda: any(robot.poll() is not None for robot in robots), timeout=60)
         with rosglass.connect(url, "me") as me:
             came: list[float] = []
             me.create_subscription(
                 "/odom", "nav_msgs/msg/Odometry", lambda _: came.append(time.monotonic())
             )
             # Longer than either watches for the other.
-            wait_for(lambda: came and came[-1] - came[0] > 9, 60)
+            eventually(lambda: came and came[-1] - came[0] > 9, timeout=60)
         assert sorted(robot.poll() or 0 for robot in robots) == [0, 3]
     finally:
         for robot in robots:

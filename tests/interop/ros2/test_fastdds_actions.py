@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from waiting import eventually
 
 from rosglass.comm import GoalStatus
 
@@ -140,7 +141,7 @@ def test_we_send_goals_to_fast_dds(fast, node):
     assert client.problem == ""
 
 
-def test_fast_dds_sends_us_goals(fast, node, wait_for):
+def test_fast_dds_sends_us_goals(fast, node):
     def count(goal: Any) -> Any:
         sequence = [0]
         while len(sequence) < goal.goal.order and not goal.wait_for_cancel(0.02):
@@ -175,7 +176,7 @@ def test_fast_dds_sends_us_goals(fast, node, wait_for):
     assert result[4] == CANCELED
     # The last may come after the result, as it is on another topic.
     told_of_one = [[0, 1], [0, 1, 2], [0, 1, 2, 3], [0, 1, 2, 3, 4]]
-    wait_for(lambda: [numbers(d, 16) for d in feedback if d[4:20] == one] == told_of_one)
+    eventually(lambda: [numbers(d, 16) for d in feedback if d[4:20] == one] == told_of_one)
 
     def told() -> set[tuple[bytes, int]]:
         last, at, found = statuses[-1], 8, set()
@@ -185,4 +186,4 @@ def test_fast_dds_sends_us_goals(fast, node, wait_for):
             at = stamp + 9
         return found
 
-    wait_for(lambda: told() == {(one, SUCCEEDED), (three, CANCELED)})
+    eventually(lambda: told() == {(one, SUCCEEDED), (three, CANCELED)})

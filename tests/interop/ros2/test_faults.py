@@ -14,6 +14,7 @@ from operator import le
 from pathlib import Path
 
 import pytest
+from waiting import eventually
 
 import rosglass
 from rosglass.comm import History, QoS, Reliability
@@ -108,7 +109,7 @@ while True:
     assert heard.wait(30).message().data == "still there"
 
 
-def test_a_slow_consumer_costs_no_memory_over_dds(dds_connect, dds_domain, wait_for):
+def test_a_slow_consumer_costs_no_memory_over_dds(dds_connect, dds_domain):
     node = dds_connect("cockpit")
     text = f"""
 publisher = node.create_publisher("/camera", {IMAGE!r}, rosglass.QoS.sensor_data())
@@ -127,9 +128,9 @@ while True:
     qos = QoS(3, reliability=Reliability.BEST_EFFORT)
     slow = node.create_subscription("/camera", IMAGE, look, qos)
     unread = node.create_subscription("/camera", IMAGE, qos=qos)
-    wait_for(lambda: slow.statistics().received > 20 and unread.statistics().received > 20)
+    eventually(lambda: slow.statistics().received > 20 and unread.statistics().received > 20)
     before, received = memory(), slow.statistics().received
-    wait_for(lambda: slow.statistics().received > received + 150, 30)
+    eventually(lambda: slow.statistics().received > received + 150, timeout=30)
     statistics = slow.statistics()
     # 140 MB have come meanwhile, twice.
     assert memory() - before < 40e6
@@ -142,7 +143,7 @@ while True:
     camera.communicate()
 
 
-def test_a_thousand_of_everything_leave_nothing_behind_over_dds(dds_connect, wait_for):
+def test_a_thousand_of_everything_leave_nothing_behind_over_dds(dds_connect):
     node, other = dds_connect("cockpit"), dds_connect("robot")
 
     def cycle() -> None:
@@ -165,14 +166,14 @@ def test_a_thousand_of_everything_leave_nothing_behind_over_dds(dds_connect, wai
 
     for _ in range(60):
         cycle()
-    wait_for(settled)
+    eventually(settled)
     gc.collect()
     used, objects, before = resources(), len(gc.get_objects()), memory()
     for _ in range(250):
         cycle()
-    wait_for(settled)
+    eventually(settled)
     gc.collect()
-    wait_for(lambda: all(map(le, resources(), used)), what=f"no more than {used} in use")
+    eventually(lambda: all(map(le, resources(), used)), what=f"no more than {used} in use")
     assert len(gc.get_objects()) < objects + 500
     assert memory() - before < 6e6
 
@@ -197,7 +198,7 @@ node.close()
     assert (process.returncode, errors) == (0, "")
 
 
-def test_closing_takes_a_second_at_most_when_the_peer_was_killed(dds_connect, dds_domain, wait_for):
+def test_closing_takes_a_second_at_most_when_the_peer_was_killed(dds_connect, dds_domain):
     topics = [f"/topic{number}" for number in range(5)]
     text = f"""
 for topic in {topics}:
@@ -207,7 +208,7 @@ time.sleep(60)
     peer = program(text, f"dds://?domain={dds_domain}")
     node = dds_connect("cockpit")
     publishers = [node.create_publisher(topic, STRING) for topic in topics]
-    wait_for(lambda: all(publisher.subscription_count() for publisher in publishers))
+    eventually(lambda: all(publisher.subscription_count() for publisher in publishers))
     time.sleep(0.5)
     peer.kill()
     peer.communicate()
@@ -260,7 +261,7 @@ def test_ctrl_c_at_any_moment_from_the_first_import_on(url):
             assert strange not in errors, what
 
 
-def test_a_node_closed_in_the_receiving_thread(url, node, wait_for):
+def test_a_node_closed_in_the_receiving_thread(url, node):
     closed = threading.Event()
     other = rosglass.connect(url, "short_lived")
 
@@ -270,7 +271,7 @@ def test_a_node_closed_in_the_receiving_thread(url, node, wait_for):
 
     other.create_subscription("/end", STRING, close, executor=rosglass.comm.IMMEDIATE)
     publisher = node.create_publisher("/end", STRING)
-    wait_for(publisher.subscription_count)
+    eventually(publisher.subscription_count)
     publisher.publish(data="now")
     assert closed.wait(30)
-    wait_for(lambda: "/short_lived" not in [found.full for found in node.nodes()], timeout=30)
+    eventually(lambda: "/short_lived" not in [found.full for found in node.nodes()], timeout=30)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from waiting import eventually
 
 from rosglass import QoS, Time
 
@@ -19,7 +20,7 @@ def node(request: pytest.FixtureRequest) -> Any:
     return connect("cockpit")
 
 
-def test_the_log_time_and_names_of_another_program(node: Any, start: Any, wait_for: Any) -> None:
+def test_the_log_time_and_names_of_another_program(node: Any, start: Any) -> None:
     logs: list[Any] = []
     node.create_subscription("/rosout", "rcl_interfaces/msg/Log", logs.append)
     arguments = ["-r", "chatter:=/talk", "-r", "__node:=left", "-r", "__ns:=/arms"]
@@ -28,21 +29,21 @@ def test_the_log_time_and_names_of_another_program(node: Any, start: Any, wait_f
     robot.event("ready")
     robot.ask(read=True)
     assert robot.event("chatter") == "/talk"
-    wait_for(lambda: "/arms/left" in [name.full for name in node.nodes()])
-    wait_for(lambda: node.publishers("/rosout"))
+    eventually(lambda: "/arms/left" in [name.full for name in node.nodes()])
+    eventually(lambda: node.publishers("/rosout"))
     robot.ask(log="battery low")
-    wait_for(lambda: [log for log in logs if log.msg == "battery low"])
+    eventually(lambda: [log for log in logs if log.msg == "battery low"])
     log = next(log for log in logs if log.msg == "battery low")
     assert (log.name, log.level, Path(log.file).name) == ("arms.left", 30, "furniture_peer.py")
 
     # Whoever comes later gets the log of the last 10 s.
     late: list[Any] = []
     node.create_subscription("/rosout", "rcl_interfaces/msg/Log", late.append, QoS.latched(100))
-    wait_for(lambda: [log for log in late if log.msg == "battery low"])
+    eventually(lambda: [log for log in late if log.msg == "battery low"])
 
     node.parameters.set({"use_sim_time": True})
     assert node.now() == Time(0)
-    wait_for(lambda: node.publishers("/clock"))
+    eventually(lambda: node.publishers("/clock"))
     ticks: list[Time] = []
     node.create_timer(1.0, lambda: ticks.append(node.now()))
 
@@ -50,8 +51,8 @@ def test_the_log_time_and_names_of_another_program(node: Any, start: Any, wait_f
         robot.ask(clock=seconds)
         return bool(node.now() == Time.from_parts(seconds, 0))
 
-    wait_for(lambda: tick(100))
-    wait_for(lambda: ticks)
-    wait_for(lambda: tick(102))
-    wait_for(lambda: len(ticks) == 2)
+    eventually(lambda: tick(100))
+    eventually(lambda: ticks)
+    eventually(lambda: tick(102))
+    eventually(lambda: len(ticks) == 2)
     assert ticks[1] == Time.from_parts(102, 0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from waiting import eventually
 
 from rosglass.comm import EndpointKind, NodeName, QoS
 from rosglass.comm.names import hidden
@@ -19,7 +20,7 @@ def nodes(request):
     return connect("robot", namespace="/arm"), connect("operator")
 
 
-def test_topics_services_and_actions_with_the_nodes_they_belong_to(nodes, wait_for):
+def test_topics_services_and_actions_with_the_nodes_they_belong_to(nodes):
     robot, operator = nodes
     robot.create_publisher("state", STRING, QoS.latched())
     robot.create_subscription("goal", STRING)
@@ -34,7 +35,7 @@ def test_topics_services_and_actions_with_the_nodes_they_belong_to(nodes, wait_f
         ("/arm/count/_action/send_goal", EndpointKind.SERVICE_SERVER),
         ("/arm/count/_action/status", EndpointKind.PUBLISHER),
     }
-    wait_for(lambda: named <= {(end.name, end.kind) for end in operator.endpoints(ROBOT)})
+    eventually(lambda: named <= {(end.name, end.kind) for end in operator.endpoints(ROBOT)})
     for node in nodes:
         assert node.topics()["/arm/state"] == node.topics()["/arm/goal"] == [STRING]
         assert node.services()["/arm/add"] == node.services()["/elsewhere"] == [ADD]
@@ -54,17 +55,17 @@ def test_topics_services_and_actions_with_the_nodes_they_belong_to(nodes, wait_f
     assert server.type_hash.startswith("RIHS01_")
 
 
-def test_what_is_closed_is_gone(nodes, wait_for):
+def test_what_is_closed_is_gone(nodes):
     robot, operator = nodes
     publisher = robot.create_publisher("state", STRING)
     server = robot.create_service_server("add", ADD, lambda request: None)
-    wait_for(lambda: operator.publishers("/arm/state") and operator.service_servers("/arm/add"))
+    eventually(lambda: operator.publishers("/arm/state") and operator.service_servers("/arm/add"))
     publisher.close()
     server.close()
     for node in nodes:
-        wait_for(lambda node=node: not node.publishers("/arm/state"))
-        wait_for(lambda node=node: "/arm/add" not in node.services())
+        eventually(lambda node=node: not node.publishers("/arm/state"))
+        eventually(lambda node=node: "/arm/add" not in node.services())
     assert ROBOT in operator.nodes()
     robot.close()
-    wait_for(lambda: ROBOT not in operator.nodes())
-    wait_for(lambda: not operator.endpoints(ROBOT))
+    eventually(lambda: ROBOT not in operator.nodes())
+    eventually(lambda: not operator.endpoints(ROBOT))

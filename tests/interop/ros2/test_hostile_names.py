@@ -8,6 +8,7 @@ import re
 
 import pytest
 import zenoh
+from waiting import eventually
 
 #: ESC, C1's CSI, carriage return, bell and a right-to-left override, as a hostile node sends them.
 HOSTILE = "evil\x1b[2J\x9b31m\r\x07\u202e"
@@ -76,15 +77,15 @@ def test_no_command_prints_what_steers_the_terminal(
             assert "left out, for ROS's rules forbid such names: 7: " in out
 
 
-def test_left_out_names_are_kept_apart_and_go_with_their_nodes(hostile, connect, wait_for):
+def test_left_out_names_are_kept_apart_and_go_with_their_nodes(hostile, connect):
     node = connect("panel", "?domain=0")
-    names = wait_for(lambda: len(node.invalid_names()) == 7 and node.invalid_names())
+    names = eventually(lambda: len(node.invalid_names()) == 7 and node.invalid_names())
     assert "/two\nlines [geometry_msgs/msg/Twist] of /robot" in names
     assert list(node.topics()) == ["/fine"]
     assert {name.full for name in node.nodes()} == {"/panel", "/robot"}
     for declared in hostile:
         declared.undeclare()
-    wait_for(lambda: not node.invalid_names())
+    eventually(lambda: not node.invalid_names())
 
 
 def test_a_hostile_dds_topic_and_type_are_left_out_of_the_graph():

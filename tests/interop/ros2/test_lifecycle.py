@@ -13,6 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from waiting import eventually, nothing_happens
 
 import rosglass
 from rosglass.comm import IMMEDIATE, ConnectionState, NodeName
@@ -32,9 +33,7 @@ def start_router(start, free_port):
     def start_router():
         address = f"tcp/127.0.0.1:{free_port}"
         process = start("-m", "rosglass", "router", "--listen", address)
-        while not any(address in line for line in process.output):
-            assert process.popen.poll() is None, process.output
-            time.sleep(0.01)
+        eventually(lambda: address in "".join(process.output))
         return process
 
     start_router.url = f"zenoh://127.0.0.1:{free_port}"
@@ -81,7 +80,7 @@ def count():
 
 
 @pytest.mark.parametrize("mode", ["peer", "client"])
-def test_nobody_listens_then_somebody_does(mode, start_router, connect, wait_for):
+def test_nobody_listens_then_somebody_does(mode, start_router, connect):
     before = time.monotonic()
     node = connect("early", f"?mode={mode}", url=start_router.url)
     assert time.monotonic() - before < 3, "connecting waits for nobody"
@@ -97,16 +96,16 @@ def test_nobody_listens_then_somebody_does(mode, start_router, connect, wait_for
     time.sleep(1.2)
     start_router()
     appeared = time.monotonic()
-    wait_for(lambda: node.status().state is CONNECTED, RECOVERY)
+    eventually(lambda: node.status().state is CONNECTED, timeout=RECOVERY)
     assert time.monotonic() - appeared < RECOVERY
-    wait_for(lambda: told)
+    eventually(lambda: told)
     assert [status.state for status in told] == [CONNECTED]
     assert told[0].detail == f"router at tcp/{address}"
     other = connect("other", url=start_router.url)
-    wait_for(lambda: NodeName("/", "early") in other.nodes())
-    wait_for(lambda: other.subscriptions("/count"))
+    eventually(lambda: NodeName("/", "early") in other.nodes())
+    eventually(lambda: other.subscriptions("/count"))
     other.create_publisher("/count", TWIST).publish(linear={"x": 7})
-    wait_for(lambda: 7 in receiver.numbers)
+    eventually(lambda: 7 in receiver.numbers)
 
 
 @pytest.mark.parametrize("mode", ["peer", "client"])
@@ -117,7 +116,7 @@ def test_a_program_that_answers_nothing_blocks_nobody(mode, free_port):
         node.create_publisher("/count", TWIST, rosglass.QoS.latched()).publish()
         node.create_subscription("/count", TWIST)
         assert time.monotonic() - before < 3
-        time.sleep(0.3)
+        nothing_happens(0.3)
         assert node.status().state is CONNECTING
         ticks = []
         ticking = threading.Timer(0.2, lambda: ticks.append(time.monotonic()))
@@ -130,7 +129,7 @@ def test_a_program_that_answers_nothing_blocks_nobody(mode, free_port):
 
 
 @pytest.mark.parametrize("mode", ["peer", "client"])
-def test_a_router_that_dies_and_returns(mode, start_router, connect, wait_for, count):
+def test_a_router_that_dies_and_returns(mode, start_router, connect, count):
     router = start_router()
     talker = connect("talker", f"?mode={mode}", url=start_router.url)
     listener = connect("listener", f"?mode={mode}", url=start_router.url)
@@ -138,32 +137,34 @@ def test_a_router_that_dies_and_returns(mode, start_router, connect, wait_for, c
     listener.on_status_change(told.append, IMMEDIATE)
     receiver = Receiver(listener)
     count(talker)
-    wait_for(lambda: len(receiver.numbers) > 20)
+    eventually(lambda: len(receiver.numbers) > 20)
     router.end()
     if mode == "client":
-        wait_for(lambda: listener.status().state is LOST)
+        eventually(lambda: listener.status().state is LOST)
         assert "lost, trying again every second" in listener.status().detail
-        wait_for(lambda: listener.nodes() == [NodeName("/", "listener")])
+        eventually(lambda: listener.nodes() == [NodeName("/", "listener")])
     else:
         # Two peers are linked with each other already and go on without the router.
-        wait_for(lambda: "no router" in listener.status().detail)
+        eventually(lambda: "no router" in listener.status().detail)
         assert listener.status().state is CONNECTED
         heard = len(receiver.numbers)
-        wait_for(lambda: len(receiver.numbers) > heard + 20)
+        eventually(lambda: len(receiver.numbers) > heard + 20)
     time.sleep(1)
     start_router()
     returned = time.monotonic()
-    wait_for(lambda: "router at" in listener.status().detail, RECOVERY)
-    wait_for(lambda: receiver.times[-1] > returned and listener.publishers("/count"), RECOVERY)
+    eventually(lambda: "router at" in listener.status().detail, timeout=RECOVERY)
+    eventually(
+        lambda: receiver.times[-1] > returned and listener.publishers("/count"), timeout=RECOVERY
+    )
     assert time.monotonic() - returned < RECOVERY
     heard = len(receiver.numbers)
-    wait_for(lambda: len(receiver.numbers) > heard + 20)
+    eventually(lambda: len(receiver.numbers) > heard + 20)
     receiver.assert_each_once()
     if mode == "client":
         assert [status.state for status in told][-2:] == [LOST, CONNECTED]
 
 
-def test_latched_messages_come_once_through_a_router_that_dies(start_router, connect, wait_for):
+def test_latched_messages_come_once_through_a_router_that_dies(start_router, connect):
     router = start_router()
     # Clients lose each other with the router, and ask for the history again when it returns.
     talker = connect("talker", "?mode=client", url=start_router.url)
@@ -175,37 +176,37 @@ def test_latched_messages_come_once_through_a_router_that_dies(start_router, con
     listener.create_subscription(
         "/map", TWIST, lambda m: numbers.append(m.linear.x), rosglass.QoS.latched(3)
     )
-    wait_for(lambda: numbers == [2, 3, 4])
+    eventually(lambda: numbers == [2, 3, 4])
     router.end()
-    wait_for(lambda: listener.status().state is LOST)
+    eventually(lambda: listener.status().state is LOST)
     start_router()
-    wait_for(lambda: listener.publishers("/map"))
-    wait_for(publisher.subscription_count)
+    eventually(lambda: listener.publishers("/map"))
+    eventually(publisher.subscription_count)
     publisher.publish(linear={"x": 5})
-    wait_for(lambda: 5 in numbers)
-    time.sleep(0.5)
+    eventually(lambda: 5 in numbers)
+    nothing_happens(0.5)
     assert numbers == [2, 3, 4, 5]
 
 
-def test_a_peer_that_is_killed_leaves_the_graph_at_once(router, start_peer, connect, wait_for):
+def test_a_peer_that_is_killed_leaves_the_graph_at_once(router, start_peer, connect):
     node = connect("cockpit")
     changes = []
     node.on_graph_change(lambda: changes.append(1))
     peer = start_peer("rosglass", router, publish={"/count": TWIST})
     subscription = node.create_subscription("/count")
     assert subscription.wait(30) is not None
-    wait_for(lambda: NodeName("/own", "peer") in node.nodes())
+    eventually(lambda: NodeName("/own", "peer") in node.nodes())
     count = len(changes)
     os.kill(peer.pid, signal.SIGKILL)
-    wait_for(lambda: NodeName("/own", "peer") not in node.nodes())
+    eventually(lambda: NodeName("/own", "peer") not in node.nodes())
     assert node.publishers("/count") == []
-    wait_for(lambda: len(changes) > count)
+    eventually(lambda: len(changes) > count)
     assert node.status().state is CONNECTED
-    wait_for(lambda: "/own/peer left" in subscription.problem)
+    eventually(lambda: "/own/peer left" in subscription.problem)
     again = start_peer("rosglass", router, publish={"/count": TWIST})
     subscription.take_latest()
     assert subscription.wait(RECOVERY) is not None
-    wait_for(lambda: subscription.problem == "")
+    eventually(lambda: subscription.problem == "")
     again.end()
 
 
@@ -256,8 +257,7 @@ def test_nodes_leave_no_threads_and_no_descriptors_behind(router):
         cycle()
     # Undeclaring at a bad moment once stopped the whole interpreter for 10 s.
     assert time.monotonic() - before < 60
-    time.sleep(1)
-    assert threading.active_count() <= threads
+    eventually(lambda: threading.active_count() <= threads)
     # Zenoh's thread pools breathe a little.
     assert native_threads() < native + 20
     assert own_descriptors() < descriptors + 20
@@ -278,13 +278,13 @@ def listening_addresses():
     return found
 
 
-def test_nothing_listens_beyond_loopback(router, connect, wait_for):
+def test_nothing_listens_beyond_loopback(router, connect):
     node = connect("shy")
-    wait_for(lambda: node.status().state is CONNECTED)
+    eventually(lambda: node.status().state is CONNECTED)
     assert listening_addresses() == {"0100007F"}
 
 
-def test_a_stalled_link_drops_pictures_but_no_command(router, start_peer, connect, wait_for):
+def test_a_stalled_link_drops_pictures_but_no_command(router, start_peer, connect):
     best_effort = rosglass.QoS.sensor_data()
     node = connect("robot")
     commands = node.create_publisher("/cmd_vel", TWIST)
@@ -296,7 +296,7 @@ def test_a_stalled_link_drops_pictures_but_no_command(router, start_peer, connec
         quiet=["/camera"],
         depth=1000,
     )
-    wait_for(lambda: commands.subscription_count() and pictures.subscription_count())
+    eventually(lambda: commands.subscription_count() and pictures.subscription_count())
     picture = rosglass.load("sensor_msgs/msg/Image").encode(data=bytes(900_000))
     os.kill(peer.pid, signal.SIGSTOP)
     slowest = 0.0

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import zenoh
+from waiting import eventually
 
 from rosglass.comm import ConnectionState
 
@@ -28,13 +29,13 @@ def count(node):
     return len(node.topics())
 
 
-def test_ten_thousand_announced_topics_cost_their_share(router, connect, wait_for, run_command):
+def test_ten_thousand_announced_topics_cost_their_share(router, connect, run_command):
     node = connect("panel", "?domain=0")
     states = []
     node.on_status_change(lambda status: states.append(status.state))
     publisher = connect("robot", "?domain=0").create_publisher("/beat", "std_msgs/msg/String")
     beats = node.create_subscription("/beat", "std_msgs/msg/String")
-    wait_for(publisher.subscription_count)
+    eventually(publisher.subscription_count)
     config = zenoh.Config()
     config.insert_json5("mode", '"client"')
     config.insert_json5("connect/endpoints", json.dumps([router.listen]))
@@ -46,14 +47,14 @@ def test_ten_thousand_announced_topics_cost_their_share(router, connect, wait_fo
             session.liveliness().declare_token(f"{head}/{n}/MP/%/%/flood/%t{n}/{kind}/{qos}")
             for n in range(TOPICS)
         ]
-        wait_for(lambda: count(node) >= TOPICS, LONG)
+        eventually(lambda: count(node) >= TOPICS, timeout=LONG)
         assert memory() - before < 3 * MEMORY * TOPICS  # three see them, the router among these
         publisher.publish(data="alive")
         assert beats.wait(30).message().data == "alive"
 
         late = connect("late", "?domain=0")
         late.on_status_change(lambda status: states.append(status.state))
-        wait_for(lambda: count(late) >= TOPICS, LONG)
+        eventually(lambda: count(late) >= TOPICS, timeout=LONG)
 
         code, out, said = run_command("topic", "list", "--url", router.url + "?domain=0")
         assert code == 0
@@ -61,7 +62,7 @@ def test_ten_thousand_announced_topics_cost_their_share(router, connect, wait_fo
         assert "the router has not sent the whole graph yet" in said
         del announced
     assert ConnectionState.LOST not in states
-    wait_for(lambda: count(node) < 10, LONG)
+    eventually(lambda: count(node) < 10, timeout=LONG)
     assert late.status().state is ConnectionState.CONNECTED
     assert time.process_time() - began < CPU
 

@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 import pytest
+from waiting import eventually, nothing_happens
 
 import rosglass
 from rosglass.comm import IMMEDIATE, CancelAnswer, GoalStatus
@@ -101,7 +102,7 @@ def test_a_callback_that_fails(node, server):
         client.call(timeout=1)
 
 
-def test_no_callback_waits_in_the_thread_that_receives(node, server, wait_for, url):
+def test_no_callback_waits_in_the_thread_that_receives(node, server, url):
     client = node.create_service_client("/add", ADD)
     assert client.wait_for_server(30), client.problem
     told = []
@@ -114,7 +115,7 @@ def test_no_callback_waits_in_the_thread_that_receives(node, server, wait_for, u
     with rosglass.connect(url, "talker") as talker:
         node.create_subscription("/talk", TEXT, ask, executor=IMMEDIATE)
         publisher = talker.create_publisher("/talk", TEXT)
-        wait_for(lambda: publisher.publish({"data": "hello"}) or told, what="a message")
+        eventually(lambda: publisher.publish({"data": "hello"}) or told, what="a message")
     told.clear()
 
     def ask_if_received(call):
@@ -126,10 +127,10 @@ def test_no_callback_waits_in_the_thread_that_receives(node, server, wait_for, u
         client.call_async({"a": 1}).add_done_callback(ask_if_received)
         return told
 
-    wait_for(call, what="the response")
+    eventually(call, what="the response")
 
 
-def test_goals_in_every_way(node, server, wait_for):
+def test_goals_in_every_way(node, server):
     client = node.create_action_client("/count", FIBONACCI)
     feedback, statuses = [], []
     goal = client.send_goal(
@@ -140,7 +141,7 @@ def test_goals_in_every_way(node, server, wait_for):
     status, result = goal.result(30)
     assert status is GoalStatus.SUCCEEDED, client.problem
     assert list(result.sequence) == [0, 1, 2, 3, 4]
-    wait_for(lambda: statuses[-1] is GoalStatus.SUCCEEDED, what=statuses)
+    eventually(lambda: statuses[-1] is GoalStatus.SUCCEEDED, what=statuses)
     assert statuses[0] is GoalStatus.ACCEPTED
     assert feedback == [2, 3, 4, 5]
     with pytest.raises(rosglass.GoalRejectedError):
@@ -158,7 +159,7 @@ def test_goals_in_every_way(node, server, wait_for):
 def test_the_other_way_round(node, url, run_peer):
     """The other program calls before we offer anything, and is answered when we do."""
     peer = run_peer("use", url, "user")
-    time.sleep(0.3)
+    nothing_happens(0.3)
     node.create_service_server("/my/add", ADD, lambda request: {"sum": request.a + request.b})
     node.create_action_server("/my/count", FIBONACCI, count)
     assert peer.event("sums") == list(range(1, 21))
@@ -166,7 +167,7 @@ def test_the_other_way_round(node, url, run_peer):
     peer.end()
 
 
-def test_the_status_of_goals_is_there_for_late_listeners(node, url, wait_for):
+def test_the_status_of_goals_is_there_for_late_listeners(node, url):
     node.create_action_server("/late", FIBONACCI, count)
     client = node.create_action_client("/late", FIBONACCI)
     goal = client.send_goal({"order": 2})
@@ -178,7 +179,7 @@ def test_the_status_of_goals_is_there_for_late_listeners(node, url, wait_for):
         assert sample is not None, subscription.problem
         entry = sample.message().status_list[0]
         assert (bytes(entry.goal_info.goal_id.uuid), entry.status) == (goal.id, 4)
-        wait_for(lambda: other.actions().get("/late") == [FIBONACCI], what=other.actions())
+        eventually(lambda: other.actions().get("/late") == [FIBONACCI], what=other.actions())
 
 
 def test_a_server_that_is_killed_at_work(new_url, run_peer, monkeypatch):
@@ -221,7 +222,7 @@ def test_closing_a_server_tells_its_clients(node, url):
     assert goal.result(30).status is GoalStatus.ABORTED
 
 
-def test_ctrl_c_ends_a_call(url, server, run_peer, wait_for):
+def test_ctrl_c_ends_a_call(url, server, run_peer):
     caller = run_peer("wait", url, "caller")
     caller.event("waiting")
     server.event("asked")
@@ -251,7 +252,7 @@ def test_clients_stay_behind_when_a_process_forks(node, server):
 
 
 @pytest.mark.parametrize("mode", ["peer", "client"])
-def test_a_goal_survives_a_router_that_is_restarted(free_port, run_peer, wait_for, mode):
+def test_a_goal_survives_a_router_that_is_restarted(free_port, run_peer, mode):
     listen = f"tcp/127.0.0.1:{free_port}"
     url = f"zenoh://127.0.0.1:{free_port}?mode={mode}"
     with Router(listen):
@@ -265,7 +266,7 @@ def test_a_goal_survives_a_router_that_is_restarted(free_port, run_peer, wait_fo
             {"order": 150}, on_feedback=lambda message: feedback.append(len(message.sequence))
         )
         assert goal.acceptance.result(30), actions.problem
-        wait_for(lambda: feedback, what="feedback")
+        eventually(lambda: feedback, what="feedback")
     time.sleep(0.5)
     with Router(listen):
         status, result = goal.result(30)
@@ -301,16 +302,16 @@ def test_a_goal_survives_a_router_that_is_restarted(free_port, run_peer, wait_fo
     ],
     ids=["services", "actions"],
 )
-def test_the_examples(new_url, start, wait_for, server, client, told):
+def test_the_examples(new_url, start, server, client, told):
     url = new_url()
     serving = start(str(EXAMPLES / server), url)
-    wait_for(lambda: "ready; Ctrl-C ends it\n" in serving.output, what=serving.output)
+    eventually(lambda: "ready; Ctrl-C ends it\n" in serving.output, what=serving.output)
     using = start(str(EXAMPLES / client), url)
     assert using.popen.wait(30) == 0, using.output
     # The lines of two threads may be mixed up, but nothing is missing.
-    wait_for(lambda: told[-1] in "".join(using.output), what=using.output)
+    eventually(lambda: told[-1] in "".join(using.output), what=using.output)
     shown = "".join(using.output)
     assert {text: shown.count(text) for text in told} == {text: told.count(text) for text in told}
     os.kill(serving.pid, signal.SIGINT)
     assert serving.popen.wait(30) == 0
-    wait_for(lambda: serving.output[-1] == "bye\n", what=serving.output)
+    eventually(lambda: serving.output[-1] == "bye\n", what=serving.output)

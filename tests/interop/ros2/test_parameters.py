@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import eventually
 
 import rosglass
 from rosglass.comm import ParameterType, Range
@@ -48,7 +49,7 @@ def start_robot(start: Any) -> Iterator[Any]:
         process.end()
 
 
-def test_another_programs_parameters(join: Any, start_robot: Any, wait_for: Any) -> None:
+def test_another_programs_parameters(join: Any, start_robot: Any) -> None:
     node = join("cockpit")
     robot = start_robot(node.url, "-p", "speed:=2.0", "-r", "chatter:=talk")
     client = node.create_parameter_client("/arm/robot")
@@ -78,7 +79,7 @@ def test_another_programs_parameters(join: Any, start_robot: Any, wait_for: Any)
     robot.ask(read=True)
     assert robot.event("speed") == 4.0
     robot.ask(set={SPEED: 0.5})
-    wait_for(lambda: [e for e in events if e.changed == {SPEED: 0.5}])
+    eventually(lambda: [e for e in events if e.changed == {SPEED: 0.5}])
     changed = [event.changed for event in events if event.changed]
     assert changed == [
         {SPEED: 3.5},
@@ -88,7 +89,7 @@ def test_another_programs_parameters(join: Any, start_robot: Any, wait_for: Any)
     ]
 
 
-def test_a_program_killed_while_it_is_asked(join: Any, start_robot: Any, wait_for: Any) -> None:
+def test_a_program_killed_while_it_is_asked(join: Any, start_robot: Any) -> None:
     node = join("cockpit")
     robot = start_robot(node.url)
     client = node.create_parameter_client("/arm/robot")
@@ -117,12 +118,10 @@ def test_a_program_killed_while_it_is_asked(join: Any, start_robot: Any, wait_fo
             return client.get([SPEED], timeout=1)
         return {}
 
-    assert wait_for(answer) == {SPEED: 1.0}
+    assert eventually(answer) == {SPEED: 1.0}
 
 
-def test_doras_parameters(
-    start: Any, dds_connect: Any, dds_domain: int, interfaces: Path, wait_for: Any
-) -> None:
+def test_doras_parameters(start: Any, dds_connect: Any, dds_domain: int, interfaces: Path) -> None:
     pytest.importorskip("dora", reason='needs pip install "rosglass[peers]"')
     given = {"speed": 1.5, "count": 3, "name": "x", "on": True, "names": ["a", "b"], "ints": [1]}
     plan = {"domain": dds_domain, "interfaces": str(interfaces), "parameters": given}
@@ -152,5 +151,5 @@ def test_doras_parameters(
     with pytest.raises(ServiceError, match="SetParametersAtomically_Response"):
         client.set_atomically({"speed": 3.5})
     dora.ask(set=["speed", 9.5])
-    wait_for(lambda: [event for event in events if event.changed == {"speed": 9.5}])
+    eventually(lambda: [event for event in events if event.changed == {"speed": 9.5}])
     assert {event.node for event in events} == {"/dora/dora_node"}

@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import partial
 
 import pytest
+from waiting import eventually, nothing_happens
 
 import rosglass
 from rosglass import Duration, QoS
@@ -51,28 +52,28 @@ def told(events):
     return [(e.change, e.count) for e in events]
 
 
-def test_both_sides_tell_who_comes_and_goes(nodes, topic, wait_for):
+def test_both_sides_tell_who_comes_and_goes(nodes, topic):
     talker, listener = nodes
     subscription = listener.create_subscription(topic, STRING)
     ours, theirs = [], []
     subscription.on_matched(ours.append)
     publisher = talker.create_publisher(topic, STRING)
     publisher.on_matched(theirs.append)
-    wait_for(lambda: told(ours) == told(theirs) == [(1, 1)])
+    eventually(lambda: told(ours) == told(theirs) == [(1, 1)])
     assert ours[0].endpoint.gid == listener.publishers(topic)[0].gid
     assert theirs[0].endpoint.gid == talker.subscriptions(topic)[0].gid
     assert (subscription.publisher_count(), publisher.subscription_count()) == (1, 1)
     publisher.close()
-    wait_for(lambda: told(ours)[1:] == [(-1, 0)])
+    eventually(lambda: told(ours)[1:] == [(-1, 0)])
     second = talker.create_publisher(topic, STRING)
-    wait_for(lambda: told(ours)[2:] == [(1, 1)])
+    eventually(lambda: told(ours)[2:] == [(1, 1)])
     second.on_matched(theirs.append)
-    wait_for(lambda: told(theirs)[1:] == [(1, 1)])
+    eventually(lambda: told(theirs)[1:] == [(1, 1)])
     subscription.close()
-    wait_for(lambda: told(theirs)[2:] == [(-1, 0)])
+    eventually(lambda: told(theirs)[2:] == [(-1, 0)])
 
 
-def test_profiles_that_do_not_match_are_told_to_both(world, nodes, topic, wait_for):
+def test_profiles_that_do_not_match_are_told_to_both(world, nodes, topic):
     talker, listener = nodes
     wanted = QoS.latched()
     subscription = listener.create_subscription(topic, STRING, qos=wanted)
@@ -81,12 +82,12 @@ def test_profiles_that_do_not_match_are_told_to_both(world, nodes, topic, wait_f
     subscription.on_incompatible_qos(ours.append)
     publisher.on_incompatible_qos(theirs.append)
     for events in (ours, theirs):
-        (event,) = wait_for(lambda events=events: events)
+        (event,) = eventually(lambda events=events: events)
         assert event.endpoint.name == topic
         assert event.policies == ("reliability", "durability")
     for side, peer in ((subscription, "talker"), (publisher, "listener")):
         problem = f"/{peer} does not match (reliability: reliable requested"
-        wait_for(lambda side=side, problem=problem: problem in side.problem)
+        eventually(lambda side=side, problem=problem: problem in side.problem)
     if world == "dds":
         assert "nothing is received" in subscription.problem
         assert (subscription.publisher_count(), publisher.subscription_count()) == (0, 0)
@@ -94,26 +95,26 @@ def test_profiles_that_do_not_match_are_told_to_both(world, nodes, topic, wait_f
         assert subscription.wait(0.3) is None
     else:
         assert "without that guarantee" in subscription.problem
-        wait_for(publisher.subscription_count)
+        eventually(publisher.subscription_count)
 
         def arrived():
             publisher.publish(data="x")
             return subscription.wait(0.1)
 
-        wait_for(arrived)
+        eventually(arrived)
 
 
-def test_what_is_available_adapts_to_who_comes(nodes, topic, wait_for):
+def test_what_is_available_adapts_to_who_comes(nodes, topic):
     talker, listener = nodes
     latched = talker.create_publisher(topic, STRING, QoS.latched())
     latched.publish(data="kept")
-    wait_for(lambda: listener.publishers(topic))
+    eventually(lambda: listener.publishers(topic))
     subscription = listener.create_subscription(topic, STRING, qos=QoS.best_available())
     assert subscription.qos.durability is Durability.TRANSIENT_LOCAL
     assert subscription.wait(30).message().data == "kept"
     fast = talker.create_publisher(topic, STRING, BEST_EFFORT)
-    wait_for(lambda: subscription.qos == BEST_EFFORT)
-    wait_for(lambda: fast.subscription_count() == 1)
+    eventually(lambda: subscription.qos == BEST_EFFORT)
+    eventually(lambda: fast.subscription_count() == 1)
     assert subscription.publisher_count() == 2
     received = []
 
@@ -123,7 +124,7 @@ def test_what_is_available_adapts_to_who_comes(nodes, topic, wait_for):
             received.append(sample.message().data)
         return "fast" in received
 
-    wait_for(arrived)
+    eventually(arrived)
     latched.publish(data="more")
     while "more" not in received:
         received.append(subscription.wait(30).message().data)
@@ -132,13 +133,13 @@ def test_what_is_available_adapts_to_who_comes(nodes, topic, wait_for):
     assert subscription.problem == ""
 
 
-def test_a_publisher_of_what_is_available_serves_everybody(nodes, topic, wait_for):
+def test_a_publisher_of_what_is_available_serves_everybody(nodes, topic):
     talker, listener = nodes
     strict = listener.create_subscription(topic, STRING, qos=QoS.latched())
     loose = listener.create_subscription(topic, STRING, qos=BEST_EFFORT)
-    wait_for(lambda: len(talker.subscriptions(topic)) == 2)
+    eventually(lambda: len(talker.subscriptions(topic)) == 2)
     publisher = talker.create_publisher(topic, STRING, QoS.best_available())
-    wait_for(lambda: publisher.subscription_count() == 2)
+    eventually(lambda: publisher.subscription_count() == 2)
     assert publisher.problem == ""
     received = set()
 
@@ -147,24 +148,24 @@ def test_a_publisher_of_what_is_available_serves_everybody(nodes, topic, wait_fo
         received.update(s for s in (strict, loose) if s.take() is not None)
         return len(received) == 2
 
-    wait_for(arrived)
+    eventually(arrived)
 
 
-def test_deadlines_are_watched_on_both_sides(nodes, topic, wait_for):
+def test_deadlines_are_watched_on_both_sides(nodes, topic):
     talker, listener = nodes
     qos = QoS(deadline=SHORT)
     subscription = listener.create_subscription(topic, STRING, qos=qos)
     publisher = talker.create_publisher(topic, STRING, qos)
-    wait_for(publisher.subscription_count)
+    eventually(publisher.subscription_count)
     publisher.publish(data="x")
     missed, skipped = [], []
     subscription.on_deadline_missed(missed.append)
     publisher.on_deadline_missed(skipped.append)
-    wait_for(lambda: len(missed) >= 2 and len(skipped) >= 2)
+    eventually(lambda: len(missed) >= 2 and len(skipped) >= 2)
     assert missed[-1].total == sum(event.change for event in missed)
 
 
-def test_manual_liveliness_is_kept_by_sending_and_lost_by_silence(world, nodes, topic, wait_for):
+def test_manual_liveliness_is_kept_by_sending_and_lost_by_silence(world, nodes, topic):
     talker, listener = nodes
     manual = QoS(liveliness=Liveliness.MANUAL_BY_TOPIC, lease_duration=SHORT)
     subscription = listener.create_subscription(topic, STRING, qos=manual)
@@ -172,27 +173,27 @@ def test_manual_liveliness_is_kept_by_sending_and_lost_by_silence(world, nodes, 
     changes, lost = [], []
     subscription.on_liveliness_change(changes.append)
     publisher.on_liveliness_lost(lost.append)
-    wait_for(publisher.subscription_count)
+    eventually(publisher.subscription_count)
     show = publisher.assert_liveliness if world == "dds" else partial(publisher.publish, data="x")
 
     def alive():
         show()
         return bool(changes) and changes[-1].alive == 1
 
-    wait_for(alive)
+    eventually(alive)
     end = time.monotonic() + 0.6
     count = len(changes)
     while time.monotonic() < end:
         show()
         time.sleep(0.02)
     assert len(changes) == count or changes[-1].alive == 1
-    wait_for(lambda: changes[-1].change == -1 and lost)
+    eventually(lambda: changes[-1].change == -1 and lost)
     assert (changes[-1].alive, changes[-1].not_alive) == (0, 1)
     publisher.publish(data="x")
-    wait_for(lambda: changes[-1].change == 1)
+    eventually(lambda: changes[-1].change == 1)
 
 
-def test_a_relay_passes_on_a_type_that_it_does_not_know(link, topic, wait_for):
+def test_a_relay_passes_on_a_type_that_it_does_not_know(link, topic):
     library = Library()
     library.add_text("secret_msgs/msg/Thing", "string text\nint32[] numbers\n")
     secret = rosglass.load("secret_msgs/msg/Thing", library=library)
@@ -208,15 +209,15 @@ def test_a_relay_passes_on_a_type_that_it_does_not_know(link, topic, wait_for):
         sample = taken.wait(0.1)
         return sample
 
-    wait_for(arrived)
+    eventually(arrived)
     assert sample.type == OpaqueType(secret.name, secret.rihs01)
     with pytest.raises(rosglass.TypeNotFoundError, match="only bytes"):
         sample.message()
     second = relay.create_publisher(f"{topic}/b", sample.type)
     final = sink.create_subscription(f"{topic}/b", secret)
-    (endpoint,) = wait_for(lambda: sink.publishers(f"{topic}/b"))
+    (endpoint,) = eventually(lambda: sink.publishers(f"{topic}/b"))
     assert (endpoint.type, endpoint.type_hash) == (secret.name, secret.rihs01)
-    wait_for(second.subscription_count)
+    eventually(second.subscription_count)
     got = None
 
     def passed_on():
@@ -225,12 +226,12 @@ def test_a_relay_passes_on_a_type_that_it_does_not_know(link, topic, wait_for):
         got = final.wait(0.1)
         return got
 
-    wait_for(passed_on)
+    eventually(passed_on)
     assert got.message() == secret.create(value)
     assert final.problem == ""
 
 
-def test_local_messages_come_once_and_can_be_left_out(link, topic, wait_for):
+def test_local_messages_come_once_and_can_be_left_out(link, topic):
     first, second = link("first"), link("second")
     publisher = first.create_publisher(topic, STRING, 100)
     seen = {"own": [], "other": [], "never": []}
@@ -243,34 +244,34 @@ def test_local_messages_come_once_and_can_be_left_out(link, topic, wait_for):
             ignore_local=name == "never",
             **arguments,
         )
-    wait_for(lambda: publisher.subscription_count() == 3)
+    eventually(lambda: publisher.subscription_count() == 3)
     for node in (first, second):
-        wait_for(lambda node=node: node.publishers(topic))
+        eventually(lambda node=node: node.publishers(topic))
 
     def linked():
         publisher.publish(data="ready?")
         return seen["own"] and seen["other"]
 
-    wait_for(linked)
+    eventually(linked)
     texts = [str(number) for number in range(20)]
     for text in texts:
         publisher.publish(data=text)
     for name in ("own", "other"):
-        wait_for(lambda name=name: "19" in seen[name])
-    time.sleep(0.1)
+        eventually(lambda name=name: "19" in seen[name])
+    nothing_happens(0.1)
     for name in ("own", "other"):
         assert [text for text in seen[name] if text != "ready?"] == texts
     assert seen["never"] == []
 
 
-def test_several_types_on_one_topic(nodes, topic, wait_for):
+def test_several_types_on_one_topic(nodes, topic):
     talker, listener = nodes
     texts, twists = (talker.create_publisher(topic, name) for name in (STRING, TWIST))
-    wait_for(lambda: len(listener.publishers(topic)) == 2)
+    eventually(lambda: len(listener.publishers(topic)) == 2)
     unsure = listener.create_subscription(topic)
-    wait_for(lambda: "published with several types" in unsure.problem)
+    eventually(lambda: "published with several types" in unsure.problem)
     chosen = {name: listener.create_subscription(topic, name) for name in (STRING, TWIST)}
-    wait_for(lambda: texts.subscription_count() == twists.subscription_count() == 1)
+    eventually(lambda: texts.subscription_count() == twists.subscription_count() == 1)
     received = {}
 
     def arrived():
@@ -282,28 +283,28 @@ def test_several_types_on_one_topic(nodes, topic, wait_for):
                 received[name] = sample.message()
         return len(received) == 2
 
-    wait_for(arrived)
+    eventually(arrived)
     assert received[STRING].data == "x"
     assert received[TWIST].linear.x == 2.0
     texts.close()
-    wait_for(lambda: unsure.type and unsure.type.name == TWIST)
+    eventually(lambda: unsure.type and unsure.type.name == TWIST)
 
 
-def test_the_last_message_of_a_topic_comes_at_once(nodes, topic, wait_for):
+def test_the_last_message_of_a_topic_comes_at_once(nodes, topic):
     talker, listener = nodes
     qos = replace(QoS.latched(), deadline=Duration.from_seconds(60))
     talker.create_publisher(topic, STRING, qos).publish(data="kept")
-    wait_for(lambda: listener.publishers(topic))
+    eventually(lambda: listener.publishers(topic))
     assert listener.wait_for_message(topic, timeout=30).data == "kept"
     with pytest.raises(rosglass.TimeoutError, match=f"nobody publishes {topic}_; did you mean"):
         listener.wait_for_message(f"{topic}_", timeout=0.1)
 
 
-def test_what_nobody_waits_for_is_there_when_somebody_looks(nodes, topic, wait_for):
+def test_what_nobody_waits_for_is_there_when_somebody_looks(nodes, topic):
     talker, listener = nodes
     publisher = talker.create_publisher(topic, STRING)
     subscription = listener.create_subscription(topic, STRING, qos=1)
-    wait_for(publisher.subscription_count)
+    eventually(publisher.subscription_count)
     end = time.monotonic() + 2.5
     number = 0
     behind = []

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import eventually
 
 import rosglass
 from rosglass.comm import GoalStatus, QoS, Reliability
@@ -82,21 +83,21 @@ def do(peer: Any, task: str, **arguments: Any) -> Any:
 # -- topics ----------------------------------------------------------------------------------------
 
 
-def test_we_receive_what_rclpy_publishes(peer, node, wait_for):
+def test_we_receive_what_rclpy_publishes(peer, node):
     do(peer, "advertise", topic="/chatter", type=STRING, depth=50)
     got: list[Any] = []
     with node.create_subscription("/chatter", STRING, got.append, QoS(50)) as subscription:
-        wait_for(subscription.publisher_count)
+        eventually(subscription.publisher_count)
         values = [{"data": f"Grüße {n}"} for n in range(20)]
         do(peer, "publish", topic="/chatter", values=values)
-        wait_for(lambda: len(got) >= 20, 30, lambda: got)
+        eventually(lambda: len(got) >= 20, timeout=30, what=lambda: got)
     assert [message.data for message in got] == [value["data"] for value in values]
 
 
-def test_rclpy_receives_what_we_publish(peer, node, wait_for):
+def test_rclpy_receives_what_we_publish(peer, node):
     do(peer, "subscribe", topic="/cmd_vel", type=TWIST, depth=50)
     with node.create_publisher("/cmd_vel", TWIST, QoS(50)) as publisher:
-        wait_for(publisher.subscription_count)
+        eventually(publisher.subscription_count)
         for n in range(20):
             publisher.publish({"linear": {"x": n / 2}, "angular": {"z": -n}})
         got = [peer.event("received /cmd_vel") for _ in range(20)]
@@ -104,12 +105,12 @@ def test_rclpy_receives_what_we_publish(peer, node, wait_for):
     assert [value["angular"]["z"] for value in got] == [-n for n in range(20)]
 
 
-def test_what_rclpy_latched_comes_late_but_comes(peer, node, wait_for):
+def test_what_rclpy_latched_comes_late_but_comes(peer, node):
     do(peer, "advertise", topic="/map_name", type=STRING, latched=True, depth=1)
     do(peer, "publish", topic="/map_name", values=[{"data": "a"}, {"data": "b"}], matched=0)
     got: list[Any] = []
     with node.create_subscription("/map_name", STRING, got.append, QoS.latched()):
-        wait_for(lambda: got)
+        eventually(lambda: got)
     assert [message.data for message in got] == ["b"]
 
 
@@ -121,7 +122,7 @@ def test_what_we_latched_reaches_rclpy_late(peer, node):
         assert peer.event("received /our_map") == {"data": "b"}
 
 
-def test_best_effort_both_ways(peer, node, wait_for):
+def test_best_effort_both_ways(peer, node):
     do(peer, "advertise", topic="/scan_name", type=STRING, best_effort=True)
     do(peer, "subscribe", topic="/our_scan", type=STRING, best_effort=True)
     got: list[Any] = []
@@ -130,24 +131,24 @@ def test_best_effort_both_ways(peer, node, wait_for):
         node.create_subscription("/scan_name", STRING, got.append, qos) as subscription,
         node.create_publisher("/our_scan", STRING, qos) as publisher,
     ):
-        wait_for(lambda: subscription.publisher_count() and publisher.subscription_count())
+        eventually(lambda: subscription.publisher_count() and publisher.subscription_count())
         do(peer, "publish", topic="/scan_name", values=[{"data": "theirs"}] * 3, period=0.1)
-        wait_for(lambda: got)
+        eventually(lambda: got)
         publisher.publish(data="ours")
         assert peer.event("received /our_scan") == {"data": "ours"}
     assert got[0].data == "theirs"
 
 
-def test_profiles_that_do_not_match_are_named_here(peer, node, wait_for):
+def test_profiles_that_do_not_match_are_named_here(peer, node):
     do(peer, "advertise", topic="/volatile", type=STRING, best_effort=True)
     with node.create_subscription("/volatile", STRING, print, QoS.latched()) as subscription:
-        problem = wait_for(lambda: subscription.problem)
+        problem = eventually(lambda: subscription.problem)
     assert NAME in problem
     assert "reliab" in problem
 
 
 @pytest.mark.parametrize("size", [100_000, 6_220_800])
-def test_big_messages_both_ways(peer, node, wait_for, size):
+def test_big_messages_both_ways(peer, node, size):
     picture = {"height": 1, "width": size // 3, "step": size, "encoding": "rgb8"}
     data = (bytes(range(251)) * (size // 251 + 1))[:size]
     got: list[Any] = []
@@ -157,10 +158,10 @@ def test_big_messages_both_ways(peer, node, wait_for, size):
         node.create_subscription(f"/theirs{size}", IMAGE, got.append) as subscription,
         node.create_publisher(f"/ours{size}", IMAGE) as publisher,
     ):
-        wait_for(lambda: subscription.publisher_count() and publisher.subscription_count())
+        eventually(lambda: subscription.publisher_count() and publisher.subscription_count())
         value = picture | {"data": {"fill": size}}
         do(peer, "publish", topic=f"/theirs{size}", values=[value])
-        wait_for(lambda: got)
+        eventually(lambda: got)
         publisher.publish(picture | {"data": data})
         assert peer.event(f"received /ours{size}")["data"] == [size, zlib.crc32(data)]
     assert bytes(got[0].data) == data
@@ -171,7 +172,7 @@ def test_big_messages_both_ways(peer, node, wait_for, size):
     # Where all processors are busy, 93 MB a second come late: none is displaced by the next ones.
     [(640, 480, 30, 120, 10), (1920, 1080, 15, 45, 45)],
 )
-def test_rclpy_receives_every_picture(peer, node, wait_for, width, height, rate, count, depth):
+def test_rclpy_receives_every_picture(peer, node, width, height, rate, count, depth):
     """Its socket holds 208 kB by default; bursts of ours overran that again and again."""
     topic = f"/camera{width}"
     do(peer, "subscribe", topic=topic, type=IMAGE, quiet=True, depth=depth)
@@ -179,7 +180,7 @@ def test_rclpy_receives_every_picture(peer, node, wait_for, width, height, rate,
         height=height, width=width, encoding="rgb8", step=3 * width, data=bytes(3 * width * height)
     )
     with node.create_publisher(topic, IMAGE, QoS(depth)) as publisher:
-        wait_for(publisher.subscription_count)
+        eventually(publisher.subscription_count)
         ended = threading.Event()
         sent: list[int] = []
 
@@ -329,7 +330,7 @@ def test_rclpy_sends_us_goals(peer, informed):
 # -- parameters ------------------------------------------------------------------------------------
 
 
-def test_we_set_parameters_of_rclpy(peer, node, wait_for):
+def test_we_set_parameters_of_rclpy(peer, node):
     with node.create_parameter_client(NAME) as client:
         changes: list[Any] = []
         client.watch(changes.append)
@@ -339,7 +340,7 @@ def test_we_set_parameters_of_rclpy(peer, node, wait_for):
         results = client.set({"speed": 0.75, "name": 3})
         assert [result.successful for result in results.values()] == [True, False]
         assert "type" in results["name"].reason
-        wait_for(lambda: [change for change in changes if change.changed == {"speed": 0.75}])
+        eventually(lambda: [change for change in changes if change.changed == {"speed": 0.75}])
     assert do(peer, "own_parameter", name="speed") == 0.75
 
 
@@ -355,18 +356,18 @@ def test_rclpy_sets_our_parameters(peer, node):
 # -- graph -----------------------------------------------------------------------------------------
 
 
-def test_we_see_the_nodes_and_topics_of_rclpy(peer, node, wait_for):
+def test_we_see_the_nodes_and_topics_of_rclpy(peer, node):
     do(peer, "advertise", topic="/seen", type=TWIST, best_effort=True)
-    wait_for(lambda: node.publishers("/seen"))
-    wait_for(lambda: NAME in [name.full for name in node.nodes()])
-    (end,) = wait_for(lambda: [e for e in node.publishers("/seen") if e.node.full == NAME])
+    eventually(lambda: node.publishers("/seen"))
+    eventually(lambda: NAME in [name.full for name in node.nodes()])
+    (end,) = eventually(lambda: [e for e in node.publishers("/seen") if e.node.full == NAME])
     assert end.type == TWIST
     assert end.type_hash == rihs01(Library().definition(TWIST))
     assert end.qos.reliability is Reliability.BEST_EFFORT
     assert node.services()[f"{NAME}/get_parameters"] == ["rcl_interfaces/srv/GetParameters"]
 
 
-def test_rclpy_sees_our_nodes_and_topics(peer, node, wait_for):
+def test_rclpy_sees_our_nodes_and_topics(peer, node):
     def seen() -> Any:
         found = do(peer, "graph")
         return found if "/shown" in found["topics"] and "/own/cockpit" in found["nodes"] else None
@@ -379,10 +380,10 @@ def test_rclpy_sees_our_nodes_and_topics(peer, node, wait_for):
         node.create_publisher("/shown", TWIST, QoS.latched()),
         node.create_service_server("/shown_service", SWITCH, lambda _: {}),
     ):
-        found = wait_for(seen)
+        found = eventually(seen)
         assert found["topics"]["/shown"] == [TWIST]
         assert found["services"]["/shown_service"] == [SWITCH]
-        ends = wait_for(shown)
+        ends = eventually(shown)
         assert ends == [
             {
                 "node": "/own/cockpit", "type": TWIST, "kind": "PUBLISHER",
@@ -395,23 +396,21 @@ def test_rclpy_sees_our_nodes_and_topics(peer, node, wait_for):
 # -- types that only the peer knows ----------------------------------------------------------------
 
 
-def test_a_message_that_only_rclpy_knows(peer, node, wait_for):
+def test_a_message_that_only_rclpy_knows(peer, node):
     do(peer, "advertise", topic="/basic", type=BASIC)
     got: list[Any] = []
     with node.create_subscription("/basic", None, got.append) as subscription:
-        wait_for(subscription.publisher_count)
-        wait_for(lambda: subscription.type, 30, lambda: subscription.problem)
+        eventually(subscription.publisher_count)
+        eventually(lambda: subscription.type, timeout=30, what=lambda: subscription.problem)
         do(peer, "publish", topic="/basic", values=[{"int32_value": 7, "float64_value": 0.1}])
-        wait_for(lambda: got)
+        eventually(lambda: got)
     assert (got[0].int32_value, got[0].float64_value) == (7, 0.1)
 
 
-def test_services_and_actions_that_only_rclpy_knows_are_refused_with_the_reason(
-    peer, node, wait_for
-):
+def test_services_and_actions_that_only_rclpy_knows_are_refused_with_the_reason(peer, node):
     do(peer, "serve", service="/real/unknown", type=ECHO)
     with node.create_service_client("/real/unknown") as client:
-        problem = wait_for(lambda: "Over DDS" in client.problem and client.problem)
+        problem = eventually(lambda: "Over DDS" in client.problem and client.problem)
     assert ECHO in problem
     package = ECHO.partition("/")[0]
     assert f"ros2 pkg prefix --share {package} says where" in problem

@@ -6,6 +6,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import eventually
 
 from rosglass.comm import Durability, QoS
 from rosglass.messages import MessageType
@@ -28,7 +29,6 @@ def test_wstrings_reach_rclpy_and_come_back(
     rclpy_python: Path,
     start_rclpy: Callable[..., subprocess.Popen[str]],
     dds_connect: Callable[..., Node],
-    wait_for: Any,
 ) -> None:
     file = rclpy_python.parents[1] / "share/test_msgs/msg/WStrings.msg"
     kind = MessageType.from_text(WSTRINGS, file.read_text(encoding="utf-8"))
@@ -41,7 +41,7 @@ def test_wstrings_reach_rclpy_and_come_back(
     asked = node.create_publisher("/asked", kind, kept)
     for count, text in enumerate(TEXTS, 1):
         asked.publish(wstring_value=text, unbounded_sequence_of_wstrings=TEXTS)
-        wait_for(lambda count=count: len(answers) == count, what=f"the answer to {text!r}")
+        eventually(lambda count=count: len(answers) == count, what=f"the answer to {text!r}")
         assert json.loads(peer.stdout.readline()) == [text, *TEXTS]
         message = answers[-1]
         assert message.wstring_value == text

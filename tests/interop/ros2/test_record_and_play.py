@@ -15,6 +15,7 @@ import pytest
 from mcap_ros2.reader import read_ros2_messages
 from rosbags import rosbag1
 from rosbags.typesys import Stores, get_typestore
+from waiting import eventually
 
 from rosglass.bags import Player, PlayerState, Recorder, open_bag
 from rosglass.comm import QoS
@@ -28,14 +29,6 @@ if TYPE_CHECKING:
     from rosglass.comm import Node
 
 STRING, GRID = "std_msgs/msg/String", "nav_msgs/msg/OccupancyGrid"
-
-
-def until(condition: Callable[[], Any], timeout: float = 30.0) -> Any:
-    deadline = time.monotonic() + timeout
-    while not (value := condition()):
-        assert time.monotonic() < deadline, f"not within {timeout} s"
-        time.sleep(0.01)
-    return value
 
 
 @pytest.fixture(params=["zenoh", "dds"])
@@ -55,12 +48,12 @@ def recording(join: Callable[..., Node], tmp_path: Path) -> Path:
     texts = robot.create_publisher("/chatter", STRING)
     path = tmp_path / "a.mcap"
     with Recorder(ears, path, exclude="/rosout|/parameter_events") as recorder:
-        until(lambda: texts.subscription_count() and secret.subscription_count())
+        eventually(lambda: texts.subscription_count() and secret.subscription_count())
         for i in range(10):
             texts.publish(data=f"n{i}")
             secret.publish_serialized(b"\0\1\0\0" + bytes([i]))
             time.sleep(0.1)
-        until(lambda: recorder.status().messages >= 21)
+        eventually(lambda: recorder.status().messages >= 21)
         assert not recorder.status().dropped
     robot.close()
     ears.close()
@@ -72,11 +65,11 @@ def test_all_types_of_a_topic_are_recorded(join: Callable[..., Node], tmp_path: 
     texts = robot.create_publisher("/mixed", STRING)
     path = tmp_path / "mixed.mcap"
     with Recorder(ears, path, ["/mixed"]) as recorder:
-        until(texts.subscription_count)
+        eventually(texts.subscription_count)
         texts.publish(data="x")
-        until(lambda: recorder.status().messages)
+        eventually(lambda: recorder.status().messages)
         switches = robot.create_publisher("/mixed", "std_msgs/msg/Bool")
-        until(lambda: switches.subscription_count() > 1 or len(ears.topics()["/mixed"]) > 1)
+        eventually(lambda: switches.subscription_count() > 1 or len(ears.topics()["/mixed"]) > 1)
 
         def both() -> bool:
             texts.publish(data="y")
@@ -85,7 +78,7 @@ def test_all_types_of_a_topic_are_recorded(join: Callable[..., Node], tmp_path: 
             with recorder._lock:
                 return len(recorder._channels) == 2
 
-        until(both)
+        eventually(both)
         assert recorder.status().problems == {}
     with open_bag(path) as bag:
         assert [channel.type_name for channel in bag.channels] == ["std_msgs/msg/Bool", STRING]
@@ -119,12 +112,12 @@ def test_a_recording_is_read_by_others_and_played_by_us(
         assert player.status().sent == 21
         assert player.problems == {}
         assert time.monotonic() - began > bag.duration / 3
-        until(lambda: len(heard) == 10)
+        eventually(lambda: len(heard) == 10)
         assert heard == [f"n{i}" for i in range(10)]
         sample = grid.wait(30)
         assert sample is not None
         assert list(sample.message().data) == [1, 2]
-        until(lambda: secret.statistics().received == 10)
+        eventually(lambda: secret.statistics().received == 10)
         assert len(times) > 2
 
 
@@ -136,20 +129,20 @@ def test_pausing_stepping_seeking_and_looping(join: Callable[..., Node], recordi
         open_bag(recording) as bag,
         Player(node, bag, topics=["chatter"], paused=True, loop=True) as player,
     ):
-        until(lambda: player.status().state is PlayerState.PAUSED)
+        eventually(lambda: player.status().state is PlayerState.PAUSED)
         assert heard == []
         player.step()
-        until(lambda: heard == ["n0"])
+        eventually(lambda: heard == ["n0"])
         player.seek(bag.duration - 0.25)
         player.resume()
-        until(lambda: "n9" in heard)
+        eventually(lambda: "n9" in heard)
         assert "n4" not in heard[: heard.index("n9")]
-        until(lambda: heard.count("n0") == 2)
+        eventually(lambda: heard.count("n0") == 2)
         player.pause()
         assert player.is_paused
         player.set_rate(1000.0)
         player.resume()
-        until(lambda: len(heard) > 100)
+        eventually(lambda: len(heard) > 100)
         for wrong in (-1, 1e9, float("nan"), True, "1"):
             with pytest.raises(BagError, match="position must be a number from 0"):
                 player.seek(wrong)  # type: ignore[arg-type]
@@ -162,7 +155,7 @@ def test_mixing_with_a_robot_is_said(
 ) -> None:
     node, robot = join("player"), join("robot2")
     robot.create_publisher("/chatter", STRING)
-    until(lambda: node.publishers("/chatter"))
+    eventually(lambda: node.publishers("/chatter"))
     with (
         caplog.at_level(logging.WARNING),
         open_bag(recording) as bag,
@@ -190,7 +183,7 @@ def test_wrong_arguments_are_refused(
     path = tmp_path / "a.mcap"
     with Recorder(node, path) as recorder:
         node.create_publisher("/chatter", STRING, QoS.latched()).publish(data="x")
-        until(lambda: recorder.status().messages)
+        eventually(lambda: recorder.status().messages)
     with open_bag(path) as bag, pytest.raises(BagError, match=message):
         Player(node, bag, **options)
     with pytest.raises(BagError, match="File exists"):
@@ -227,7 +220,7 @@ def test_the_commands_with_a_ros1_bag(
         [*rosglass, "record", "/scan", "-o", str(output), "--url", router.url],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
-    until(output.exists)
+    eventually(output.exists)
     played = subprocess.run(
         [*rosglass, "play", str(tmp_path / "a.bag"), "--url", router.url, "--delay", "2"],
         capture_output=True, text=True, check=True, timeout=60,

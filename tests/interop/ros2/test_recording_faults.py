@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader
+from waiting import eventually
 
 from rosglass.bags import Recorder, open_bag
 from rosglass.comm import QoS
@@ -73,7 +74,7 @@ def test_a_killed_recording_is_readable_but_for_its_last_second(start, router, t
     assert len(read) == KILLS
 
 
-def test_what_comes_now_and_then_is_in_the_file_within_a_second(connect, tmp_path, wait_for):
+def test_what_comes_now_and_then_is_in_the_file_within_a_second(connect, tmp_path):
     robot, panel = connect("robot"), connect("panel")
     publisher = robot.create_publisher("/numbers", "std_msgs/msg/ByteMultiArray", QoS.latched())
     path = tmp_path / "rare.mcap"
@@ -84,11 +85,11 @@ def test_what_comes_now_and_then_is_in_the_file_within_a_second(connect, tmp_pat
 
     with Recorder(panel, path, ["/numbers"]):
         publish(0)
-        wait_for(lambda: 0 in numbers(path))  # just written
+        eventually(lambda: 0 in numbers(path))  # just written
         sent = publish(1)
         time.sleep(0.9)
         publish(2)
-        wait_for(lambda: 1 in numbers(path))
+        eventually(lambda: 1 in numbers(path))
         # Half a second is usual; not a second after the last that came.
         assert time.monotonic() - sent < 1.6
 
@@ -110,9 +111,7 @@ def on_a_full_disk(start_program, router, tmp_path, disk):
 
 
 @pytest.mark.parametrize("disk", ["limit", "tmpfs"])
-def test_a_full_disk_is_said_and_costs_the_last_second(
-    start_program, router, tmp_path, wait_for, disk
-):
+def test_a_full_disk_is_said_and_costs_the_last_second(start_program, router, tmp_path, disk):
     peer, path = on_a_full_disk(start_program, router, tmp_path, disk)
     events = []
     while not peer.event("error", 0.01, otherwise=""):
@@ -122,7 +121,7 @@ def test_a_full_disk_is_said_and_costs_the_last_second(
     closed = peer.event("closed")
     why = "File too large" if disk == "limit" else "No space left on device"
     assert f"full.mcap cannot be written: {why}; nothing more is recorded" in closed
-    wait_for(path.exists)
+    eventually(path.exists)
     peer.popen.wait()
     assert check(path, events, ended) > 500
     assert not any("Traceback" in line for line in peer.output), peer.output

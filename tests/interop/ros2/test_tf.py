@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from waiting import eventually
 
 from rosglass.comm import Time
 from rosglass.errors import ExtrapolationException, UnsupportedError
@@ -29,7 +30,7 @@ def node(request: pytest.FixtureRequest) -> Any:
     return connect("cockpit")
 
 
-def test_two_robots(node: Any, start: Any, wait_for: Any) -> None:
+def test_two_robots(node: Any, start: Any) -> None:
     robots = {}
     for name, frames in (("left", ["camera", "lidar"]), ("right", ["gripper"])):
         plan = {"url": node.url, "name": name, "static": frames}
@@ -41,12 +42,12 @@ def test_two_robots(node: Any, start: Any, wait_for: Any) -> None:
     buffer = listener.buffer
     buffer.wait_for_transform("gripper", "camera", timeout=30)
     buffer.wait_for_transform("gripper", "lidar", timeout=30)
-    wait_for(lambda: buffer.tree()["camera"].authority == "/left")
-    wait_for(lambda: buffer.tree()["gripper"].authority == "/right")
+    eventually(lambda: buffer.tree()["camera"].authority == "/left")
+    eventually(lambda: buffer.tree()["gripper"].authority == "/right")
 
     told: list[None] = []
     buffer.on_change("map", "camera", lambda: told.append(None))
-    wait_for(lambda: listener.subscriptions[0].publisher_count() == 2)
+    eventually(lambda: listener.subscriptions[0].publisher_count() == 2)
     later = Time(START + 50_000_000)
     promise = buffer.lookup_transform_async("map", "camera", later, timeout=30)
     for step in (0, 100_000_000):
@@ -62,7 +63,7 @@ def test_two_robots(node: Any, start: Any, wait_for: Any) -> None:
     listener.close()
 
 
-def test_who_receives_cannot_wait(node: Any, start: Any, wait_for: Any) -> None:
+def test_who_receives_cannot_wait(node: Any, start: Any) -> None:
     plan = {"url": node.url, "name": "waker", "static": ["waker"]}
     robot = start(str(PEERS / "tf_peer.py"), json.dumps(plan))
     robot.event("ready")
@@ -76,32 +77,31 @@ def test_who_receives_cannot_wait(node: Any, start: Any, wait_for: Any) -> None:
             caught.append(error)
 
     listener.buffer.wait_for_transform("base", "waker", timeout=30)
-    wait_for(listener.subscriptions[0].publisher_count)
+    eventually(listener.subscriptions[0].publisher_count)
     listener.buffer.on_update(wait)
     robot.ask(stamp=START)
-    wait_for(lambda: caught)
+    eventually(lambda: caught)
     assert isinstance(caught[0], UnsupportedError)
 
 
-def test_a_clock_that_jumps_back(node: Any, wait_for: Any) -> None:
+def test_a_clock_that_jumps_back(node: Any) -> None:
     listener = TransformListener(node)
     sent = Transform(stamp=Time(START), frame_id="table", child_frame_id="cup")
     broadcaster = TransformBroadcaster(node, namespace="/")
-    wait_for(broadcaster.publisher.subscription_count)
+    eventually(broadcaster.publisher.subscription_count)
     broadcaster.send_transform(sent)
-    wait_for(lambda: listener.buffer.has_frame("cup"))
+    eventually(lambda: listener.buffer.has_frame("cup"))
     node.clock.simulate(True)
     node.clock.advance(Time(START))
-    wait_for(lambda: not listener.buffer.has_frame("cup"))
+    eventually(lambda: not listener.buffer.has_frame("cup"))
     broadcaster.send_transform(sent)
-    wait_for(lambda: listener.buffer.has_frame("cup"))
+    eventually(lambda: listener.buffer.has_frame("cup"))
     node.clock.advance(Time(START - 10**9))
-    wait_for(lambda: not listener.buffer.has_frame("cup"))
+    eventually(lambda: not listener.buffer.has_frame("cup"))
 
 
 def test_the_guide_as_it_is_printed(
     node: Any,
-    wait_for: Any,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -114,8 +114,8 @@ def test_the_guide_as_it_is_printed(
     try:
         for block in blocks:
             exec(compile(block, str(GUIDE), "exec"), names)
-        wait_for(lambda: "camera" in names["buffer"].tree())
-        wait_for(lambda: "odom" in names["buffer"].tree())
+        eventually(lambda: "camera" in names["buffer"].tree())
+        eventually(lambda: "odom" in names["buffer"].tree())
     finally:
         names["node"].close()
     told = capsys.readouterr().out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from waiting import eventually
 
 import rosglass
 from rosglass.comm import NodeName
@@ -65,9 +66,9 @@ def test_we_receive_what_the_peer_publishes(node, type_name, given, peer_values)
 
 
 @pytest.mark.parametrize("type_name", TYPES)
-def test_the_peer_receives_what_we_publish(node, peer, type_name, peer_values, wait_for):
+def test_the_peer_receives_what_we_publish(node, peer, type_name, peer_values):
     publisher = node.create_publisher(topic("to", type_name), type_name)
-    wait_for(publisher.subscription_count, what="the peer's subscription in our graph")
+    eventually(publisher.subscription_count, what="the peer's subscription in our graph")
     value = peer_values.VALUES[type_name]
     received = {}
 
@@ -78,15 +79,15 @@ def test_the_peer_receives_what_we_publish(node, peer, type_name, peer_values, w
             received[event["received"]] = event["value"]
         return publisher.topic in received
 
-    wait_for(arrived, what="our message at the peer")
+    eventually(arrived, what="our message at the peer")
     assert received[publisher.topic] == peer_values.summary(value)
 
 
-def test_the_peer_is_in_our_graph(node, kind, wait_for):
-    wait_for(lambda: NODES[kind] in node.nodes(), what="the peer's node")
+def test_the_peer_is_in_our_graph(node, kind):
+    eventually(lambda: NODES[kind] in node.nodes(), what="the peer's node")
     for type_name in TYPES:
-        (publisher,) = wait_for(lambda t=type_name: node.publishers(topic("from", t)))
-        (subscription,) = wait_for(lambda t=type_name: node.subscriptions(topic("to", t)))
+        (publisher,) = eventually(lambda t=type_name: node.publishers(topic("from", t)))
+        (subscription,) = eventually(lambda t=type_name: node.subscriptions(topic("to", t)))
         announced = "" if kind == "dora-humble" else rosglass.load(type_name).rihs01
         for endpoint in (publisher, subscription):
             assert endpoint.type == type_name
@@ -98,7 +99,7 @@ def test_the_peer_is_in_our_graph(node, kind, wait_for):
 
 
 @pytest.mark.parametrize("kind", ["sdk"], indirect=True)
-def test_we_are_in_the_peers_graph(node, peer, wait_for):
+def test_we_are_in_the_peers_graph(node, peer):
     qos = rosglass.QoS.sensor_data()
     node.create_publisher("ours", "geometry_msgs/msg/Twist", qos)
     node.create_subscription("ours", "geometry_msgs/msg/Twist")
@@ -109,7 +110,7 @@ def test_we_are_in_the_peers_graph(node, peer, wait_for):
         return found if len(found) == 2 else None
 
     twist_hash = rosglass.load("geometry_msgs/msg/Twist").rihs01
-    publisher, subscription = wait_for(seen, what="both ends in the SDK's graph")
+    publisher, subscription = eventually(seen, what="both ends in the SDK's graph")
     assert publisher[1:4] == ["cockpit", "geometry_msgs/msg/Twist", twist_hash]
     assert publisher[4] == "2::,5:,:,:,,"
     assert subscription[1:4] == publisher[1:4]
@@ -117,13 +118,13 @@ def test_we_are_in_the_peers_graph(node, peer, wait_for):
 
 @pytest.mark.parametrize("peer_kind", ["rosglass", "dora-humble", "dora-rep2016"])
 def test_the_last_message_of_a_latched_peer_comes_late_but_comes(
-    peer_kind, router, start_peer, connect, wait_for, peer_values
+    peer_kind, router, start_peer, connect, peer_values
 ):
     name = "geometry_msgs/msg/Twist"
     plan = {"publish": {"/latched": name}, "latched": True, "count": 1, "domain": 8}
     process = start_peer(peer_kind, router, **plan)
     node = connect("late", "?domain=8")
-    wait_for(lambda: node.publishers("/latched"))
+    eventually(lambda: node.publishers("/latched"))
     # So late that the message was sent long before: whoever wants none of the past gets nothing.
     process.event("published")
     assert node.create_subscription("/latched", name).wait(1) is None
@@ -137,7 +138,7 @@ def test_the_last_message_of_a_latched_peer_comes_late_but_comes(
 
 @pytest.mark.parametrize("peer_kind", ["rosglass", "sdk", "dora-humble", "dora-rep2016"])
 def test_our_last_latched_message_reaches_a_late_peer(
-    peer_kind, router, start_peer, connect, wait_for, peer_values
+    peer_kind, router, start_peer, connect, peer_values
 ):
     name = "geometry_msgs/msg/Twist"
     node = connect("early", "?domain=9")
@@ -166,15 +167,15 @@ def test_pictures_through_shared_memory(router, start_peer, connect, peer_values
     process.end()
 
 
-def test_humbles_spelling_between_our_own_nodes(connect, wait_for):
+def test_humbles_spelling_between_our_own_nodes(connect):
     name = "std_msgs/msg/String"
     old = connect("old", "?domain=4&distro=humble")
     new = connect("new", "?domain=4")
     from_old = new.create_subscription("/from_old", name)
     from_new = old.create_subscription("/from_new")
     one, two = old.create_publisher("/from_old", name), new.create_publisher("/from_new", name)
-    wait_for(lambda: one.subscription_count() and two.subscription_count())
-    (endpoint,) = wait_for(lambda: new.publishers("/from_old"))
+    eventually(lambda: one.subscription_count() and two.subscription_count())
+    (endpoint,) = eventually(lambda: new.publishers("/from_old"))
     assert endpoint.type_hash == ""
     one.publish(data="old")
     two.publish(data="new")
@@ -182,7 +183,7 @@ def test_humbles_spelling_between_our_own_nodes(connect, wait_for):
     assert from_new.wait(30).message().data == "new"
 
 
-def test_serving_two_spellings_sends_nothing_twice(connect, wait_for):
+def test_serving_two_spellings_sends_nothing_twice(connect):
     name = "std_msgs/msg/String"
     talker = connect("talker", "?domain=5")
     humble = connect("humble", "?domain=5&distro=humble")
@@ -197,7 +198,7 @@ def test_serving_two_spellings_sends_nothing_twice(connect, wait_for):
         for node in (humble, listener)
         for publisher in publishers
     ]
-    wait_for(lambda: all(p.subscription_count() == 2 for p in publishers))
+    eventually(lambda: all(p.subscription_count() == 2 for p in publishers))
     texts = [str(number) for number in range(20)]
     for text in texts:
         for publisher in publishers:
@@ -209,7 +210,7 @@ def test_serving_two_spellings_sends_nothing_twice(connect, wait_for):
         assert subscription.wait(0.1) is None
 
 
-def test_a_session_configuration_as_rmw_zenoh_has_it(router, monkeypatch, tmp_path, wait_for):
+def test_a_session_configuration_as_rmw_zenoh_has_it(router, monkeypatch, tmp_path):
     address = router.listen
     file = tmp_path / "session.json5"
     file.write_text(f"""{{
@@ -223,6 +224,6 @@ def test_a_session_configuration_as_rmw_zenoh_has_it(router, monkeypatch, tmp_pa
     monkeypatch.delenv("ROSGLASS_URL", raising=False)
     monkeypatch.delenv("RMW_IMPLEMENTATION", raising=False)
     with rosglass.connect(name="configured") as node, rosglass.connect(name="other") as other:
-        wait_for(lambda: node.status().detail == f"router at {address}")
-        wait_for(lambda: NodeName("/", "configured") in other.nodes())
+        eventually(lambda: node.status().detail == f"router at {address}")
+        eventually(lambda: NodeName("/", "configured") in other.nodes())
         assert node.url == "zenoh://"

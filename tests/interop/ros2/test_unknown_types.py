@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import eventually
 
 import rosglass
 from rosglass.bags import Recorder, open_bag
@@ -90,11 +91,11 @@ def cockpit(url) -> Iterator[Callable[..., Any]]:
         node.close()
 
 
-def test_topics(robot, cockpit, wait_for) -> None:
+def test_topics(robot, cockpit) -> None:
     process = robot()
     node = cockpit()
     subscription = node.create_subscription("/state")
-    message = wait_for(subscription.take, what=lambda: subscription.problem).message()
+    message = eventually(subscription.take, what=lambda: subscription.problem).message()
     assert message.name == "Grüße"
     assert [part.a for part in message.parts] == [-1, 2]
     assert subscription.problem == ""
@@ -104,14 +105,12 @@ def test_topics(robot, cockpit, wait_for) -> None:
     assert definition.constants[0].comment.endswith("nothing")
     # Its name is enough now, and missing fields get the robot's defaults.
     publisher = node.create_publisher("/command", STATE)
-    wait_for(publisher.subscription_count)
+    eventually(publisher.subscription_count)
     publisher.publish(parts=[{}])
     assert process.event("command") == {"state": 3, "parts": [{"a": 5}], "name": ""}
 
 
-def test_what_comes_before_the_definition_is_recorded(
-    url, folders, cockpit, wait_for, tmp_path
-) -> None:
+def test_what_comes_before_the_definition_is_recorded(url, folders, cockpit, tmp_path) -> None:
     library = Library()
     library.add_path(folders["truth"])
     node = cockpit()
@@ -119,10 +118,10 @@ def test_what_comes_before_the_definition_is_recorded(
     with rosglass.connect(url, "robot", library=library) as robot:
         publisher = robot.create_publisher("/state", STATE)
         with Recorder(node, path, ["/state"]) as recorder:
-            wait_for(publisher.subscription_count)
+            eventually(publisher.subscription_count)
             for number in range(200):
                 publisher.publish(state=number, name="first")
-            wait_for(lambda: recorder.status().messages >= 200)
+            eventually(lambda: recorder.status().messages >= 200)
             assert recorder.status().problems == {}
     with open_bag(path) as bag:
         found = [message.channel.type().decode(message.data) for message in bag.messages()]
@@ -130,20 +129,20 @@ def test_what_comes_before_the_definition_is_recorded(
     assert {message.name for message in found} == {"first"}
 
 
-def test_publishing_first(robot, cockpit, wait_for) -> None:
+def test_publishing_first(robot, cockpit) -> None:
     process = robot()
     node = cockpit()
-    wait_for(lambda: node.subscriptions("/command") and node.nodes())
+    eventually(lambda: node.subscriptions("/command") and node.nodes())
     publisher = node.create_publisher("/command", STATE)
-    wait_for(publisher.subscription_count)
+    eventually(publisher.subscription_count)
     publisher.publish(name="first")
     assert process.event("command")["name"] == "first"
 
 
-def test_services(robot, cockpit, wait_for) -> None:
+def test_services(robot, cockpit) -> None:
     robot()
     node = cockpit()
-    wait_for(lambda: node.service_servers("/ask"))
+    eventually(lambda: node.service_servers("/ask"))
     client = node.create_service_client("/ask", ASK)
     assert client.type.constants["request"]["WHY"] == 1
     assert client.call({"part": {"a": 5}}).to_dict() == {"yes": True, "text": "ok"}
@@ -152,7 +151,7 @@ def test_services(robot, cockpit, wait_for) -> None:
     assert again.call({"part": {"a": 6}}).yes is False
 
 
-def test_actions(robot, cockpit, wait_for) -> None:
+def test_actions(robot, cockpit) -> None:
     robot(action=True)
     node = cockpit()
     found = node.fetch_type(GO)
@@ -175,27 +174,27 @@ def test_everything_by_name(robot, cockpit) -> None:
         assert node.fetch_type(f"{package}/{base}") == found
 
 
-def test_a_robot_that_sends_no_definitions(robot, cockpit, wait_for) -> None:
+def test_a_robot_that_sends_no_definitions(robot, cockpit) -> None:
     robot(mood="mute")
     node = cockpit()
     samples: list[Any] = []
     subscription = node.create_subscription("/state", raw_callback=samples.append)
     told = "/robot has no get_type_description service"
-    wait_for(lambda: told in subscription.problem, what=lambda: subscription.problem)
+    eventually(lambda: told in subscription.problem, what=lambda: subscription.problem)
     # Raw bytes come all the same.
-    assert isinstance(wait_for(lambda: samples)[0].type, OpaqueType)
+    assert isinstance(eventually(lambda: samples)[0].type, OpaqueType)
     with pytest.raises(TypeNotFoundError, match=told):
         node.fetch_type(STATE)
 
 
-def test_a_liar_is_named_once(robot, cockpit, wait_for, caplog) -> None:
+def test_a_liar_is_named_once(robot, cockpit, caplog) -> None:
     process = robot(mood="liar")
     node = cockpit()
     samples: list[Any] = []
     subscription = node.create_subscription("/state", raw_callback=samples.append)
     told = f"/robot: it sent a definition of {STATE} with the hash RIHS01_"
-    wait_for(lambda: told in subscription.problem, what=lambda: subscription.problem)
-    assert isinstance(wait_for(lambda: samples)[0].type, OpaqueType)
+    eventually(lambda: told in subscription.problem, what=lambda: subscription.problem)
+    assert isinstance(eventually(lambda: samples)[0].type, OpaqueType)
     with pytest.raises(TypeNotFoundError, match=told):
         node.fetch_type(STATE)
     assert caplog.text.count("/robot is not believed") == 1
@@ -205,7 +204,7 @@ def test_a_liar_is_named_once(robot, cockpit, wait_for, caplog) -> None:
     assert node.create_subscription("/other", "std_msgs/msg/String").problem == ""
 
 
-def test_killed_while_it_is_asked(robot, cockpit, wait_for) -> None:
+def test_killed_while_it_is_asked(robot, cockpit) -> None:
     process = robot(mood="silent")
     node = cockpit()
     subscription = node.create_subscription("/state")
@@ -213,20 +212,20 @@ def test_killed_while_it_is_asked(robot, cockpit, wait_for) -> None:
     process.popen.kill()
     process.popen.wait()
     robot(name="spare")
-    wait_for(subscription.take, what=lambda: subscription.problem)
+    eventually(subscription.take, what=lambda: subscription.problem)
     assert subscription.type.definition.source.provider == "wire /spare"
 
 
-def test_the_cache_serves_the_next_program(robot, cockpit, wait_for, tmp_path, monkeypatch) -> None:
+def test_the_cache_serves_the_next_program(robot, cockpit, tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("ROSGLASS_TYPE_CACHE", str(tmp_path))
     process = robot()
     first = cockpit("first").fetch_type(STATE, timeout=10)
-    wait_for(lambda: os.listdir(tmp_path))  # noqa: PTH208 - files of any name
+    eventually(lambda: os.listdir(tmp_path))  # noqa: PTH208 - files of any name
     process.end()
     robot(mood="mute")
     node = cockpit("second")
     subscription = node.create_subscription("/state")
-    sample = wait_for(subscription.take, 15, what=lambda: subscription.problem)
+    sample = eventually(subscription.take, timeout=15, what=lambda: subscription.problem)
     assert sample.message().name == "Grüße"
     assert subscription.type.definition.source.provider == "cache, from /robot"
     assert subscription.type.rihs01 == first.rihs01
@@ -243,15 +242,17 @@ def test_the_cache_serves_the_next_program(robot, cockpit, wait_for, tmp_path, m
         ("dora-humble", "/dora/dora_node announces no type hash and sends no definitions"),
     ],
 )
-def test_peers_that_send_none(kind, complaint, router, start_peer, wait_for) -> None:
+def test_peers_that_send_none(kind, complaint, router, start_peer) -> None:
     process = start_peer(kind, router, publish={"/words": "std_msgs/msg/String"}, domain=9)
     with rosglass.connect(
         f"{router.url}?domain=9", "bare", library=Library(MemoryProvider())
     ) as node:
         samples: list[Any] = []
         subscription = node.create_subscription("/words", raw_callback=samples.append)
-        wait_for(lambda: complaint in subscription.problem, 20, what=lambda: subscription.problem)
-        assert isinstance(wait_for(lambda: samples)[0].type, OpaqueType)
+        eventually(
+            lambda: complaint in subscription.problem, timeout=20, what=lambda: subscription.problem
+        )
+        assert isinstance(eventually(lambda: samples)[0].type, OpaqueType)
         with pytest.raises(TypeNotFoundError, match=complaint):
             node.fetch_type("std_msgs/msg/String")
     process.end()
@@ -271,10 +272,10 @@ def cyclone(start, dds_domain) -> Any:
 
 
 @pytest.mark.peers
-def test_types_that_endpoints_announce_themselves(cyclone, dds_connect, wait_for) -> None:
+def test_types_that_endpoints_announce_themselves(cyclone, dds_connect) -> None:
     node = dds_connect("cockpit")
     subscription = node.create_subscription("/state")
-    sample = wait_for(subscription.take, 15, what=lambda: subscription.problem)
+    sample = eventually(subscription.take, timeout=15, what=lambda: subscription.problem)
     part = {"a": 1, "xyz": [1.0, 2.0, 3.0]}
     told = json.dumps(sample.message().to_dict(), default=lambda array: array.tolist())
     assert json.loads(told) == {
@@ -310,9 +311,9 @@ def test_types_that_endpoints_announce_themselves(cyclone, dds_connect, wait_for
         ("/maybe", "field a.* optional fields are not ROS 2's"),
     ],
 )
-def test_announced_types_that_ros_does_not_have(
-    topic, complaint, cyclone, dds_connect, wait_for
-) -> None:
+def test_announced_types_that_ros_does_not_have(topic, complaint, cyclone, dds_connect) -> None:
     node = dds_connect("cockpit")
     subscription = node.create_subscription(topic)
-    wait_for(lambda: re.search(complaint, subscription.problem), what=lambda: subscription.problem)
+    eventually(
+        lambda: re.search(complaint, subscription.problem), what=lambda: subscription.problem
+    )

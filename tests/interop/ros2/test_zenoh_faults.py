@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import pytest
+from waiting import eventually
 
 import rosglass
 from rosglass.comm import ConnectionState, NodeName
@@ -40,9 +41,7 @@ def start_router(start, free_port):
 
     def start_router():
         process = start("-m", "rosglass", "router", "--listen", f"tcp/127.0.0.1:{free_port}")
-        while not any("Zenoh router at" in line for line in process.output):
-            assert process.popen.poll() is None, process.output
-            time.sleep(0.01)
+        eventually(lambda: "Zenoh router at" in "".join(process.output))
         return process
 
     start_router.url = f"zenoh://127.0.0.1:{free_port}"
@@ -63,15 +62,14 @@ def test_a_cable_that_is_unplugged_for_ten_seconds(on_two_machines):
 
 
 @pytest.mark.parametrize("mode", ["peer", "client"])
-def test_services_and_latched_topics_after_a_router_was_restarted(
-    mode, start_router, connect, wait_for
-):
+def test_services_and_latched_topics_after_a_router_was_restarted(mode, start_router, connect):
     router = start_router()
     robot = connect("robot", f"?mode={mode}", url=start_router.url)
     cockpit = connect("cockpit", f"?mode={mode}", url=start_router.url)
-    answer = threading.Event()
+    asked, answer = threading.Event(), threading.Event()
 
     def add(request):
+        asked.set()
         answer.wait(30)
         return {"sum": request.a + request.b}
 
@@ -80,7 +78,7 @@ def test_services_and_latched_topics_after_a_router_was_restarted(
     client = cockpit.create_service_client("/add", ADD)
     assert client.wait_for_server(30), client.problem
     call = client.call_async({"a": 1, "b": 2}, timeout=30)
-    time.sleep(0.2)
+    assert asked.wait(30)
     before = time.monotonic()
     router.end()
     if mode == "client":
@@ -98,12 +96,12 @@ def test_services_and_latched_topics_after_a_router_was_restarted(
     subscription = late.create_subscription("/map", STRING, qos=rosglass.QoS.latched())
     assert subscription.wait(RECOVERY).message().data == "hall"
     assert time.monotonic() - returned < 2 * RECOVERY
-    wait_for(lambda: len(cockpit.service_servers("/add")) == 1)
-    wait_for(lambda: len(late.publishers("/map")) == 1)
+    eventually(lambda: len(cockpit.service_servers("/add")) == 1)
+    eventually(lambda: len(late.publishers("/map")) == 1)
 
 
 @pytest.mark.parametrize("mode", ["peer", "client"])
-def test_a_client_follows_its_servers_wherever_they_are(mode, start_router, connect, wait_for):
+def test_a_client_follows_its_servers_wherever_they_are(mode, start_router, connect):
     router = start_router()
     cockpit = connect("cockpit", f"?mode={mode}", url=start_router.url)
     client = cockpit.create_service_client("/add", ADD)
@@ -118,7 +116,7 @@ def test_a_client_follows_its_servers_wherever_they_are(mode, start_router, conn
         return client.call({"a": 1, "b": 2}, timeout=30).sum == 3
 
     def servers(*names):
-        wait_for(lambda: {s.node.name for s in cockpit.service_servers("/add")} == set(names))
+        eventually(lambda: {s.node.name for s in cockpit.service_servers("/add")} == set(names))
 
     assert not client.ready
     first = offer("first", "peer")
@@ -129,15 +127,15 @@ def test_a_client_follows_its_servers_wherever_they_are(mode, start_router, conn
     servers("second")
     assert answers(), "the other one serves"
     second.close()
-    wait_for(lambda: not client.ready)
+    eventually(lambda: not client.ready)
     third = offer("third", "client")
     assert answers(), "the next one is found"
     router.end()
-    wait_for(lambda: not client.ready)
+    eventually(lambda: not client.ready)
     start_router()
     assert answers(), "and again behind a new router"
     third.close()
-    wait_for(lambda: not client.ready)
+    eventually(lambda: not client.ready)
     offer("third", "peer")
     assert answers(), "and when it is back by the same name, on another link"
 
@@ -153,9 +151,7 @@ while True:
 """
 
 
-def test_what_a_stalled_link_hands_on_too_late_is_dropped_if_it_says_so(
-    start_router, connect, wait_for
-):
+def test_what_a_stalled_link_hands_on_too_late_is_dropped_if_it_says_so(start_router, connect):
     router = start_router()
     robot, cockpit = (
         connect(name, "?mode=client", url=start_router.url) for name in ("robot", "cockpit")
@@ -173,7 +169,7 @@ def test_what_a_stalled_link_hands_on_too_late_is_dropped_if_it_says_so(
             raw_callback=lambda s, seen=seen: seen.append((s.received_ns - s.sent_ns) / 1e9),
             qos=rosglass.QoS(1000),
         )
-    wait_for(lambda: all(p.subscription_count() for p in publishers))
+    eventually(lambda: all(p.subscription_count() for p in publishers))
 
     def publish(seconds):
         end = time.monotonic() + seconds
@@ -187,13 +183,13 @@ def test_what_a_stalled_link_hands_on_too_late_is_dropped_if_it_says_so(
     publish(1.2)
     os.kill(router.pid, signal.SIGCONT)
     publish(0.3)
-    wait_for(lambda: max(ages["/immortal"]) > 0.9)
+    eventually(lambda: max(ages["/immortal"]) > 0.9)
     assert max(ages["/mortal"]) < 0.6
     assert len(ages["/mortal"]) > 20
     assert ages["/mortal"][-1] < 0.3, "those that follow are fresh"
 
 
-def test_a_slow_consumer_costs_no_memory(router, start, connect, wait_for):
+def test_a_slow_consumer_costs_no_memory(router, start, connect):
     node = connect("cockpit")
     camera = start("-c", CAMERA.format(url=router.url, image=IMAGE))
     ready = threading.Event()
@@ -204,9 +200,9 @@ def test_a_slow_consumer_costs_no_memory(router, start, connect, wait_for):
         ready.wait(0.2)
 
     subscription = node.create_subscription("/camera", IMAGE, look, rosglass.QoS.sensor_data())
-    wait_for(lambda: subscription.statistics().received > 20)
+    eventually(lambda: subscription.statistics().received > 20)
     before, received = memory(), subscription.statistics().received
-    wait_for(lambda: subscription.statistics().received > received + 150)
+    eventually(lambda: subscription.statistics().received > received + 150)
     statistics = subscription.statistics()
     # 140 MB have come meanwhile.
     assert memory() - before < 40e6
@@ -216,7 +212,7 @@ def test_a_slow_consumer_costs_no_memory(router, start, connect, wait_for):
     camera.end()
 
 
-def test_rubbish_is_named_and_disturbs_nothing(router, connect, caplog, wait_for):
+def test_rubbish_is_named_and_disturbs_nothing(router, connect, caplog):
     zenoh = pytest.importorskip("zenoh")
     node = connect("cockpit")
     good, received = connect("robot"), []
@@ -228,7 +224,7 @@ def test_rubbish_is_named_and_disturbs_nothing(router, connect, caplog, wait_for
     config.insert_json5("connect/endpoints", f'["{router.listen}"]')
     twist, add = rosglass.load(TWIST), rosglass.load(ADD)
     publisher = good.create_publisher("/count", TWIST)
-    wait_for(publisher.subscription_count)
+    eventually(publisher.subscription_count)
     caplog.set_level(logging.WARNING)
     caplog.clear()
     with zenoh.open(config) as session:
@@ -254,7 +250,7 @@ def test_rubbish_is_named_and_disturbs_nothing(router, connect, caplog, wait_for
             )
         ]
         assert refused == [[True], [True], [True]]
-        wait_for(lambda: 290 in received)
+        eventually(lambda: 290 in received)
         del tokens
     assert [x for x in received if x in range(0, 300, 10)] == [*range(0, 300, 10)]
     client = good.create_service_client("/add", ADD)
@@ -308,7 +304,7 @@ def test_a_server_that_answers_rubbish(router, connect, caplog):
             one.undeclare()
 
 
-def test_a_thousand_of_everything_leave_nothing_behind(start_router, connect, wait_for):
+def test_a_thousand_of_everything_leave_nothing_behind(start_router, connect):
     start_router()
     node, other = (connect(name, url=start_router.url) for name in ("cockpit", "robot"))
     latched = rosglass.QoS.latched()
@@ -334,15 +330,15 @@ def test_a_thousand_of_everything_leave_nothing_behind(start_router, connect, wa
 
     for number in range(100):
         cycle(number)
-    wait_for(settled)
+    eventually(settled)
     gc.collect()
     threads, files, objects, before = (
         threading.active_count(), descriptors(), len(gc.get_objects()), memory(),
     )  # fmt: skip
     for number in range(250):
         cycle(number)
-    wait_for(settled)
-    wait_for(lambda: threading.active_count() <= threads)
+    eventually(settled)
+    eventually(lambda: threading.active_count() <= threads)
     gc.collect()
     assert descriptors() <= files + 2
     assert len(gc.get_objects()) < objects + 500
@@ -351,7 +347,7 @@ def test_a_thousand_of_everything_leave_nothing_behind(start_router, connect, wa
     assert node.status().state is ConnectionState.CONNECTED
 
 
-def test_nodes_that_call_each_other_leave_nothing_behind(router, wait_for):
+def test_nodes_that_call_each_other_leave_nothing_behind(router):
     def cycle():
         with (
             rosglass.connect(router.url, "one") as one,
@@ -371,12 +367,12 @@ def test_nodes_that_call_each_other_leave_nothing_behind(router, wait_for):
     threads, files, before = threading.active_count(), descriptors(), memory()
     for _ in range(12):
         cycle()
-    wait_for(lambda: threading.active_count() <= threads)
-    wait_for(lambda: descriptors() <= files)
+    eventually(lambda: threading.active_count() <= threads)
+    eventually(lambda: descriptors() <= files)
     assert memory() - before < 30e6
 
 
-def test_nodes_that_come_and_go_beside_others_leave_no_links_behind(router, connect, wait_for):
+def test_nodes_that_come_and_go_beside_others_leave_no_links_behind(router, connect):
     stay = [connect(name) for name in ("cockpit", "robot", "arm")]
 
     def cycle():
@@ -384,27 +380,27 @@ def test_nodes_that_come_and_go_beside_others_leave_no_links_behind(router, conn
             node.create_publisher("/count", TWIST).publish()
 
     cycle()
-    wait_for(lambda: all(len(node.nodes()) == 3 for node in stay))
+    eventually(lambda: all(len(node.nodes()) == 3 for node in stay))
     threads, files = threading.active_count(), descriptors()
     for _ in range(20):
         cycle()
-    wait_for(lambda: all(len(node.nodes()) == 3 for node in stay))
-    wait_for(lambda: descriptors() <= files)
-    wait_for(lambda: threading.active_count() <= threads)
+    eventually(lambda: all(len(node.nodes()) == 3 for node in stay))
+    eventually(lambda: descriptors() <= files)
+    eventually(lambda: threading.active_count() <= threads)
 
 
-def test_two_nodes_in_one_process(connect, wait_for):
+def test_two_nodes_in_one_process(connect):
     one, two = connect("one"), connect("two")
     one.create_service_server("/add", ADD, lambda r: {"sum": r.a + r.b})
     subscription = one.create_subscription("/count", TWIST)
     publisher = two.create_publisher("/count", TWIST)
-    wait_for(publisher.subscription_count)
+    eventually(publisher.subscription_count)
     publisher.publish(linear={"x": 4.0})
     assert subscription.wait(30).message().linear.x == 4
     assert two.create_service_client("/add", ADD).call({"a": 1, "b": 2}).sum == 3
     assert one.create_service_client("/add", ADD).call({"a": 2, "b": 2}).sum == 4
     one.close()
-    wait_for(lambda: NodeName("/", "one") not in two.nodes())
+    eventually(lambda: NodeName("/", "one") not in two.nodes())
     publisher.publish()
     assert two.status().state is ConnectionState.CONNECTED
 

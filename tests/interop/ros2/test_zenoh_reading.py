@@ -6,6 +6,7 @@ import threading
 import time
 
 import pytest
+from waiting import eventually, nothing_happens
 
 import rosglass
 
@@ -58,15 +59,13 @@ def has_thread(word):
     return any(word in thread.name for thread in threading.enumerate())
 
 
-def test_what_nobody_waits_for_is_collected_and_comes_at_once_to_who_waits(
-    connect, stream, wait_for
-):
+def test_what_nobody_waits_for_is_collected_and_comes_at_once_to_who_waits(connect, stream):
     node = connect("cockpit")
     subscription = node.create_subscription("/count", TWIST, qos=rosglass.QoS(100_000))
-    wait_for(subscription.publisher_count)
+    eventually(subscription.publisher_count)
     stream(300)
-    wait_for(lambda: has_thread("unread"), what="collecting")
-    time.sleep(0.5)
+    eventually(lambda: has_thread("unread"), what="collecting")
+    time.sleep(0.5)  # more and more is kept
     assert subscription.statistics().frequency == pytest.approx(300, rel=0.5)
     samples, waits = [], []
     end = time.monotonic() + 0.5
@@ -78,41 +77,41 @@ def test_what_nobody_waits_for_is_collected_and_comes_at_once_to_who_waits(
     assert sorted(waits[-50:])[25] < 0.1e9
     Received(samples).assert_each_once_in_order()
     assert subscription.statistics().dropped == subscription.statistics().lost == 0
-    wait_for(lambda: not has_thread("unread"), what="the thread has nothing more to do")
+    eventually(lambda: not has_thread("unread"), what="the thread has nothing more to do")
 
 
-def test_the_fastest_get_a_thread_of_their_own_and_keep_their_order(connect, stream, wait_for):
+def test_the_fastest_get_a_thread_of_their_own_and_keep_their_order(connect, stream):
     node, received = connect("cockpit"), Received()
     subscription = node.create_subscription("/count", TWIST, received, rosglass.QoS(100_000))
-    wait_for(subscription.publisher_count)
+    eventually(subscription.publisher_count)
     stream(6000)
-    wait_for(lambda: has_thread("/count"), what="a thread for a fast topic")
+    eventually(lambda: has_thread("/count"), what="a thread for a fast topic")
     time.sleep(0.3)
     stream(50)
-    wait_for(lambda: not has_thread("/count"), what="slow again")
-    time.sleep(0.1)
+    eventually(lambda: not has_thread("/count"), what="slow again")
+    nothing_happens(0.1)
     subscription.close()
     received.assert_each_once_in_order()
 
 
-def test_closing_ends_every_way_of_receiving(connect, stream, wait_for):
+def test_closing_ends_every_way_of_receiving(connect, stream):
     node, received = connect("cockpit"), Received()
     qos = rosglass.QoS(100_000)
     unread = node.create_subscription("/count", TWIST, qos=qos)
     fast = node.create_subscription("/count", TWIST, received, qos)
-    wait_for(unread.publisher_count)
+    eventually(unread.publisher_count)
     stream(6000)
-    wait_for(lambda: has_thread("/count") and has_thread("unread"))
+    eventually(lambda: has_thread("/count") and has_thread("unread"))
     unread.close()
     fast.close()
     count = len(received.numbers)
-    wait_for(lambda: not has_thread("/count"))
-    wait_for(lambda: not has_thread("unread"))
-    time.sleep(0.1)
+    eventually(lambda: not has_thread("/count"))
+    eventually(lambda: not has_thread("unread"))
+    nothing_happens(0.1)
     assert len(received.numbers) == count
 
 
-def test_samples_that_do_not_say_who_sent_them(router, connect, caplog, wait_for):
+def test_samples_that_do_not_say_who_sent_them(router, connect, caplog):
     zenoh = pytest.importorskip("zenoh")
     node, received = connect("cockpit"), Received()
     node.create_subscription("/count", TWIST, received)
@@ -130,7 +129,7 @@ def test_samples_that_do_not_say_who_sent_them(router, connect, caplog, wait_for
             session.put(key, data)
             return len(received.numbers) > 10
 
-        wait_for(arrived)
+        eventually(arrived)
     told = [record.message for record in caplog.records if "8 bytes attached" in record.message]
     assert len(told) == 1
     assert "/count" in told[0]

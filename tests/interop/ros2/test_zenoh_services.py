@@ -11,6 +11,7 @@ from concurrent.futures import Future
 from pathlib import Path
 
 import pytest
+from waiting import eventually
 
 import rosglass
 from rosglass.comm import GoalStatus
@@ -96,8 +97,8 @@ def test_a_call_that_is_never_answered_ends_at_its_time(node, server):
     assert client.pending == 0
 
 
-def test_the_peers_service_is_in_our_graph(node, kind, server, wait_for):
-    (found,) = wait_for(lambda: node.service_servers("/add"))
+def test_the_peers_service_is_in_our_graph(node, kind, server):
+    (found,) = eventually(lambda: node.service_servers("/add"))
     assert str(found.node) == NODES[kind.partition("-")[0]]
     assert found.type == ADD
     assert found.type_hash == ("" if kind == "dora-humble" else rosglass.load(ADD).rihs01)
@@ -138,7 +139,7 @@ def test_the_peer_is_told_when_our_callback_fails(node, kind, run_peer):
     process.end()
 
 
-def test_a_peer_that_is_killed_in_mid_call(node, kind, run_peer, wait_for):
+def test_a_peer_that_is_killed_in_mid_call(node, kind, run_peer):
     process = run_peer(kind, do="serve", suffix="2")
     client = node.create_service_client("/add2", ADD)
     assert client.wait_for_server(30), client.problem
@@ -147,7 +148,7 @@ def test_a_peer_that_is_killed_in_mid_call(node, kind, run_peer, wait_for):
         client.call({"a": -2}, timeout=30)
     assert time.monotonic() - before < 15
     assert process.popen.wait(30) == 1
-    wait_for(lambda: not client.ready)
+    eventually(lambda: not client.ready)
     # The one that comes after it serves the same client.
     again = run_peer(kind, do="serve", suffix="2")
     assert client.call({"a": 1, "b": 1}, timeout=30).sum == 2
@@ -186,7 +187,7 @@ def test_we_send_goals_to_dora(node, dora, run_peer):
     process.end()
 
 
-def test_dora_sends_us_goals(node, dora, run_peer, wait_for):
+def test_dora_sends_us_goals(node, dora, run_peer):
     ended = []
 
     def work(goal):
@@ -200,7 +201,7 @@ def test_dora_sends_us_goals(node, dora, run_peer, wait_for):
     assert process.event("status") == "succeeded"
     assert process.event("rejected") == 5000
     assert process.event("cancelled") == 0
-    wait_for(lambda: len(ended) == 2)
+    eventually(lambda: len(ended) == 2)
     assert ended[0] == (False, 5)
     assert ended[1][0]
     assert ended[1][1] < 100
