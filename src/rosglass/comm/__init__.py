@@ -6,15 +6,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rosglass.comm.action import (
-        ActionClient,
-        ActionResult,
-        ActionServer,
-        CancelAnswer,
-        ClientGoal,
-        GoalStatus,
-        ServerGoal,
-    )
+    from rosglass.comm.action import ActionResult, CancelAnswer, GoalStatus
+    from rosglass.comm.action_client import ActionClient, ClientGoal
+    from rosglass.comm.action_server import ActionServer, ServerGoal
     from rosglass.comm.anonymous import anonymous_name
     from rosglass.comm.clock import Clock, ClockChange, Jump, Timer
     from rosglass.comm.events import (
@@ -128,12 +122,16 @@ __all__ = [
 
 _HOMES = {
     "action": (
-        "ActionClient",
         "ActionResult",
-        "ActionServer",
         "CancelAnswer",
-        "ClientGoal",
         "GoalStatus",
+    ),
+    "action_client": (
+        "ActionClient",
+        "ClientGoal",
+    ),
+    "action_server": (
+        "ActionServer",
         "ServerGoal",
     ),
     "anonymous": ("anonymous_name",),

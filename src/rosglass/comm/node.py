@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from logging import Logger
     from types import TracebackType
 
-    from rosglass.comm.action import ActionClient, ActionServer, ServerGoal
+    from rosglass.comm.action_client import ActionClient
+    from rosglass.comm.action_server import ActionServer, ServerGoal
     from rosglass.comm.clock import Clock, Timer
     from rosglass.comm.graph import EndpointInfo, NodeName, Status
     from rosglass.comm.lifecycle import LifecycleClient

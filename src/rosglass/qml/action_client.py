@@ -18,8 +18,8 @@ from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rosglass.comm.action import ActionClient as Sender
     from rosglass.comm.action import CancelAnswer
+    from rosglass.comm.action_client import ActionClient as Sender
     from rosglass.comm.node import Node
     from rosglass.comm.promise import Promise
     from rosglass.qml.runtime import Runtime

@@ -18,8 +18,8 @@ from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rosglass.comm.action import ActionServer as Server
-    from rosglass.comm.action import ServerGoal
+    from rosglass.comm.action_server import ActionServer as Server
+    from rosglass.comm.action_server import ServerGoal
     from rosglass.comm.node import Node
     from rosglass.messages import Message
     from rosglass.qml.runtime import Runtime

@@ -18,7 +18,8 @@ from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from rosglass.comm.action import ActionClient, CancelAnswer, ClientGoal
+    from rosglass.comm.action import CancelAnswer
+    from rosglass.comm.action_client import ActionClient, ClientGoal
     from rosglass.comm.node import Executor
     from rosglass.comm.promise import Promise
     from rosglass.messages import Message

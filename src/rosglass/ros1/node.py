@@ -23,7 +23,7 @@ from rosglass.comm.rclpy_names import check_order
 from rosglass.comm.receiving import check_may_wait
 from rosglass.comm.subscription_feed import find_subscribed_type
 from rosglass.errors import InvalidNameError
-from rosglass.ros1.action_types import actions
+from rosglass.ros1.actionlib_types import actions
 from rosglass.ros1.answers import Answers
 from rosglass.ros1.connection import Connection
 from rosglass.ros1.core import Core
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Mapping
 
     from rosglass.comm import (
+        ActionServer,
         Answer,
         EndpointInfo,
         Executor,
@@ -52,8 +53,7 @@ if TYPE_CHECKING:
     from rosglass.comm.node import Result
     from rosglass.interfaces import Library
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
-    from rosglass.ros1.action_client import Ros1ActionClient
-    from rosglass.ros1.action_server import Ros1ActionServer
+    from rosglass.ros1.actionlib_client import ActionlibClient
     from rosglass.ros1.options import Ros1Options
     from rosglass.ros1.parameter_namespace import Ros1Parameters
 
@@ -204,14 +204,14 @@ class Ros1Node(CoreNode):
 
     def create_action_client(
         self, name: str, type: str | ActionType | None = None
-    ) -> Ros1ActionClient:
+    ) -> ActionlibClient:
         """Return a client of an action; see :meth:`rosglass.comm.Node.create_action_client`."""
-        from rosglass.ros1.action_client import Ros1ActionClient  # noqa: PLC0415
+        from rosglass.ros1.actionlib_client import ActionlibClient  # noqa: PLC0415
 
         self._core.check_open()
         check_order("create_action_client", name, type)
         wanted = None if type is None else self._core.types.action(type)
-        return Ros1ActionClient(self._core, self._topics, self.resolve(name), wanted)
+        return ActionlibClient(self._core, self._topics, self.resolve(name), wanted)
 
     def create_action_server(
         self,
@@ -223,7 +223,7 @@ class Ros1Node(CoreNode):
         cancel: Callable[[ServerGoal], bool] | None = None,
         executor: Executor | None = None,
         simple: bool = False,
-    ) -> Ros1ActionServer:
+    ) -> ActionServer:
         """Offer an action; see :meth:`rosglass.comm.Node.create_action_server`.
 
         Args:
@@ -236,21 +236,14 @@ class Ros1Node(CoreNode):
             simple: Whether one goal is executed at a time, as by actionlib's SimpleActionServer: a
                 newer one asks it to end, and is executed after it.
         """
-        from rosglass.ros1.action_server import Ros1ActionServer  # noqa: PLC0415
+        from rosglass.comm.action_server import ActionServer  # noqa: PLC0415
+        from rosglass.ros1.actionlib_server import ActionlibServer  # noqa: PLC0415
 
         self._core.check_open()
         check_order("create_action_server", name, type)
-        return Ros1ActionServer(
-            self._core,
-            self._topics,
-            self.resolve(name),
-            self._core.types.action(type),
-            execute,
-            accept,
-            cancel,
-            executor,
-            simple,
-        )
+        kind = self._core.types.action(type)
+        protocol = ActionlibServer(self._core, self._topics, self.resolve(name), kind, simple)
+        return ActionServer(self._core, protocol, execute, accept, cancel, executor)
 
     def actions(self) -> dict[str, list[str]]:
         """Return every action in the graph with its type."""

@@ -1,7 +1,7 @@
 """Getting definitions that nobody here has from the nodes that use the types.
 
 In ROS 1, publishers tell the definition to who connects with them; services' servers tell name and
-md5 sum only; of actions, see :mod:`rosglass.ros1.action_discovery`.
+md5 sum only; of actions, see :mod:`rosglass.ros1.actionlib_discovery`.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from rosglass.errors import (
     TypeNotFoundError,
 )
 from rosglass.interfaces import adding_definitions, ros1_name, split_name
-from rosglass.ros1.action_discovery import ActionDiscovery
-from rosglass.ros1.action_types import actions
+from rosglass.ros1.actionlib_discovery import ActionDiscovery
+from rosglass.ros1.actionlib_types import actions
 from rosglass.ros1.core import Member
 from rosglass.ros1.names import split
 from rosglass.ros1.types import ANY

@@ -161,7 +161,7 @@ class Ros2Node(CoreNode):
         self._core.check_open()
         check_order("create_action_client", name, type)
         self._core.types.ensure(type)
-        from rosglass.ros2.action_client import Ros2ActionClient  # noqa: PLC0415 - few need it
+        from rosglass.ros2.action_client_protocol import Ros2ActionClient  # noqa: PLC0415 - few need it
 
         return Ros2ActionClient(self._core, self.resolve(name), type)
 
@@ -179,10 +179,12 @@ class Ros2Node(CoreNode):
         self._core.check_open()
         check_order("create_action_server", name, type)
         self._core.types.ensure(type)
-        from rosglass.ros2.action_server import Ros2ActionServer  # noqa: PLC0415 - few need it
+        from rosglass.comm.action_server import ActionServer  # noqa: PLC0415 - few need it
+        from rosglass.ros2.action_server_protocol import Ros2ActionServerProtocol  # noqa: PLC0415
 
-        full = self.resolve(name)
-        return Ros2ActionServer(self._core, full, type, execute, accept, cancel, executor)
+        kind = self._core.types.action(type)
+        protocol = Ros2ActionServerProtocol(self._core, self.resolve(name), kind)
+        return ActionServer(self._core, protocol, execute, accept, cancel, executor)
 
     @property
     def parameters(self) -> Ros2Parameters:

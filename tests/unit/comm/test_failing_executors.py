@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import queue
 import threading
@@ -15,9 +14,7 @@ from waiting import eventually
 from rosglass import QoS
 from rosglass.comm import IMMEDIATE, Clock, Dispatcher, History, Sample, Subscription, Timers
 from rosglass.comm.executor import RetryingExecutor
-from rosglass.comm.goal_runner import GoalRunner
 from rosglass.comm.listeners import Listeners
-from rosglass.comm.loop import LoopExecutor
 from rosglass.comm.node import Executor
 from rosglass.comm.promise import Promise
 
@@ -215,31 +212,6 @@ def test_a_promise_calls_back_although_its_executor_raised_at_first():
     promise.on_done(lambda _: came.set(), Refusing(2))
     promise.fulfil(1)
     assert came.wait(LIMIT)
-
-
-class Goal:
-    """What a GoalRunner asks of a goal."""
-
-    id_text = "7"
-
-    def __init__(self):
-        self.error = None
-
-    def fail(self, error):
-        self.error = error
-
-
-@pytest.mark.parametrize("kind", ["refuses", "closed loop"])
-def test_a_goal_that_no_executor_takes_is_aborted_and_the_next_one_has_its_turn(kind, caplog):
-    loop = asyncio.new_event_loop()
-    loop.close()
-    executor = Refusing(1) if kind == "refuses" else LoopExecutor(loop)
-    goal, over = Goal(), []
-    log = logging.getLogger("rosglass")
-    GoalRunner("/dock", print, executor, log, lambda: over.append(1)).start(goal)
-    assert isinstance(goal.error, queue.Full if kind == "refuses" else RuntimeError)
-    assert over == [1]
-    assert "aborting goal 7" in caplog.text
 
 
 def test_jobs_that_were_refused_keep_their_order_and_are_forgotten_at_the_end():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import itertools
 import logging
 import threading
@@ -18,7 +17,6 @@ from rosglass.errors import (
     NodeClosedError,
     ServiceUnavailableError,
     TimeoutError,  # noqa: A004
-    TypeNotFoundError,
 )
 from rosglass.interfaces import Library
 from rosglass.ros1.action_state import CommState, ServerState, TerminalState
@@ -148,7 +146,7 @@ def test_another_servers_list_does_not_lose_a_goal(sent, connect, puppet, eventu
 
 
 def test_a_goal_whose_result_never_comes_is_lost(sent, puppet, eventually, monkeypatch):
-    monkeypatch.setattr("rosglass.ros1.client_goal._OVERDUE", 0.2)
+    monkeypatch.setattr("rosglass.ros1.actionlib_client._OVERDUE_S", 0.2)
     puppet.say(g0="SUCCEEDED")
     eventually(lambda: sent.comm_state is CommState.WAITING_FOR_RESULT)
     assert sent.status is GoalStatus.SUCCEEDED
@@ -164,9 +162,9 @@ def test_a_goal_whose_result_never_comes_is_lost(sent, puppet, eventually, monke
 
 def test_a_silent_server_that_lives_keeps_its_goals(sent, puppet, monkeypatch, eventually):
     asked = []
-    monkeypatch.setattr("rosglass.ros1.action_client._SILENCE", 0.1)
+    monkeypatch.setattr("rosglass.ros1.actionlib_client._SILENCE_S", 0.1)
     monkeypatch.setattr(
-        "rosglass.ros1.action_client.call_node", lambda *given, **_: asked.append(given[1])
+        "rosglass.ros1.actionlib_client.call_node", lambda *given, **_: asked.append(given[1])
     )
     eventually(lambda: len(asked) > 1)
     assert set(asked) == {"getPid"}
@@ -179,8 +177,8 @@ def test_a_silent_server_that_does_not_answer_loses_its_goals(sent, client, monk
     def fail(*_given, **_more):
         raise ConnectionLostError("http://robot:1 does not answer: no answer in time")
 
-    monkeypatch.setattr("rosglass.ros1.action_client._SILENCE", 0.1)
-    monkeypatch.setattr("rosglass.ros1.action_client.call_node", fail)
+    monkeypatch.setattr("rosglass.ros1.actionlib_client._SILENCE_S", 0.1)
+    monkeypatch.setattr("rosglass.ros1.actionlib_client.call_node", fail)
     with pytest.raises(ConnectionLostError, match=r"fell silent .*no answer in time.* before goal"):
         sent.result(30)
     assert not client.ready
@@ -190,7 +188,7 @@ def test_a_silent_server_that_does_not_answer_loses_its_goals(sent, client, monk
 def test_a_request_to_cancel_is_repeated_until_the_server_shows_a_sign(
     sent, puppet, eventually, monkeypatch
 ):
-    monkeypatch.setattr("rosglass.ros1.client_goal._INSIST", 0.05)
+    monkeypatch.setattr("rosglass.ros1.actionlib_client._REPEAT_S", 0.05)
     answer = sent.cancel()
     eventually(lambda: sent.comm_state is CommState.WAITING_FOR_CANCEL_ACK)
     assert sent.status is GoalStatus.EXECUTING
@@ -211,7 +209,7 @@ def test_a_request_to_cancel_is_repeated_until_the_server_shows_a_sign(
 
 
 def test_a_request_to_cancel_outlives_a_connection(sent, client, puppet, eventually, monkeypatch):
-    monkeypatch.setattr("rosglass.ros1.client_goal._INSIST", 0.02)
+    monkeypatch.setattr("rosglass.ros1.actionlib_client._REPEAT_S", 0.02)
     puppet.listening.close()
     eventually(lambda: not client.ready)
     answer, every = sent.cancel(), client.cancel_all()
@@ -375,24 +373,6 @@ def test_a_server_of_another_type_is_named(puppet, connect, eventually):
     client = connect("us").create_action_client(NAME, "actionlib/TwoIntsAction")
     eventually(lambda: "actionlib/TestActionResult" in client.problem)
     assert not client.ready
-
-
-def test_what_cannot_be_sent(client, connect):
-    for given in (5, "five", {"goal": "five"}, {"unknown": 1}):
-        with pytest.raises(ConversionError):
-            client.send_goal(given)
-    with pytest.raises(ConversionError):
-        client.send_goal({"goal": 1}, on_done=5)
-    with pytest.raises(ConversionError):
-        client.send_goal({"goal": 1}, executor="here")
-    with pytest.raises(ConversionError):
-        client.send_goal({"goal": 1}, timeout="soon")
-    for wrong in (Time(), 5, None, Time(2**63)):
-        with pytest.raises(ConversionError):
-            client.cancel_before(wrong)
-    with pytest.raises(TypeNotFoundError, match="TestGoal"):
-        connect("other").create_action_client("/a", "actionlib/TestGoal")
-    assert client.goals == ()
 
 
 def test_a_closed_client_says_so(sent, client, puppet):
@@ -577,33 +557,6 @@ def test_a_goal_cancelled_while_it_is_decided_on_is_recalled(offer, eventually):
     assert executed == []
 
 
-@pytest.mark.parametrize(
-    ("answer", "allowed"), [(True, True), (False, False), (None, True), (RuntimeError(), True)]
-)
-def test_who_decides_on_cancelling(answer, allowed, offer, eventually):
-    asked = []
-
-    def cancel(goal):
-        asked.append(goal)
-        if isinstance(answer, Exception):
-            raise answer
-        return answer
-
-    server, hand = offer(until_stopped, cancel=cancel)
-    hand.send("a")
-    (goal,) = eventually(lambda: server.goals)
-    hand.stop("a")
-    eventually(lambda: asked == [goal])
-    if allowed:
-        eventually(lambda: hand.results)
-        assert hand.results["a"] == [("PREEMPTED", "", 3)]
-        return
-    hand.stop("marker")
-    eventually(lambda: "marker" in hand.listed)
-    assert hand.listed["a"] == "ACTIVE"
-    assert not goal.is_cancel_requested
-
-
 class Failing(Executor):
     """Runs each job on a thread of its own, until it fails."""
 
@@ -706,23 +659,6 @@ def test_an_executor_takes_goals_one_by_one(offer, eventually):
     assert begun == ["a"]
     assert [end[0][0] for end in hand.results.values()] == ["PREEMPTED", "PREEMPTED"]
     executor.close()
-
-
-def test_coroutines_execute_goals(master):
-    async def main():
-        async def execute(goal):
-            await asyncio.sleep(0)
-            return {"result": goal.goal.goal + 1}
-
-        with (
-            rosglass.connect(master.url, "robot") as robot,
-            rosglass.connect(master.url, "us") as us,
-        ):
-            robot.create_action_server(NAME, TYPE, execute)
-            goal = us.create_action_client(NAME, TYPE).send_goal({"goal": 4})
-            return await asyncio.wait_for(goal.done, 30)
-
-    assert asyncio.run(main()).result.result == 5
 
 
 def test_a_newer_goal_takes_the_place_of_those_before(offer, eventually):

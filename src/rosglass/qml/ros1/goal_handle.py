@@ -19,7 +19,7 @@ from rosglass.qml.log import log_from_qml
 from rosglass.qt import Property, QJSValue, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
-    from rosglass.comm.action import ClientGoal
+    from rosglass.comm.action_client import ClientGoal
     from rosglass.comm.node import Executor
 
 __all__ = ["RosGoalHandle"]

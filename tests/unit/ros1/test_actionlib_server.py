@@ -8,7 +8,7 @@ import pytest
 
 from rosglass.comm import Time
 from rosglass.ros1.action_state import ServerState
-from rosglass.ros1.goal_list import _MAX_ENDED, GoalList
+from rosglass.ros1.actionlib_server import _MAX_ENDED, GoalList
 
 NOW = 100.0
 

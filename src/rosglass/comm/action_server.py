@@ -1,0 +1,594 @@
+"""Offering an action: the server, its goals, and the protocol that brings them."""
+
+from __future__ import annotations
+
+import inspect
+import threading
+import time
+from abc import ABC, abstractmethod
+from concurrent.futures import Future
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from rosglass.comm.action import GoalStatus
+from rosglass.comm.loop import LoopExecutor, executor_for
+from rosglass.comm.node import Handle
+from rosglass.comm.promise import Promise
+from rosglass.comm.rclpy_names import hint_at_members
+from rosglass.errors import ArgumentError, Error, NodeClosedError
+
+if TYPE_CHECKING:
+    import logging
+    from collections.abc import Awaitable, Callable, Sequence
+
+    from rosglass.comm.core import NodeCore
+    from rosglass.comm.node import Executor, Result
+    from rosglass.comm.time import Time
+    from rosglass.messages import ActionType, Message
+
+__all__ = ["ActionServer", "ActionServerProtocol", "ServerGoal"]
+
+_Goal = TypeVar("_Goal", bound="ServerGoal")
+
+#: Time in all that closing waits for goals to end.
+_CLOSE_TIMEOUT_S = 2.0
+
+
+class ActionServerProtocol(ABC, Generic[_Goal]):
+    """How goals reach an action server, and how their clients hear of them.
+
+    A protocol receives goals and requests to cancel, and calls the server's ``_on_goal``,
+    ``_run`` and ``_on_cancel`` with them. It never decides or executes anything itself.
+
+    Args:
+        core: The node.
+        name: Absolute action name.
+        type: The type.
+        wire: The wire format of messages, ``ros1`` or ``cdr``.
+        log: Where failures are logged.
+
+    Attributes:
+        dispatcher: Where callbacks run unless the user gives an executor.
+        lock: Held while goals change their status.
+        closed: Whether the server was closed; set by the server.
+    """
+
+    def __init__(
+        self, core: NodeCore[Any], name: str, type: ActionType, wire: str, log: logging.Logger
+    ) -> None:
+        self.name, self.type, self.wire, self.log = name, type, wire, log
+        self.dispatcher = core.dispatcher
+        self.lock = threading.Lock()
+        self.closed = False
+
+    @abstractmethod
+    def open(self, server: ActionServer) -> None:
+        """Announce the action, and hand what comes to `server`."""
+
+    @abstractmethod
+    def withdraw(self) -> None:
+        """Take the action back, once all goals have ended."""
+
+    @abstractmethod
+    def problems(self) -> list[str]:
+        """Say why some clients cannot be served."""
+
+    def post(self, job: Callable[[], None]) -> None:
+        """Run what follows a decision of the user's, soon."""
+        job()
+
+    @abstractmethod
+    def accept(self, goal: _Goal) -> bool:
+        """Note that a goal is accepted, or return False: it was cancelled. The lock is held."""
+
+    @abstractmethod
+    def start(self, goal: _Goal) -> None:
+        """Answer the client of a goal that was accepted, then have the server run it."""
+
+    @abstractmethod
+    def reject(self, goal: _Goal, reason: str) -> None:
+        """Answer the client of a goal that was not accepted."""
+
+    def on_returned(self) -> None:
+        """Take note that `execute` has returned, whatever became of the goal."""
+
+    @abstractmethod
+    def publish_feedback(self, goal: _Goal, feedback: Message) -> None:
+        """Send feedback of a goal."""
+
+    @abstractmethod
+    def publish_status(self) -> None:
+        """Send the status of all goals, as of now."""
+
+    @abstractmethod
+    def on_end(self, goal: _Goal, text: str) -> None:
+        """Note that a goal has ended, and why. The lock is held."""
+
+    @abstractmethod
+    def publish_result(self, goal: _Goal, result: Message) -> None:
+        """Send the result of a goal that has ended, and the status of all."""
+
+
+@hint_at_members
+class ServerGoal(Handle):
+    """A goal that a server accepted.
+
+    Closing it aborts it, unless it has ended: ``with goal:`` leaves no goal behind.
+
+    Attributes:
+        id: 16 bytes (a UUID) in ROS 2; a text in UTF-8 in ROS 1.
+        goal: What is asked for.
+        accepted: When it was accepted.
+    """
+
+    id: bytes
+    goal: Message
+    accepted: Time
+
+    def __init__(
+        self, protocol: ActionServerProtocol[Any], id: bytes, goal: Message, accepted: Time
+    ) -> None:
+        self._protocol = protocol
+        self.id, self.goal, self.accepted = id, goal, accepted
+        self._status = GoalStatus.ACCEPTED
+        self._begun = self._superseded = False
+        self._stop = threading.Event()
+        self._cancel_request: Promise[None] = Promise(
+            f"nobody asked to cancel a goal of {protocol.name}",
+            protocol.dispatcher,
+            cancellable=False,
+        )
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.id_text} {self.status.value}>"
+
+    @property
+    def id_text(self) -> str:
+        """The id as ROS's tools print it.
+
+        In ROS 2, 32 hexadecimal digits (some logs put dashes in); in ROS 1, the text that it is.
+        """
+        return self.id.hex()
+
+    @property
+    def status(self) -> GoalStatus:
+        """What has become of it."""
+        return self._status
+
+    @property
+    def is_cancel_requested(self) -> bool:
+        """Whether it should end soon: with :meth:`canceled`, or because the server closes.
+
+        That is so, too, once a newer goal waits for its place (in ROS 1, with ``simple=True``).
+        """
+        return self._stop.is_set()
+
+    @property
+    def cancel_request(self) -> Promise[None]:
+        """Comes when :attr:`is_cancel_requested` becomes true: to be told of it, or to await it."""
+        return self._cancel_request
+
+    def wait_for_cancel(self, timeout: float) -> bool:
+        """Sleep up to `timeout` seconds; return early, with True, when it should end."""
+        return self._stop.wait(timeout)
+
+    def publish_feedback(
+        self, feedback: Message | dict[str, Any] | None = None, /, **fields: Any
+    ) -> None:
+        """Send feedback: a message, a dict of fields, or the fields as keyword arguments.
+
+        Raises:
+            ConversionError: A value does not fit its field; nothing is sent.
+            NodeClosedError: The server was closed.
+            Error: The goal has ended.
+        """
+        if not self._status.is_active:
+            raise self._over("feedback comes too late")
+        kind = self._protocol.type.feedback
+        if feedback is not None and fields:
+            told = "either feedback or keyword fields, not both"
+            raise ArgumentError("", fields, told, kind.name)
+        made = kind.create(fields if feedback is None else feedback)
+        self._protocol.publish_feedback(self, made)
+
+    def succeed(self, result: Message | dict[str, Any] | None = None) -> None:
+        """End it as done.
+
+        Args:
+            result: A message or a dict of fields; missing fields, and None, get the defaults.
+
+        Raises:
+            ConversionError: A value does not fit its field; the goal goes on.
+            NodeClosedError: The server was closed.
+            Error: The goal has ended already.
+        """
+        self._end(GoalStatus.SUCCEEDED, result)
+
+    def abort(self, result: Message | dict[str, Any] | None = None) -> None:
+        """End it as failed; arguments and errors as :meth:`succeed`."""
+        self._end(GoalStatus.ABORTED, result)
+
+    def canceled(self, result: Message | dict[str, Any] | None = None) -> None:
+        """End it as cancelled, after a request to cancel; as :meth:`succeed`.
+
+        Raises:
+            Error: Nobody asked to cancel it: abort() is for ends of the server's own choice.
+        """
+        self._end(GoalStatus.CANCELED, result)
+
+    def close(self) -> None:
+        """Abort it, unless it has ended; safe to call twice."""
+        self._end(GoalStatus.ABORTED, None, "it was closed", strict=False)
+
+    # -- for its server and the protocol ---------------------------------------------------------
+
+    def _begin(self) -> bool:
+        """Note that it is executed now; return whether it is, and was not cancelled."""
+        with self._protocol.lock:
+            if self._status is not GoalStatus.ACCEPTED:
+                return False
+            self._status, self._begun = GoalStatus.EXECUTING, True
+        self._protocol.publish_status()
+        return True
+
+    @property
+    def _cancelable(self) -> bool:
+        """Whether it has neither ended nor is being cancelled (``rcl_action``'s state machine)."""
+        return self._status in (GoalStatus.ACCEPTED, GoalStatus.EXECUTING)
+
+    def _request_cancel(self) -> bool:
+        """Let it be cancelled; return whether it still can be."""
+        with self._protocol.lock:
+            if not self._cancelable:
+                return False
+            self._status = GoalStatus.CANCELING
+        self._wake()
+        return True
+
+    def _supersede(self) -> None:
+        """Let it end for a newer goal: it may end as cancelled although no client asked for it."""
+        self._superseded = True
+        self._wake()
+
+    def _wake(self) -> None:
+        """Let what executes it see that it should end; the lock is not held."""
+        self._stop.set()
+        self._cancel_request.fulfil(None)
+
+    def _conclude(self, result: Any) -> None:
+        """End it with what executing it returned: cancelled if that was asked for, or done.
+
+        Raises:
+            ConversionError: `result` does not fit.
+        """
+        self._end(None, result, strict=False)
+
+    def _fail(self, error: BaseException) -> None:
+        """End it as failed, unless it has ended."""
+        self._end(GoalStatus.ABORTED, None, f"{type(error).__name__}: {error}", strict=False)
+
+    def _end(
+        self, status: GoalStatus | None, result: Any, text: str = "", *, strict: bool = True
+    ) -> None:
+        """End it.
+
+        Args:
+            status: How; None for SUCCEEDED, or CANCELED if that was asked for.
+            result: The result, None for the type's defaults.
+            text: Why, in words for its client, where the protocol has room for it.
+            strict: Whether it is an error that it has ended already.
+        """
+        protocol, kind = self._protocol, self._protocol.type.result
+        made = kind.decode(kind.encode(result, wire=protocol.wire), wire=protocol.wire)
+        with protocol.lock:
+            asked = self._superseded or self._status is GoalStatus.CANCELING
+            if status is None:
+                status = GoalStatus.CANCELED if asked else GoalStatus.SUCCEEDED
+            ends = self._status.is_active
+            if ends and status is GoalStatus.CANCELED and not asked:
+                raise Error(
+                    f"nobody asked to cancel goal {self.id_text} of {protocol.name}; end it with "
+                    "abort() instead"
+                )
+            if ends:
+                self._status = status
+                protocol.on_end(self, text)
+        if ends:
+            self._wake()
+            protocol.publish_result(self, made)
+        elif strict:
+            raise self._over(f"it cannot end as {status.value}")
+
+    def _over(self, what: str) -> Error:
+        """Return the error of what comes after its end."""
+        where = f"goal {self.id_text} of {self._protocol.name}"
+        if self._protocol.closed:
+            return NodeClosedError(f"{where} was aborted when its server closed: {what}")
+        return Error(f"{where} has ended as {self._status.value} already: {what}")
+
+
+@hint_at_members
+class ActionServer(Handle):
+    """Offers an action; made by :meth:`Node.create_action_server`.
+
+    Closing it aborts the goals that run, and tells their clients.
+
+    Args:
+        core: The node it belongs to.
+        protocol: How goals come and go; it is opened here.
+        execute: Called with each accepted goal.
+        accept: Told a goal, says whether it is accepted; None accepts all.
+        cancel: Told a goal, says whether it may be cancelled; None accepts all.
+        executor: Where all three run; None for a thread for each goal and, for the latter two,
+            the node's dispatcher. When `execute` is a coroutine function, all run in the event
+            loop.
+
+    Attributes:
+        name: Absolute action name.
+        type: The action type.
+    """
+
+    name: str
+    type: ActionType
+
+    def __init__(
+        self,
+        core: NodeCore[Any],
+        protocol: ActionServerProtocol[Any],
+        execute: Callable[[ServerGoal], Result | Awaitable[Result]],
+        accept: Callable[[Message], bool] | None,
+        cancel: Callable[[ServerGoal], bool] | None,
+        executor: Executor | None,
+    ) -> None:
+        self.name, self.type = protocol.name, protocol.type
+        chosen = executor_for(execute, executor, core.dispatcher, self.name)
+        for word, callback in (("accept", accept), ("cancel", cancel)):
+            plain = callable(callback) and not inspect.iscoroutinefunction(callback)
+            if callback is not None and not plain:
+                raise ArgumentError(word, callback, "a plain function, or None", self.name)
+        self._core, self._protocol, self._log = core, protocol, protocol.log
+        self._execute, self._accept, self._cancel = execute, accept, cancel
+        self._decider = chosen
+        given = executor is not None or isinstance(chosen, LoopExecutor)
+        #: Where goals run; None for a thread for each.
+        self._executor = chosen if given else None
+        #: Those that have not ended.
+        self._goals: dict[bytes, ServerGoal] = {}
+        self._threads: set[threading.Thread] = set()
+        protocol.open(self)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.name} [{self.type.name}]>"
+
+    @property
+    def closed(self) -> bool:
+        """Whether :meth:`close` was called."""
+        return self._protocol.closed
+
+    @property
+    def goals(self) -> Sequence[ServerGoal]:
+        """The goals that have not ended, in order of acceptance."""
+        with self._protocol.lock:
+            return tuple(goal for goal in self._goals.values() if goal.status.is_active)
+
+    @property
+    def problem(self) -> str:
+        """Why some clients cannot be served, in words; empty when all is well."""
+        if self.closed:
+            return "the server is closed"
+        problems = self._protocol.problems()
+        return "; ".join(dict.fromkeys(problem for problem in problems if problem))
+
+    def close(self) -> None:
+        """Abort the goals that run, tell their clients, and withdraw; safe to call twice."""
+        with self._protocol.lock:
+            if self._protocol.closed:
+                return
+            self._protocol.closed = True
+            goals = list(self._goals.values())
+        if self._core.forked:
+            return
+        for goal in goals:
+            goal.close()
+        self._protocol.withdraw()
+        self._join()
+
+    def _join(self) -> None:
+        """Wait for the threads of goals."""
+        with self._protocol.lock:
+            threads = [t for t in self._threads if t is not threading.current_thread()]
+        until = time.monotonic() + _CLOSE_TIMEOUT_S
+        for thread in threads:
+            thread.join(max(0.0, until - time.monotonic()))
+            if thread.is_alive():
+                self._log.warning(
+                    "%s still runs %.0f s after closing", thread.name, _CLOSE_TIMEOUT_S
+                )
+
+    # -- deciding --------------------------------------------------------------------------------
+
+    def _on_goal(self, goal: ServerGoal) -> None:
+        """Decide on a goal that has come."""
+        if self._accept is None:
+            self._take(goal, "")
+            return
+
+        def decide() -> None:
+            refusal = "" if self._accepts(goal) else "It is not accepted"
+            self._protocol.post(lambda: self._take(goal, refusal))
+
+        if not self._decide_later(decide):
+            self._take(goal, "It cannot be decided on")
+
+    def _take(self, goal: ServerGoal, refusal: str) -> None:
+        """Start a goal that was decided on, or reject it."""
+        protocol = self._protocol
+        with protocol.lock:
+            if not refusal and protocol.closed:
+                refusal = "The server was closed"
+            accepted = not refusal and protocol.accept(goal)
+            if accepted:
+                ended = [key for key, old in self._goals.items() if not old.status.is_active]
+                for key in ended:
+                    del self._goals[key]
+                self._goals[goal.id] = goal
+        if accepted:
+            protocol.start(goal)
+        else:
+            protocol.reject(goal, refusal)
+
+    def _on_cancel(
+        self, goals: Sequence[ServerGoal], then: Callable[[Sequence[ServerGoal]], None]
+    ) -> None:
+        """Decide which goals may be cancelled, and hand them to `then`."""
+        if self._cancel is None or not goals:
+            then(goals)
+            return
+
+        def decide() -> None:
+            allowed = [goal for goal in goals if self._allows(goal)]
+            self._protocol.post(lambda: then(allowed))
+
+        # What cannot be asked must not hold up a stop.
+        if not self._decide_later(decide):
+            then(goals)
+
+    def _decide_later(self, decide: Callable[[], None]) -> bool:
+        """Have a callback of the user's decide; return whether its executor takes that."""
+        try:
+            self._decider.post(decide)
+        except Exception:
+            self._log.exception(
+                "%s: the executor of accept and cancel raised: goals are rejected, and cancelled",
+                self.name,
+            )
+            return False
+        return True
+
+    def _accepts(self, goal: ServerGoal) -> bool:
+        """Return whether the user accepts a goal."""
+        assert self._accept is not None
+        decision: Any = False
+        try:
+            decision = self._accept(goal.goal)
+        except Exception:
+            self._log.exception("%s: accept failed; rejecting goal %s", self.name, goal.id_text)
+        if decision is not True and decision is not False:
+            self._log.error(
+                "%s: accept returned %.80r instead of True or False; rejecting goal %s",
+                self.name,
+                decision,
+                goal.id_text,
+            )
+        return decision is True
+
+    def _allows(self, goal: ServerGoal) -> bool:
+        """Return whether a goal may be cancelled; a callback that fails must not hold up a stop."""
+        assert self._cancel is not None
+        try:
+            decision: Any = self._cancel(goal)
+        except Exception:
+            self._log.exception("%s: cancel failed; cancelling goal %s", self.name, goal.id_text)
+            return True
+        if decision is not True and decision is not False:
+            self._log.error(
+                "%s: cancel returned %.80r instead of True or False; cancelling goal %s",
+                self.name,
+                decision,
+                goal.id_text,
+            )
+        return decision is not False
+
+    # -- executing -------------------------------------------------------------------------------
+
+    def _run(self, goal: ServerGoal) -> None:
+        """Execute a goal soon, and end it with what comes of that."""
+        try:
+            if self._executor is not None:
+                self._executor.post(lambda: self._execute_goal(goal))
+                return
+            thread = threading.Thread(
+                target=self._run_in_thread,
+                args=(goal,),
+                name=f"{self.name} {goal.id_text}",
+                daemon=True,
+            )
+            with self._protocol.lock:  # closing must find it started
+                thread.start()
+                self._threads.add(thread)
+        except Exception as error:
+            self._log.error(
+                "%s: aborting goal %s, which cannot be executed: %r", self.name, goal.id_text, error
+            )
+            goal._fail(error)
+            self._protocol.on_returned()
+
+    def _run_in_thread(self, goal: ServerGoal) -> None:
+        try:
+            self._execute_goal(goal)
+        finally:
+            with self._protocol.lock:
+                self._threads.discard(threading.current_thread())
+
+    def _execute_goal(self, goal: ServerGoal) -> None:
+        if not goal._begin():
+            goal._conclude(None)  # cancelled before its turn, unless it has ended
+            self._protocol.on_returned()
+            return
+        try:
+            result: Any = self._execute(goal)
+        except BaseException as error:
+            self._on_failure(goal, error)
+            self._protocol.on_returned()
+            return
+        if inspect.iscoroutine(result) and isinstance(self._executor, LoopExecutor):
+            result = self._executor.run(result)
+        if isinstance(result, Future):
+            result.add_done_callback(lambda done: self._on_done(goal, done))
+            return
+        if inspect.iscoroutine(result):
+            result.close()
+            self._on_failure(goal, TypeError("execute must be an async def to be awaited"))
+        else:
+            self._on_result(goal, result)
+        self._protocol.on_returned()
+
+    def _on_done(self, goal: ServerGoal, done: Future[Any]) -> None:
+        """Take the end of a goal whose execution has returned a future."""
+        try:
+            result = done.result(0)
+        except BaseException as error:
+            self._on_failure(goal, error)
+        else:
+            self._on_result(goal, result)
+        self._protocol.on_returned()
+
+    def _on_result(self, goal: ServerGoal, result: Any) -> None:
+        if not goal.status.is_active:
+            if result is not None and not self.closed:
+                self._log.warning(
+                    "%s: goal %s has ended as %s already; what execute returned is dropped",
+                    self.name,
+                    goal.id_text,
+                    goal.status.value,
+                )
+            return
+        try:
+            goal._conclude(result)
+        except Error as error:
+            self._log.error(
+                "%s: the result of goal %s does not fit, the goal is aborted: %s",
+                self.name,
+                goal.id_text,
+                error,
+            )
+            goal._fail(error)
+
+    def _on_failure(self, goal: ServerGoal, error: BaseException) -> None:
+        if not (self.closed and isinstance(error, NodeClosedError)):
+            self._log.error(
+                "%s: execute failed on goal %s, which is aborted",
+                self.name,
+                goal.id_text,
+                exc_info=error,
+            )
+        goal._fail(error)

@@ -1,0 +1,529 @@
+"""Actions over actionlib's five topics, as their server has them.
+
+Protocol: ROS wiki, "actionlib/DetailedDescription", sections "Server-Side States" and "Cancel
+Policy"; where it is silent, actionlib's servers in C++ and Python.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from contextlib import suppress
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from rosglass.comm import IMMEDIATE, GoalStatus, Publisher, QoS, Subscription, Time
+from rosglass.comm.action_server import ActionServerProtocol, ServerGoal
+from rosglass.comm.flags import check_flag
+from rosglass.comm.inorder import InOrder
+from rosglass.errors import ArgumentError, DecodeError, MasterError, NodeClosedError
+from rosglass.ros1.action_state import ServerState
+from rosglass.ros1.actionlib_types import (
+    CANCEL,
+    FEEDBACK,
+    GOAL,
+    QUEUE,
+    RESULT,
+    STATUS,
+    ActionTypes,
+    goal_id,
+    new_id,
+    part,
+    stamp,
+    time_of,
+)
+from rosglass.ros1.core import Member
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rosglass.comm import Sample
+    from rosglass.comm.action_server import ActionServer
+    from rosglass.messages import ActionType, Message
+    from rosglass.ros1.core import Core
+    from rosglass.ros1.master import Master
+    from rosglass.ros1.topics import Topics
+
+__all__ = ["ActionlibServer", "ActionlibServerGoal", "GoalEntry", "GoalList"]
+
+_log = logging.getLogger("rosglass.ros1")
+#: Status messages per second, and seconds that ended goals stay in them, unless parameters say
+#: otherwise.
+_FREQUENCY_HZ, _KEEP_S = 5.0, 5.0
+#: Longest pause before ended goals are forgotten where no status is published.
+_TICK_S = 1.0
+#: Goals that have ended and are kept at most: clients gone wild must not fill the memory.
+_MAX_ENDED = 1000
+_CANCELABLE = (ServerState.PENDING, ServerState.ACTIVE)
+_REPLACED = "Another goal was received, which takes its place"
+_RECALLED = "It was cancelled before it was executed"
+
+#: The states of goals that were accepted: of those that became active, and of those that wait.
+_ACTIVE_STATES = {
+    GoalStatus.ACCEPTED: ServerState.ACTIVE,
+    GoalStatus.EXECUTING: ServerState.ACTIVE,
+    GoalStatus.CANCELING: ServerState.PREEMPTING,
+    GoalStatus.CANCELED: ServerState.PREEMPTED,
+    GoalStatus.SUCCEEDED: ServerState.SUCCEEDED,
+    GoalStatus.ABORTED: ServerState.ABORTED,
+}
+_WAITING_STATES = {
+    **_ACTIVE_STATES,
+    GoalStatus.ACCEPTED: ServerState.PENDING,
+    GoalStatus.CANCELING: ServerState.RECALLING,
+    GoalStatus.CANCELED: ServerState.RECALLED,
+    GoalStatus.ABORTED: ServerState.REJECTED,
+}
+
+
+class GoalEntry:
+    """A goal in the list.
+
+    Attributes:
+        id: Its id.
+        stamp: Its time stamp.
+        text: Why it is in its state, in words for its client.
+        asked: What is asked for; None for one that is known from a request to cancel only.
+        goal: The goal once it is accepted; None before.
+        at_once: Whether it becomes active when it is accepted, and not when it is executed.
+        until: Monotonic time until which it stays in the list; None for one that has not ended.
+    """
+
+    def __init__(self, id: str, stamp: Time, state: ServerState, asked: Any = None) -> None:
+        self.id, self.stamp, self.asked = id, stamp, asked
+        self.text = ""
+        self.goal: ActionlibServerGoal | None = None
+        self.at_once = True
+        self.until: float | None = None
+        self._state = state
+
+    @property
+    def state(self) -> ServerState:
+        """Its state."""
+        if self.goal is None:
+            return self._state
+        active = self.at_once or self.goal._begun
+        return (_ACTIVE_STATES if active else _WAITING_STATES)[self.goal.status]
+
+    def go(self, state: ServerState, text: str = "") -> None:
+        """Change the state of one that is not accepted."""
+        self._state, self.text = state, text
+
+    def status(self) -> dict[str, Any]:
+        """Return its ``actionlib_msgs/GoalStatus``."""
+        state = int(self.state)
+        return {"goal_id": goal_id(self.id, self.stamp), "status": state, "text": self.text}
+
+
+class GoalList:
+    """Goals in order of arrival; the caller sees to it that one thread uses it at a time.
+
+    Args:
+        keep: Seconds that goals stay in it after their end.
+
+    Attributes:
+        keep: As given; may be changed.
+    """
+
+    def __init__(self, keep: float = 5.0) -> None:
+        self.keep = keep
+        self._entries: dict[str, GoalEntry] = {}
+        self._last_cancel = Time()
+
+    def __iter__(self) -> Any:
+        return iter(list(self._entries.values()))
+
+    def take(self, id: str, stamp: Time, asked: Any, now: float) -> GoalEntry | None:
+        """Take a goal in.
+
+        Args:
+            id: Its id.
+            stamp: Its time stamp.
+            asked: What is asked for.
+            now: Monotonic time.
+
+        Returns:
+            Its entry, RECALLED when it was cancelled before it came; None for one that is known,
+            of which no notice need be taken.
+        """
+        known = self._entries.get(id)
+        if known is not None:
+            if known.until is not None:
+                known.until = now + self.keep
+            if known.state is not ServerState.RECALLING or known.asked is not None:
+                return None
+            known.asked, known.stamp = asked, stamp
+            known.go(ServerState.RECALLED, "It was cancelled before it came")
+            return known
+        entry = self._entries[id] = GoalEntry(id, stamp, ServerState.PENDING, asked)
+        if stamp <= self._last_cancel:
+            told = "Its time stamp is not after that of the last request to cancel"
+            entry.go(ServerState.RECALLED, told)
+            self.end(entry, now)
+        return entry
+
+    def select(self, id: str, stamp: Time, now: float) -> Sequence[GoalEntry]:
+        """Return the goals that a request to cancel means and that can be cancelled.
+
+        An id means its goal; a stamp, all goals until then; both mean both; neither, all goals. An
+        unknown goal is cancelled when it comes.
+        """
+        everything = not id and stamp == Time()
+        chosen = [
+            entry
+            for entry in self._entries.values()
+            if everything or entry.id == id or (stamp != Time() and entry.stamp <= stamp)
+        ]
+        if id and id not in self._entries:
+            self._entries[id] = GoalEntry(id, stamp, ServerState.RECALLING)
+            self._entries[id].until = now + self.keep
+        self._last_cancel = max(self._last_cancel, stamp)
+        return [entry for entry in chosen if entry.state in _CANCELABLE]
+
+    def end(self, entry: GoalEntry, now: float) -> None:
+        """Take note that a goal has ended."""
+        entry.until = now + self.keep
+
+    def expire(self, now: float) -> None:
+        """Forget goals that ended some time ago."""
+        ended = [entry for entry in self._entries.values() if entry.until is not None]
+        surplus = len(ended) - _MAX_ENDED
+        for number, entry in enumerate(sorted(ended, key=lambda entry: entry.until or 0.0)):
+            if number < surplus or (entry.until is not None and entry.until < now):
+                del self._entries[entry.id]
+
+
+class ActionlibServerGoal(ServerGoal):
+    """A goal, with the text that actionlib sends with its end.
+
+    Args:
+        protocol: How its client hears of it.
+        entry: Its place in the list.
+
+    Attributes:
+        client_id: Its id in text, as its client made it.
+    """
+
+    def __init__(self, protocol: ActionlibServer, entry: GoalEntry) -> None:
+        super().__init__(protocol, entry.id.encode(), entry.asked, entry.stamp)
+        self.client_id = entry.id
+        self._entry = entry
+
+    @property
+    def id_text(self) -> str:
+        """The id as it goes over the wire."""
+        return self.client_id
+
+    @property
+    def state(self) -> ServerState:
+        """What the server's status topic says of it."""
+        return self._entry.state
+
+    def succeed(self, result: Message | dict[str, Any] | None = None, text: str = "") -> None:
+        """End it as done; `text` goes to its client with the status."""
+        self._end(GoalStatus.SUCCEEDED, result, self._checked(text))
+
+    def abort(self, result: Message | dict[str, Any] | None = None, text: str = "") -> None:
+        """End it as failed; `text` tells its client why."""
+        self._end(GoalStatus.ABORTED, result, self._checked(text))
+
+    def canceled(self, result: Message | dict[str, Any] | None = None, text: str = "") -> None:
+        """End it as cancelled (preempted), after a request to cancel or for a newer goal."""
+        self._end(GoalStatus.CANCELED, result, self._checked(text))
+
+    def _checked(self, text: str) -> str:
+        if not isinstance(text, str):
+            raise ArgumentError("text", text, "a text", f"goal {self.id_text}")
+        return text
+
+
+class ActionlibServer(ActionServerProtocol[ActionlibServerGoal], Member):
+    """The three publishers and two subscriptions of an action server.
+
+    The parameters of actionlib's servers hold for it, too: ``actionlib_status_frequency`` (searched
+    from the node upwards; 0 for changes only), ``status_frequency`` and ``status_list_timeout``
+    below the action's name.
+
+    Args:
+        core: The node.
+        topics: Its topics.
+        name: Absolute action name.
+        type: The type.
+        simple: Whether one goal is executed at a time, and a newer one takes its place, as with
+            actionlib's SimpleActionServer.
+    """
+
+    _server: ActionServer
+
+    def __init__(
+        self, core: Core, topics: Topics, name: str, type: ActionType, simple: bool
+    ) -> None:
+        super().__init__(core, name, type, "ros1", _log)
+        self._simple = check_flag(simple, "simple", name)
+        self._core, self._topics = core, topics
+        self._types = ActionTypes.of(type, core.types)
+        self._list = GoalList(_KEEP_S)
+        #: With `simple`: the goal that is executed, and the one that waits for its end.
+        self._current: ActionlibServerGoal | None = None
+        self._next: ActionlibServerGoal | None = None
+        self._frequency_hz = _FREQUENCY_HZ
+        self._publishing = InOrder()
+        self._publishers: dict[str, Publisher] = {}
+        self._subscriptions: list[Subscription] = []
+
+    def open(self, server: ActionServer) -> None:
+        """Open the topics."""
+        self._server = server
+        core, topics, name = self._core, self._topics, self.name
+        try:
+            for word, qos in ((STATUS, QoS.latched()), (RESULT, QUEUE), (FEEDBACK, QUEUE)):
+                topic = core.resolve(part(name, word))
+                self._publishers[word] = Publisher(core, topic, getattr(self._types, word), qos)
+        except BaseException:
+            self._close_publishers()
+            raise
+        self._publish_status()
+        for word, callback in ((CANCEL, self._on_cancel), (GOAL, self._on_goal)):
+            topic = core.resolve(part(name, word))
+            kind = getattr(self._types, word)
+            subscription = Subscription(topic, kind, QUEUE, IMMEDIATE, raw_callback=callback)
+            self._subscriptions.append(subscription)
+            topics.subscribe(subscription, False)
+        core.add(self)
+        self._tick()
+
+    def withdraw(self) -> None:
+        """Reject the goals that are not decided on, and close the topics."""
+        for subscription in self._subscriptions:
+            subscription.close()
+        with self.lock:
+            undecided = [
+                each for each in self._list if each.goal is None and each.asked is not None
+            ]
+        for entry in undecided:
+            self._refuse(entry, "The server was closed")
+        self._close_publishers()
+        self._core.remove(self)
+
+    def close(self) -> None:
+        """Close the server, with its node."""
+        self._server.close()
+
+    def _close_publishers(self) -> None:
+        for publisher in self._publishers.values():
+            publisher.close()
+
+    def problems(self) -> list[str]:
+        """Say why some clients cannot be served."""
+        problems = [subscription.problem for subscription in self._subscriptions]
+        return problems + [publisher.problem for publisher in self._publishers.values()]
+
+    # -- what clients are sent -------------------------------------------------------------------
+
+    def publish_feedback(self, goal: ActionlibServerGoal, feedback: Message) -> None:
+        """Publish feedback of a goal."""
+        with self.lock:
+            status = goal._entry.status()
+        message = {"header": self._header(), "status": status, "feedback": feedback}
+        self._publishers[FEEDBACK].publish(message)
+
+    def on_end(self, goal: ActionlibServerGoal, text: str) -> None:
+        """Note that a goal has ended."""
+        goal._entry.text = text
+        self._list.end(goal._entry, time.monotonic())
+
+    def publish_result(self, goal: ActionlibServerGoal, result: Message) -> None:
+        """Publish how a goal has ended, and the status of all."""
+        self._publish_end(goal._entry, result)
+
+    def _publish_end(self, entry: GoalEntry, result: Message) -> None:
+        with self.lock:
+            status = entry.status()
+        message = {"header": self._header(), "status": status, "result": result}
+
+        def publish() -> None:
+            with suppress(NodeClosedError):
+                self._publishers[RESULT].publish(message)
+
+        self._publishing.add(publish)
+        self.publish_status()
+
+    def publish_status(self) -> None:
+        """Publish the status of all goals, as of now."""
+        self._publishing.add(self._publish_status)
+
+    def _publish_status(self) -> None:
+        with self.lock:
+            self._list.expire(time.monotonic())
+            entries = [entry.status() for entry in self._list]
+        with suppress(NodeClosedError):  # clients see that the server is gone
+            self._publishers[STATUS].publish({"header": self._header(), "status_list": entries})
+
+    def _header(self) -> dict[str, Any]:
+        return {"stamp": stamp(self._core.clock.now())}
+
+    def _tick(self) -> None:
+        """Publish the status again and again."""
+        if self.closed:
+            return
+        if self._frequency_hz > 0:
+            self.publish_status()
+        else:
+            with self.lock:
+                self._list.expire(time.monotonic())
+        pause = 1 / self._frequency_hz if self._frequency_hz > 0 else _TICK_S
+        self._core.timers.after(pause, self._tick)
+
+    # -- parameters ------------------------------------------------------------------------------
+
+    def register(self, master: Master) -> None:
+        """Read the parameters; the topics register themselves."""
+        frequency = _ask(master, "getParam", part(self.name, "status_frequency"))
+        found = _ask(master, "searchParam", "actionlib_status_frequency")
+        if frequency is None and found is not None:
+            frequency = _ask(master, "getParam", str(found))
+        keep = _ask(master, "getParam", part(self.name, "status_list_timeout"))
+        self._frequency_hz = self._number("status frequency", frequency, _FREQUENCY_HZ)
+        self._list.keep = self._number("status_list_timeout", keep, _KEEP_S)
+
+    def _number(self, what: str, value: Any, default: float) -> float:
+        if value is None:
+            return default
+        if type(value) in (int, float) and 0 <= value < 1e6:
+            return float(value)
+        _log.warning("%s: the parameter for the %s is no number but %r", self.name, what, value)
+        return default
+
+    # -- accepting -------------------------------------------------------------------------------
+
+    def _on_goal(self, sample: Sample) -> None:
+        try:
+            message = sample.message()
+            goal_id, asked = message.goal_id, message.goal
+            id_text, sent = str(goal_id.id), time_of(goal_id.stamp)
+        except DecodeError as error:
+            _log.warning("%s: a goal cannot be decoded: %s", self.name, error)
+            return
+        now = self._core.clock.now()
+        if not id_text:
+            id_text = new_id(self._core.name.full, now)
+        with self.lock:
+            known = self.closed
+            stamped = sent if sent.nanoseconds else now
+            entry = None if known else self._list.take(id_text, stamped, asked, time.monotonic())
+        if entry is None:
+            return
+        if entry.state is ServerState.RECALLED:
+            self._publish_end(entry, self.type.result.create())
+            return
+        if self._server._accept is not None:
+            self.publish_status()  # deciding may take its time
+        self._server._on_goal(ActionlibServerGoal(self, entry))
+
+    def accept(self, goal: ActionlibServerGoal) -> bool:
+        """Note that a goal is accepted, unless it was cancelled meanwhile."""
+        entry = goal._entry
+        if entry.state is not ServerState.PENDING:
+            return False
+        entry.goal, entry.at_once = goal, not self._simple
+        return True
+
+    def start(self, goal: ActionlibServerGoal) -> None:
+        """Show that a goal is accepted, and have it executed in its turn."""
+        if self._simple:
+            self._queue(goal)
+        else:
+            self.publish_status()
+            self._server._run(goal)
+
+    def reject(self, goal: ActionlibServerGoal, reason: str) -> None:
+        """Reject a goal, or let one go that was cancelled before it was decided on."""
+        self._refuse(goal._entry, reason)
+
+    def _refuse(self, entry: GoalEntry, reason: str) -> None:
+        with self.lock:
+            if entry.state.is_terminal:
+                return
+            if entry.state is ServerState.RECALLING:
+                entry.go(ServerState.RECALLED, _RECALLED)
+            else:
+                entry.go(ServerState.REJECTED, reason)
+            self._list.end(entry, time.monotonic())
+        self._publish_end(entry, self.type.result.create())
+
+    # -- one at a time ---------------------------------------------------------------------------
+
+    def _queue(self, goal: ActionlibServerGoal) -> None:
+        """Let a goal take the place of the one that is executed, once that has ended."""
+        with self.lock:
+            rivals = [one for one in (self._current, self._next) if one is not None]
+            late = any(goal.accepted < rival.accepted for rival in rivals)
+            bumped = goal if late else self._next
+            current = self._current
+            if not late and current is None:
+                self._current = goal
+            elif not late:
+                self._next = goal
+        if bumped is not None:
+            self._recall(bumped, _REPLACED)
+        if late:
+            return
+        if current is None:
+            self._server._run(goal)
+        else:
+            current._supersede()
+            self.publish_status()
+
+    def on_returned(self) -> None:
+        """Go on with the goal that waits."""
+        if not self._simple:
+            return
+        with self.lock:
+            self._current, self._next = self._next, None
+            waiting = self._current
+        if waiting is not None:
+            self._server._run(waiting)
+
+    def _recall(self, goal: ActionlibServerGoal, text: str) -> None:
+        goal._supersede()
+        with suppress(Exception):
+            goal.canceled(text=text)
+
+    # -- cancelling ------------------------------------------------------------------------------
+
+    def _on_cancel(self, sample: Sample) -> None:
+        try:
+            message = sample.message()
+            id_text, until = str(message.id), time_of(message.stamp)
+        except DecodeError as error:
+            _log.warning("%s: a request to cancel cannot be decoded: %s", self.name, error)
+            return
+        with self.lock:
+            if self.closed:
+                return
+            chosen = self._list.select(id_text, until, time.monotonic())
+        accepted = [entry.goal for entry in chosen if entry.goal is not None]
+        undecided = [entry for entry in chosen if entry.goal is None]
+        self._server._on_cancel(accepted, partial(self._cancel, undecided))
+
+    def _cancel(self, undecided: Sequence[GoalEntry], allowed: Sequence[ServerGoal]) -> None:
+        with self.lock:
+            accepted = [entry.goal for entry in undecided if entry.goal is not None]  # meanwhile
+            for entry in undecided:
+                if entry.state is ServerState.PENDING and entry.goal is None:
+                    entry.go(ServerState.RECALLING)
+            waiting = self._next
+            if waiting is not None and waiting in (*accepted, *allowed):
+                self._next = None
+        for goal in (*accepted, *allowed):
+            goal._request_cancel()
+            if goal is waiting:
+                self._recall(waiting, _RECALLED)
+        self.publish_status()
+
+
+def _ask(master: Master, method: str, name: str) -> Any:
+    """Return a parameter's value or full name; None when it is not set."""
+    with suppress(MasterError):
+        return master.call(method, name)
+    return None

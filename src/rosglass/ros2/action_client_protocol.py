@@ -1,0 +1,723 @@
+"""Actions over ROS 2's three services and two topics, as their client has them.
+
+Protocol: http://design.ros2.org/articles/actions.html and ``rcl_action``'s ``action_client.c``.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+import uuid
+from collections import deque
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from rosglass.comm import (
+    ActionResult,
+    CancelAnswer,
+    ConnectionState,
+    EndpointInfo,
+    EndpointKind,
+    GoalStatus,
+    Handle,
+    Promise,
+    QoS,
+    Time,
+)
+from rosglass.comm.action_client import (
+    FEEDBACK_DEPTH,
+    GRACE_S,
+    OUTAGE_S,
+    ActionClient,
+    ClientGoal,
+)
+from rosglass.comm.complaints import Complaints
+from rosglass.comm.inorder import InOrder
+from rosglass.errors import (
+    ConnectionLostError,
+    DecodeError,
+    Error,
+    GoalRejectedError,
+    NodeClosedError,
+    ServiceUnavailableError,
+    TimeoutError,  # noqa: A004 - the field's own word
+)
+from rosglass.ros2.action_types import (
+    CANCEL_GOAL,
+    CANCEL_REASONS,
+    FEEDBACK,
+    GET_RESULT,
+    NO_ID,
+    SEND_GOAL,
+    STATUS,
+    STATUSES,
+    goal_info,
+    part,
+    stamp_of,
+)
+from rosglass.ros2.action_version import ActionVersion
+from rosglass.ros2.core import Member
+from rosglass.ros2.repeats import Repeats
+from rosglass.ros2.service_client import Ros2ServiceClient
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rosglass.comm import Call
+    from rosglass.messages import ActionType, Message, MessageType
+    from rosglass.ros2.action_types import ActionTypes
+    from rosglass.ros2.core import Core
+    from rosglass.wires.base import OnSample, Reader
+
+__all__ = ["Ros2ActionClient", "Ros2ClientGoal"]
+
+_log = logging.getLogger("rosglass.ros2")
+#: Seconds that do not fit into a time stamp any more, and their year.
+_END_OF_TIME = 2**31, 2038
+#: Time after which a result is asked for again, when asking failed or an end was announced.
+_RETRY_S = 1.0
+#: The same for an end that was announced, from then on.
+_OVERDUE_S = 5.0
+#: What feedback and status are received with. The status topic's latched array is not asked for:
+#: a client needs none from before its goals, and some servers' topic is volatile.
+_QOS = QoS()
+#: Where a goal's id is in feedback: behind the encapsulation header.
+_ID = slice(4, 20)
+
+_RANK = {
+    GoalStatus.PENDING: 0,
+    GoalStatus.ACCEPTED: 1,
+    GoalStatus.EXECUTING: 2,
+    GoalStatus.CANCELING: 3,
+}
+_END = 4
+
+
+class Ros2ClientGoal(ClientGoal):
+    """A goal: it asks for its acceptance, then for its result, and follows the status topic.
+
+    Args:
+        client: Its client.
+        id: Its id, 16 random bytes.
+        goal: What is asked for: a message of the action's type, or what becomes one.
+        timeout: Seconds for the server to appear and to accept or reject it.
+        typed: Whether the action's type is known.
+    """
+
+    _client: Ros2ActionClient
+
+    def __init__(
+        self, client: Ros2ActionClient, id: bytes, goal: Any, timeout: float | None, *, typed: bool
+    ) -> None:
+        super().__init__(client, id, goal, timeout, typed=typed, jobs=InOrder(), log=_log)
+        self._deadline = None if timeout is None else time.monotonic() + timeout
+        self._accepted: Time | None = None
+        #: Feedback that waits for the goal's acceptance.
+        self._held: deque[Message] = deque(maxlen=FEEDBACK_DEPTH)
+        self._early_status: tuple[GoalStatus, Time] | None = None
+        self._sending: Call | None = None
+        self._asking: Call | None = None
+        self._servers: frozenset[bytes | str] = frozenset()
+        self._strangers: frozenset[bytes | str] = frozenset()
+        self._alone: float | None = None
+        self._asked = 0.0
+
+    @property
+    def accepted(self) -> Time | None:
+        """When the server accepted it, by the server's clock; None before."""
+        return self._accepted
+
+    # -- for its client --------------------------------------------------------------------------
+
+    def _send(self) -> None:
+        """Send it, as soon as a server is there; again when the type has changed."""
+        left = None if self._deadline is None else max(0.0, self._deadline - time.monotonic())
+        call = self._client._ask_goal(self, left)
+        self._sending = call
+        call.add_done_callback(lambda _: self._jobs.add(lambda: self._on_answer(call)))
+
+    def _take_back(self, service: Ros2ServiceClient) -> bool:
+        """Take it back from its service if it was not sent yet; return whether that was so."""
+        call, self._sending = self._sending, None  # its end is not the goal's
+        if call is None or service.withdraw(call):
+            return call is not None
+        self._sending = call
+        if call.done():
+            self._jobs.add(lambda: self._on_answer(call))
+        return False
+
+    def _send_again(self, kind: MessageType) -> None:
+        """Send it with another version of its type."""
+        try:
+            assert self.goal is not None  # it waited to be sent
+            self.goal = kind.create(self.goal.to_dict())
+            self._send()
+        except Error as error:
+            self._lose_later(error)
+
+    def _lose_later(self, error: Error) -> None:
+        self._jobs.add(lambda: self._lose(error))
+
+    # -- sending ---------------------------------------------------------------------------------
+
+    def _on_type(self) -> None:
+        """Send it, now that the type is known."""
+        if self._done.done():
+            return
+        kind = self._client.type
+        try:
+            if kind is None:
+                raise self._client._ended()
+            self.goal = kind.goal.create(self._given)
+            self._send()
+        except Error as error:
+            self._lose(self._closing(error))
+
+    def _give_up(self) -> None:
+        if self.goal is None:
+            self._lose(self._client._unsent(self._timeout))
+
+    def _on_answer(self, call: Call) -> None:
+        """Take the answer to the goal."""
+        if call is not self._sending or self._status is not GoalStatus.PENDING:
+            return
+        if call.cancelled():
+            result = ActionResult(GoalStatus.CANCELED, self._client._empty_result())
+            self._end(GoalStatus.CANCELED, result)
+            return
+        error = call.exception(0)
+        if error is None:
+            response = call.result(0)
+            if response.accepted:
+                self._accept(stamp_of(response.stamp))
+            else:
+                told = f"the server of {self._client.name} does not accept goal {self.id_text}"
+                self._end(GoalStatus.REJECTED, GoalRejectedError(told))
+        elif self._early_status is not None:
+            self._accept(self._early_status[1])  # its answer got lost, but not the goal
+        else:
+            self._lose(self._explain(error))
+
+    def _explain(self, error: BaseException) -> Error:
+        name, seconds = self._client.name, self._timeout or 0.0
+        if isinstance(error, ServiceUnavailableError):
+            return self._client._unsent(seconds)
+        if isinstance(error, (TimeoutError, ConnectionLostError)):
+            # It may have been accepted, or be yet: nothing is to run that nobody watches.
+            self._client._ask_cancel(self.id, Time(), Promise(cancellable=False), 10.0)
+        if isinstance(error, TimeoutError):
+            return TimeoutError(
+                f"the server of {name} neither accepted nor rejected goal {self.id_text} within "
+                f"{seconds:g} s; it was asked to cancel it, should it accept it yet"
+            )
+        if isinstance(error, NodeClosedError) and not self._client.closed:
+            return self._client._replaced()
+        return error if isinstance(error, Error) else ConnectionLostError(str(error))
+
+    def _accept(self, stamp: Time) -> None:
+        self._accepted = stamp
+        self._servers = self._client._servers()
+        self._advance(GoalStatus.ACCEPTED)
+        self._acceptance.fulfil(True)
+        early, self._early_status = self._early_status, None
+        if early is not None:
+            self._on_status(*early)
+        while self._held:
+            self._add_feedback(self._held.popleft())
+        self._ask_soon(0.0)
+        cancels, self._cancels = self._cancels, []
+        for answer, deadline in cancels:
+            left = None if deadline is None else max(0.0, deadline - time.monotonic())
+            self._later(0.0, partial(self._client._ask_cancel, self.id, Time(), answer, left))
+
+    # -- while it runs ---------------------------------------------------------------------------
+
+    def _on_status(self, status: GoalStatus, accepted: Time) -> None:
+        """Take what the status topic says of it."""
+        if self._status is GoalStatus.PENDING:
+            self._early_status = (status, accepted)
+            return
+        self._alive()
+        known = self._status
+        self._advance(status)
+        if known.is_active and not status.is_active:
+            # The result should be on its way already; a reply can get lost with a link.
+            self._later(_RETRY_S, lambda: self._jobs.add(self._ask_again))
+
+    def _on_feedback(self, feedback: Message) -> None:
+        """Take feedback for it."""
+        if self._status is GoalStatus.PENDING:
+            self._held.append(feedback)
+        elif not self._done.done():
+            self._alive()
+            self._add_feedback(feedback)
+
+    def _alive(self) -> None:
+        """Take note that a server has the goal, whichever it is."""
+        if self._alone is not None:
+            self._alone, self._servers = None, self._client._servers()
+
+    def _advance(self, status: GoalStatus) -> None:
+        """Take a later status; what comes late itself is ignored."""
+        if _RANK.get(status, _END) > _RANK.get(self._status, _END):
+            self._set_status(status)
+
+    def _cancel(self, answer: Promise[CancelAnswer], timeout: float | None) -> None:
+        call = self._sending
+        if not self._status.is_active:
+            answer.fulfil(self._too_late())
+        elif self.goal is None:
+            self._end(GoalStatus.CANCELED, self._without_result())
+            answer.fulfil(CancelAnswer((self.id,)))
+        elif self._status is not GoalStatus.PENDING:
+            self._client._ask_cancel(self.id, Time(), answer, timeout)
+        elif call is not None and self._client._take_back(call):
+            answer.fulfil(CancelAnswer((self.id,)))
+        else:
+            # Only a goal that was accepted can be cancelled: the server's answer comes first.
+            failure = (
+                f"{self._label} could not be cancelled within {timeout or 0.0:g} s: the server has "
+                "neither accepted nor rejected it"
+            )
+            self._add_cancel(answer, timeout, failure)
+
+    def _watch(self) -> None:
+        if self._status is GoalStatus.PENDING or self._done.done():
+            return
+        here = self._client._servers()
+        now = time.monotonic()
+        if not self._servers:
+            self._servers = here
+        if not self._status.is_active and now - self._asked >= _OVERDUE_S:
+            self._ask_again()
+        if self._servers & here:
+            if self._alone is not None:
+                self._alone = None
+                self._ask_again()  # what was asked before may have got lost with the link
+            return
+        if self._alone is None:
+            self._alone = now
+        if here - self._strangers:
+            # A server that took the place of the server that had the goal should not know it.
+            self._strangers |= here
+            self._ask_again()
+        status = self._client._core.status()
+        cut_off = not here and status.state is not ConnectionState.CONNECTED
+        known = not self._status.is_active
+        if now - self._alone >= (OUTAGE_S if cut_off and not known else GRACE_S):
+            told = "goal {} ended; nobody knows what becomes of it"
+            if known:
+                told = (
+                    "it told the result of goal {}, " + f"which has ended as {self._status.value}"
+                )
+            lost = f"the server of {self._client.name} went away before {told.format(self.id_text)}"
+            self._lose(ConnectionLostError(f"{lost} ({self._client._core.url}: {status})"))
+
+    # -- the result ------------------------------------------------------------------------------
+
+    def _ask_soon(self, delay: float) -> None:
+        """Ask for the result, not on the thread of the middleware that may have called us."""
+        self._later(delay, lambda: self._jobs.add(self._ask))
+
+    def _ask_again(self) -> None:
+        asking, self._asking = self._asking, None
+        if asking is not None:
+            asking.cancel()
+        if not self._done.done():
+            self._ask_soon(0.0)
+
+    def _ask(self) -> None:
+        if self._done.done() or self._asking is not None:
+            return
+        try:
+            call = self._client._ask_result(self)
+        except Error as error:
+            self._lose(self._closing(error))
+            return
+        self._asking, self._asked = call, time.monotonic()
+        call.add_done_callback(lambda _: self._on_result(call))
+
+    def _on_result(self, call: Call) -> None:
+        """Take the end, after the feedback that came before it on another way."""
+        self._client._flush()
+        self._jobs.add(lambda: self._take_result(call))
+
+    def _take_result(self, call: Call) -> None:
+        if call is not self._asking:
+            return
+        self._asking = None
+        error = call.exception(0)
+        if error is None:
+            response = call.result(0)
+            status = STATUSES.get(int(response.status))
+            if status is None:
+                lost = ConnectionLostError(
+                    f"the server of {self._client.name} does not know goal {self.id_text} any "
+                    "more: it was restarted meanwhile, or did not keep the result for long enough"
+                )
+                self._lose(lost)
+            elif status.is_active:
+                self._ask_soon(_RETRY_S)  # a server that does not wait for the end
+            else:
+                self._end(status, ActionResult(status, response.result))
+        elif isinstance(error, NodeClosedError) or isinstance(error.__cause__, DecodeError):
+            self._lose(self._closing(error))
+        else:
+            _log.debug("%s: asking for its result failed, trying again: %s", self._label, error)
+            self._ask_soon(_RETRY_S)
+
+    def _closing(self, error: BaseException) -> BaseException:
+        """Return the error of a goal: asking may fail before the goal hears that all is closed."""
+        if isinstance(error, NodeClosedError) and self._client.closed:
+            return self._client._ended()
+        return error
+
+    def _lose(self, error: BaseException) -> None:
+        """End it as LOST, unless it has ended."""
+        self._end(GoalStatus.LOST, error)
+
+    def _end(self, status: GoalStatus, end: ActionResult | BaseException) -> None:
+        if self._done.done():
+            return
+        self._advance(status)
+        asking, self._asking = self._asking, None
+        if asking is not None:
+            asking.cancel()
+        self._finish(end)
+
+    def _later(self, delay: float, job: Callable[[], None]) -> None:
+        self._client._core.timers.after(delay, job)
+
+
+class Ros2ActionClient(ActionClient, Member):
+    """An action client, in the version of the type that its server announces.
+
+    Args:
+        core: The node it belongs to.
+        name: Absolute action name.
+        wanted: The type, or its name: then the version that the server announces is taken if the
+            library has it; None takes whatever type the server announces.
+    """
+
+    _core: Core
+    _goals: dict[bytes, Ros2ClientGoal]
+
+    def __init__(self, core: Core, name: str, wanted: ActionType | str | None) -> None:
+        super().__init__(core, name, _END_OF_TIME)
+        self._version = ActionVersion(core, name, wanted)
+        self._ends: _ClientEndpoints | None = None
+        #: What is to be done once the type is known.
+        self._held: list[Callable[[], None]] = []
+        self._version.follow(retry=True)
+        if self._version.types is not None:
+            self._speak(self._version.types)
+        core.add(self)
+        core.wake()
+
+    @property
+    def ready(self) -> bool:
+        """Whether a server is there that understands the goals."""
+        ends = self._ends
+        return ends is not None and not self._closed and all(end.ready for end in ends.services)
+
+    # -- sending and cancelling ------------------------------------------------------------------
+
+    def _make_goal(self, goal: Any, timeout: float | None, *, typed: bool) -> Ros2ClientGoal:
+        return Ros2ClientGoal(self, uuid.uuid4().bytes, goal, timeout, typed=typed)
+
+    def _begin(self, goal: Ros2ClientGoal) -> None:
+        if goal.goal is not None:
+            goal._send()
+        else:
+            goal._wait()
+            self._once_typed(lambda: goal._jobs.add(goal._on_type))
+
+    def _cancel_many(self, until: Time | None, timeout: float | None) -> Promise[CancelAnswer]:
+        if until is None:
+            for goal in self._live():
+                if goal.accepted is None:
+                    goal.cancel(timeout)
+        told = f"{self.name} has not answered the request to cancel"
+        answer: Promise[CancelAnswer] = Promise(told, self._core.dispatcher, cancellable=False)
+        self._ask_cancel(NO_ID, until or Time(), answer, timeout)
+        return answer
+
+    def _ask_goal(self, goal: Ros2ClientGoal, timeout: float | None) -> Call:
+        """Send a goal."""
+        request = {"goal_id": {"uuid": goal.id}, "goal": goal.goal}
+        return self._open_ends().send_goal.call_async(request, timeout=timeout)
+
+    def _ask_result(self, goal: Ros2ClientGoal) -> Call:
+        """Ask for a goal's result, for as long as it takes."""
+        request = {"goal_id": {"uuid": goal.id}}
+        return self._open_ends().get_result.call_async(request, timeout=None)
+
+    def _ask_cancel(
+        self, goal_id: bytes, stamp: Time, answer: Promise[CancelAnswer], timeout: float | None
+    ) -> None:
+        """Ask for goals to be cancelled: one, or those until a time, or all."""
+        if self._ends is None and not self._closed:
+            self._ask_cancel_later(goal_id, stamp, answer, timeout)
+            return
+        try:
+            request = {"goal_info": goal_info(goal_id, stamp)}
+            call = self._open_ends().cancel_goal.call_async(request, timeout=timeout)
+        except Error as error:
+            answer.fail(error)
+            return
+        call.add_done_callback(lambda _: self._on_cancel_answer(goal_id, call, answer, timeout))
+
+    def _ask_cancel_later(
+        self, goal_id: bytes, stamp: Time, answer: Promise[CancelAnswer], timeout: float | None
+    ) -> None:
+        until = None if timeout is None else time.monotonic() + timeout
+
+        def ask() -> None:
+            if not answer.done():
+                left = None if until is None else max(0.0, until - time.monotonic())
+                self._ask_cancel(goal_id, stamp, answer, left)
+
+        def give_up() -> None:
+            if self._ends is None:
+                answer.fail(self._not_cancelled(timeout))
+
+        if timeout is not None:
+            self._core.timers.after(timeout, give_up)
+        self._once_typed(ask)
+
+    def _take_back(self, call: Call) -> bool:
+        """Take a goal back that was not sent yet; return whether that was so."""
+        ends = self._ends
+        return ends is not None and ends.send_goal.withdraw(call)
+
+    def _flush(self) -> None:
+        """Take the feedback and status that have arrived and wait to be taken."""
+        ends = self._ends
+        if ends is not None:
+            ends.flush()
+
+    def _servers(self) -> frozenset[bytes | str]:
+        """Return the identities of the servers that understand the goals."""
+        ends = self._ends
+        return frozenset() if ends is None else ends.send_goal.server_ids()
+
+    def _empty_result(self) -> Message:
+        """Return a result with the type's defaults."""
+        assert self.type is not None  # there are goals
+        return self.type.result.create()
+
+    def _replaced(self) -> ConnectionLostError:
+        """Return the error of goals whose server made way for one with another definition."""
+        return ConnectionLostError(
+            f"the server of {self.name} was replaced by one with another definition of the type; "
+            "nobody knows what becomes of the goal"
+        )
+
+    def _on_cancel_answer(
+        self, goal_id: bytes, call: Call, answer: Promise[CancelAnswer], timeout: float | None
+    ) -> None:
+        """Take the answer to a request to cancel."""
+        error = call.exception(0)
+        if isinstance(error, TimeoutError):
+            error = TimeoutError(
+                f"{self.name} did not answer the request to cancel within {timeout:g} s; some "
+                "servers answer only while their program looks for such requests. It may cancel "
+                "all the same: watch the goal's status"
+            )
+        elif isinstance(error, ServiceUnavailableError):
+            error = self._not_cancelled(timeout)
+        if error is not None:
+            answer.fail(error)
+            return
+        response = call.result(0)
+        accepted = tuple(bytes(info.goal_id.uuid) for info in response.goals_canceling)
+        for each in accepted:
+            goal = self._goals.get(each)
+            if goal is not None:
+                goal._jobs.add(partial(goal._advance, GoalStatus.CANCELING))
+        code = int(response.return_code)
+        reason = CANCEL_REASONS.get(code, f"the server answers with the unknown code {code}")
+        got = goal_id in accepted if goal_id != NO_ID else bool(accepted)
+        answer.fulfil(CancelAnswer(accepted, "" if got else reason))
+
+    # -- following the graph ---------------------------------------------------------------------
+
+    def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - definitions may be added
+        """Follow the graph: the type, whether a server is there, goals whose server went."""
+        if self._closed:
+            return
+        if self._version.follow(retry=idle) and self._version.types is not None:
+            self._speak(self._version.types)
+        self._warn(_log, logging.INFO if self._version.pending else logging.WARNING)
+        self._readiness.update()
+        for goal in self._live():
+            goal._jobs.add(goal._watch)
+
+    def _speak(self, types: ActionTypes) -> None:
+        """Speak this version of the type from now on."""
+        ends = _ClientEndpoints(self._core, self.name, types, self._goals)
+        with self._lock:
+            old, self._ends = self._ends, ends
+            self.type = types.action
+            closed = self._closed
+            goals = list(self._goals.values())
+            held, self._held = self._held, []
+        if closed:
+            ends.close()
+        for job in held:
+            job()
+        if old is None:
+            return
+        for goal in goals:
+            if goal._take_back(old.send_goal):
+                goal._send_again(types.action.goal)
+            elif goal.accepted is not None:
+                goal._lose_later(self._replaced())
+        old.close()
+
+    def _once_typed(self, job: Callable[[], None]) -> None:
+        """Do something now, or as soon as the type is known."""
+        with self._lock:
+            if self._ends is None and not self._closed:
+                self._held.append(job)
+                return
+        job()
+
+    def _conflicts(self) -> list[str]:
+        problems = self._version.conflicts()
+        ends = self._ends
+        if not problems and ends is not None:
+            problems = [end.trouble for end in ends.services if end.trouble]
+        return list(dict.fromkeys(problems))
+
+    def _absence(self) -> str:
+        ends = self._ends
+        if ends is not None and any(end.server_ids() for end in ends.services):
+            missing = ", ".join(end.name for end in ends.services if not end.ready)
+            return f"its server is incomplete, or not linked yet: {missing} does not answer"
+        graph = self._core.graph
+        offered = [
+            name
+            for name in graph.actions()
+            if graph.endpoints(EndpointKind.SERVICE_SERVER, part(name, SEND_GOAL))
+        ]
+        return self._no_server(offered)
+
+    # -- the end ---------------------------------------------------------------------------------
+
+    def _withdraw(self) -> None:
+        with self._lock:
+            ends, held, self._held = self._ends, self._held, []
+        for goal in self._live():
+            goal._lose_later(self._ended())
+        for job in held:
+            job()  # finds the client closed
+        if ends is not None:
+            ends.close()
+        self._core.remove(self)
+
+    def _open_ends(self) -> _ClientEndpoints:
+        self._check_open()
+        assert self._ends is not None  # there is a type
+        return self._ends
+
+
+class _ClientEndpoints(Handle):
+    """Speaks one version of an action's type.
+
+    Args:
+        core: The node.
+        name: Absolute name of the action.
+        types: The types to speak.
+        goals: The client's goals by their ids, which take feedback and status.
+    """
+
+    def __init__(
+        self, core: Core, name: str, types: ActionTypes, goals: dict[bytes, Ros2ClientGoal]
+    ) -> None:
+        self._core, self._name, self._goals = core, name, goals
+        self._complaints = Complaints()
+        self.types = types
+        self.send_goal = Ros2ServiceClient(core, part(name, SEND_GOAL), types.send_goal, quiet=True)
+        self.cancel_goal = Ros2ServiceClient(
+            core, part(name, CANCEL_GOAL), types.cancel_goal, quiet=True
+        )
+        self.get_result = Ros2ServiceClient(
+            core, part(name, GET_RESULT), types.get_result, patient=True, quiet=True
+        )
+        self.services = (self.send_goal, self.cancel_goal, self.get_result)
+        self._readers = [
+            self._read(FEEDBACK, types.feedback),
+            self._read(STATUS, types.status),
+        ]
+
+    def flush(self) -> None:
+        """Take what has arrived on the topics and waits to be taken, in the calling thread."""
+        for reader in self._readers:
+            reader.flush()
+
+    def close(self) -> None:
+        """Listen and talk no longer; calls that have not ended fail."""
+        for end in (*self.services, *self._readers):
+            end.close()
+
+    def _read(self, topic: str, kind: MessageType) -> Reader:
+        """Listen to one of the action's topics."""
+        core, full = self._core, part(self._name, topic)
+        endpoint = EndpointInfo(
+            EndpointKind.SUBSCRIPTION, full, kind.name, core.name, _QOS, kind.rihs01
+        )
+        return core.middleware.create_reader(endpoint, self._taker(topic, kind))
+
+    def _taker(self, topic: str, kind: MessageType) -> OnSample:
+        """Return what takes a topic's samples from the middleware."""
+        ours, repeats, feedback = kind.rihs01, Repeats(), topic == FEEDBACK
+
+        def receive(
+            data: bytes | memoryview,
+            received: int,  # noqa: ARG001 - more is told than needed
+            sent: int | None,
+            gid: bytes,
+            sequence: int,
+            hash: str,
+        ) -> None:
+            try:
+                if hash not in ("", ours):
+                    told = f"another definition of {kind.name} ({hash}, ours is {ours})"
+                    self._complain(topic, gid, told)
+                elif not repeats.seen(gid, sequence, sent):
+                    if feedback:
+                        self._take_feedback(kind, data)
+                    else:
+                        self._take_status(kind, data)
+            except DecodeError as error:
+                self._complain(topic, gid, str(error))
+            except Exception:
+                _log.exception("%s: taking %s failed", self._name, topic)
+
+        return receive
+
+    def _take_feedback(self, kind: MessageType, data: bytes | memoryview) -> None:
+        goal = self._goals.get(bytes(data[_ID]))
+        if goal is None and len(data) >= _ID.stop:
+            return  # another client's
+        kind.validate(data)
+        if goal is not None:
+            goal._jobs.add(partial(goal._on_feedback, kind.decode(data).feedback))
+
+    def _take_status(self, kind: MessageType, data: bytes | memoryview) -> None:
+        kind.validate(data)
+        for entry in kind.decode(data).status_list:
+            goal = self._goals.get(bytes(entry.goal_info.goal_id.uuid))
+            status = STATUSES.get(int(entry.status))
+            if goal is not None and status is not None:
+                stamp = stamp_of(entry.goal_info.stamp)
+                goal._jobs.add(partial(goal._on_status, status, stamp))
+
+    def _complain(self, topic: str, gid: bytes, reason: str) -> None:
+        """Log what cannot be understood, once for each publisher."""
+        if not self._complaints.fresh((topic, gid)):
+            return
+        publishers = self._core.graph.endpoints(EndpointKind.PUBLISHER, part(self._name, topic))
+        who = [found.node.full for found in publishers if found.gid == gid] or [f"gid {gid.hex()}"]
+        _log.warning("%s: ignoring %s of %s: %s", self._name, topic, who[0], reason)
