@@ -339,11 +339,13 @@ def test_a_publisher_that_comes_and_goes_between_two_looks_is_reported(
         held.set()
         free.wait(60)
 
-    # The thread that looks calls this itself, and looks no more until it returns.
+    # The thread that looks calls this itself, after it has looked, and waits until it returns.
     console.on_graph_change(hold, executor=IMMEDIATE)
     try:
+        assert robot.create_publisher(f"{topic}_other", TEXT)
+        eventually(held.is_set)
         first = robot.create_publisher(topic, TEXT)
-        eventually(lambda: held.is_set() and subscription.publisher_count())
+        eventually(subscription.publisher_count)
         first.close()
         eventually(lambda: not subscription.publisher_count())
     finally:
