@@ -63,6 +63,15 @@ def escape_controls(text: str) -> str:
     return _CONTROLS.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
+def shown(value: object) -> str:
+    """Return a value as error messages show it, cut if it is long."""
+    try:
+        text = repr(value)
+    except Exception as error:  # an integer of 5,000 digits, or a class of the user's
+        text = f"a value that cannot be shown ({type(error).__name__}: {error})"
+    return f"{text[:77]}..." if len(text) > 80 else text
+
+
 def _shortened(text: str) -> str:
     """Return a message with the beginnings only of words and lines that are very long."""
     if len(text) <= _MOST_IN_WORD:
@@ -129,14 +138,8 @@ class ConversionError(Error):
     """
 
     def __init__(self, path: str, value: object, expected: str, type_name: str = "") -> None:
-        try:
-            shown = repr(value)
-        except Exception as error:  # an integer of 5,000 digits, or a class of the user's
-            shown = f"a value that cannot be shown ({type(error).__name__}: {error})"
-        if len(shown) > 80:
-            shown = shown[:77] + "..."
         where = f"{type_name}: " if type_name else ""
-        super().__init__(f"{where}{path or '(message)'}: expected {expected}, got {shown}")
+        super().__init__(f"{where}{path or '(message)'}: expected {expected}, got {shown(value)}")
         self.path, self.value, self.expected, self.type_name = path, value, expected, type_name
 
 

@@ -30,7 +30,6 @@ __all__ = [
     "RemoteParameters",
     "SetResult",
     "check_values",
-    "shown",
 ]
 
 #: What a parameter can be; None stands for "not set".
@@ -429,9 +428,3 @@ def check_values(values: object, node: str) -> None:
             f"{node}: parameters are set by a dict of names and values, e.g. "
             f"set({{'speed': 1.5}}); got {values!r}"
         )
-
-
-def shown(value: object) -> str:
-    """Return a value as error messages show it, cut if it is long."""
-    text = repr(value)
-    return f"{text[:77]}..." if len(text) > 80 else text

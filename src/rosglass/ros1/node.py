@@ -9,7 +9,6 @@ from rosglass.comm import (
     EndpointKind,
     History,
     NodeName,
-    ParameterClient,
     Publisher,
     QoS,
     Subscription,
@@ -43,6 +42,7 @@ if TYPE_CHECKING:
         Answer,
         EndpointInfo,
         Executor,
+        ParameterClient,
         Promise,
         Sample,
         ServerGoal,
@@ -270,6 +270,7 @@ class Ros1Node(CoreNode):
         Raises:
             InvalidNameError: The name breaks ROS's rules.
         """
+        from rosglass.comm.parameters import ParameterClient  # noqa: PLC0415 - few need it
         from rosglass.ros1.parameter_namespace import RemoteNamespace  # noqa: PLC0415
 
         self._core.check_open()

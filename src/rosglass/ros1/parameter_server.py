@@ -19,11 +19,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from rosglass.comm import Executor, Handle, Listeners
 from rosglass.comm.inorder import InOrder
-from rosglass.comm.parameters import shown
 from rosglass.comm.promise import check_timeout
 from rosglass.comm.receiving import check_may_wait
 from rosglass.comm.similar import similar
-from rosglass.errors import Error, InvalidNameError, MasterError, ParameterError
+from rosglass.errors import Error, InvalidNameError, MasterError, ParameterError, shown
 from rosglass.ros1.core import Member
 from rosglass.ros1.questions import Questions
 

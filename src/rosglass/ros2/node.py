@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rosglass.comm import EndpointKind, NodeName, ParameterClient, Publisher, QoS, Subscription
+from rosglass.comm import EndpointKind, NodeName, Publisher, QoS, Subscription
 from rosglass.comm.builtin_services import BuiltinServices
 from rosglass.comm.core_node import CoreNode
 from rosglass.comm.flags import check_flag
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
         EndpointInfo,
         Executor,
         LifecycleClient,
+        ParameterClient,
         Promise,
         Sample,
         ServerGoal,
@@ -193,6 +194,7 @@ class Ros2Node(CoreNode):
 
     def create_parameter_client(self, node: str | NodeName) -> ParameterClient:
         """Return a client of another node's parameters; `node` is its full name."""
+        from rosglass.comm.parameters import ParameterClient  # noqa: PLC0415 - few need it
         from rosglass.ros2.parameter_services import RemoteParameterServices  # noqa: PLC0415
 
         self._core.check_open()

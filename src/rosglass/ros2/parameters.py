@@ -25,9 +25,9 @@ from rosglass.comm import (
 )
 from rosglass.comm import ParameterEvent as Event
 from rosglass.comm.loop import check_plain
-from rosglass.comm.parameters import check_values, shown
+from rosglass.comm.parameters import check_values
 from rosglass.comm.sim_time import USE_SIM_TIME
-from rosglass.errors import NodeClosedError, ParameterError
+from rosglass.errors import NodeClosedError, ParameterError, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
