@@ -39,7 +39,7 @@ def start_robot(start: Any) -> Iterator[Any]:
 
     def start_robot(url: str, *arguments: str) -> Any:
         plan = {"url": url, "arguments": arguments}
-        process = start(str(PEERS / "furniture_peer.py"), json.dumps(plan))
+        process = start(str(PEERS / "rcl_services_peer.py"), json.dumps(plan))
         started.append(process)
         process.event("ready")
         return process

@@ -41,7 +41,7 @@ LOG, CLOCK = "rcl_interfaces/msg/Log", "rosgraph_msgs/msg/Clock"
 
 @pytest.fixture
 def start(url: str) -> Iterator[Callable[..., Ros2Node]]:
-    """Start a node with the furniture that connect() gives it, told with --ros-args."""
+    """Start a node with the built-in services that connect() gives it, told with --ros-args."""
     made: list[Ros2Node] = []
 
     def start(

@@ -25,7 +25,7 @@ def test_the_log_time_and_names_of_another_program(node: Any, start: Any) -> Non
     node.create_subscription("/rosout", "rcl_interfaces/msg/Log", logs.append)
     arguments = ["-r", "chatter:=/talk", "-r", "__node:=left", "-r", "__ns:=/arms"]
     plan = {"url": node.url, "arguments": arguments}
-    robot = start(str(PEERS / "furniture_peer.py"), json.dumps(plan))
+    robot = start(str(PEERS / "rcl_services_peer.py"), json.dumps(plan))
     robot.event("ready")
     robot.ask(read=True)
     assert robot.event("chatter") == "/talk"
@@ -34,7 +34,7 @@ def test_the_log_time_and_names_of_another_program(node: Any, start: Any) -> Non
     robot.ask(log="battery low")
     eventually(lambda: [log for log in logs if log.msg == "battery low"])
     log = next(log for log in logs if log.msg == "battery low")
-    assert (log.name, log.level, Path(log.file).name) == ("arms.left", 30, "furniture_peer.py")
+    assert (log.name, log.level, Path(log.file).name) == ("arms.left", 30, "rcl_services_peer.py")
 
     # Whoever comes later gets the log of the last 10 s.
     late: list[Any] = []

@@ -1,4 +1,4 @@
-"""Another rosglass program with parameters, a log and a clock: `furniture_peer.py PLAN`.
+"""Another rosglass program with parameters, a log and a clock: `rcl_services_peer.py PLAN`.
 
 The plan: {"url", "arguments": what follows --ros-args}. On its standard input it is told
 {"log": text}, {"set": {name: value}}, {"clock": seconds} (which it publishes), {"read": true}.
