@@ -11,7 +11,7 @@ from waiting import nothing_happens
 
 import rosglass
 from rosglass import Duration, QoS
-from rosglass.comm import IMMEDIATE, Matched, NodeName, Sample
+from rosglass.comm import IMMEDIATE, Liveliness, LivelinessLost, Matched, NodeName, Sample
 
 TEXT, TWIST, IMAGE = "std_msgs/msg/String", "geometry_msgs/msg/Twist", "sensor_msgs/msg/Image"
 HEADER = "std_msgs/msg/Header"
@@ -436,6 +436,25 @@ def test_waiting_ends_with_the_node(console, topic):
     with pytest.raises(rosglass.NodeClosedError):
         console.wait_for_message(topic, TEXT)
     later.join()
+
+
+def test_manual_liveliness_is_lost_once_for_each_silence(robot, topic, wire, eventually):
+    lease = rosglass.Duration.from_seconds(0.05)
+    profile = QoS(liveliness=Liveliness.MANUAL_BY_TOPIC, lease_duration=lease)
+    publisher = robot.create_publisher(topic, TEXT, profile)
+    events = []
+    publisher.on_liveliness_lost(events.append)
+    if wire.is_ros1:
+        with pytest.raises(rosglass.UnsupportedError, match=f"{topic}: .* but by sending"):
+            publisher.assert_liveliness()
+        publisher.publish(data="x")
+    else:
+        publisher.assert_liveliness()
+    eventually(lambda: events)
+    nothing_happens(0.15)
+    assert events == [LivelinessLost(1)]
+    publisher.publish(data="x")
+    eventually(lambda: events == [LivelinessLost(1), LivelinessLost(2)])
 
 
 def test_two_types_on_a_topic_are_a_problem_that_names_both(robot, console, topic, eventually):

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Topics"]
 
-#: Seconds that a publisher may take for each of its answers.
-_TIMEOUT = 5.0
+#: How long a publisher may take for each of its answers.
+_ANSWER_TIMEOUT_S = 5.0
 
 
 class Topics:
@@ -156,7 +156,7 @@ class Topics:
             topic: Absolute topic name.
             timeout: Seconds to wait in all; None for as long as each may take.
         """
-        limit = _TIMEOUT if timeout is None else min(timeout, _TIMEOUT)
+        limit = _ANSWER_TIMEOUT_S if timeout is None else min(timeout, _ANSWER_TIMEOUT_S)
         ends = self._core.graph.endpoints(EndpointKind.PUBLISHER, topic)
         told: dict[NodeName, dict[str, str]] = {}
         left, answered = len(ends), threading.Condition()

@@ -20,7 +20,6 @@ from rosglass.comm import (
     Durability,
     EndpointKind,
     Liveliness,
-    LivelinessLost,
     Reliability,
     SamplesLost,
 )
@@ -293,21 +292,6 @@ def test_a_deadline_that_passes_without_message_is_told(node, middleware, robot,
     assert len(events) <= settled + 2, "six more would have come without messages"
     middleware.graph.remove(key)
     eventually(lambda: subscription._source._deadline is None)
-
-
-def test_manual_liveliness_is_lost_once_for_each_silence(node, middleware, eventually):
-    publisher = node.create_publisher("/t", STRING, MANUAL)
-    events = []
-    publisher.on_liveliness_lost(events.append)
-    publisher.assert_liveliness()
-    eventually(lambda: events)
-    nothing_happens(0.15)
-    assert events == [LivelinessLost(1)]
-    publisher.publish(data="x")
-    eventually(lambda: len(events) == 2)
-    publisher.close()
-    with pytest.raises(rosglass.NodeClosedError):
-        publisher.assert_liveliness()
 
 
 def test_publishers_that_show_themselves_are_alive_while_they_do(
