@@ -293,9 +293,15 @@ while True:
 
 
 @pytest.mark.parametrize(
-    ("end", "code"), [("", 0), ("sys.exit(3)", 3), ("raise KeyboardInterrupt", -signal.SIGINT)]
+    ("end", "codes"),
+    [
+        ("", {0}),
+        ("sys.exit(3)", {3}),
+        # Python forgets why it ends when another thread runs exec() meanwhile, as for dataclasses.
+        ("raise KeyboardInterrupt", {-signal.SIGINT, 1}),
+    ],
 )
-def test_a_program_that_closes_nothing_ends_cleanly(dds_domain, end, code):
+def test_a_program_that_closes_nothing_ends_cleanly(dds_domain, end, codes):
     text = f"""
 heard = []
 node.create_subscription('/t', '{STRING}', heard.append)
@@ -309,7 +315,7 @@ picture = keep.wait(30).message().data
 """
     process = program(text + end, dds_domain)
     told, _ = process.communicate(timeout=60)
-    assert process.returncode == code, told
+    assert process.returncode in codes, told
     if not end.startswith("raise"):
         assert told == ""
 

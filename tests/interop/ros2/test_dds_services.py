@@ -316,13 +316,13 @@ def test_a_server_that_was_cut_off_shortly_still_answers(start_services, node, t
 def test_a_call_goes_on_as_long_as_one_of_its_servers_stays(start_services, node, types, impatient):
     one, two = (start_services("cyclone", "both", ["add"], config=SHORT_LEASE) for _ in range(2))
     client = node.create_service_client("/both/add", types[ADD])
-    eventually(lambda: len(client.server_ids()) == 2, what="two servers")
+    eventually(lambda: len(node.service_servers("/both/add")) == 2, what="two servers")
     eventually(lambda: "offer" in client.problem, what="two servers")
     ready(client)
     call = client.call_async({"a": -1}, timeout=None)
     assert one.event("got") == two.event("got") == [-1, 0]
-    cut_off(one, lambda: len(client.server_ids()) == 1)
-    eventually(lambda: len(client.server_ids()) == 2, what="the return of the first")
+    cut_off(one, lambda: len(node.service_servers("/both/add")) == 1)
+    eventually(lambda: len(node.service_servers("/both/add")) == 2, what="the return of the first")
     with pytest.raises(rosglass.TimeoutError):
         call.result(1.5)
     # The one that is back never asked again: the call ends with the other.
