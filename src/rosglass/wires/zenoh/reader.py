@@ -213,7 +213,8 @@ class _Collected:
 
     def end(self) -> None:
         self._drain.remove(self)
-        with suppress(zenoh.ZError):  # the session went first
+        # Not while its handler is read: undeclaring it then raises "Already borrowed".
+        with self._lock, suppress(zenoh.ZError):  # the session went first
             self._subscriber.undeclare()
         self.flush()
 

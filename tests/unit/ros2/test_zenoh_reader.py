@@ -1,0 +1,65 @@
+"""How samples that are collected now and then are taken, and the end of that."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+pytest.importorskip("zenoh")
+
+from rosglass.wires.zenoh.reader import _Collected
+
+
+class Subscriber:
+    """A subscriber of Zenoh, whose handler is borrowed while a sample is taken from it."""
+
+    def __init__(self):
+        self.handler = self
+        self.reading, self.go_on = threading.Event(), threading.Event()
+        self.borrowed, self.undeclared = False, False
+
+    def try_recv(self):
+        self.borrowed = True
+        self.reading.set()
+        self.go_on.wait(30)
+        self.borrowed = False
+
+    def undeclare(self):
+        if self.borrowed:
+            raise RuntimeError("Already borrowed")
+        self.undeclared = True
+
+
+class Session:
+    def __init__(self, subscriber):
+        self.declare_subscriber = lambda *_, **__: subscriber
+
+
+class Drain:
+    def __init__(self, closing):
+        self.remove = lambda _: closing.set()
+
+
+def test_a_reader_is_closed_while_the_drain_takes_its_samples():
+    subscriber, closing, failed = Subscriber(), threading.Event(), []
+    collected = _Collected(Session(subscriber), "key", 10, print, Drain(closing))
+
+    def end():
+        try:
+            collected.end()
+        except RuntimeError as error:
+            failed.append(error)
+
+    taking = threading.Thread(target=collected.flush)
+    taking.start()
+    assert subscriber.reading.wait(30)
+    ending = threading.Thread(target=end)
+    ending.start()
+    assert closing.wait(30)
+    ending.join(0.05)  # where it raised before
+    subscriber.go_on.set()
+    for thread in (taking, ending):
+        thread.join(30)
+    assert failed == []
+    assert subscriber.undeclared
