@@ -326,35 +326,55 @@ def test_publishers_that_are_there_already_are_reported_first(link, eventually):
         eventually(lambda told=events: told == [(1, 1)])
 
 
-def test_a_publisher_that_comes_and_goes_between_two_looks_is_reported(
-    robot, console, topic, eventually
-):
-    events, held, free = [], threading.Event(), threading.Event()
-    subscription = console.create_subscription(topic, TEXT)
-    subscription.on_matched(
-        lambda e: events.append((e.endpoint.node.full, e.change, e.count, e.total))
-    )
+@pytest.fixture
+def hold(topic, eventually):
+    """Let the thread of a node that looks at publishers and subscriptions look no more."""
+    free = threading.Event()
 
-    def hold():
-        held.set()
-        free.wait(60)
-
-    # The thread that looks calls this itself, after it has looked, and waits until it returns.
-    console.on_graph_change(hold, executor=IMMEDIATE)
-    try:
-        assert robot.create_publisher(f"{topic}_other", TEXT)
+    def hold(node, other):
+        held = threading.Event()
+        # That thread calls this itself, after it has looked, and waits until it returns.
+        node.on_graph_change(lambda: (held.set(), free.wait(60)), executor=IMMEDIATE)
+        assert other.create_publisher(f"{topic}_other", TEXT)
         eventually(held.is_set)
-        first = robot.create_publisher(topic, TEXT)
-        eventually(subscription.publisher_count)
-        first.close()
-        eventually(lambda: not subscription.publisher_count())
-    finally:
-        free.set()
-    came, went = eventually(lambda: events[1:] and events)
-    assert (came[1:], went[1:]) == ((1, 1, 1), (-1, 0, 1))
+        return free
+
+    yield hold
+    free.set()
+
+
+def test_a_publisher_that_comes_and_goes_between_two_looks_is_reported(
+    robot, console, topic, eventually, hold
+):
+    events = []
+    subscription = console.create_subscription(topic, TEXT)
+    subscription.on_matched(lambda e: events.append((e.change, e.count, e.total)))
+    free = hold(console, robot)
+    first = robot.create_publisher(topic, TEXT)
+    eventually(subscription.publisher_count)
+    first.close()
+    eventually(lambda: not subscription.publisher_count())
+    free.set()
+    eventually(lambda: events == [(1, 1, 1), (-1, 0, 1)], lambda: events)
     assert robot.create_publisher(topic, TEXT)
-    eventually(lambda: events[2:])
-    assert events[2][1:] == (1, 1, 2)
+    eventually(lambda: events[2:] == [(1, 1, 2)], lambda: events)
+
+
+def test_a_subscription_that_comes_and_goes_between_two_looks_is_reported(
+    robot, console, topic, eventually, hold
+):
+    events = []
+    publisher = robot.create_publisher(topic, TEXT)
+    publisher.on_matched(lambda e: events.append((e.change, e.count, e.total)))
+    free = hold(robot, console)
+    first = console.create_subscription(topic, TEXT)
+    eventually(publisher.subscription_count)
+    first.close()
+    eventually(lambda: not publisher.subscription_count())
+    free.set()
+    eventually(lambda: events == [(1, 1, 1), (-1, 0, 1)], lambda: events)
+    assert console.create_subscription(topic, TEXT)
+    eventually(lambda: events[2:] == [(1, 1, 2)], lambda: events)
 
 
 def test_a_publisher_is_alive_while_it_is_there(robot, console, topic, eventually):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import time
+from collections import deque
 from typing import TYPE_CHECKING, Any, overload
 
 from rosglass.comm.events import DeadlineMissed, LivelinessLost, Matched, PublisherEvents
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 __all__ = ["Publisher"]
 
 _SUBSCRIPTION = EndpointKind.SUBSCRIPTION
+#: Subscriptions that left since the last look, and are reported at the next one.
+_MAX_LEFT = 1000
 #: Payloads above this size are handed on in parts, so that arrays in them are not copied.
 _BIG_BYTES = 64 * 1024
 #: Tells `publish()` from `publish(None)`.
@@ -61,6 +64,7 @@ class Publisher(Handle):
         self._problem = ""
         #: The subscriptions in the graph at the last look; None asks for another one.
         self._known: list[EndpointInfo] | None = None
+        self._left: deque[EndpointInfo] = deque(maxlen=_MAX_LEFT)
         self._big = False
         self._events = PublisherEvents(core.dispatcher, self._look, topic)
         self._lock = threading.Lock()
@@ -78,6 +82,7 @@ class Publisher(Handle):
         core.add(self, self._follow)
         core.wake()
         if self._writer.subscribers() is None:
+            core.graph.watch(topic, self._on_endpoint_removed)
             self._writer.match(self._matching(self._subscriptions()))
 
     def __repr__(self) -> str:
@@ -236,6 +241,8 @@ class Publisher(Handle):
         self._events.clear()
         if self._process != os.getpid():
             return
+        if self._writer.subscribers() is None:
+            self._core.graph.unwatch(self.topic, self._on_endpoint_removed)
         self._writer.close()
         self._core.local_gids.discard(self._writer.gid)
         self._core.remove(self)
@@ -279,6 +286,12 @@ class Publisher(Handle):
         self._known = None
         self._core.wake()
 
+    def _on_endpoint_removed(self, endpoint: EndpointInfo) -> None:
+        """Report a matching subscription that left, even if no look has found it."""
+        if endpoint.kind is _SUBSCRIPTION and self._matching([endpoint]):
+            self._left.append(endpoint)
+            self._look()
+
     def _follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - both look alike here
         """Follow the subscriptions, on the node's own thread."""
         if self._closed:
@@ -300,7 +313,8 @@ class Publisher(Handle):
         matching, conflicting = self._matching(subscriptions), self._conflicts(subscriptions)
         self._writer.match(matching)
         self._set_problem("; ".join(self._problems(subscriptions, conflicting)))
-        self._events.matched.update(matching, Matched)
+        left = [self._left.popleft() for _ in range(len(self._left))]
+        self._events.matched.update(matching, Matched, left)
         self._events.incompatible.update(conflicting, conflict_events(conflicting))
 
     def _subscriptions(self) -> list[EndpointInfo]:
