@@ -212,7 +212,7 @@ class ServiceServer(Handle):
     def _on_failure(self, request: RequestId, error: Exception) -> None:
         """Log that the callback failed, and tell the client where the wire can."""
         client = self._replier.client_name(request)
-        if isinstance(error, ServiceError) and self._replier.tells_failures:
+        if isinstance(error, ServiceError) and self._replier.has_refusals:
             # Raised on purpose, as rospy's ServiceException: the client is told, that is all.
             _log.info("%s: the request of %s is refused: %s", self.name, client, error)
         else:

@@ -61,7 +61,7 @@ class TcprosReplier(Replier, Member):
         type: The service type.
     """
 
-    tells_failures = True
+    tells_failures = has_refusals = True
     max_reply = MAX_FRAME
 
     def __init__(

@@ -233,6 +233,8 @@ class Replier(Handle):
     tells_failures: bool = False
     #: Most bytes that a response may have; None for any number.
     max_reply: int | None = None
+    #: Whether a ServiceError that the callback raises is an answer, as in rospy, and no failure.
+    has_refusals: bool = False
 
     @abstractmethod
     def reply(self, request: RequestId, data: bytes | bytearray) -> None:
