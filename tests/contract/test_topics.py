@@ -268,6 +268,7 @@ def test_publishers_that_come_and_go_are_reported(connect, robot, console, topic
 def test_a_publisher_reports_subscriptions_that_come_and_go(robot, console, topic, eventually):
     publisher = robot.create_publisher(topic, TEXT)
     events, before = [], console.create_subscription(topic, TEXT)
+    eventually(lambda: [end.node for end in robot.subscriptions(topic)] == [name_of(console)])
     eventually(lambda: publisher.subscription_count() == 1)
     publisher.on_matched(events.append)
     eventually(lambda: events)

@@ -569,12 +569,15 @@ class Failing(Executor):
 
 
 def test_a_stop_is_taken_although_the_executor_raises(offer, eventually, caplog):
-    executor = Failing()
-    server, hand = offer(
-        until_stopped, accept=lambda _: True, cancel=lambda _: False, executor=executor
-    )
+    executor, started = Failing(), threading.Event()
+
+    def execute(goal):
+        started.set()
+        return until_stopped(goal)
+
+    _, hand = offer(execute, accept=lambda _: True, cancel=lambda _: False, executor=executor)
     hand.send("a")
-    eventually(lambda: server.goals)
+    assert started.wait(30)  # it is started by the executor, too
     executor.failing = True
     hand.stop("a")
     eventually(lambda: "a" in hand.results)
