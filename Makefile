@@ -5,7 +5,7 @@ SHELL := /bin/bash
 BIN := .venv/bin
 export PYTHON
 
-.PHONY: help demo rviz-demo test setup dev lint types docs wheel coverage bench clean
+.PHONY: help demo rviz-demo check test setup dev lint types docs wheel coverage bench clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
@@ -17,6 +17,9 @@ demo: ## open the demo cockpit on a simulated robot (20 s on a virtual screen wh
 rviz-demo: ## open RViz with a dashboard on a simulated robot (20 s on a virtual screen where there is no display)
 	@scripts/setup.sh rviz-demo
 	@ROSGLASS_QT=pyside2 .venv-system/bin/python -m rosglass.demo.rviz
+
+check: dev ## run lint, types and the quick unit tests, for between two edits
+	@scripts/check.sh
 
 test: ## run lint, types, docs and all tests in both environments
 	@scripts/setup.sh test

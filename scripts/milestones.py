@@ -108,18 +108,19 @@ def worlds(sources: list[Source]) -> int:
     return len(found)
 
 
-def sleeps(sources: list[Source]) -> tuple[int, int]:
-    """Count calls of ``time.sleep``, and waits of a GUI test for a number of milliseconds."""
-    fixed = waits = 0
+def sleeps(sources: list[Source]) -> tuple[int, int, int]:
+    """Count calls of ``time.sleep`` in tests, of ``nothing_happens``, and sleeps of their peers.
+
+    Peers are programs of their own, which send at a rate.
+    """
+    fixed = quiet = peers = 0
     for source in sources:
-        for name, owner, call in source.calls():
-            fixed += name == "sleep" and owner == "time"
-            first = call.args[0] if call.args else None
-            is_number = isinstance(first, ast.Constant) and type(first.value) is int
-            waits += (
-                name == "wait" and is_number and {"gui", "rviz"} & set(source.path.parts) != set()
-            )
-    return fixed, waits
+        for name, owner, _ in source.calls():
+            is_sleep = name == "sleep" and owner == "time"
+            peers += is_sleep and "peers" in source.path.parts
+            fixed += is_sleep and "peers" not in source.path.parts
+            quiet += name == "nothing_happens"
+    return fixed, quiet, peers
 
 
 def private_reaches(sources: list[Source]) -> int:
@@ -311,7 +312,7 @@ def main() -> None:
             [one for one in source if folder in one.path.relative_to(package).parts[:1]]
         )
 
-    fixed, waits = sleeps(tests)
+    fixed, quiet, peers = sleeps(tests)
     groups, inside = cycles(graph)
     rows = [
         ("module names in both ROS worlds", twins(package), "0"),
@@ -319,7 +320,7 @@ def main() -> None:
         ("locks, events, conditions in them", locks(clients), "25"),
         ("in-memory worlds (product and tests)", worlds(source + tests), "1"),
         ("tests, lines", total_lines(tests), "50,000; then 45,000"),
-        ("tests: fixed sleeps + Qt waits", f"{fixed} + {waits}", "20"),
+        ("tests: sleeps, nothing_happens(), in peers", f"{fixed}, {quiet}, {peers}", "20"),
         ("tests: reaches into privates", private_reaches(tests), "60"),
         ("files in src", len(source), "320"),
         ("modules imported by one sibling only", lone_modules(graph), "60"),

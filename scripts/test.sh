@@ -28,24 +28,32 @@ failed=0
 wait "$checked" || failed=$?
 cat "$types"
 ((failed == 0)) || exit "$failed"
-# Most tests wait for others most of the time: four side by side, each file in one process.
-# Once more what failed: with other programs, machines under load can. Each is listed at the end.
+# Most tests wait for others most of the time: six side by side, each file in one process.
+# RViz and Qt 5 draw on the processor: four of them keep two cores busy.
 # A process that crashes fails its test and is not replaced: the others would wait for it for ever.
 # Files in the order of their folders: by default, those of few tests come last, which here are
 # those that wait longest for others, and the end would be spent on waiting for one of them.
-side_by_side=(-n 4 --dist loadfile --no-loadscope-reorder --max-worker-restart=0 --reruns 1
-  --rerun-show-tracebacks)
+run() { # ENVIRONMENT PROCESSES ARGUMENT...
+  local environment=$1 processes=$2
+  shift 2
+  scripts/private_network.sh "$environment/bin/python" -m pytest -q -n "$processes" --dist loadfile \
+    --no-loadscope-reorder --max-worker-restart=0 "$@"
+}
+# Once more what failed, with windows and other programs: those can fail on machines under load.
+# Each is listed at the end.
+once_more=(--reruns 1 --rerun-show-tracebacks)
 version() { "$1/bin/python" -c 'import sys; print("%d.%d" % sys.version_info[:2])'; }
 # Unit tests need no Qt: once for each Python is enough. Debian's has genpy to compare with.
 say "unit tests, and what holds on every wire ($(.venv-system/bin/python -V), Debian's own)"
-scripts/private_network.sh .venv-system/bin/python -m pytest -q "${side_by_side[@]}" tests/unit tests/contract "$@"
+run .venv-system 6 tests/unit tests/contract "$@"
 say "tests of interfaces in Qt 5 ($(.venv-system/bin/python -V), PySide2)"
-scripts/private_network.sh .venv-system/bin/python -m pytest -q "${side_by_side[@]}" tests/gui "$@"
+run .venv-system 4 "${once_more[@]}" tests/gui "$@"
 say "tests in RViz ($(.venv-system/bin/python -V))"
 # Apart from tests/gui: a process has one Qt application, and RViz needs one of its own kind.
-scripts/private_network.sh .venv-system/bin/python -m pytest -q "${side_by_side[@]}" tests/rviz "$@"
+run .venv-system 4 "${once_more[@]}" tests/rviz "$@"
+if [[ "$(version .venv)" != "$(version .venv-system)" ]]; then
+  say "unit tests, and what holds on every wire ($(.venv/bin/python -V))"
+  run .venv 6 -m "not exhaustive" tests/unit tests/contract "$@"
+fi
 say "tests of interfaces in Qt 6, and with other programs ($(.venv/bin/python -V), PySide6)"
-folders=(tests/gui tests/interop)
-[ "$(version .venv)" = "$(version .venv-system)" ] || folders+=(tests/unit tests/contract)
-scripts/private_network.sh .venv/bin/python -m pytest -q "${side_by_side[@]}" -m "not exhaustive" \
-  "${folders[@]}" "$@"
+run .venv 6 "${once_more[@]}" -m "not exhaustive" tests/gui tests/interop "$@"

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 os.environ["ROSGLASS_TYPE_CACHE"] = "off"
 
 #: ROS domains for tests: above 101 the ports are among those that Linux gives to anybody.
-DOMAINS, DOMAIN_SHARES = 100, 4
+DOMAINS, DOMAIN_SHARES = 100, 8
 
 #: Whether a test has failed.
 FAILED = pytest.StashKey[bool]()
