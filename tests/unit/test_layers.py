@@ -26,16 +26,16 @@ RANK = {
     "ros1": 4,
     "ros2": 4,
     "wires": 5,
-    "connection": 7,
-    "bags": 6,
+    "connection": 6,
+    "bags": 5,
     "bridge": 5,
     "tf": 5,
     "images": 5,
     "qt": 5,
-    "qml": 8,
-    "rviz": 9,
-    "cli": 11,
-    "demo": 10,
+    "qml": 7,
+    "rviz": 8,
+    "cli": 10,
+    "demo": 9,
 }
 QT = {"PySide6", "PySide2", "PyQt5", "PyQt6", "shiboken6", "shiboken2"}
 MODULES = sorted(ROOT.rglob("*.py"))
