@@ -68,6 +68,9 @@ class MemoryWorld:
 
 
 class MemoryPublisher(Publisher):
+    problem = hint = ""
+    dropped = 0
+
     def __init__(self, node: MemoryNode, topic: str, type: MessageType, qos: QoS) -> None:
         self.node, self.topic, self.type, self.qos = node, topic, type, qos
         self.kept: list[bytes] = []

@@ -177,6 +177,11 @@ class SilentPublisher(Publisher):
     _problem = ""
 
     @property
+    def dropped(self) -> int:
+        """None: a recording waits for no subscriber."""
+        return 0
+
+    @property
     def hint(self) -> str:
         """Nothing."""
         return ""
