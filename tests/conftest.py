@@ -10,6 +10,7 @@ import subprocess
 import sys
 from typing import TYPE_CHECKING, Any
 
+import ports
 import pytest
 import waiting
 
@@ -36,6 +37,12 @@ def ros_domains() -> list[int]:
     share = DOMAINS // DOMAIN_SHARES
     number = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:]) % DOMAIN_SHARES
     return random.SystemRandom().sample(range(1 + number * share, 1 + (number + 1) * share), share)
+
+
+@pytest.fixture
+def free_port() -> int:
+    """See :func:`ports.free_port`."""
+    return ports.free_port()
 
 
 @pytest.fixture(scope="session")

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from ports import free_port
 from waiting import eventually
 
 import rosglass
@@ -75,7 +76,7 @@ def wire(
         _need("zenoh", "zenoh")
         from rosglass.wires.zenoh.router import Router
 
-        with Router("tcp/127.0.0.1:0") as router:
+        with Router(f"tcp/127.0.0.1:{free_port()}") as router:
             yield Wire("zenoh", router.url)
     else:
         with _RosMaster(tmp_path_factory.mktemp("master")) as url:
@@ -96,9 +97,7 @@ class _RosMaster:
         self._home = home
 
     def __enter__(self) -> str:
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            port = probe.getsockname()[1]
+        port = free_port()
         home = str(self._home)
         env = {"PATH": "/usr/bin:/bin", "HOME": home, "ROS_HOME": home, "ROS_IP": "127.0.0.1"}
         command = [str(_ROSMASTER), "--core", "-p", str(port)]

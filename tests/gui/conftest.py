@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import socket
 import subprocess
 import sys
 import threading
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from ports import free_port
 
 sys.path.insert(0, str(Path(__file__).parent))
 # Python code that paints would deadlock with grabs under the threaded render loop.
@@ -171,14 +171,12 @@ def url(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
     if request.param == "zenoh":
         from rosglass.wires.zenoh.router import Router
 
-        with Router("tcp/127.0.0.1:0") as router:
+        with Router(f"tcp/127.0.0.1:{free_port()}") as router:
             yield router.url
         return
     if not Path("/usr/bin/rosmaster").exists():
         pytest.skip("ROS 1 is not installed: sudo apt-get install python3-rosmaster")
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     home = tmp_path_factory.mktemp("master")
     env = {"PATH": "/usr/bin:/bin", "HOME": str(home), "ROS_HOME": str(home)}
     command = ["/usr/bin/rosmaster", "--core", "-p", str(port)]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from ports import free_port
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -81,7 +82,7 @@ class RobotSide:
 def robot() -> Iterator[RobotSide]:
     from rosglass.wires.zenoh.router import Router
 
-    with Router("tcp/127.0.0.1:0") as router:
+    with Router(f"tcp/127.0.0.1:{free_port()}") as router:
         side = RobotSide(router.url)
         yield side
         side.close()

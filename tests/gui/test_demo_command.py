@@ -6,7 +6,6 @@ import os
 import re
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from ports import free_port
 from waiting import eventually
 
 if TYPE_CHECKING:
@@ -24,12 +24,6 @@ pytest.importorskip("zenoh", reason="the cockpit needs the extra `zenoh`")
 
 pytestmark = pytest.mark.xvfb
 _STARTED = re.compile(r"started the robot, process (\d+)")
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @pytest.fixture
@@ -179,7 +173,7 @@ def test_bad_options_are_explained(tmp_path: Path, arguments: list[str], named: 
 def test_it_uses_a_router_that_is_there(tmp_path: Path) -> None:
     from rosglass.wires.zenoh.router import Router
 
-    with Router("tcp/127.0.0.1:0") as router:
+    with Router(f"tcp/127.0.0.1:{free_port()}") as router:
         process = start(tmp_path, "demo", "--url", router.url, "--seconds", "4")
         output, _ = process.communicate(timeout=60)
     assert process.returncode == 0, output

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from ports import free_port
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -29,7 +30,7 @@ def world() -> Iterator[str]:
     """A router and the simulated robot; gives the URL."""
     from rosglass.wires.zenoh.router import Router
 
-    with Router("tcp/127.0.0.1:0") as router:
+    with Router(f"tcp/127.0.0.1:{free_port()}") as router:
         command = [sys.executable, "-m", "rosglass.cli", "robot", "--url", router.url, "--leash"]
         robot = subprocess.Popen(
             command, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=sys.stderr

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from ports import free_port
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -26,7 +27,7 @@ CHUNKS = ["singletons", "given", "types", "lifecycle"]
 def router() -> Iterator[str]:
     from rosglass.wires.zenoh.router import Router
 
-    with Router("tcp/127.0.0.1:0") as router:
+    with Router(f"tcp/127.0.0.1:{free_port()}") as router:
         yield router.url
 
 

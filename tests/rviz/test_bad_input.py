@@ -13,6 +13,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from ports import free_port
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -385,7 +386,7 @@ def test_a_node_finds_its_master_again(
     from rosglass.qml import Session
     from rosglass.rviz import QmlOverlay
 
-    port = int(xmlrpc_port())
+    port = free_port()
     uri = f"http://127.0.0.1:{port}"
     servers = [start_master(port, tmp_path)]
     file.write_text(
@@ -418,14 +419,6 @@ def test_a_node_finds_its_master_again(
             server.kill()
             server.wait()
     goes_on()
-
-
-def xmlrpc_port() -> int:
-    import socket
-
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def start_master(port: int, home: Path) -> subprocess.Popen[bytes]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from ports import free_port
 from waiting import eventually
 
 from rosglass.demo.processes import VirtualScreen
@@ -165,9 +165,7 @@ def test_ends_when_told_to_at_any_moment(
 
 
 def test_waits_for_a_master_and_says_so(start: Callable[..., Program]) -> None:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     program = start("--url", f"ros1://127.0.0.1:{port}")
     program.wait_for(f"start one: roscore -p {port}")
     assert program.end() == 130
@@ -209,9 +207,7 @@ def test_ends_when_the_node_of_overlays_is_killed(
 def test_tells_when_the_master_is_gone_and_when_another_one_came(
     start: Callable[..., Program], tmp_path: Path
 ) -> None:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     home = str(tmp_path / "ros")
 
     def roscore() -> subprocess.Popen[bytes]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-import socket
 import subprocess
 import sys
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from ports import free_port
 from waiting import eventually
 
 from rosglass.errors import ConnectionLostError
@@ -24,9 +24,7 @@ SERVICE = "/rviz/hector_view_controller/set_view_mode"
 @pytest.fixture
 def address(tmp_path: Path) -> Iterator[tuple[str, Any]]:
     """Address of a master of the test's own, and what starts it, after its end as well."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     home = str(tmp_path / "ros")
     running: list[subprocess.Popen[bytes]] = []
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from ports import free_port
 
 import rosglass
 from rosglass.bridge import Bridge
@@ -35,12 +36,12 @@ start_master, master = _ros1.start_master, _ros1.master
 start_rospy, rospy_peer = _ros1.start_rospy, _ros1.rospy_peer
 tool = _ros1.tool
 interfaces, peer_values, start_peer = _ros2.interfaces, _ros2.peer_values, _ros2.start_peer
-free_port, dds_domain = _ros2.free_port, _ros2.dds_domain
+dds_domain = _ros2.dds_domain
 
 
 @pytest.fixture(scope="module")
 def router() -> Iterator[Router]:
-    with Router("tcp/127.0.0.1:0") as running:
+    with Router(f"tcp/127.0.0.1:{free_port()}") as running:
         yield running
 
 

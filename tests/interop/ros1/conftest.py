@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import itertools
-import os
-import random
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import xmlrpc.client
@@ -16,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from ports import free_port
 from waiting import eventually
 
 import rosglass
@@ -36,20 +34,6 @@ INSTALL = (
 INSTALL_CPP = (
     "roscpp is not installed: sudo apt-get install g++ pkg-config libroscpp-dev libactionlib-dev"
 )
-
-
-def free_port() -> int:
-    """Return a port of the loopback interface that is not in use.
-
-    From a range that no other process of tests takes ports from, nor the system by itself: until
-    the test's program listens there, another one's must not.
-    """
-    number = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
-    while True:
-        port = 12000 + number % 4 * 5000 + random.SystemRandom().randrange(5000)
-        with suppress(OSError), socket.socket() as probe:
-            probe.bind(("127.0.0.1", port))
-            return port
 
 
 def needs(*programs: str) -> None:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import socket
-
 import pytest
+from ports import free_port
 from waiting import eventually
 
 import rosglass
@@ -110,10 +109,7 @@ def test_without_being_told_we_announce_what_others_reach(start_rospy, monkeypat
 
 def test_the_master_of_the_command_line_and_fixed_ports(start_master):
     master = start_master()
-    with socket.socket() as one, socket.socket() as two:
-        for probe in (one, two):
-            probe.bind(("127.0.0.1", 0))
-        port, api = one.getsockname()[1], two.getsockname()[1]
+    port, api = free_port(), free_port()
     node = rosglass.connect(
         f"ros1://?slave_port={api}&ip=127.0.0.1",
         "fixed",

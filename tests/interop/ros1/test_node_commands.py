@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import socket
 from typing import Any
 
 import pytest
@@ -24,14 +23,6 @@ def run(robot: Any, master: Any, monkeypatch: pytest.MonkeyPatch, run_command: A
     """Run a command that looks at the robot."""
     monkeypatch.setenv("ROSGLASS_URL", f"{master.url}?ip=127.0.0.1")
     return run_command
-
-
-@pytest.fixture
-def free_port() -> int:
-    """A port that nobody listens on."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def test_topic_info_says_what_it_cannot_know(run, master, connect, free_port):

@@ -8,12 +8,12 @@ import json
 import os
 import random
 import shutil
-import socket
 import subprocess
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from ports import free_port
 
 import rosglass
 from rosglass.interfaces import (
@@ -35,13 +35,6 @@ PEERS = Path(__file__).parent / "peers"
 MODULES = {"rosglass": "rosglass", "sdk": "zenoh_ros2_sdk", "dora": "dora"}
 
 
-@pytest.fixture
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 @pytest.fixture(scope="session")
 def peer_values() -> Any:
     """The module that peers share: ``VALUES`` they publish, ``summary()`` of what they receive."""
@@ -55,7 +48,7 @@ def peer_values() -> Any:
 
 @pytest.fixture(scope="module")
 def router() -> Iterator[Router]:
-    with Router("tcp/127.0.0.1:0") as running:
+    with Router(f"tcp/127.0.0.1:{free_port()}") as running:
         yield running
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from ports import free_port
 
 import rosglass
 from rosglass.comm import QoS
@@ -383,9 +383,7 @@ def test_what_the_environment_says_is_not_overruled(
 
 
 def test_a_robot_alone_names_what_it_waits_for(start_command_at: Any) -> None:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     url = f"zenoh://127.0.0.1:{port}"
     robot = start_command_at(url, "robot", "--url", url, "--fps", "1")
     line = robot.stderr.readline()

@@ -13,6 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from ports import free_port
 from waiting import eventually, nothing_happens
 
 import rosglass
@@ -346,7 +347,7 @@ def test_a_router_refuses_what_is_no_address(listen):
 
 
 def test_a_router_closes_twice_and_frees_its_port():
-    with Router("tcp/127.0.0.1:0") as first:
+    with Router(f"tcp/127.0.0.1:{free_port()}") as first:
         assert is_router_reachable(first.url)
     first.close()
     assert not is_router_reachable(first.url)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import socket
 import socketserver
 import threading
 import xmlrpc.client
@@ -272,11 +271,3 @@ def connect(master: FakeMaster) -> Iterator[Callable[..., Ros1Node]]:
     yield connect
     for node in nodes:
         node.close()
-
-
-@pytest.fixture
-def free_port() -> int:
-    """A port that nobody listens on."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])

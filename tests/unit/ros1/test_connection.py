@@ -8,6 +8,7 @@ import threading
 import time
 
 import pytest
+from ports import free_port
 from waiting import eventually, nothing_happens
 
 from rosglass.ros1 import connection as module
@@ -103,9 +104,7 @@ def test_a_header_in_time_lasts(loop, monkeypatch):
 
 
 def test_nobody_listens(loop):
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        address = probe.getsockname()
+    address = ("127.0.0.1", free_port())
     ended = []
     loop.call(
         lambda: Connection.dial(loop, address, {}, lambda _: None, lambda *_: None, ended.append)

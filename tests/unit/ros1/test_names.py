@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 
 import pytest
+from ports import free_port
 
 import rosglass
 from rosglass import ConversionError, InvalidNameError
@@ -201,9 +202,7 @@ def test_ports_that_are_taken_are_named() -> None:
 
 
 def test_fixed_ports_can_be_had_again_at_once() -> None:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     for _ in range(5):
         with rosglass.connect(f"{PLACE}?slave_port={port}&ip=127.0.0.1") as node:
             assert node.status().state.value == "connecting"

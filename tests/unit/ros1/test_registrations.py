@@ -9,6 +9,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from ports import free_port
 from waiting import eventually
 
 import rosglass
@@ -257,9 +258,7 @@ def test_the_graph_is_told_and_changes_are(master: FakeMaster, node: Ros1Node) -
 def test_a_publisher_that_is_registered_but_gone_is_named(
     master: FakeMaster, node: Ros1Node
 ) -> None:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     master.publishers["/scan"] = {"/laser": f"http://127.0.0.1:{port}/"}
     subscription = node.create_subscription("/scan")
     eventually(lambda: "Connection refused" in subscription.problem)
