@@ -10,7 +10,7 @@ import pytest
 
 import rosglass
 from rosglass.comm import CancelAnswer, Dispatcher, Executor, GoalStatus, Time
-from rosglass.comm.loop import LoopExecutor
+from rosglass.comm.executor import LoopExecutor
 
 ENDLESS = {"order": 1_000_000}
 

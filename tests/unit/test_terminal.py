@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 PROGRAM = """
 import logging
-from rosglass.comm.terminal import warn_on_terminal
+from rosglass.comm.log import warn_on_terminal
 {0}
 warn_on_terminal()
 warn_on_terminal()

@@ -28,12 +28,10 @@ from rosglass.comm import (
     Time,
     Timers,
 )
-from rosglass.comm.log import NodeLogger
-from rosglass.comm.loop import check_plain
-from rosglass.comm.names import expand
+from rosglass.comm.executor import check_plain
+from rosglass.comm.log import NodeLogger, show_on_terminal
+from rosglass.comm.names import expand, similar
 from rosglass.comm.rclpy_names import check_order
-from rosglass.comm.similar import similar
-from rosglass.comm.terminal import show_on_terminal
 from rosglass.errors import ConversionError, NodeClosedError, UnsupportedError
 from rosglass.interfaces.names import join_name
 from rosglass.messages import Message, MessageType, OpaqueType, load

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.bags.recording_file import create
 from rosglass.comm import IMMEDIATE, Handle, QoS
-from rosglass.comm.similar import similar
+from rosglass.comm.names import similar
 from rosglass.errors import BagError, Error, NodeClosedError
 from rosglass.messages import OpaqueType
 

@@ -16,8 +16,8 @@ from rosglass.bridge.side import Side
 from rosglass.bridge.status import BridgeStatus, RelayStatus
 from rosglass.bridge.topic_relay import TopicRelay
 from rosglass.comm import IMMEDIATE, ConnectionState, Handle, Node, QoS, Worker
+from rosglass.comm.names import similar
 from rosglass.comm.promise import check_timeout
-from rosglass.comm.similar import similar
 from rosglass.errors import ArgumentError, Error, InvalidNameError, NodeClosedError
 
 if TYPE_CHECKING:

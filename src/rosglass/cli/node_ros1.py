@@ -17,7 +17,7 @@ from rosglass.cli.connecting import End, add_connection_options, connect, find, 
 from rosglass.cli.output import add_output_options, note, print_json
 from rosglass.cli.worlds import as_ros1, names_ros1
 from rosglass.comm import EndpointKind
-from rosglass.comm.similar import similar
+from rosglass.comm.names import similar
 from rosglass.errors import ConnectionLostError, Error, MasterError, UnsupportedError
 
 if TYPE_CHECKING:

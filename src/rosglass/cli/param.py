@@ -10,7 +10,7 @@ from rosglass.cli.output import Style, add_output_options, note, print_json, to_
 from rosglass.cli.subcommands import Subcommands
 from rosglass.cli.worlds import names_ros1
 from rosglass.comm import ParameterType
-from rosglass.comm.similar import similar
+from rosglass.comm.names import similar
 from rosglass.errors import Error
 
 if TYPE_CHECKING:

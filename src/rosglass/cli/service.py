@@ -31,7 +31,7 @@ from rosglass.cli.output import (
 from rosglass.cli.subcommands import Subcommands
 from rosglass.cli.values import parse_fields, split_type
 from rosglass.cli.worlds import is_hidden, is_ros1, spelled
-from rosglass.comm.similar import similar
+from rosglass.comm.names import similar
 
 if TYPE_CHECKING:
     import argparse

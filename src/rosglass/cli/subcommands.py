@@ -40,7 +40,7 @@ class Parser(argparse.ArgumentParser):
 
     def _refuse(self, unknown: list[str]) -> NoReturn:
         """End with this command's own usage; argparse alone shows that of ``rosglass``."""
-        from rosglass.comm.similar import similar
+        from rosglass.comm.names import similar
 
         options = [one for action in self._actions for one in action.option_strings]
         hints = (similar(one.partition("=")[0], options) for one in unknown if one[:1] == "-")

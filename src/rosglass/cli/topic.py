@@ -27,7 +27,7 @@ from rosglass.cli.topic_echo import echo
 from rosglass.cli.topic_rates import measure
 from rosglass.cli.values import parse_fields, profile, split_type
 from rosglass.cli.worlds import as_ros1, is_hidden, spelled
-from rosglass.comm.similar import similar
+from rosglass.comm.names import similar
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rosglass.cli.output import note, require_reader
 from rosglass.cli.worlds import spelled
 from rosglass.comm import ConnectionState
-from rosglass.comm.similar import similar
+from rosglass.comm.names import similar
 
 if TYPE_CHECKING:
     import argparse

@@ -9,7 +9,6 @@ if TYPE_CHECKING:
     from rosglass.comm.action import ActionResult, CancelAnswer, GoalStatus
     from rosglass.comm.action_client import ActionClient, ClientGoal
     from rosglass.comm.action_server import ActionServer, ServerGoal
-    from rosglass.comm.anonymous import anonymous_name
     from rosglass.comm.clock import Clock, ClockChange, Jump, Timer
     from rosglass.comm.events import (
         DeadlineMissed,
@@ -21,12 +20,12 @@ if TYPE_CHECKING:
         SamplesLost,
         SubscriptionEvents,
     )
-    from rosglass.comm.executor import IMMEDIATE, Dispatcher
+    from rosglass.comm.executor import IMMEDIATE, Dispatcher, LoopExecutor, executor_for
     from rosglass.comm.graph import ConnectionState, EndpointInfo, EndpointKind, NodeName, Status
     from rosglass.comm.inbox import INBOX_LIMIT
     from rosglass.comm.lifecycle import LifecycleClient, State, Transition, TransitionEvent
     from rosglass.comm.listeners import Listeners
-    from rosglass.comm.loop import LoopExecutor, executor_for
+    from rosglass.comm.names import anonymous_name
     from rosglass.comm.node import Answer, Executor, Handle, Node
     from rosglass.comm.parameters import (
         ParameterClient,
@@ -48,8 +47,7 @@ if TYPE_CHECKING:
     from rosglass.comm.statistics import Statistics
     from rosglass.comm.subscription import Subscription
     from rosglass.comm.time import Duration, Time
-    from rosglass.comm.timers import Timers
-    from rosglass.comm.worker import Worker
+    from rosglass.comm.timers import Timers, Worker
 
 __all__ = [
     "BEST_AVAILABLE",
@@ -121,6 +119,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "names": ("anonymous_name",),
     "action": (
         "ActionResult",
         "CancelAnswer",
@@ -134,7 +133,6 @@ _HOMES = {
         "ActionServer",
         "ServerGoal",
     ),
-    "anonymous": ("anonymous_name",),
     "clock": (
         "Clock",
         "ClockChange",
@@ -152,8 +150,10 @@ _HOMES = {
         "SubscriptionEvents",
     ),
     "executor": (
-        "IMMEDIATE",
         "Dispatcher",
+        "IMMEDIATE",
+        "LoopExecutor",
+        "executor_for",
     ),
     "graph": (
         "ConnectionState",
@@ -170,10 +170,6 @@ _HOMES = {
         "TransitionEvent",
     ),
     "listeners": ("Listeners",),
-    "loop": (
-        "LoopExecutor",
-        "executor_for",
-    ),
     "node": (
         "Answer",
         "Executor",
@@ -213,8 +209,10 @@ _HOMES = {
         "Duration",
         "Time",
     ),
-    "timers": ("Timers",),
-    "worker": ("Worker",),
+    "timers": (
+        "Timers",
+        "Worker",
+    ),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 

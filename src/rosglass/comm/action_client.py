@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from rosglass.comm.action import ActionResult, CancelAnswer, GoalStatus
 from rosglass.comm.client import Client, untyped
 from rosglass.comm.listeners import Listeners
+from rosglass.comm.names import similar
 from rosglass.comm.node import Executor, Handle
 from rosglass.comm.promise import Promise, check_timeout
 from rosglass.comm.rclpy_names import hint_at_members
-from rosglass.comm.similar import similar
 from rosglass.comm.time import Time
 from rosglass.errors import (
     ArgumentError,
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from rosglass.comm.core import NodeCore
-    from rosglass.comm.inorder import InOrder
+    from rosglass.comm.executor import InOrder
     from rosglass.messages import ActionType, Message
 
     _T = TypeVar("_T")

@@ -10,7 +10,7 @@ from concurrent.futures import Future
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from rosglass.comm.action import GoalStatus
-from rosglass.comm.loop import LoopExecutor, executor_for
+from rosglass.comm.executor import LoopExecutor, executor_for
 from rosglass.comm.node import Handle
 from rosglass.comm.promise import Promise
 from rosglass.comm.rclpy_names import hint_at_members

@@ -14,13 +14,11 @@ from enum import Enum
 from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.comm.complaints import FailureLog
-from rosglass.comm.executor import RetryingExecutor, let_exit
+from rosglass.comm.executor import RetryingExecutor, check_plain, let_exit
 from rosglass.comm.listeners import Listeners
-from rosglass.comm.loop import check_plain
-from rosglass.comm.node import Executor, Handle
+from rosglass.comm.node import Executor, Handle, Unique
 from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.comm.time import Duration, Time
-from rosglass.comm.unique import Unique
 from rosglass.errors import ArgumentError, NodeClosedError
 
 if TYPE_CHECKING:

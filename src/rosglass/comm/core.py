@@ -9,12 +9,11 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from rosglass.comm.clock import Clock
-from rosglass.comm.executor import Dispatcher
+from rosglass.comm.executor import Dispatcher, check_plain
 from rosglass.comm.graph import ConnectionState, Status
 from rosglass.comm.listeners import Listeners
-from rosglass.comm.node import Handle
-from rosglass.comm.timers import Timers
-from rosglass.comm.worker import Worker
+from rosglass.comm.node import Handle, Node
+from rosglass.comm.timers import Timers, Worker
 from rosglass.errors import NodeClosedError
 
 if TYPE_CHECKING:
@@ -22,10 +21,16 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.comm.graph import EndpointInfo, NodeName
+    from rosglass.comm.node import Executor
+    from rosglass.comm.time import Time
     from rosglass.messages import MessageType
     from rosglass.wires.base import Middleware, Writer
 
-__all__ = ["NodeCore", "NodeMember"]
+__all__ = [
+    "CoreNode",
+    "NodeCore",
+    "NodeMember",
+]
 
 #: Seconds between the members' regular looks at what has no event.
 _POLL = 1.0
@@ -189,3 +194,39 @@ class NodeCore(ABC, Generic[_Member]):
 
 def _ignore(moved: bool, idle: bool) -> None:
     """Follow nothing."""
+
+
+class CoreNode(Node):
+    """A node that keeps time, and tells its status and changes of the graph, by its core."""
+
+    _core: NodeCore[Any]
+
+    @property
+    def clock(self) -> Clock:
+        """The node's clock, which follows ``/clock`` where ROS's parameter says so."""
+        return self._core.clock
+
+    def now(self) -> Time:
+        """Return the time of the node's clock."""
+        return self._core.clock.now()
+
+    def on_graph_change(
+        self, callback: Callable[[], None], executor: Executor | None = None
+    ) -> Handle:
+        """Call `callback` after nodes or endpoints appeared or went; changes may be merged."""
+        self._core.check_open()
+        check_plain(callback, "on_graph_change()")
+        return self._core.graph_listeners.add(
+            lambda _: callback(), executor or self._core.dispatcher
+        )
+
+    def status(self) -> Status:
+        """Return the state of the connection and what is being done about it."""
+        return self._core.status()
+
+    def on_status_change(
+        self, callback: Callable[[Status], None], executor: Executor | None = None
+    ) -> Handle:
+        """Call `callback` with the new status whenever it changes."""
+        self._core.check_open()
+        return self._core.status_listeners.add(callback, executor or self._core.dispatcher)

@@ -14,10 +14,12 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 from rosglass.comm.listeners import Listener, Listeners
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable, Iterable, Sequence
+    from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 
     from rosglass.comm.graph import EndpointInfo
     from rosglass.comm.node import Executor, Handle
+    from rosglass.comm.qos import QoS
+    from rosglass.wires.base import Middleware
 
 __all__ = [
     "Appearances",
@@ -29,6 +31,9 @@ __all__ = [
     "PublisherEvents",
     "SamplesLost",
     "SubscriptionEvents",
+    "conflict_events",
+    "conflicts",
+    "words",
 ]
 
 _E = TypeVar("_E")
@@ -261,3 +266,38 @@ class PublisherEvents:
         self.deadline.clear()
         self.liveliness.clear()
         self.problem.clear()
+
+
+def conflicts(
+    middleware: Middleware, endpoint: EndpointInfo, requested: QoS, offered: QoS
+) -> dict[str, str]:
+    """Say, policy by policy, what keeps a publisher and a subscription apart.
+
+    Args:
+        middleware: What connects them.
+        endpoint: The one of the two that is not ours.
+        requested: The subscription's profile.
+        offered: The publisher's profile.
+    """
+    return {**requested.conflicts(offered), **middleware.conflicts(endpoint)}
+
+
+def words(found: Mapping[str, str]) -> str:
+    """Return the conflicts of policies as one line."""
+    return "; ".join(f"{policy}: {reason}" for policy, reason in found.items())
+
+
+def conflict_events(
+    found: Mapping[EndpointInfo, Mapping[str, str]],
+) -> Callable[[EndpointInfo, int, int, int], IncompatibleQoS | None]:
+    """Return what makes events of the endpoints in conflict, for :class:`comm.Appearances`."""
+
+    def event(
+        endpoint: EndpointInfo, change: int, _count: int, total: int
+    ) -> IncompatibleQoS | None:
+        if change < 0:
+            return None
+        policies = found[endpoint]
+        return IncompatibleQoS(endpoint, tuple(policies), words(policies), total)
+
+    return event

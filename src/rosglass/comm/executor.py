@@ -2,33 +2,42 @@
 
 from __future__ import annotations
 
+import inspect
 import logging
 import math
 import threading
 import time
 from collections import deque
 from queue import SimpleQueue
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.complaints import FailureLog
 from rosglass.comm.node import Executor
 from rosglass.comm.timers import Timers
+from rosglass.errors import ArgumentError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    import asyncio
+    from collections.abc import Callable, Coroutine
+    from concurrent.futures import Future
 
 __all__ = [
     "IMMEDIATE",
     "Dispatcher",
     "ImmediateExecutor",
+    "InOrder",
+    "LoopExecutor",
     "RetryingExecutor",
+    "check_plain",
+    "executor_for",
+    "is_coroutine_function",
     "let_exit",
     "run_job",
 ]
 
 _log = logging.getLogger("rosglass.comm")
 #: Seconds that closing waits for a callback that is still running.
-_PATIENCE = 2.0
+_CLOSE_TIMEOUT_S = 2.0
 #: Seconds until an executor that raised is given its jobs again: the first, and the longest.
 _FIRST_RETRY_S, _LONGEST_RETRY_S = 0.05, 1.0
 #: Gives executors that raised their jobs again; its thread starts with the first of them.
@@ -107,9 +116,11 @@ class Dispatcher(Executor):
         self._jobs.put(None)
         if thread is None or thread is threading.current_thread():
             return
-        thread.join(_PATIENCE)
+        thread.join(_CLOSE_TIMEOUT_S)
         if thread.is_alive():
-            _log.warning("%s: a callback still runs %.0f s after closing", self._name, _PATIENCE)
+            _log.warning(
+                "%s: a callback still runs %.0f s after closing", self._name, _CLOSE_TIMEOUT_S
+            )
 
     def _start(self) -> None:
         with self._lock:
@@ -204,3 +215,121 @@ class RetryingExecutor(Executor):
             self._name,
             self._executor,
         )
+
+
+class LoopExecutor(Executor):
+    """Runs callbacks in an asyncio event loop, and coroutines.
+
+    Args:
+        loop: The loop.
+    """
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self._loop = loop
+
+    @classmethod
+    def running(cls, callback: object, where: str) -> LoopExecutor:
+        """Return one for the loop that runs in this thread, for a coroutine function.
+
+        Raises:
+            ArgumentError: None runs, so that `callback` could never be called.
+        """
+        import asyncio  # noqa: PLC0415 - only for those who use it
+
+        try:
+            return cls(asyncio.get_running_loop())
+        except RuntimeError:
+            raise ArgumentError(
+                "callback",
+                callback,
+                "a plain function, or to be created inside a running event loop, as in "
+                "`async def main()`, where coroutine functions are run",
+                where,
+            ) from None
+
+    @property
+    def is_current(self) -> bool:
+        """Whether the calling thread runs the loop just now."""
+        import asyncio  # noqa: PLC0415 - only for those who use it
+
+        try:
+            return asyncio.get_running_loop() is self._loop
+        except RuntimeError:
+            return False
+
+    def post(self, job: Callable[[], None]) -> None:
+        """Run `job` in the loop soon; raises RuntimeError when the loop is closed."""
+        self._loop.call_soon_threadsafe(job)
+
+    def run(self, coroutine: Coroutine[Any, Any, Any]) -> Future[Any]:
+        """Run a coroutine in the loop; the future has what it returns."""
+        import asyncio  # noqa: PLC0415 - only for those who use it
+
+        return asyncio.run_coroutine_threadsafe(coroutine, self._loop)
+
+
+def is_coroutine_function(callback: object) -> bool:
+    """Return whether calling `callback` does nothing but make a coroutine."""
+    call = getattr(callback, "__call__", None)  # noqa: B004 - objects may be callable, too
+    return inspect.iscoroutinefunction(callback) or inspect.iscoroutinefunction(call)
+
+
+def check_plain(callback: object, where: str = "", name: str = "callback") -> None:
+    """Raise ArgumentError unless `callback` can be called and is no coroutine function."""
+    if not callable(callback):
+        raise ArgumentError(name, callback, "something that can be called", where)
+    if is_coroutine_function(callback):
+        # It would be called, and nothing in it would ever run.
+        told = "a plain function (loop.call_soon_threadsafe() brings work into asyncio)"
+        raise ArgumentError(name, callback, told, where)
+
+
+def executor_for(
+    callback: Any, executor: Executor | None, default: Executor, where: str
+) -> Executor:
+    """Return where a callback runs; raises ArgumentError when it cannot run."""
+    if not callable(callback):
+        raise ArgumentError("callback", callback, "something that can be called", where)
+    if executor is not None and not isinstance(executor, Executor):
+        raise ArgumentError("executor", executor, "a rosglass.comm.Executor", where)
+    if not is_coroutine_function(callback):
+        return executor or default
+    if executor is not None:
+        told = "no executor beside a coroutine function, which runs in its event loop"
+        raise ArgumentError("executor", executor, told, where)
+    return LoopExecutor.running(callback, where)
+
+
+class InOrder:
+    """Runs jobs one at a time, in order, in the threads that add them.
+
+    A thread that finds another one at it leaves its job to that one. So state that only jobs
+    touch needs no lock, and callbacks that jobs make come in the order of what they tell.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._jobs: deque[Callable[[], None]] = deque()
+        self._busy = False
+
+    def add(self, job: Callable[[], None]) -> None:
+        """Run `job` once all before it have run; exceptions are logged."""
+        with self._lock:
+            self._jobs.append(job)
+            if self._busy:
+                return
+            self._busy = True
+        while True:
+            with self._lock:
+                if not self._jobs:
+                    self._busy = False
+                    return
+                job = self._jobs.popleft()
+            try:
+                job()
+            except Exception:
+                _log.exception("a job failed")
+            except BaseException:  # Ctrl-C: the next one to come goes on
+                with self._lock:
+                    self._busy = False
+                raise

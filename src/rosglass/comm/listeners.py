@@ -5,8 +5,7 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-from rosglass.comm.executor import RetryingExecutor, run_job
-from rosglass.comm.loop import check_plain
+from rosglass.comm.executor import RetryingExecutor, check_plain, run_job
 from rosglass.comm.node import Executor, Handle
 from rosglass.errors import ArgumentError
 

@@ -7,6 +7,7 @@ message on ``/rosout`` looks like is ROS 1's or ROS 2's own: a :class:`RosoutTop
 from __future__ import annotations
 
 import logging
+import sys
 import threading
 import time
 from collections import deque
@@ -15,9 +16,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.core import NodeMember
 from rosglass.comm.rclpy_names import hint_at_members
-from rosglass.comm.terminal import show_on_terminal, warn_on_terminal
-from rosglass.comm.worker import Worker
-from rosglass.errors import Error
+from rosglass.comm.timers import Worker
+from rosglass.errors import Error, escape_controls
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -35,6 +35,8 @@ __all__ = [
     "RosoutTopic",
     "clean",
     "message_of",
+    "show_on_terminal",
+    "warn_on_terminal",
 ]
 
 _TOPIC = "/rosout"
@@ -320,3 +322,49 @@ def clean(text: str) -> str:
     if len(text) > _MAX_TEXT:
         text = f"{text[:_MAX_TEXT]}... (cut; {len(text)} characters)"
     return text.replace("\0", "\\0").encode("utf-8", "backslashreplace").decode()
+
+
+class _TerminalHandler(logging.Handler):
+    """Does what `logging.lastResort` does, which says nothing once there is any handler.
+
+    There always is: what is logged goes to /rosout as well.
+
+    Args:
+        logger: The logger that it is for.
+        level: Least severe level that it shows.
+    """
+
+    def __init__(self, logger: logging.Logger, level: int) -> None:
+        super().__init__(level)
+        self._logger = logger
+        self.setFormatter(logging.Formatter("%(levelname)s %(name)s: %(message)s"))
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write a record to stderr, unless the program has made its own arrangements."""
+        if logging.lastResort is None or logging.getLogger().handlers:
+            return
+        if any(isinstance(handler, logging.StreamHandler) for handler in self._logger.handlers):
+            return
+        try:
+            sys.stderr.write(f"{escape_controls(self.format(record))}\n")
+        except Exception:
+            self.handleError(record)
+
+
+_handler = _TerminalHandler(logging.getLogger("rosglass"), logging.WARNING)
+
+
+def show_on_terminal(logger: logging.Logger) -> None:
+    """Show what a node's logger logs, as ROS does, where `logging` has not been configured."""
+    logger.addHandler(_TerminalHandler(logger, logging.NOTSET))
+
+
+def warn_on_terminal(formatter: logging.Formatter | None = None) -> None:
+    """Have warnings of the library be seen where `logging` has not been configured.
+
+    Args:
+        formatter: How they look; as before, or with level and logger, by default.
+    """
+    if formatter is not None:
+        _handler.setFormatter(formatter)
+    logging.getLogger("rosglass").addHandler(_handler)

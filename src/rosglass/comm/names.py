@@ -7,14 +7,22 @@ Rules: design article "Topic and Service name mapping to DDS" and the behaviour 
 
 from __future__ import annotations
 
+import itertools
+import os
 import re
+import time
+from typing import TYPE_CHECKING
 
 from rosglass.errors import InvalidNameError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 __all__ = [
     "MAX_NODE_NAME",
     "MAX_TOPIC_NAME",
     "action_of",
+    "anonymous_name",
     "demangle_topic",
     "demangle_type",
     "expand",
@@ -22,6 +30,7 @@ __all__ = [
     "is_valid_node",
     "is_valid_topic",
     "mangle_type",
+    "similar",
     "validate_namespace",
     "validate_node_name",
 ]
@@ -212,3 +221,40 @@ def _limit(what: str, name: str, limit: int) -> None:
         raise InvalidNameError(
             f"{what} {name[:40] + '...'!r} has {len(name)} characters; at most {limit} are allowed"
         )
+
+
+_numbers = itertools.count(1)
+
+
+def anonymous_name(name: str) -> str:
+    """Return a node name that begins with `name` and that nobody else has.
+
+    In ROS 1 a second node of a name ends the first one, and process numbers alone are no
+    distinction: programs in containers often have the same.
+
+    Made as rospy and roscpp do: host, process and time in milliseconds are appended.
+    """
+    import socket  # noqa: PLC0415 - only needed to connect
+
+    host = re.sub(r"[^A-Za-z0-9_]", "_", socket.gethostname())
+    # Two underscores in a row are no name in ROS 2.
+    text = f"{name}_{host}_{os.getpid()}_{int(time.time() * 1000)}_{next(_numbers)}"
+    return re.sub("__+", "_", text)
+
+
+def similar(name: str, known: Iterable[str]) -> str:
+    """Return a hint at a known name that `name` may stand for, empty when there is none."""
+    import difflib  # noqa: PLC0415 - only needed to explain an error
+
+    names = [other for other in known if other != name]
+    base = name.rpartition("/")[2]
+    near = [other for other in names if other.rpartition("/")[2] == base]
+    plain = _plain(name)
+    near += [other for other in names if _plain(other) == plain]
+    near += difflib.get_close_matches(name, names, 2, 0.8)
+    return f"; did you mean {' or '.join(list(dict.fromkeys(near))[:2])}?" if near else ""
+
+
+def _plain(name: str) -> str:
+    """Return a name without what languages spell differently: frameId and frame_id."""
+    return name.replace("_", "").lower()

@@ -6,16 +6,16 @@ package knows which one it talks to.
 
 from __future__ import annotations
 
+import sys
 import time
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias, TypeVar
 
 from rosglass.comm.graph import ConnectionState
 from rosglass.comm.qos import QoS
 from rosglass.comm.rclpy_names import hint_at_members
-from rosglass.comm.receiving import check_may_wait
-from rosglass.comm.unique import Unique
 from rosglass.errors import (
+    ArgumentError,
     NodeClosedError,
     TimeoutError,  # noqa: A004 - the field's own word
     UnsupportedError,
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
     from concurrent.futures import Future
     from logging import Logger
-    from types import TracebackType
+    from types import FrameType, TracebackType
 
     from rosglass.comm.action_client import ActionClient
     from rosglass.comm.action_server import ActionServer, ServerGoal
@@ -42,17 +42,41 @@ if TYPE_CHECKING:
     from rosglass.comm.time import Duration, Time
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
 
-__all__ = ["Answer", "Executor", "Handle", "Node"]
+__all__ = [
+    "Answer",
+    "Executor",
+    "Handle",
+    "Node",
+    "Unique",
+    "check_flag",
+    "check_may_wait",
+]
+
 
 _H = TypeVar("_H", bound="Handle")
 #: Seconds between two looks whether a node that spins is closed.
 _SPIN_POLL_S = 0.2
+#: Where the threads begin that receive.
+_RECEIVING = ("rosglass.wires.dds.", "rosglass.wires.zenoh.", "rosglass.ros1.io_loop")
+#: Where those begin that follow the graph and keep time; some of their jobs may wait for a moment.
+_FOLLOWING = ("rosglass.comm.timers",)
 #: What answers a request: a response, or the promise of one.
 Answer: TypeAlias = (
     "Message | dict[str, Any] | Future[Message] | Future[dict[str, Any] | None] | None"
 )
 #: What a goal ends with.
 Result: TypeAlias = "Message | dict[str, Any] | None"
+
+
+class Unique:
+    """Base of what cannot be copied: a copy would share threads and sockets, and close them."""
+
+    def __reduce_ex__(self, _: object) -> NoReturn:
+        # What copy.copy, copy.deepcopy and pickle ask for.
+        raise UnsupportedError(
+            f"{self!r} can neither be copied nor pickled: it lives in this process, and exists "
+            "once; hand on the object itself, or create another one"
+        )
 
 
 class Executor(ABC):
@@ -455,3 +479,35 @@ class Node(Handle):
         None pass while a recording that is shown in a robot's place is paused.
         """
         return time.monotonic()
+
+
+def check_flag(value: object, name: str, where: str = "") -> bool:
+    """Return an option that is True or False; raises ArgumentError.
+
+    Python takes any text for true, "no" and "false" included.
+    """
+    if value is not True and value is not False:
+        raise ArgumentError(name, value, "True or False", where)
+    return value
+
+
+def check_may_wait(name: str, *, following: bool = False) -> None:
+    """Raise UnsupportedError in a callback that runs in a thread that receives.
+
+    Args:
+        name: The service, action or topic that is about to be waited for.
+        following: Whether threads that follow the graph and keep time may wait.
+    """
+    # Zenoh's threads are not Python's, and marking them would cost something with every sample.
+    frame: FrameType | None = sys._getframe()
+    first = ""
+    while frame is not None:
+        module = frame.f_globals.get("__name__", "")
+        first = first if module == "threading" else module
+        frame = frame.f_back
+    if first.startswith(_RECEIVING if following else (*_RECEIVING, *_FOLLOWING)):
+        raise UnsupportedError(
+            f"{name}: this callback runs in a thread that receives (executor=IMMEDIATE, or "
+            "add_done_callback()), where what it waits for could never arrive; take call_async(), "
+            "get_async() or the like here, or let it run elsewhere: on_done(), or another executor"
+        )

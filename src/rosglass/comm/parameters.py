@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
-from rosglass.comm.deadline import Deadline
-from rosglass.comm.loop import check_plain
+from rosglass.comm.executor import check_plain
 from rosglass.comm.node import Handle
+from rosglass.comm.promise import Deadline
 from rosglass.errors import ArgumentError, NodeClosedError, ParameterError, UnsupportedError
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from concurrent.futures import TimeoutError as _NotYet
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rosglass.comm.executor import RetryingExecutor, run_job
-from rosglass.comm.receiving import check_may_wait
+from rosglass.comm.node import check_may_wait
 from rosglass.errors import ArgumentError, TimeoutError  # noqa: A004 - the field's own word
 
 if TYPE_CHECKING:
@@ -17,7 +17,11 @@ if TYPE_CHECKING:
 
     from rosglass.comm.node import Executor
 
-__all__ = ["Promise", "check_timeout"]
+__all__ = [
+    "Deadline",
+    "Promise",
+    "check_timeout",
+]
 
 _T = TypeVar("_T")
 #: Longest uninterrupted wait in seconds: on Windows a lock that is waited for holds up Ctrl-C.
@@ -141,3 +145,24 @@ def _tell_waiters(promise: Future[Any]) -> None:
     """Let ``concurrent.futures.wait`` notice that a promise was given up."""
     if promise.cancelled():
         promise.set_running_or_notify_cancel()
+
+
+class Deadline:
+    """The end of the time that a caller gives.
+
+    Args:
+        timeout: Seconds from now, None for ever.
+        where: What is asked, in errors.
+
+    Raises:
+        ConversionError: The timeout is none.
+    """
+
+    def __init__(self, timeout: float | None, where: str) -> None:
+        timeout = check_timeout(timeout, where)
+        self._end = None if timeout is None else time.monotonic() + timeout
+
+    def left(self) -> float | None:
+        """Return the seconds that are left, None when there is no end."""
+        # Rounded: people read it when the time is over.
+        return None if self._end is None else max(0.0, round(self._end - time.monotonic(), 2))

@@ -8,15 +8,22 @@ import time
 from collections import deque
 from typing import TYPE_CHECKING, Any, overload
 
-from rosglass.comm.events import DeadlineMissed, LivelinessLost, Matched, PublisherEvents
+from rosglass.comm.events import (
+    DeadlineMissed,
+    LivelinessLost,
+    Matched,
+    PublisherEvents,
+    conflict_events,
+    conflicts,
+    words,
+)
 from rosglass.comm.graph import EndpointInfo, EndpointKind
-from rosglass.comm.matching import conflict_events, conflicts, words
+from rosglass.comm.names import similar
 from rosglass.comm.node import Handle
 from rosglass.comm.qos import Liveliness
 from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.comm.sample import Sample
-from rosglass.comm.similar import similar
-from rosglass.comm.watchdog import Watchdog
+from rosglass.comm.timers import Watchdog
 from rosglass.errors import ConversionError, NodeClosedError, TypeNotFoundError, UnsupportedError
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.client import Client, untyped
+from rosglass.comm.node import check_may_wait
 from rosglass.comm.promise import Promise, check_timeout
 from rosglass.comm.rclpy_names import hint_at_members
-from rosglass.comm.receiving import check_may_wait
 from rosglass.comm.service_server import decode_checked, served_by_this_thread
 from rosglass.errors import (
     ConnectionLostError,

@@ -9,9 +9,8 @@ from concurrent.futures import CancelledError, Future
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.complaints import Complaints
-from rosglass.comm.executor import Dispatcher
+from rosglass.comm.executor import Dispatcher, LoopExecutor, executor_for
 from rosglass.comm.graph import EndpointKind
-from rosglass.comm.loop import LoopExecutor, executor_for
 from rosglass.comm.node import Handle
 from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.errors import DecodeError, Error, NodeClosedError, ServiceError

@@ -11,14 +11,11 @@ from functools import wraps
 from typing import TYPE_CHECKING
 
 from rosglass.comm.events import SubscriptionEvents
-from rosglass.comm.executor import IMMEDIATE
-from rosglass.comm.flags import check_flag
+from rosglass.comm.executor import IMMEDIATE, check_plain
 from rosglass.comm.inbox import ImmediateInbox, Inbox
-from rosglass.comm.loop import check_plain
-from rosglass.comm.node import Executor, Handle
+from rosglass.comm.node import Executor, Handle, check_flag, check_may_wait
 from rosglass.comm.promise import check_timeout
 from rosglass.comm.rclpy_names import hint_at_members
-from rosglass.comm.receiving import check_may_wait
 from rosglass.comm.sample import Sample
 from rosglass.comm.source import Source
 from rosglass.errors import ConversionError

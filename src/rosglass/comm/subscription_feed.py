@@ -10,12 +10,17 @@ from collections import deque
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.core import NodeMember
-from rosglass.comm.events import DeadlineMissed, LivelinessChanged, Matched, SamplesLost
+from rosglass.comm.events import (
+    DeadlineMissed,
+    LivelinessChanged,
+    Matched,
+    SamplesLost,
+    conflict_events,
+)
 from rosglass.comm.graph import ConnectionState, EndpointKind
-from rosglass.comm.matching import conflict_events
-from rosglass.comm.similar import similar
+from rosglass.comm.names import similar
 from rosglass.comm.source import Source
-from rosglass.comm.watchdog import Watchdog
+from rosglass.comm.timers import Watchdog
 from rosglass.errors import Error, NodeClosedError, TypeNotFoundError
 from rosglass.interfaces.names import join_name
 

@@ -14,15 +14,21 @@ from rosglass.comm.node import Handle
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-__all__ = ["Timers"]
+    from rosglass.comm.time import Duration
+
+__all__ = [
+    "Timers",
+    "Watchdog",
+    "Worker",
+]
 
 _log = logging.getLogger("rosglass.comm")
 #: Seconds that closing waits for a job that is still running.
-_PATIENCE = 2.0
+_CLOSE_TIMEOUT_S = 2.0
 #: Longest single wait in seconds; the system's limit is some thousand years below infinity.
-_LONGEST = 3600.0
+_LONGEST_WAIT_S = 3600.0
 #: Jobs that were called off are swept out when they are so many, and more than half.
-_SWEEP = 64
+_SWEEP_COUNT = 64
 
 
 class Timers:
@@ -67,14 +73,14 @@ class Timers:
             self._changed.notify()
         if thread is None or thread is threading.current_thread():
             return
-        thread.join(_PATIENCE)
+        thread.join(_CLOSE_TIMEOUT_S)
         if thread.is_alive():
-            _log.warning("%s: a job still runs %.0f s after closing", self._name, _PATIENCE)
+            _log.warning("%s: a job still runs %.0f s after closing", self._name, _CLOSE_TIMEOUT_S)
 
     def _call_off(self) -> None:
         with self._changed:
             self._called_off += 1
-            if self._called_off >= _SWEEP and 2 * self._called_off > len(self._jobs):
+            if self._called_off >= _SWEEP_COUNT and 2 * self._called_off > len(self._jobs):
                 self._jobs = [entry for entry in self._jobs if entry[2].job is not None]
                 heapq.heapify(self._jobs)
                 self._called_off = 0
@@ -86,9 +92,9 @@ class Timers:
                 while job is None:
                     if self._closed:
                         return
-                    left = self._jobs[0][0] - time.monotonic() if self._jobs else _LONGEST
+                    left = self._jobs[0][0] - time.monotonic() if self._jobs else _LONGEST_WAIT_S
                     if left > 0:
-                        self._changed.wait(min(left, _LONGEST))
+                        self._changed.wait(min(left, _LONGEST_WAIT_S))
                         continue
                     job = heapq.heappop(self._jobs)[2].take()
                     if job is None:
@@ -111,3 +117,104 @@ class _Job(Handle):
     def close(self) -> None:
         if self.take() is not None:
             self._owner._call_off()
+
+
+class Worker:
+    """Runs `job` soon after each :meth:`wake`, merging requests, and after every pause.
+
+    Args:
+        name: The thread's name.
+        job: What to do; told whether it runs because the pause is over. Exceptions are logged.
+        pause: Longest time between two runs in seconds.
+    """
+
+    def __init__(self, name: str, job: Callable[[bool], None], pause: float) -> None:
+        self._job, self._pause = job, pause
+        self._wanted = threading.Event()
+        self._closed = False
+        self._thread = threading.Thread(target=self._work, name=name, daemon=True)
+        self._thread.start()
+
+    def wake(self) -> None:
+        """Ask for a run soon; from any thread, without waiting."""
+        self._wanted.set()
+
+    @property
+    def is_current(self) -> bool:
+        """Whether this is the worker's own thread."""
+        return self._thread is threading.current_thread()
+
+    def close(self) -> None:
+        """End the thread after the run in progress and wait for it; safe to call twice.
+
+        A run that takes longer than 2 s more is left to its daemon thread, with a warning: closing
+        must not hang a program.
+        """
+        self._closed = True
+        self._wanted.set()
+        if self._thread is threading.current_thread():
+            return
+        self._thread.join(_CLOSE_TIMEOUT_S)
+        if self._thread.is_alive():
+            _log.warning("%s still runs %.0f s after closing", self._thread.name, _CLOSE_TIMEOUT_S)
+
+    def _work(self) -> None:
+        while True:
+            asked = self._wanted.wait(self._pause)
+            self._wanted.clear()
+            if self._closed:
+                return
+            try:
+                self._job(not asked)
+            except Exception:
+                _log.exception("%s failed", self._thread.name)
+
+
+class Watchdog(Handle):
+    """Counts how often nothing happened for as long as a limit; costs what happens nothing.
+
+    Args:
+        timers: Runs the checks.
+        limit: Longest time between two events.
+        last: Returns when the last event was, by :func:`time.monotonic`; called on the timers'
+            thread.
+        missed: Called, on the same thread, with how many times the limit passed by.
+
+    Attributes:
+        limit: As given.
+    """
+
+    def __init__(
+        self,
+        timers: Timers,
+        limit: Duration,
+        last: Callable[[], float],
+        missed: Callable[[int], None],
+    ) -> None:
+        self.limit = limit
+        self._timers, self._period = timers, limit.seconds
+        self._last, self._missed = last, missed
+        self._lock = threading.Lock()
+        self._closed = False
+        self._since = time.monotonic()
+        self._timer = timers.after(self._period, self._check)
+
+    def close(self) -> None:
+        """Count no more; safe to call twice."""
+        with self._lock:
+            self._closed = True
+            timer = self._timer
+        timer.close()
+
+    def _check(self) -> None:
+        if self._closed:
+            return
+        self._since = max(self._since, self._last())
+        count = int((time.monotonic() - self._since) / self._period)
+        if count:
+            self._since += count * self._period
+            self._missed(count)
+        with self._lock:
+            if not self._closed:
+                left = self._since + self._period - time.monotonic()
+                self._timer = self._timers.after(max(0.0, left), self._check)

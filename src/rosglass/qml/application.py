@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import Handle
-from rosglass.comm.terminal import warn_on_terminal
+from rosglass.comm.log import warn_on_terminal
 from rosglass.errors import Error
 from rosglass.qml.display import require_display
 from rosglass.qml.interrupt import QuitOnSignal, end_process_within

@@ -7,7 +7,7 @@ import time
 from contextlib import suppress
 from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar
 
-from rosglass.comm.similar import similar
+from rosglass.comm.names import similar
 from rosglass.errors import Error
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.log import Caller, RateLimit, log_from_qml, plain_path

@@ -7,8 +7,8 @@ import time
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.executor import Dispatcher
+from rosglass.comm.names import similar
 from rosglass.comm.parameters import ParameterDescriptor, ParameterType
-from rosglass.comm.similar import similar
 from rosglass.errors import Error, ParameterError
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
-from rosglass.comm.similar import similar
+from rosglass.comm.names import similar
 from rosglass.errors import QmlError
 
 __all__ = ["import_folder", "interface_file", "locate", "near"]

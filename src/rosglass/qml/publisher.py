@@ -10,8 +10,8 @@ from collections import deque
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from rosglass.comm.names import similar
 from rosglass.comm.qos import Durability, History
-from rosglass.comm.similar import similar
 from rosglass.errors import ConversionError, Error, TypeNotFoundError
 from rosglass.qml.element import LONELY_MS, RETRY, Element
 from rosglass.qml.from_js import fields_from_js

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm.similar import similar
+from rosglass.comm.names import similar
 from rosglass.errors import ConversionError, Error
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.from_js import elements_from_js

@@ -23,7 +23,7 @@ from rosglass.comm import (
     Time,
 )
 from rosglass.comm.action_client import GRACE_S, OUTAGE_S, ActionClient, ClientGoal
-from rosglass.comm.inorder import InOrder
+from rosglass.comm.executor import InOrder
 from rosglass.errors import (
     ConnectionLostError,
     DecodeError,

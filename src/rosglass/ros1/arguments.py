@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm.similar import similar
+from rosglass.comm.names import similar
 from rosglass.errors import ConversionError, InvalidNameError, ParameterError, RosArgumentError
 from rosglass.ros1.address import check_host, parse_uri
 from rosglass.ros1.names import absolute_namespace, expand, validate_node_name

@@ -15,11 +15,10 @@ from rosglass.comm import (
 )
 from rosglass.comm.builtin_services import BuiltinServices
 from rosglass.comm.complaints import Complaints
-from rosglass.comm.core_node import CoreNode
-from rosglass.comm.flags import check_flag
+from rosglass.comm.core import CoreNode
+from rosglass.comm.node import check_flag, check_may_wait
 from rosglass.comm.promise import check_timeout
 from rosglass.comm.rclpy_names import check_order
-from rosglass.comm.receiving import check_may_wait
 from rosglass.comm.subscription_feed import find_subscribed_type
 from rosglass.errors import InvalidNameError
 from rosglass.ros1.actionlib_types import actions

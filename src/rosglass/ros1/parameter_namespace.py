@@ -21,10 +21,10 @@ from rosglass.comm import (
     ParameterType,
     SetResult,
 )
-from rosglass.comm.loop import check_plain
+from rosglass.comm.client import Readiness
+from rosglass.comm.executor import check_plain
+from rosglass.comm.names import similar
 from rosglass.comm.parameters import RemoteParameters, check_values
-from rosglass.comm.readiness import Readiness
-from rosglass.comm.similar import similar
 from rosglass.errors import ConnectionLostError, NodeClosedError, ParameterError, UnsupportedError
 from rosglass.ros1.parameter_server import flat, same, to_wire
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from os import PathLike
 
     from rosglass.comm import Executor, ParameterValue
-    from rosglass.comm.deadline import Deadline
+    from rosglass.comm.promise import Deadline
     from rosglass.ros1.core import Core
     from rosglass.ros1.parameter_server import ParameterServer
 

@@ -18,10 +18,10 @@ from datetime import datetime
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rosglass.comm import Executor, Handle, Listeners
-from rosglass.comm.inorder import InOrder
+from rosglass.comm.executor import InOrder
+from rosglass.comm.names import similar
+from rosglass.comm.node import check_may_wait
 from rosglass.comm.promise import check_timeout
-from rosglass.comm.receiving import check_may_wait
-from rosglass.comm.similar import similar
 from rosglass.errors import Error, InvalidNameError, MasterError, ParameterError, shown
 from rosglass.ros1.core import Member
 from rosglass.ros1.questions import Questions

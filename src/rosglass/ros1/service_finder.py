@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, Protocol
 
-from rosglass.comm.similar import similar
+from rosglass.comm.names import similar
 from rosglass.errors import ConnectionLostError, Error
 from rosglass.ros1.service_probe import locate, probe
 from rosglass.ros1.types import ANY

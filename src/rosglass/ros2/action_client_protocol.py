@@ -32,7 +32,7 @@ from rosglass.comm.action_client import (
     ClientGoal,
 )
 from rosglass.comm.complaints import Complaints
-from rosglass.comm.inorder import InOrder
+from rosglass.comm.executor import InOrder
 from rosglass.errors import (
     ConnectionLostError,
     DecodeError,

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import Dispatcher, EndpointKind, Publisher, Time
 from rosglass.comm.action_server import ActionServerProtocol, ServerGoal
-from rosglass.comm.inorder import InOrder
+from rosglass.comm.executor import InOrder
 from rosglass.errors import NodeClosedError
 from rosglass.ros2.action_types import (
     CANCEL_GOAL,

@@ -6,7 +6,7 @@ import threading
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointInfo, EndpointKind, Sample
-from rosglass.comm.matching import conflicts, words
+from rosglass.comm.events import conflicts, words
 from rosglass.comm.subscription_feed import Problem, TopicMatching
 from rosglass.ros2.liveliness import Liveness
 from rosglass.ros2.repeats import Repeats

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rosglass.comm import LifecycleClient, State, Time, Transition, TransitionEvent
-from rosglass.comm.deadline import Deadline
+from rosglass.comm.promise import Deadline
 from rosglass.errors import TransitionError
 from rosglass.ros2.other_node import OtherNode
 

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointKind, NodeName, Publisher, QoS, Subscription
 from rosglass.comm.builtin_services import BuiltinServices
-from rosglass.comm.core_node import CoreNode
-from rosglass.comm.flags import check_flag
+from rosglass.comm.core import CoreNode
 from rosglass.comm.names import validate_namespace, validate_node_name
+from rosglass.comm.node import check_flag
 from rosglass.comm.rclpy_names import check_order
 from rosglass.comm.subscription_feed import SubscriptionFeed, find_subscribed_type
 from rosglass.errors import ArgumentError

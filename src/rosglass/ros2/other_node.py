@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from rosglass.comm import Executor, Node, QoS, ServiceClient, Subscription
-    from rosglass.comm.deadline import Deadline
+    from rosglass.comm.promise import Deadline
     from rosglass.messages import Message
 
 __all__ = ["OtherNode"]

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from os import PathLike
 
     from rosglass.comm import Executor, Node, ParameterValue, Publisher, Time
-    from rosglass.comm.deadline import Deadline
+    from rosglass.comm.promise import Deadline
     from rosglass.messages import Message
     from rosglass.ros2.parameters import Change, Ros2Parameters
 

@@ -24,7 +24,7 @@ from rosglass.comm import (
     Range,
 )
 from rosglass.comm import ParameterEvent as Event
-from rosglass.comm.loop import check_plain
+from rosglass.comm.executor import check_plain
 from rosglass.comm.parameters import check_values
 from rosglass.comm.sim_time import USE_SIM_TIME
 from rosglass.errors import NodeClosedError, ParameterError, shown

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointInfo, EndpointKind, QoS
+from rosglass.comm.names import similar
 from rosglass.comm.service_client import Call, PendingCall, ServiceClient, ServiceRequester
-from rosglass.comm.similar import similar
 from rosglass.errors import Error, ServiceError
 from rosglass.ros2.announced import (
     Announced,

@@ -9,8 +9,8 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import Handle
+from rosglass.comm.log import warn_on_terminal
 from rosglass.comm.names import validate_node_name
-from rosglass.comm.terminal import warn_on_terminal
 from rosglass.errors import ConnectionLostError, Error, UnsupportedError
 from rosglass.qml.display import require_display
 from rosglass.qml.interrupt import QuitOnSignal, end_process_within

@@ -6,7 +6,7 @@ import math
 import time
 from typing import TYPE_CHECKING
 
-from rosglass.comm.similar import similar
+from rosglass.comm.names import similar
 from rosglass.errors import Error, LookupException, TransformException
 from rosglass.qml.tf_link import TfLink
 from rosglass.qt import QtCore, Signal

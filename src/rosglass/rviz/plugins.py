@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 from xml.etree import ElementTree
 
-from rosglass.comm.similar import similar
+from rosglass.comm.names import similar
 from rosglass.errors import Error
 from rosglass.interfaces.folders import workspace
 from rosglass.rviz.shown import shown

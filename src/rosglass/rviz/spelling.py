@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm.similar import similar
+from rosglass.comm.names import similar
 from rosglass.qml.js_values import object_of
 from rosglass.qml.log import log_from_qml
 from rosglass.qt import QJSValue, QtCore, QtQml, Slot

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm.similar import similar
+from rosglass.comm.names import similar
 from rosglass.errors import Error
 from rosglass.qt import Signal
 from rosglass.rviz.display_classes import QML_CLASS, REFERENCE_QML_CLASS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm.similar import similar
+from rosglass.comm.names import similar
 from rosglass.errors import Error
 from rosglass.qt import QtCore, Signal
 from rosglass.rviz.plugins import VIEW, declared

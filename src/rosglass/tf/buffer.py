@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 
 from rosglass.comm.complaints import Complaints
 from rosglass.comm.executor import IMMEDIATE
+from rosglass.comm.names import similar
 from rosglass.comm.node import Handle
 from rosglass.comm.promise import check_timeout
-from rosglass.comm.similar import similar
 from rosglass.comm.time import Duration, Time
 from rosglass.errors import (
     ArgumentError,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING
 
+from rosglass.comm.executor import check_plain
 from rosglass.comm.listeners import Listeners
-from rosglass.comm.loop import check_plain
 from rosglass.comm.node import Executor, Handle
 
 if TYPE_CHECKING:

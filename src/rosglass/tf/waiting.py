@@ -5,8 +5,8 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING
 
+from rosglass.comm.node import check_may_wait
 from rosglass.comm.promise import Promise, check_timeout
-from rosglass.comm.receiving import check_may_wait
 from rosglass.comm.timers import Timers
 from rosglass.errors import (
     InvalidArgumentException,

@@ -115,7 +115,7 @@ def test_a_hostile_dds_topic_and_type_are_left_out_of_the_graph():
 
 
 def test_log_lines_and_errors_show_no_control_characters(capsys):
-    from rosglass.comm.terminal import warn_on_terminal
+    from rosglass.comm.log import warn_on_terminal
     from rosglass.errors import ServiceError
 
     warn_on_terminal()

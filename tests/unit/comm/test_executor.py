@@ -135,7 +135,7 @@ def test_a_worker_survives_an_error_in_its_job(caplog):
 
 
 def test_a_worker_that_hangs_does_not_hang_closing(monkeypatch, caplog):
-    monkeypatch.setattr("rosglass.comm.worker._PATIENCE", 0.05)
+    monkeypatch.setattr("rosglass.comm.timers._PATIENCE", 0.05)
     started, go_on = threading.Event(), threading.Event()
     worker = Worker("test worker", lambda _: (started.set(), go_on.wait(30)), pause=10)
     worker.wake()

@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from rosglass.comm.inorder import InOrder
+from rosglass.comm.executor import InOrder
 
 
 def test_jobs_run_one_at_a_time_in_order():

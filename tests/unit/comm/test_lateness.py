@@ -5,7 +5,7 @@ import pytest
 from rosglass import Duration, QoS
 from rosglass.comm import IMMEDIATE, Sample, Subscription
 from rosglass.comm import lateness as module
-from rosglass.comm.lateness import Lateness
+from rosglass.comm.statistics import Lateness
 
 P = b"p" * 16
 MS = 1_000_000

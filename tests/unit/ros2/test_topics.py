@@ -24,7 +24,7 @@ from rosglass.comm import (
     SamplesLost,
 )
 from rosglass.comm import watchdog as watchdog_module
-from rosglass.comm.watchdog import Watchdog
+from rosglass.comm.timers import Watchdog
 from rosglass.interfaces import Library
 from rosglass.messages import OpaqueType
 from rosglass.ros2 import Ros2Node

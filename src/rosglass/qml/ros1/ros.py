@@ -79,7 +79,7 @@ class Ros(ValueFunctions, GraphSingleton):
 
     def _init(self, name: str, options: int, args: Sequence[str]) -> None:
         if options & InitOptions.Option.AnonymousName:
-            from rosglass.comm.anonymous import anonymous_name  # noqa: PLC0415 - few ask for it
+            from rosglass.comm.names import anonymous_name  # noqa: PLC0415 - few ask for it
 
             name = anonymous_name(name)
         if options & InitOptions.Option.NoRosout:

@@ -20,7 +20,7 @@ import zenoh
 import zenoh.ext
 
 from rosglass.comm import Durability, EndpointKind, Reliability
-from rosglass.comm.lateness import Lateness
+from rosglass.comm.statistics import Lateness
 from rosglass.wires.base import OnSample, Reader
 from rosglass.wires.zenoh.endpoints import Declaration, Owner, Pump
 from rosglass.wires.zenoh.keys import ATTACHMENT, HUMBLE_HASH, NO_ATTACHMENT
