@@ -177,7 +177,7 @@ def test_waits_for_a_master_and_says_so(start: Callable[..., Program]) -> None:
 def test_ends_when_another_node_takes_its_name(
     start: Callable[..., Program], tmp_path: Path, master: str
 ) -> None:
-    from rosglass.ros1.master import call_node
+    from rosglass.wires.tcpros.master import call_node
 
     program = start("--name", "rviz_named", "--overlay", interface(tmp_path, "console.warn('up')"))
     program.wait_for("up")
@@ -190,7 +190,7 @@ def test_ends_when_another_node_takes_its_name(
 def test_ends_when_the_node_of_overlays_is_killed(
     start: Callable[..., Program], tmp_path: Path, master: str
 ) -> None:
-    from rosglass.ros1.master import call_node
+    from rosglass.wires.tcpros.master import call_node
 
     file = interface(tmp_path, 'console.warn(Ros.ok() ? "up" : "down")')
     file.write_text("import Ros 1.0\n" + file.read_text())
@@ -286,7 +286,7 @@ def test_without_a_display(start: Callable[..., Program]) -> None:
 
 def nodes(master: str) -> set[str]:
     """Return what the master knows of."""
-    from rosglass.ros1.master import call_node
+    from rosglass.wires.tcpros.master import call_node
 
     state = call_node(master, "getSystemState", "/test")
     return {node for kind in state for _, found in kind for node in found}

@@ -23,19 +23,20 @@ RANK = {
     "interfaces": 1,
     "messages": 2,
     "comm": 3,
-    "ros1": 4,
-    "ros2": 4,
-    "wires": 5,
-    "connection": 6,
-    "bags": 5,
-    "bridge": 5,
-    "tf": 5,
-    "images": 5,
-    "qt": 5,
-    "qml": 7,
-    "rviz": 8,
-    "cli": 10,
-    "demo": 9,
+    "wires/tcpros": 4,
+    "ros1": 5,
+    "ros2": 5,
+    "wires": 6,
+    "connection": 7,
+    "bags": 6,
+    "bridge": 6,
+    "tf": 6,
+    "images": 6,
+    "qt": 6,
+    "qml": 8,
+    "rviz": 9,
+    "cli": 11,
+    "demo": 10,
 }
 QT = {"PySide6", "PySide2", "PyQt5", "PyQt6", "shiboken6", "shiboken2"}
 MODULES = sorted(ROOT.rglob("*.py"))
@@ -56,7 +57,10 @@ def imports(path: Path) -> set[str]:
 
 def room_of(parts: Sequence[str]) -> str:
     # The seam is the client layer's lower edge: wires stand above it, and import it.
-    return "comm" if tuple(parts[:2]) == ("wires", "base") else parts[0]
+    if tuple(parts[:2]) == ("wires", "base"):
+        return "comm"
+    # ROS 1's protocols stand above their wire, which all of them know.
+    return "wires/tcpros" if tuple(parts[:2]) == ("wires", "tcpros") else parts[0]
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda p: p.relative_to(ROOT).as_posix())

@@ -98,8 +98,8 @@ def _join(url: str, timeout: float) -> Ros1Node | Finding:
 def _master(uri: str, timeout: float) -> Finding | None:
     """Knock where the master should be; None when it answers."""
     from rosglass.cli.network import roscore
-    from rosglass.ros1.address import parse_uri
-    from rosglass.ros1.master import call_node
+    from rosglass.wires.tcpros.address import parse_uri
+    from rosglass.wires.tcpros.master import call_node
 
     host, port = parse_uri(uri, "master")
     start = roscore(host, port)
@@ -127,7 +127,7 @@ def _master(uri: str, timeout: float) -> Finding | None:
 
 def _own_address(node: Ros1Node, options: Ros1Options) -> Iterator[Finding]:
     """Look whether the address that nodes here announce makes sense."""
-    from rosglass.ros1.address import doubt, parse_uri
+    from rosglass.wires.tcpros.address import doubt, parse_uri
 
     host, _ = parse_uri(options.master, "master")
     address = node.address
@@ -141,7 +141,7 @@ def _own_address(node: Ros1Node, options: Ros1Options) -> Iterator[Finding]:
 
 def _echo(node: Ros1Node, options: Ros1Options, own: list[Finding]) -> Iterator[Finding]:
     """Let the master call back: by that it tells nodes who publishes."""
-    from rosglass.ros1.master import call_node
+    from rosglass.wires.tcpros.master import call_node
 
     ready, heard = threading.Event(), threading.Event()
     name, master = f"/{node.name}_was_here", options.master
@@ -187,7 +187,7 @@ def _graph(node: Ros1Node) -> Iterator[Finding]:
 
 def _nodes(node: Ros1Node, options: Ros1Options, timeout: float) -> Iterator[Finding]:
     """Look whether every node can be reached under what it announces."""
-    from rosglass.ros1.address import parse_uri
+    from rosglass.wires.tcpros.address import parse_uri
 
     me = node.resolve(node.name)
     names = [name.full for name in node.nodes() if name.full != me]
@@ -228,8 +228,8 @@ def _nodes(node: Ros1Node, options: Ros1Options, timeout: float) -> Iterator[Fin
 
 def _visit(master: str, name: str, timeout: float) -> _Place:
     """Ask a node whether it is there."""
-    from rosglass.ros1.address import parse_uri
-    from rosglass.ros1.master import call_node
+    from rosglass.wires.tcpros.address import parse_uri
+    from rosglass.wires.tcpros.master import call_node
 
     try:
         uri = str(call_node(master, "lookupNode", _CALLER, name, timeout=timeout))

@@ -80,7 +80,7 @@ def nearby_url() -> str:
 
 def roscore(host: str, port: int) -> str:
     """Say how to start a ROS 1 master that does not run."""
-    from rosglass.ros1.address import is_loopback
+    from rosglass.wires.tcpros.address import is_loopback
 
     start = "start it: roscore" + ("" if port == 11311 else f" -p {port}")
     return start if is_loopback(host) else f"on {host}, {start}; or correct the address"
@@ -91,8 +91,8 @@ def refused(url: str) -> tuple[str, str] | None:
 
     None as well when nobody answers at all: that takes longer to tell from a slow network.
     """
-    from rosglass.ros1.address import parse_uri
     from rosglass.ros1.options import Ros1Options
+    from rosglass.wires.tcpros.address import parse_uri
 
     if url.startswith("ros1:"):
         host, port = parse_uri(Ros1Options.parse(url).master, "master")

@@ -103,7 +103,7 @@ def _known(node: Ros1Node, given: str, timeout: float) -> str:
 
 def _visit(node: Ros1Node, name: str, timeout: float) -> _Answer:
     """Ask a node for a sign of life."""
-    from rosglass.ros1.master import call_node
+    from rosglass.wires.tcpros.master import call_node
 
     me = node.resolve(node.name)
     try:
@@ -178,7 +178,7 @@ def _kill(args: argparse.Namespace) -> int:
 
 def _end(node: Ros1Node, name: str, timeout: float) -> bool:
     """Ask a node to end, and wait until it has left the graph; returns whether it has."""
-    from rosglass.ros1.master import call_node
+    from rosglass.wires.tcpros.master import call_node
 
     me = node.resolve(node.name)
     answer = _visit(node, name, _TIMEOUT)
@@ -258,7 +258,7 @@ def _remove(node: Ros1Node, name: str, uri: str) -> bool:
 
 
 def _unregister(node: Ros1Node, end: EndpointInfo, uri: str) -> None:
-    from rosglass.ros1.master import call_node
+    from rosglass.wires.tcpros.master import call_node
 
     place = uri
     if end.kind is EndpointKind.SERVICE_SERVER:

@@ -57,7 +57,7 @@ _H = TypeVar("_H", bound="Handle")
 #: Seconds between two looks whether a node that spins is closed.
 _SPIN_POLL_S = 0.2
 #: Where the threads begin that receive.
-_RECEIVING = ("rosglass.wires.dds.", "rosglass.wires.zenoh.", "rosglass.ros1.io_loop")
+_RECEIVING = ("rosglass.wires.dds.", "rosglass.wires.zenoh.", "rosglass.wires.tcpros.io_loop")
 #: Where those begin that follow the graph and keep time; some of their jobs may wait for a moment.
 _FOLLOWING = ("rosglass.comm.timers",)
 #: What answers a request: a response, or the promise of one.

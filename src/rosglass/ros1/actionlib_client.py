@@ -51,8 +51,8 @@ from rosglass.ros1.actionlib_types import (
     state_of,
     time_of,
 )
-from rosglass.ros1.core import Member
-from rosglass.ros1.master import call_node
+from rosglass.wires.tcpros.master import call_node
+from rosglass.wires.tcpros.registrations import Member
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping
@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     from rosglass.messages import ActionType, Message
     from rosglass.ros1.action_state import Step, TerminalState
     from rosglass.ros1.core import Core
-    from rosglass.ros1.topics import Topics
+    from rosglass.wires.tcpros.topics import Topics
 
 __all__ = ["ActionlibClient", "ActionlibClientGoal"]
 
@@ -719,7 +719,7 @@ class ActionlibClient(ActionClient, Member):
             silent = time.monotonic() - self._heard.get(server, time.monotonic())
             if silent >= _SILENCE_S and server not in self._asked:
                 self._asked.add(server)
-                self._core.errands.run(partial(self._ask, server, status_publishers[server]))
+                self._core.pool.run(partial(self._ask, server, status_publishers[server]))
 
     def _ask(self, server: str, uri: str) -> None:
         """Ask a silent server whether it lives: it may be one that sends changes only."""

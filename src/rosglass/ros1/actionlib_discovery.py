@@ -22,14 +22,14 @@ from rosglass.ros1.actionlib_types import (
     assemble,
     part,
 )
-from rosglass.ros1.core import Member
+from rosglass.wires.tcpros.registrations import Member
 
 if TYPE_CHECKING:
     from rosglass.messages import MessageType
-    from rosglass.ros1.connection import Connection
     from rosglass.ros1.core import Core
-    from rosglass.ros1.master import Master
-    from rosglass.ros1.topics import Topics
+    from rosglass.wires.tcpros.connection import Connection
+    from rosglass.wires.tcpros.master import Master
+    from rosglass.wires.tcpros.topics import Topics
 
 __all__ = ["ActionDiscovery"]
 

@@ -32,7 +32,7 @@ from rosglass.ros1.actionlib_types import (
     stamp,
     time_of,
 )
-from rosglass.ros1.core import Member
+from rosglass.wires.tcpros.registrations import Member
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,8 +41,8 @@ if TYPE_CHECKING:
     from rosglass.comm.action_server import ActionServer
     from rosglass.messages import ActionType, Message
     from rosglass.ros1.core import Core
-    from rosglass.ros1.master import Master
-    from rosglass.ros1.topics import Topics
+    from rosglass.wires.tcpros.master import Master
+    from rosglass.wires.tcpros.topics import Topics
 
 __all__ = ["ActionlibServer", "ActionlibServerGoal", "GoalEntry", "GoalList"]
 

@@ -18,8 +18,8 @@ from rosglass.ros1.action_state import ServerState
 
 if TYPE_CHECKING:
     from rosglass.messages import ActionType, Message, MessageType
-    from rosglass.ros1.graph import Graph
     from rosglass.ros1.types import Types
+    from rosglass.wires.tcpros.graph import Graph
 
 __all__ = [
     "CANCEL",

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.names import similar
 from rosglass.errors import ConversionError, InvalidNameError, ParameterError, RosArgumentError
-from rosglass.ros1.address import check_host, parse_uri
 from rosglass.ros1.names import absolute_namespace, expand, validate_node_name
+from rosglass.wires.tcpros.address import check_host, parse_uri
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -8,11 +8,11 @@ from __future__ import annotations
 import re
 
 from rosglass.errors import InvalidNameError
+from rosglass.wires.tcpros.graph import split
 
-__all__ = ["absolute_namespace", "expand", "is_valid_full", "split", "validate_node_name"]
+__all__ = ["absolute_namespace", "expand", "split", "validate_node_name"]
 
 _FORBIDDEN = re.compile(r"[^A-Za-z0-9_/]")
-_FULL_NAME = re.compile(r"/[A-Za-z0-9_/]+\Z")
 _NODE_FORBIDDEN = re.compile(r"[^A-Za-z0-9_]")
 
 
@@ -76,17 +76,6 @@ def expand(name: str, node: str, namespace: str) -> str:
         full = f"{prefix}/{name}"
     clean = re.sub(r"/{2,}", "/", full)
     return clean.rstrip("/") or "/"
-
-
-def is_valid_full(name: str) -> bool:
-    """Return whether `name` is an absolute topic or service name after ROS's rules."""
-    return _FULL_NAME.match(name) is not None
-
-
-def split(full: str) -> tuple[str, str]:
-    """Return namespace and base name of an absolute name."""
-    namespace, _, name = full.rpartition("/")
-    return namespace or "/", name
 
 
 def _check(what: str, text: str, whole: str) -> None:

@@ -22,15 +22,14 @@ from rosglass.comm.rclpy_names import check_order
 from rosglass.comm.subscription_feed import find_subscribed_type
 from rosglass.errors import InvalidNameError
 from rosglass.ros1.actionlib_types import actions
-from rosglass.ros1.answers import Answers
-from rosglass.ros1.connection import Connection
 from rosglass.ros1.core import Core
 from rosglass.ros1.names import absolute_namespace, split, validate_node_name
-from rosglass.ros1.outages import outlast
 from rosglass.ros1.parameter_server import ParameterServer
 from rosglass.ros1.roscpp_services import RoscppServices
 from rosglass.ros1.services import Services
-from rosglass.ros1.topics import Topics
+from rosglass.wires.tcpros.connection import Connection, outlast
+from rosglass.wires.tcpros.slave import NodeApi
+from rosglass.wires.tcpros.topics import Topics
 
 if TYPE_CHECKING:
     import socket
@@ -112,7 +111,7 @@ class Ros1Node(CoreNode):
             RoscppServices(self, self._core, self._parameter_server, self._topic_names),
         )
         self._core.start(
-            Answers(self._core, self._topics, self._parameter_server.changed), self._accept
+            NodeApi(self._core, self._topics, self._parameter_server.changed), self._accept
         )
         self._builtin_services.open(own_services)
 

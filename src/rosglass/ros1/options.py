@@ -9,9 +9,10 @@ from urllib.parse import parse_qsl, unquote, urlsplit
 
 from rosglass.comm import anonymous_name
 from rosglass.errors import ArgumentError
-from rosglass.ros1.address import bracketed, check_host, given_address, parse_uri
 from rosglass.ros1.arguments import NO_ARGUMENTS
 from rosglass.ros1.names import absolute_namespace
+from rosglass.wires.tcpros.address import bracketed, check_host, given_address, parse_uri
+from rosglass.wires.tcpros.core import TcprosOptions
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -26,24 +27,14 @@ _OPTIONS = ("anonymous", "ip", "slave_port", "tcpros_port")
 
 
 @dataclass(frozen=True)
-class Ros1Options:
+class Ros1Options(TcprosOptions):
     """How a node takes part in a ROS 1 graph.
 
     Attributes:
-        master: URI of the master.
-        address: Host or address under which others reach this node; empty to find it out.
-        source: Who gave the address, for messages, such as ``ROS_IP``; empty when nobody did.
-        tcpros_port: Where connections are accepted; 0 for any free port.
-        slave_port: Where the node's API is served; 0 for any free port.
         anonymous: Whether something is to be appended to the node's name that makes it unique.
         arguments: What the program was told.
     """
 
-    master: str
-    address: str = ""
-    source: str = ""
-    tcpros_port: int = 0
-    slave_port: int = 0
     anonymous: bool = False
     arguments: Arguments = NO_ARGUMENTS
 

@@ -13,26 +13,33 @@ import re
 import threading
 import time
 import xmlrpc.client
+from collections import deque
 from collections.abc import Mapping
 from datetime import datetime
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from rosglass.comm import Executor, Handle, Listeners
+from rosglass.comm import Executor, Handle, Listeners, Promise
 from rosglass.comm.executor import InOrder
 from rosglass.comm.names import similar
 from rosglass.comm.node import check_may_wait
 from rosglass.comm.promise import check_timeout
-from rosglass.errors import Error, InvalidNameError, MasterError, ParameterError, shown
-from rosglass.ros1.core import Member
-from rosglass.ros1.questions import Questions
+from rosglass.errors import (
+    ConnectionLostError,
+    Error,
+    InvalidNameError,
+    MasterError,
+    NodeClosedError,
+    ParameterError,
+    shown,
+)
+from rosglass.wires.tcpros.registrations import Member
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from os import PathLike
 
-    from rosglass.comm import Promise
     from rosglass.ros1.core import Core
-    from rosglass.ros1.master import Master
+    from rosglass.wires.tcpros.master import Master
 
 __all__ = [
     "ParameterServer",
@@ -89,7 +96,7 @@ class ParameterServer(Handle):
         self._core, self._start = core, start
         self._beginning = threading.Lock()
         self._begun = not start
-        self._questions = Questions(core)
+        self._calls = MasterCallQueue(core)
         self._watches = ParameterWatches(core)
 
     def __repr__(self) -> str:
@@ -294,7 +301,7 @@ class ParameterServer(Handle):
     def later(self, what: str, job: Callable[[], _T]) -> Promise[_T]:
         """Run `job`, which waits for the master, after what was asked before; return at once."""
         self._check_open()
-        return self._questions.ask(what, job)
+        return self._calls.ask(what, job)
 
     # -- the node's ------------------------------------------------------------------------------
 
@@ -334,7 +341,7 @@ class ParameterServer(Handle):
 
     def close(self) -> None:
         """Give up what was asked without waiting; safe to call twice."""
-        self._questions.close()
+        self._calls.close()
 
     def _leaves(self, place: str, value: Any) -> Iterator[tuple[str, Any]]:
         """Yield name and wire value of each single parameter that a file has for `place`."""
@@ -387,6 +394,85 @@ class ParameterServer(Handle):
 
     def _check_open(self) -> None:
         self._core.check_open()
+
+
+class MasterCallQueue:
+    """Puts questions to the master on a thread that may wait.
+
+    Answers come in order, so that of two values that are set the second one stays. When the master
+    is gone, all that wait are told at once, instead of one after the other.
+
+    Args:
+        core: The node.
+    """
+
+    def __init__(self, core: Core) -> None:
+        self._core = core
+        self._lock = threading.Lock()
+        self._waiting: deque[tuple[Promise[Any], Callable[[], Any]]] = deque()
+        self._asked: Promise[Any] | None = None
+        self._busy = self._closed = False
+
+    def ask(self, what: str, job: Callable[[], _T]) -> Promise[_T]:
+        """Run `job`, which waits for the master; return the promise of what it returns.
+
+        Args:
+            what: What is asked for, for messages.
+            job: Asks.
+        """
+        made: Promise[_T] = Promise(
+            f"{self._core.master.uri} has not answered ({what})",
+            self._core.dispatcher,
+            cancellable=True,
+        )
+        with self._lock:
+            closed, start = self._closed, not self._busy
+            if not closed:
+                self._busy = True
+                self._waiting.append((made, job))
+        if closed:
+            made.fail(self._end())
+        elif start:
+            self._core.pool.run(self._work)
+        return made
+
+    def close(self) -> None:
+        """Give up what was asked; safe to call twice."""
+        with self._lock:
+            self._closed = True
+            waiting = [promise for promise, _ in self._waiting]
+            self._waiting.clear()
+            asked, self._asked = self._asked, None
+        for promise in waiting if asked is None else [asked, *waiting]:
+            promise.fail(self._end())
+
+    def _work(self) -> None:
+        while True:
+            with self._lock:
+                if not self._waiting:
+                    self._busy = False
+                    return
+                promise, job = self._waiting.popleft()
+                self._asked = promise
+            if promise.done():
+                continue  # it was given up
+            try:
+                promise.fulfil(job())
+            except ConnectionLostError as error:
+                promise.fail(error)
+                self._lose(error)
+            except Exception as error:
+                promise.fail(error)
+
+    def _lose(self, error: ConnectionLostError) -> None:
+        with self._lock:
+            waiting = [promise for promise, _ in self._waiting]
+            self._waiting.clear()
+        for promise in waiting:
+            promise.fail(error)
+
+    def _end(self) -> NodeClosedError:
+        return NodeClosedError(f"node {self._core.name} was closed meanwhile")
 
 
 class StartParameters(Member):
@@ -600,7 +686,7 @@ class ParameterWatch(Member):
             if self._busy or self._closed:
                 return
             self._busy = True
-        self._core.errands.run(self._run)
+        self._core.pool.run(self._run)
 
     def read(self, master: Master) -> None:
         """Read it, and pass it on if it has changed.

@@ -9,13 +9,13 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rosglass.errors import ConnectionLostError
-from rosglass.ros1.core import Member
-from rosglass.ros1.service_probe import locate, probe
+from rosglass.wires.tcpros.registrations import Member
+from rosglass.wires.tcpros.service_requester import locate, probe
 
 if TYPE_CHECKING:
     from rosglass.ros1.core import Core
-    from rosglass.ros1.errands import Errands
-    from rosglass.ros1.service_probe import Peer, Place
+    from rosglass.wires.tcpros.core import BlockingPool
+    from rosglass.wires.tcpros.service_requester import Peer, Place
 
 __all__ = ["ServiceTypes"]
 
@@ -34,11 +34,11 @@ class ServiceTypes(Member):
 
     Args:
         core: The node.
-        errands: Runs lookups.
+        pool: Runs lookups.
     """
 
-    def __init__(self, core: Core, errands: Errands) -> None:
-        self._core, self._errands = core, errands
+    def __init__(self, core: Core, pool: BlockingPool) -> None:
+        self._core, self._pool = core, pool
         self._lock = threading.Lock()
         #: What is known, by service: whose it was according to the master, and what it says.
         self._known: dict[str, tuple[list[str], Peer]] = {}
@@ -117,7 +117,7 @@ class ServiceTypes(Member):
                     return
                 name = self._queue.popleft()
                 self._asked.add(name)
-            self._errands.run(lambda name=name: self._look_up(name))  # type: ignore[misc]
+            self._pool.run(lambda name=name: self._look_up(name))  # type: ignore[misc]
 
     def _look_up(self, name: str) -> None:
         place: Place | None = None

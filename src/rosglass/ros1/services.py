@@ -10,9 +10,9 @@ from rosglass.comm import EndpointKind, QoS
 from rosglass.comm.service_client import ServiceClient
 from rosglass.comm.service_server import ServiceServer
 from rosglass.errors import ConversionError, ServiceError
-from rosglass.ros1.service_replier import TcprosReplier
-from rosglass.ros1.service_requester import TcprosRequester
 from rosglass.ros1.service_types import ServiceTypes
+from rosglass.wires.tcpros.service_replier import TcprosReplier
+from rosglass.wires.tcpros.service_requester import TcprosRequester
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Mapping
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from rosglass.comm import Answer, EndpointInfo, Executor
     from rosglass.comm.service_client import PendingCall
     from rosglass.messages import Message, ServiceType
-    from rosglass.ros1.connection import Connection
     from rosglass.ros1.core import Core
     from rosglass.wires.base import OnReply, OnRequest
+    from rosglass.wires.tcpros.connection import Connection
 
 __all__ = ["Services"]
 
@@ -34,7 +34,6 @@ class Services:
         core: The node.
 
     Attributes:
-        errands: Runs lookups.
         types: What others' servers say of themselves.
     """
 
@@ -42,8 +41,7 @@ class Services:
         self._core = core
         self._lock = threading.Lock()
         self._repliers: dict[str, TcprosReplier] = {}
-        self.errands = core.lookups
-        self.types = ServiceTypes(core, self.errands)
+        self.types = ServiceTypes(core, core.lookups)
 
     # -- making ----------------------------------------------------------------------------------
 
@@ -56,7 +54,9 @@ class Services:
         def create(
             _pending: Mapping[int, PendingCall], on_reply: OnReply, on_change: Callable[[], None]
         ) -> TcprosRequester:
-            return TcprosRequester(self._core, self, name, type, persistent, on_reply, on_change)
+            return TcprosRequester(
+                self._core, self.types.note, name, type, persistent, on_reply, on_change
+            )
 
         return ServiceClient(self._core, name, _profile(qos, name), create)
 

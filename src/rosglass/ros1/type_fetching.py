@@ -24,9 +24,9 @@ from rosglass.errors import (
 from rosglass.interfaces import adding_definitions, ros1_name, split_name
 from rosglass.ros1.actionlib_discovery import ActionDiscovery
 from rosglass.ros1.actionlib_types import actions
-from rosglass.ros1.core import Member
 from rosglass.ros1.names import split
-from rosglass.ros1.types import ANY
+from rosglass.wires.tcpros.connection import ANY
+from rosglass.wires.tcpros.registrations import Member
 
 if TYPE_CHECKING:
     from concurrent.futures import Future
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from rosglass.messages import ActionType, MessageType, ServiceType
     from rosglass.ros1.core import Core
     from rosglass.ros1.services import Services
-    from rosglass.ros1.topics import Topics
+    from rosglass.wires.tcpros.topics import Topics
 
     AnyType: TypeAlias = MessageType | ServiceType | ActionType
 
@@ -255,7 +255,7 @@ class _Fetch(Member):
             if node in self._asked or node in self._headers or now - failed < _AGAIN:
                 return
             self._asked.add(node)
-        self._core.errands.run(lambda: self._question(node, topic))
+        self._core.pool.run(lambda: self._question(node, topic))
 
     def _question(self, node: str, topic: str) -> None:
         try:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from rosglass.errors import DefinitionConflictError, Error, TypeNotFoundError, UnsupportedError
 from rosglass.interfaces import adding_definitions, full_text, join_name, split_name
+from rosglass.wires.tcpros.connection import ANY
 
 if TYPE_CHECKING:
     from rosglass.interfaces import Library
@@ -15,10 +16,7 @@ if TYPE_CHECKING:
 
     _T = TypeVar("_T", MessageType, ServiceType, ActionType)
 
-__all__ = ["ANY", "Types"]
-
-#: What stands for any type, and any md5 sum, in a connection header.
-ANY = "*"
+__all__ = ["Types"]
 
 
 class Types:

@@ -12,8 +12,8 @@ from urllib.parse import urlsplit
 from rosglass.errors import ConnectionLostError, Error
 from rosglass.qml.executor import GuiExecutor
 from rosglass.qt import QtCore, Signal, run_event_loop
-from rosglass.ros1.master import call_node
 from rosglass.rviz.qt5 import QtWidgets
+from rosglass.wires.tcpros.master import call_node
 
 if TYPE_CHECKING:
     from collections.abc import Callable

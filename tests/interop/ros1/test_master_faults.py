@@ -178,10 +178,10 @@ def test_publishers_are_found_though_the_master_cannot_call_us(own_master, conne
     eventually(lambda: registered(own_master, "/talk")[1])
     # Its API is not served any more: calls of the master's get lost.
     core = node._core
-    door = core._doors[1]
-    core.loop.call(door.end)
+    acceptor = core._acceptors[1]
+    core.loop.call(acceptor.end)
     core._api.close()
-    eventually(lambda: door._listener.fileno() < 0)
+    eventually(lambda: acceptor._listener.fileno() < 0)
     talker = connect("talker", url=own_master.url)
     publisher = talker.create_publisher("/talk", "std_msgs/Int32")
     eventually(publisher.subscription_count)
@@ -219,10 +219,10 @@ def test_a_node_ends_although_the_master_cannot_tell_it_that_its_name_is_taken(o
     older.create_publisher("/old", "std_msgs/Empty")
     eventually(lambda: registered(own_master, "/old")[0])
     core = older._core
-    door = core._doors[1]
-    core.loop.call(door.end)
+    acceptor = core._acceptors[1]
+    core.loop.call(acceptor.end)
     core._api.close()
-    eventually(lambda: door._listener.fileno() < 0)
+    eventually(lambda: acceptor._listener.fileno() < 0)
     newer = connect("twin", url=own_master.url)
     newer.create_publisher("/new", "std_msgs/Empty")
     eventually(lambda: older.status().state is ConnectionState.CLOSED)

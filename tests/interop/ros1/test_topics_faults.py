@@ -17,7 +17,7 @@ from waiting import eventually
 import rosglass
 from rosglass.comm import IMMEDIATE
 from rosglass.messages import MessageType, OpaqueType
-from rosglass.ros1.header import encode_header, parse_header
+from rosglass.wires.tcpros.connection import encode_header, parse_header
 
 STRING = "std_msgs/String"
 

@@ -11,10 +11,9 @@ import pytest
 from ports import free_port
 from waiting import eventually, nothing_happens
 
-from rosglass.ros1 import connection as module
-from rosglass.ros1.connection import Connection
-from rosglass.ros1.header import encode_header
-from rosglass.ros1.io_loop import IoLoop
+from rosglass.wires.tcpros import connection as module
+from rosglass.wires.tcpros.connection import Connection, encode_header
+from rosglass.wires.tcpros.io_loop import IoLoop
 
 HEADER = encode_header({"callerid": "/peer", "topic": "/t"})
 
@@ -88,13 +87,13 @@ def test_garbage_ends_the_connection_and_says_why(end, data, told):
 
 
 def test_whoever_sends_no_header_is_not_waited_for(loop, monkeypatch):
-    monkeypatch.setattr(module, "_HEADER_LIMIT", 0.1)
+    monkeypatch.setattr(module, "_HEADER_TIMEOUT_S", 0.1)
     end = End(loop)
     assert "sent no connection header" in eventually(lambda: end.ended)[0]
 
 
 def test_a_header_in_time_lasts(loop, monkeypatch):
-    monkeypatch.setattr(module, "_HEADER_LIMIT", 0.1)
+    monkeypatch.setattr(module, "_HEADER_TIMEOUT_S", 0.1)
     end = End(loop)
     end.peer.sendall(HEADER)
     eventually(lambda: end.headers)

@@ -7,9 +7,15 @@ import struct
 import pytest
 
 from rosglass.errors import DecodeError
-from rosglass.ros1.header import MAX_HEADER, encode_header, parse_header
-from rosglass.ros1.incoming import MAX_FRAME, Incoming
-from rosglass.ros1.outgoing import Frame, Outgoing
+from rosglass.wires.tcpros.connection import (
+    MAX_FRAME,
+    MAX_HEADER,
+    Frame,
+    Incoming,
+    Outgoing,
+    encode_header,
+    parse_header,
+)
 
 HEADER = {"callerid": "/n", "md5sum": "*"}
 

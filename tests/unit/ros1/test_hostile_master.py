@@ -14,10 +14,11 @@ from xml.parsers.expat import ExpatError
 import pytest
 
 import rosglass
+from rosglass import ros1
 from rosglass.comm import ConnectionState
 from rosglass.errors import ConnectionLostError, MasterError
-from rosglass.ros1 import master as client
-from rosglass.ros1.master import Master, call_node
+from rosglass.wires.tcpros import master as client
+from rosglass.wires.tcpros.master import Master, call_node
 
 #: What XML can carry and no terminal should get: C1's CSI and a right-to-left override.
 HOSTILE = "/evil\x9b2J\u202e"
@@ -282,7 +283,8 @@ def test_a_call_that_drips_ends_when_the_node_is_closed():
 def test_every_answer_that_is_used_has_its_form():
 
     used = set()
-    for file in Path(client.__file__).parent.glob("*.py"):
+    folders = [Path(client.__file__).parent, Path(ros1.__file__).parent]
+    for file in [file for folder in folders for file in folder.glob("*.py")]:
         used |= set(re.findall(r'(?:call|_call|_ask)\([^()]*?"([a-z]+[A-Z]\w+)"', file.read_text()))
 
     known = set(client._ANSWERS)

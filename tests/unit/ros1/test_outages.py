@@ -10,10 +10,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from rosglass.ros1 import outages
-from rosglass.ros1.connection import Connection
-from rosglass.ros1.io_loop import IoLoop
-from rosglass.ros1.outages import Unconfirmed, outlast
+from rosglass.wires.tcpros import connection
+from rosglass.wires.tcpros.connection import Connection, UnackedBytes, outlast
+from rosglass.wires.tcpros.io_loop import IoLoop
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have other options")
@@ -32,12 +31,12 @@ def test_a_subscriber_gives_a_connection_up_before_its_publisher_does():
 def clock(monkeypatch):
     made = SimpleNamespace(now=100.0)
     # Only for the module: whatever else runs in this process goes by the real one.
-    monkeypatch.setattr(outages, "time", SimpleNamespace(monotonic=lambda: made.now))
+    monkeypatch.setattr(connection, "time", SimpleNamespace(monotonic=lambda: made.now))
     return made
 
 
 def test_who_confirms_nothing_for_half_a_second_has_stalled(clock, monkeypatch):
-    watched, waiting = Unconfirmed(None), [0]
+    watched, waiting = UnackedBytes(None), [0]
     monkeypatch.setattr(watched, "_waiting", lambda: waiting[0])
 
     def later(seconds, written, unconfirmed):
@@ -60,9 +59,9 @@ def test_who_confirms_nothing_for_half_a_second_has_stalled(clock, monkeypatch):
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems do not tell what is confirmed")
 def test_a_silent_subscriber_gets_only_the_newest_afterwards(monkeypatch):
     silent = [False]
-    real = Unconfirmed._waiting
+    real = UnackedBytes._waiting
     # As if the network was away: what is sent stays unconfirmed.
-    monkeypatch.setattr(Unconfirmed, "_waiting", lambda u: u.written if silent[0] else real(u))
+    monkeypatch.setattr(UnackedBytes, "_waiting", lambda u: u.written if silent[0] else real(u))
     loop = IoLoop("test outages")
     ours, peer = socket.socketpair()
     link = Connection(loop, _Tcp(ours), print, print, print, peer="robot")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
+from contextlib import suppress
 
 import pytest
 
@@ -544,3 +545,18 @@ def test_a_refusal_is_a_master_error_elsewhere(node, master):
     master.answers["getParamNames"] = lambda *_: [0, "broken", 0]
     with pytest.raises(MasterError, match="broken"):
         node.parameter_server.names()
+
+
+def test_what_comes_of_a_call_may_wait_for_the_master_again(server, master):
+    server.set("/speed", 1.5)
+    got = []
+    done = threading.Event()
+
+    def read_again(_):
+        with suppress(UnsupportedError):
+            got.append(server.get("/speed"))
+        done.set()
+
+    server.get_async("/speed").add_done_callback(read_again)
+    assert done.wait(20)
+    assert got == [1.5]

@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from rosglass.comm import History, QoS
-from rosglass.ros1 import publisher_link
+from rosglass.wires.tcpros import topic_subscription
 
 ALL = QoS(history=History.KEEP_ALL)
 
@@ -15,8 +15,8 @@ ALL = QoS(history=History.KEEP_ALL)
 @pytest.fixture
 def flood(connect, eventually, monkeypatch):
     """Return a publisher, a slow subscription, its link, the callback's gate and what it got."""
-    monkeypatch.setattr(publisher_link, "_BATCH", 1)
-    monkeypatch.setattr(publisher_link, "_BEHIND", 10)
+    monkeypatch.setattr(topic_subscription, "_BATCH", 1)
+    monkeypatch.setattr(topic_subscription, "_MAX_BEHIND", 10)
     robot, cockpit = connect("robot"), connect("cockpit")
     publisher = robot.create_publisher("/flood", "std_msgs/Int32", ALL)
     gate, got = threading.Event(), []
@@ -33,7 +33,7 @@ def flood(connect, eventually, monkeypatch):
 
 
 def test_reading_makes_way_for_callbacks_that_are_behind(flood, eventually, monkeypatch):
-    monkeypatch.setattr(publisher_link, "_BREATH", 3600.0)
+    monkeypatch.setattr(topic_subscription, "_PAUSE_S", 3600.0)
     publisher, _, link, _, _ = flood
     sent = iter(range(10_000))
     eventually(lambda: publisher.publish({"data": next(sent)}) or not link._connection._reading)

@@ -14,9 +14,9 @@ from waiting import eventually
 
 import rosglass
 from rosglass.comm import ConnectionState, EndpointKind, NodeName
-from rosglass.ros1 import address, farewells
-from rosglass.ros1.publication import Publication
-from rosglass.ros1.topic_subscription import TopicSubscription
+from rosglass.wires.tcpros import address, registrations
+from rosglass.wires.tcpros.publication import Publication
+from rosglass.wires.tcpros.topic_subscription import TopicSubscription
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -221,8 +221,8 @@ def test_a_node_that_somebody_else_closes_looks_nothing_up_any_more(
     eventually(lambda: node.status().state is ConnectionState.CLOSED)
     eventually(lambda: "shutdown" not in [thread.name for thread in threading.enumerate()])
     ran = threading.Event()
-    for errands in (node._core.errands, node._services.errands):
-        errands.run(ran.set)
+    for pool in (node._core.pool, node._core.lookups):
+        pool.run(ran.set)
     assert not ran.wait(0.3)
 
 
@@ -295,7 +295,7 @@ def test_who_closes_while_the_master_hangs_is_forgotten_once_it_answers(
     began = time.monotonic()
     hung.close()
     assert time.monotonic() - began < 8, "about two seconds on a machine that is not loaded"
-    (thread,) = [one for one in threading.enumerate() if one.name == "rosglass farewells"]
+    (thread,) = [one for one in threading.enumerate() if one.name == "rosglass unregister"]
     thaw.set()
     eventually(lambda: "/hung" not in master.publishers["/a"], lambda: master.calls[-20:])
     eventually(lambda: "/hung" not in master.subscribers["/b"] and "/c" not in master.services)
@@ -307,7 +307,7 @@ def test_who_closes_while_the_master_hangs_is_forgotten_once_it_answers(
 def test_a_master_that_stays_away_is_not_waited_for_for_ever(
     master: FakeMaster, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(farewells, "_PATIENCE", 0.0)
+    monkeypatch.setattr(registrations, "_RETRY_LIMIT_S", 0.0)
     gone = connected(master, "gone")
     gone.create_publisher("/a", "std_msgs/Empty")
     eventually(lambda: "/gone" in master.publishers.get("/a", {}))
@@ -315,7 +315,7 @@ def test_a_master_that_stays_away_is_not_waited_for_for_ever(
     master.stop()
     gone.close()
     eventually(lambda: "may list /gone still" in caplog.text)
-    eventually(lambda: "rosglass farewells" not in [one.name for one in threading.enumerate()])
+    eventually(lambda: "rosglass unregister" not in [one.name for one in threading.enumerate()])
     master.start()
 
 
@@ -332,7 +332,7 @@ def test_a_node_on_the_ports_of_one_that_is_seen_off_stays_registered(
     second = rosglass.connect(f"{master.url}&slave_port={port}", "same", own_services=False)
     second.create_publisher("/a", "std_msgs/Empty")
     master.start()
-    eventually(lambda: "rosglass farewells" not in [one.name for one in threading.enumerate()])
+    eventually(lambda: "rosglass unregister" not in [one.name for one in threading.enumerate()])
     eventually(lambda: master.publishers.get("/a", {}).get("/same") == known)
     second.close()
 

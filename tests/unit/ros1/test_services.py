@@ -15,7 +15,7 @@ from waiting import nothing_happens
 import rosglass
 from rosglass.comm import IMMEDIATE
 from rosglass.interfaces import Library
-from rosglass.ros1.header import encode_header, parse_header
+from rosglass.wires.tcpros.connection import encode_header, parse_header
 
 ADD, TRIGGER, BOOL = "rospy_tutorials/AddTwoInts", "std_srvs/Trigger", "std_srvs/SetBool"
 MD5 = "6a2e34150c00229791cc89ff309fff21"

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from rosglass.comm import ConnectionState
-from rosglass.ros1.slave import Slave
+from rosglass.wires.tcpros.slave import Slave
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -14,7 +14,7 @@ import pytest
 import rosglass
 from rosglass.errors import DefinitionConflictError, NodeClosedError, TypeNotFoundError
 from rosglass.interfaces import Library
-from rosglass.ros1.header import encode_header
+from rosglass.wires.tcpros.connection import encode_header
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -19,7 +19,7 @@ from two_machines import THERE, Cable
 
 import rosglass
 from rosglass.comm import IMMEDIATE
-from rosglass.ros1 import connection
+from rosglass.wires.tcpros import connection
 
 if TYPE_CHECKING:
     from collections.abc import Callable

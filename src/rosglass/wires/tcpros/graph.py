@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import re
 import time
 from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.comm import EndpointInfo, EndpointKind, NodeName
 from rosglass.errors import InvalidNameError
 from rosglass.interfaces import join_name
-from rosglass.ros1.names import is_valid_full, split
 
 if TYPE_CHECKING:
-    from rosglass.ros1.master import Master
+    from rosglass.wires.tcpros.master import Master
 
-__all__ = ["Graph", "full_type"]
+__all__ = ["Graph", "full_type", "split"]
 
+_FULL_NAME = re.compile(r"/[A-Za-z0-9_/]+\Z")
 _Offers = dict[str, list[str]]
 #: What the master says of a type that nobody has told it.
 _UNKNOWN = ("", "*")
@@ -129,7 +130,7 @@ def _valid(part: list[tuple[str, list[str]]], invalid: set[str]) -> _Offers:
     """Return those of the names that can be used, with their nodes; the others go to `invalid`."""
     found = {}
     for name, nodes in part:
-        if not is_valid_full(name):
+        if not _FULL_NAME.match(name):
             invalid.add(name)
             continue
         found[name] = sorted(node for node in nodes if node.isprintable())
@@ -145,3 +146,9 @@ def full_type(name: str) -> str:
         return join_name(name)
     except InvalidNameError:
         return name if name.isprintable() else ""
+
+
+def split(full: str) -> tuple[str, str]:
+    """Return namespace and base name of an absolute name."""
+    namespace, _, name = full.rpartition("/")
+    return namespace or "/", name

@@ -1,37 +1,75 @@
 """What the master knows of a node, kept true; and the graph, as the master tells it.
 
 The master tells nobody when it was restarted and has forgotten everybody, or when its calls do not
-get through: it is asked once a second.
+get through: it is asked once a second. What it could not be told when a node was closed, it is told
+in the background.
 """
 
 from __future__ import annotations
 
 import logging
 import threading
+import time
 from collections import deque
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rosglass.comm import ConnectionState, EndpointKind, Status
 from rosglass.comm.complaints import Complaints
+from rosglass.comm.core import NodeMember
 from rosglass.errors import ConnectionLostError, Error, MasterError
-from rosglass.ros1.address import doubt, own_address, parse_uri
-from rosglass.ros1.farewells import see_off
+from rosglass.wires.tcpros.address import doubt, own_address, parse_uri
+from rosglass.wires.tcpros.master import Master
 
 if TYPE_CHECKING:
-    from rosglass.ros1.core import Core, Member
+    from collections.abc import Iterable
 
-__all__ = ["Registrations"]
+    from rosglass.wires.tcpros.core import TcprosCore
+
+__all__ = ["Member", "Registrations", "unregister_later"]
+
 
 _log = logging.getLogger("rosglass.ros1")
 #: Seconds between looks at the master.
-_POLL = 1.0
+_POLL_S = 1.0
 #: Seconds that closing waits for the master, and then for calls that were cut.
-_FAREWELL, _END = 1.5, 0.5
+_UNREGISTER_TIMEOUT_S, _CUT_TIMEOUT_S = 1.5, 0.5
 #: Looks at a publisher without connection until the master is asked about it.
-_LOOKS = 2
+_MISSED_LOOKS = 2
 #: Seconds that the master may take to tell who has the node's name.
-_PATIENCE = 1.0
+_OWNER_TIMEOUT_S = 1.0
+
+
+class Member(NodeMember):
+    """Something created from a node: it is registered with the master, and ends with the node.
+
+    Attributes:
+        place: As what the master shows it once it is registered, and under which name: it is
+            registered again should it be missing there. None for what the master does not show.
+    """
+
+    place: tuple[EndpointKind, str] | None = None
+
+    def register(self, master: Master) -> None:
+        """Tell the master of it; called on a thread that may wait, again after its restart.
+
+        Raises:
+            ConnectionLostError: The master does not answer; this is called again then.
+            MasterError: It refuses.
+        """
+
+    def unregister(self, master: Master) -> Member | None:  # noqa: ARG002 - some are not known
+        """Tell the master that it is gone; called on a thread that may wait.
+
+        Returns:
+            Who has its name in this node by now, if anybody: the master was told nothing then, and
+            what it knows is the other's.
+        """
+        return None
+
+    def lacks(self, publishers: int) -> bool:  # noqa: ARG002 - most have none
+        """Return whether it is connected with fewer publishers than the master knows."""
+        return False
 
 
 class Registrations:
@@ -41,7 +79,7 @@ class Registrations:
         core: The node.
     """
 
-    def __init__(self, core: Core) -> None:
+    def __init__(self, core: TcprosCore) -> None:
         self._core = core
         self._wanted = threading.Event()
         self._lock = threading.Lock()
@@ -92,12 +130,12 @@ class Registrations:
         if self.is_current:
             self._leave()
         elif known:
-            self._thread.join(_FAREWELL)
+            self._thread.join(_UNREGISTER_TIMEOUT_S)
         self._core.master.close()
         if not self.is_current and self._thread.is_alive():
-            self._thread.join(_END)
+            self._thread.join(_CUT_TIMEOUT_S)
         if left := self._tried.copy():
-            see_off(self._core, left)
+            unregister_later(self._core, left)
 
     def owner(self) -> str:
         """Return the URI of the node that has this node's name; empty if it is this one, or nobody.
@@ -107,7 +145,7 @@ class Registrations:
         """
         core = self._core
         try:
-            uri = core.master.call("lookupNode", core.name.full, timeout=_PATIENCE)
+            uri = core.master.call("lookupNode", core.name.full, timeout=_OWNER_TIMEOUT_S)
         except MasterError:
             return ""
         return "" if uri in core.uris else str(uri)
@@ -123,7 +161,7 @@ class Registrations:
                 self._look()
             except Exception:
                 _log.exception("%s failed", self._thread.name)
-            self._wanted.wait(_POLL)
+            self._wanted.wait(_POLL_S)
         self._leave()
 
     def _look(self) -> None:
@@ -231,14 +269,14 @@ class Registrations:
             return False
         # At first it may be about to tell, or the publisher about to answer.
         looks = self._missed[topic] = self._missed.get(topic, 0) + 1
-        return looks == _LOOKS or looks % (10 * _LOOKS) == 0
+        return looks == _MISSED_LOOKS or looks % (10 * _MISSED_LOOKS) == 0
 
     def _look_at_address(self) -> None:
         host = self._core.address[0]
         if host != self._doubted:
             self._doubted, self._doubt = host, ""
             # A name server may take its time.
-            self._core.errands.run(lambda: self._doubt_address(host))
+            self._core.pool.run(lambda: self._doubt_address(host))
 
     def _doubt_address(self, host: str) -> None:
         core = self._core
@@ -270,3 +308,136 @@ class Registrations:
                     except Error as error:
                         _log.debug("%s: %s", member, error)
                     self._tried.discard(member)
+
+
+#: Seconds for which a master is tried again, and between two tries.
+_RETRY_LIMIT_S, _RETRY_PAUSE_S = 60.0, 1.0
+
+
+class _Unregistration:
+    """What a closed node has to tell its master yet.
+
+    Args:
+        core: The node.
+        members: What the master may know of it.
+
+    Attributes:
+        uri: The master's.
+        answered: Whether the master has answered the last time.
+    """
+
+    def __init__(self, core: TcprosCore, members: Iterable[Member]) -> None:
+        self._core, self._members = core, list(members)
+        self._left, self._again = list(self._members), True
+        self.uri, self.answered = core.master.uri, True
+        self._master = Master(self.uri, core.name.full)
+        self._until = time.monotonic() + _RETRY_LIMIT_S
+
+    def go_on(self) -> bool:
+        """Tell the master what is left; return whether that was all."""
+        try:
+            while self._left:
+                self._tell(self._left[-1])
+                self._left.pop()
+            self.answered = True
+            if self._forgotten():
+                return True
+        except ConnectionLostError as error:
+            self.answered = False
+            _log.debug("%s has left, but its master does not know: %s", self._core.name, error)
+            return False
+        # A registration from before it hung was taken up after the end of it. Once is enough: who
+        # has this name and address then is another node, on the same ports.
+        again, self._again = self._again, False
+        self._left = list(self._members)
+        return not again
+
+    def expired(self) -> bool:
+        """Return whether to give up, and tell it then."""
+        if time.monotonic() < self._until:
+            return False
+        _log.info(
+            "%s does not answer, and may list %s still when it does: rosglass node cleanup "
+            "removes what is gone",
+            self.uri,
+            self._core.name,
+        )
+        return True
+
+    def end(self) -> None:
+        """Close the connection with the master."""
+        self._master.close()
+
+    def _tell(self, member: Member) -> None:
+        try:
+            member.unregister(self._master)
+        except ConnectionLostError:
+            raise
+        except Error as error:
+            _log.debug("%s: %s", member, error)
+
+    def _forgotten(self) -> bool:
+        try:
+            return self._master.call("lookupNode", self._core.name.full) not in self._core.uris
+        except MasterError:
+            return True
+
+
+class _Unregistrations:
+    """Retries all unregistrations on one daemon thread, until none is left."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._open: list[_Unregistration] = []
+        self._thread: threading.Thread | None = None
+
+    def add(self, unregistration: _Unregistration) -> None:
+        """Take one in."""
+        with self._lock:
+            self._open.append(unregistration)
+            if self._thread is None or not self._thread.is_alive():
+                self._thread = threading.Thread(
+                    target=self._work, name="rosglass unregister", daemon=True
+                )
+                self._thread.start()
+
+    def _work(self) -> None:
+        while True:
+            with self._lock:
+                around = list(self._open)
+                if not around:
+                    self._thread = None
+                    return
+            done = self._round(around)
+            with self._lock:
+                self._open = [one for one in self._open if one not in done]
+                left = bool(self._open)
+            if left:
+                time.sleep(_RETRY_PAUSE_S)
+
+    def _round(self, around: list[_Unregistration]) -> list[_Unregistration]:
+        """Return those that are over."""
+        silent: set[str] = set()
+        done = []
+        for one in around:
+            over = one.uri not in silent and one.go_on()
+            if not one.answered:
+                silent.add(one.uri)
+            if over or one.expired():
+                one.end()
+                done.append(one)
+        return done
+
+
+#: One for the process: nodes are gone when theirs is due.
+_unregistrations = _Unregistrations()
+
+
+def unregister_later(core: TcprosCore, members: Iterable[Member]) -> None:
+    """Let the master of a closed node forget it once it answers, within a minute.
+
+    Args:
+        core: The node.
+        members: What the master may know of it.
+    """
+    _unregistrations.add(_Unregistration(core, members))

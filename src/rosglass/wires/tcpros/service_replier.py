@@ -18,20 +18,19 @@ from rosglass.comm import EndpointKind
 from rosglass.comm.complaints import Complaints
 from rosglass.errors import ServiceError
 from rosglass.interfaces import ros1_name
-from rosglass.ros1.connection import MAX_FRAME
-from rosglass.ros1.core import Member
-from rosglass.ros1.types import ANY
 from rosglass.wires.base import Replier, RequestId
+from rosglass.wires.tcpros.connection import ANY, MAX_FRAME
+from rosglass.wires.tcpros.registrations import Member
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.messages import ServiceType
-    from rosglass.ros1.connection import Connection
-    from rosglass.ros1.core import Core
-    from rosglass.ros1.io_loop import IoLoop
-    from rosglass.ros1.master import Master
     from rosglass.wires.base import OnRequest
+    from rosglass.wires.tcpros.connection import Connection
+    from rosglass.wires.tcpros.core import TcprosCore
+    from rosglass.wires.tcpros.io_loop import IoLoop
+    from rosglass.wires.tcpros.master import Master
 
 __all__ = ["TcprosReplier"]
 
@@ -66,7 +65,7 @@ class TcprosReplier(Replier, Member):
 
     def __init__(
         self,
-        core: Core,
+        core: TcprosCore,
         name: str,
         type: ServiceType,
         on_request: OnRequest,

@@ -9,8 +9,7 @@ import socket
 import threading
 import time
 
-from rosglass.ros1.door import Door
-from rosglass.ros1.io_loop import IoLoop
+from rosglass.wires.tcpros.io_loop import Acceptor, IoLoop
 
 
 class Scarce(socket.socket):
@@ -27,7 +26,7 @@ class Scarce(socket.socket):
 
 
 def test_who_waits_is_accepted_once_there_are_descriptors_again(caplog):
-    loop = IoLoop("test door")
+    loop = IoLoop("test acceptor")
     came = threading.Event()
     listener = Scarce()
     listener.bind(("127.0.0.1", 0))
@@ -38,15 +37,15 @@ def test_who_waits_is_accepted_once_there_are_descriptors_again(caplog):
         sock.close()
         came.set()
 
-    door = Door(loop, listener, accept)
+    acceptor = Acceptor(loop, listener, accept)
     with caplog.at_level(logging.WARNING, "rosglass.ros1"):
-        loop.call(door.open)
+        loop.call(acceptor.open)
         with socket.create_connection(listener.getsockname()):
             time.sleep(0.5)
             attempts = listener.attempts
             listener.scarce = False
             assert came.wait(30)
-    loop.call(door.end)
+    loop.call(acceptor.end)
     loop.close()
     assert 2 <= attempts <= 10  # again and again, but it leaves time for others
     told = [record.getMessage() for record in caplog.records]

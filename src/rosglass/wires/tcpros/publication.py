@@ -8,32 +8,30 @@ import struct
 import threading
 import time
 from collections import deque
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import Durability, EndpointInfo, EndpointKind, History, NodeName
 from rosglass.comm.inbox import INBOX_LIMIT
 from rosglass.errors import ConversionError, DefinitionConflictError, UnsupportedError
 from rosglass.interfaces import ros1_name
-from rosglass.ros1.core import Member
-from rosglass.ros1.definitions import definition_text
-from rosglass.ros1.names import split
-from rosglass.ros1.outgoing import Frame
-from rosglass.ros1.types import ANY
 from rosglass.wires.base import Writer
+from rosglass.wires.tcpros.connection import ANY, Frame
+from rosglass.wires.tcpros.graph import split
+from rosglass.wires.tcpros.registrations import Member
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rosglass.comm import QoS
     from rosglass.messages import MessageType
-    from rosglass.ros1.connection import Connection
-    from rosglass.ros1.core import Core
-    from rosglass.ros1.master import Master
-    from rosglass.ros1.topics import Topics
+    from rosglass.wires.tcpros.connection import Connection
+    from rosglass.wires.tcpros.core import TcprosCore
+    from rosglass.wires.tcpros.master import Master
+    from rosglass.wires.tcpros.topics import Topics
 
     Buffer = bytes | bytearray | memoryview
 
-__all__ = ["Publication", "PublicationWriter"]
+__all__ = ["Publication", "PublicationWriter", "definition_text"]
 
 _log = logging.getLogger("rosglass.ros1")
 _SUBSCRIPTION = EndpointKind.SUBSCRIPTION
@@ -65,7 +63,7 @@ class Publication(Member):
         numbers: The running numbers of messages that begin with a header.
     """
 
-    def __init__(self, core: Core, topics: Topics, topic: str, type: MessageType) -> None:
+    def __init__(self, core: TcprosCore, topics: Topics, topic: str, type: MessageType) -> None:
         self.topic, self.type = topic, type
         self._core, self._topics = core, topics
         self._lock = threading.Lock()
@@ -393,6 +391,13 @@ class PublicationWriter(Writer):
         """Put the topic's next running number in place of ``header.seq``."""
         number = _uint32.pack(next(self.publication.numbers) & 0xFFFFFFFF)
         return (number, memoryview(parts[0])[_uint32.size :], *parts[1:])
+
+
+def definition_text(types: Any, kind: MessageType) -> str:
+    """Return a type's definition with all that it needs; an opaque type's as it was received."""
+    from rosglass.messages import OpaqueType  # noqa: PLC0415 - numpy
+
+    return kind.text if isinstance(kind, OpaqueType) else types.text(kind)
 
 
 def _has_header(type: MessageType) -> bool:

@@ -1,7 +1,8 @@
-"""The thread that waits for all of a node's sockets."""
+"""A node's I/O loop: the thread that waits for all its sockets, and accepts connections."""
 
 from __future__ import annotations
 
+import errno
 import heapq
 import itertools
 import logging
@@ -13,18 +14,22 @@ from collections import deque
 from contextlib import suppress
 from typing import TYPE_CHECKING, Protocol
 
+from rosglass.errors import ConnectionLostError
+from rosglass.wires.tcpros.address import is_loopback
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-__all__ = ["READ", "WRITE", "IoLoop", "Later", "Ready"]
+__all__ = ["READ", "WRITE", "Acceptor", "IoLoop", "Later", "Ready", "listen"]
+
 
 _log = logging.getLogger("rosglass.ros1")
 #: Seconds that closing waits for a handler that is still running.
-_PATIENCE = 2.0
+_HANDLER_TIMEOUT_S = 2.0
 #: Seconds that sockets with something left to send keep a closed loop going.
-_LINGER = 1.0
+_LINGER_S = 1.0
 #: Seconds between looks at the sockets that nobody waits for.
-_LEISURE = 0.1
+_IDLE_POLL_S = 0.1
 READ, WRITE = selectors.EVENT_READ, selectors.EVENT_WRITE
 
 
@@ -104,15 +109,17 @@ class IoLoop:
         with self._lock:
             if self._closed:
                 return
-            self._deadline = time.monotonic() + _LINGER
+            self._deadline = time.monotonic() + _LINGER_S
             self._closed = True
             with suppress(OSError):
                 self._wake_in.send(b"\0")
         if self.is_current:
             return
-        self._thread.join(_LINGER + _PATIENCE)
+        self._thread.join(_LINGER_S + _HANDLER_TIMEOUT_S)
         if self._thread.is_alive():
-            _log.warning("%s still runs %.0f s after closing", self._thread.name, _PATIENCE)
+            _log.warning(
+                "%s still runs %.0f s after closing", self._thread.name, _HANDLER_TIMEOUT_S
+            )
 
     # -- in the loop's thread --------------------------------------------------------------------
 
@@ -168,7 +175,7 @@ class IoLoop:
         """Look at the sockets that nobody waits for, when it is time."""
         now = time.monotonic()
         if now >= self._next_look:
-            self._next_look = now + _LEISURE
+            self._next_look = now + _IDLE_POLL_S
             for key, events in self._unhurried.select(0):
                 self._run(key.data, events)
 
@@ -240,3 +247,94 @@ def _set(
         selector.modify(sock, events, handler)
     else:
         selector.register(sock, events, handler)
+
+
+_BACKLOG = 128
+#: Seconds without accepting anybody after the system has run out of something.
+_ACCEPT_PAUSE_S = 0.1
+
+
+def listen(address: str, port: int, url: str) -> socket.socket:
+    """Return a socket that listens, on this machine only when that is all that `address` reaches.
+
+    Args:
+        address: Under which others reach it; one of IPv6 makes it listen for both.
+        port: 0 for any.
+        url: What the node was connected with, for the error.
+
+    Raises:
+        ConnectionLostError: The port is taken, or not allowed.
+    """
+    six = ":" in address
+    place = ""
+    if is_loopback(address):
+        place = "127.0.0.1" if address == "localhost" else address
+    sock = socket.socket(socket.AF_INET6 if six else socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        if six:
+            sock.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 0)
+        sock.bind((place, port))
+        sock.listen(_BACKLOG)
+        sock.setblocking(False)
+    except OSError as error:
+        sock.close()
+        where = f"port {port}" if port else "any port"
+        raise ConnectionLostError(
+            f"{url}: cannot listen on {where}: {error.strerror or error}"
+        ) from error
+    return sock
+
+
+class Acceptor:
+    """Accepts connections; in the loop's thread.
+
+    Args:
+        loop: Waits for the socket.
+        listener: A socket that listens; closed by :meth:`end`.
+        accept: Called with each connection and its address.
+    """
+
+    def __init__(
+        self,
+        loop: IoLoop,
+        listener: socket.socket,
+        accept: Callable[[socket.socket, str], None],
+    ) -> None:
+        self._loop, self._listener, self._accept = loop, listener, accept
+        #: Whether the log says already that nobody can be accepted.
+        self._told = False
+
+    def open(self) -> None:
+        """Begin to accept."""
+        if self._listener.fileno() >= 0:
+            self._loop.watch(self._listener, READ, self)
+
+    def ready(self, _: int) -> None:
+        """Take in whoever waits."""
+        while True:
+            try:
+                sock, address = self._listener.accept()
+            except (BlockingIOError, InterruptedError):  # noqa: PERF203 - the usual end
+                return
+            except OSError as error:
+                if error.errno != errno.ECONNABORTED:
+                    # It would be ready again at once, and nobody else would get a turn.
+                    if not self._told:
+                        self._told = True
+                        _log.warning("cannot accept connections: %s", error.strerror)
+                    self._loop.watch(self._listener, 0, self)
+                    self._loop.after(_ACCEPT_PAUSE_S, self.open)
+                    return
+            else:
+                self._told = False
+                self._accept(sock, f"{address[0]}:{address[1]}")
+
+    def end(self, reason: str = "") -> None:  # noqa: ARG002 - as all that belongs to a socket
+        """Accept nobody any more; safe to call twice."""
+        if self._listener.fileno() >= 0:
+            self._loop.watch(self._listener, 0, self)
+            with suppress(OSError):
+                # A process that was forked has the socket, too, and would go on listening.
+                self._listener.shutdown(socket.SHUT_RDWR)
+            self._listener.close()

@@ -11,20 +11,22 @@ from rosglass.comm import EndpointKind, QoS
 from rosglass.comm.subscription_feed import SubscriptionFeed
 from rosglass.errors import Error, TypeNotFoundError
 from rosglass.interfaces import ros1_name
-from rosglass.ros1.publication import Publication
-from rosglass.ros1.topic_probe import ask_publisher
-from rosglass.ros1.topic_subscription import TopicSubscription
-from rosglass.ros1.type_negotiation import TypeNegotiation
-from rosglass.ros1.types import ANY
+from rosglass.wires.tcpros.connection import ANY
+from rosglass.wires.tcpros.publication import Publication
+from rosglass.wires.tcpros.topic_subscription import (
+    TopicSubscription,
+    TypeNegotiation,
+    ask_publisher,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.comm import EndpointInfo, NodeName, Subscription
     from rosglass.messages import MessageType
-    from rosglass.ros1.connection import Connection
-    from rosglass.ros1.core import Core
-    from rosglass.ros1.publication import PublicationWriter
+    from rosglass.wires.tcpros.connection import Connection
+    from rosglass.wires.tcpros.core import TcprosCore
+    from rosglass.wires.tcpros.publication import PublicationWriter
 
 __all__ = ["Topics"]
 
@@ -43,7 +45,7 @@ class Topics:
             time must not take the other's registration away.
     """
 
-    def __init__(self, core: Core) -> None:
+    def __init__(self, core: TcprosCore) -> None:
         self._core = core
         self._lock = threading.Lock()
         self.registering = threading.Lock()
@@ -172,7 +174,7 @@ class Topics:
                 answered.notify_all()
 
         for end in ends:
-            self._core.errands.run(lambda node=end.node: ask(node))  # type: ignore[misc]
+            self._core.pool.run(lambda node=end.node: ask(node))  # type: ignore[misc]
         with answered:
             answered.wait_for(lambda: not left, timeout)
             return [_described(end, told.get(end.node, {})) for end in ends]

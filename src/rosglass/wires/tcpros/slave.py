@@ -1,6 +1,7 @@
-"""What a node answers the master and other nodes: the slave API.
+"""What a node answers the master and other nodes (``rosnode``, ``rqt_graph``): the slave API.
 
-API: ROS wiki, "ROS/Slave_API"; getBusStats and getBusInfo as ``rosnode info`` reads them.
+API: ROS wiki, "ROS/Slave_API"; getBusStats and getBusInfo as ``rosnode info`` reads them, and what
+rosgraph's ``graph.py`` and rospy make of them.
 """
 
 from __future__ import annotations
@@ -18,19 +19,24 @@ from typing import TYPE_CHECKING, Any, Protocol
 from urllib.parse import urlsplit
 
 from rosglass.comm.complaints import Complaints
-from rosglass.ros1.address import is_loopback
-from rosglass.ros1.master import parse_xml
+from rosglass.interfaces import ros1_name
+from rosglass.wires.tcpros.address import is_loopback
+from rosglass.wires.tcpros.master import parse_xml
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-__all__ = ["Slave", "SlaveApi"]
+    from rosglass.wires.tcpros.core import TcprosCore
+    from rosglass.wires.tcpros.topics import Topics
+
+__all__ = ["NodeApi", "Slave", "SlaveApi"]
+
 
 _log = logging.getLogger("rosglass.ros1")
 #: Longest call in bytes: a parameter that changed comes whole.
-_MOST_BYTES = 64 * 2**20
+_MAX_CALL_BYTES = 64 * 2**20
 #: Connections at a time; the master, and each tool that asks, has one.
-_MOST_CONNECTIONS = 100
+_MAX_CONNECTIONS = 100
 
 
 class SlaveApi(Protocol):
@@ -78,7 +84,7 @@ class _Handler(xmlrpc.server.SimpleXMLRPCRequestHandler):
     def do_POST(self) -> None:  # noqa: N802 - named by the standard library
         """Answer a call, unless it is of a length that no call has."""
         length = self.headers.get("content-length", "")
-        if not (length.isascii() and length.isdecimal()) or int(length) > _MOST_BYTES:
+        if not (length.isascii() and length.isdecimal()) or int(length) > _MAX_CALL_BYTES:
             self.send_error(400, "no content length, or too large")
             self.close_connection = True
             return
@@ -130,7 +136,7 @@ class Slave(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCDispatcher):
         In the loop's thread.
         """
         with self._lock:
-            crowded = len(self._connections) >= _MOST_CONNECTIONS
+            crowded = len(self._connections) >= _MAX_CONNECTIONS
             if crowded:
                 oldest = next(iter(self._connections))
                 del self._connections[oldest]
@@ -139,7 +145,7 @@ class Slave(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCDispatcher):
             self._connections[sock] = None
         if crowded and self._complaints.fresh("crowded"):
             text = "%s: the node's API has more than %d connections, the oldest are cut"
-            _log.warning(text, address, _MOST_CONNECTIONS)
+            _log.warning(text, address, _MAX_CONNECTIONS)
         try:
             self.process_request(sock, address)
         except RuntimeError:  # no more threads
@@ -250,3 +256,101 @@ def _answering(name: str, method: Callable[..., Any]) -> Callable[..., list[Any]
             return [0, f"{name} failed: {error}", 0]
 
     return answer
+
+
+_PROTOCOL = "TCPROS"
+#: What rospy, too, says where nobody counts.
+_UNKNOWN = -1
+#: XML-RPC has 32 bits for a number.
+_MAX_INT = 2**31 - 1
+
+
+class NodeApi:
+    """The slave API of a node.
+
+    Args:
+        core: The node.
+        topics: Its topics.
+        parameter_changed: Called with the name of a parameter that was subscribed to.
+    """
+
+    def __init__(
+        self, core: TcprosCore, topics: Topics, parameter_changed: Callable[[str], None]
+    ) -> None:
+        self._core, self._topics, self._parameter_changed = core, topics, parameter_changed
+
+    def bus_info(self) -> list[list[Any]]:
+        """Return the connections, as ``rosnode info`` shows them."""
+        found: list[list[Any]] = []
+        for topic, publication in self._topics.published().items():
+            for link in publication.links():
+                peer = link.header.get("callerid", link.peer)
+                found.append([len(found) + 1, peer, "o", _PROTOCOL, topic, True, link.info])
+        for topic, shared in self._topics.subscribed().items():
+            for source in shared.links():
+                # The publisher's URI: rosnode and rqt_graph find the node by it.
+                told = [len(found) + 1, source.uri, "i", _PROTOCOL, topic, source.connected]
+                found.append([*told, source.info])
+        return found
+
+    def bus_stats(self) -> list[Any]:
+        """Return statistics of publishers, subscriptions and services."""
+        publishers = [
+            [topic, _UNKNOWN, [[n, _UNKNOWN, _UNKNOWN, True] for n, _ in enumerate(p.links(), 1)]]
+            for topic, p in self._topics.published().items()
+        ]
+        subscriptions = [
+            [
+                topic,
+                [
+                    [n, min(source.received, _MAX_INT), _UNKNOWN, _UNKNOWN, source.connected]
+                    for n, source in enumerate(shared.links(), 1)
+                ],
+            ]
+            for topic, shared in self._topics.subscribed().items()
+        ]
+        return [publishers, subscriptions, []]
+
+    def master_uri(self) -> str:
+        """Return the master's URI."""
+        return self._core.master.uri
+
+    def published(self) -> list[list[str]]:
+        """Return topic and type of all that is published."""
+        return [[t, ros1_name(p.type.name)] for t, p in sorted(self._topics.published().items())]
+
+    def subscribed(self) -> list[list[str]]:
+        """Return topic and type of all that is subscribed."""
+        return [[t, i.type_name] for t, i in sorted(self._topics.subscribed().items())]
+
+    def shut_down(self, caller: str, reason: str) -> None:
+        """End the node, because somebody else says so: another one has its name now."""
+        self._core.shut_down(caller, reason)
+
+    def parameter_changed(self, name: str, value: Any) -> None:  # noqa: ARG002 - it may be old
+        """Look at a parameter that was subscribed to."""
+        self._parameter_changed(name)
+
+    def publishers_changed(self, topic: str, uris: list[str]) -> None:
+        """Take the publishers that a topic has now."""
+        shared = self._topics.subscribed().get(topic)
+        if shared is not None:
+            shared.on_publishers_changed(uris)
+
+    def request_topic(self, topic: str, protocols: list[Any]) -> list[Any]:
+        """Return how to connect to a published topic.
+
+        Raises:
+            KeyError: It is not published here.
+            ValueError: None of the protocols is TCPROS.
+        """
+        if not self._topics.serves(topic):
+            raise KeyError(f"{self._core.name} does not publish {topic}")
+        asked = [one[0] if isinstance(one, list) and one else one for one in protocols]
+        if _PROTOCOL not in asked:
+            names = ", ".join(one if isinstance(one, str) else reprlib.repr(one) for one in asked)
+            raise ValueError(
+                f"{self._core.name} speaks {_PROTOCOL} only, not {names or 'nothing'}; "
+                "let the subscriber ask for it, too"
+            )
+        return [_PROTOCOL, *self._core.address]

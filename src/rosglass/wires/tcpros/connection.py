@@ -1,0 +1,906 @@
+"""A TCPROS connection: a header each way, then frames with their length in front.
+
+Formats: ROS wiki, "ROS/Connection Header" and "ROS/TCPROS". A header has fields ``name=value``,
+each with its length in front, all together with theirs. A frame has its length in front, and the
+first one is the header; a service's responses have one more byte in front of the length. All
+lengths are 32-bit, little-endian.
+
+Everything of a :class:`Connection` runs in the loop's thread, except what says so.
+"""
+
+from __future__ import annotations
+
+import errno
+import itertools
+import logging
+import os
+import socket
+import struct
+import sys
+import threading
+import time
+from collections import deque
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from rosglass.errors import DecodeError
+from rosglass.wires.tcpros.io_loop import READ, WRITE
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from rosglass.wires.tcpros.io_loop import IoLoop, Later
+
+    Buffer = bytes | bytearray | memoryview
+    Received = bytes | memoryview
+
+__all__ = [
+    "ANY",
+    "CHUNK",
+    "MAX_FRAME",
+    "MAX_HEADER",
+    "Connection",
+    "Frame",
+    "Incoming",
+    "Outgoing",
+    "UnackedBytes",
+    "encode_header",
+    "outlast",
+    "parse_header",
+]
+
+
+#: What stands for any type, and any md5 sum, in a connection header.
+ANY = "*"
+#: Longest header taken in bytes; the definition of the largest message type is far below it.
+MAX_HEADER = 10_000_000
+_length = struct.Struct("<I")
+
+
+def encode_header(fields: Mapping[str, str]) -> bytes:
+    """Return a header with its length in front."""
+    lines = [f"{name}={value}".encode() for name, value in fields.items()]
+    body = b"".join(_length.pack(len(line)) + line for line in lines)
+    return _length.pack(len(body)) + body
+
+
+def parse_header(data: bytes | memoryview) -> dict[str, str]:
+    """Return the fields of a header, which comes without its own length.
+
+    Raises:
+        DecodeError: A field reaches beyond the end, or has no ``=``.
+    """
+    data = bytes(data)
+    fields: dict[str, str] = {}
+    position = 0
+    while position < len(data):
+        start = position + _length.size
+        size = _length.unpack_from(data, position)[0] if start <= len(data) else len(data)
+        if start + size > len(data):
+            raise DecodeError("connection header", "a field is cut off", offset=position)
+        # Definitions of old types are in whatever encoding their authors' editors had.
+        line = data[start : start + size].decode("utf-8", "surrogateescape")
+        name, separator, value = line.partition("=")
+        if not separator:
+            raise DecodeError("connection header", f"{line[:40]!r} has no '='", offset=position)
+        fields[name] = value
+        position = start + size
+    return fields
+
+
+#: Seconds. Only subscribers make connections: one that we gave up before its subscriber does would
+#: leave that deaf without knowing. rospy's and roscpp's own keepalive takes 60 s and 9 times 10 s.
+_SUBSCRIBER_KEEPALIVE = (("TCP_KEEPIDLE", 60), ("TCP_KEEPINTVL", 10), ("TCP_KEEPCNT", 12))
+_OUTAGE_LIMIT_S = 180
+#: TCP_RTO_MAX_MS, since Linux 6.15; Python has no name for it.
+_TCP_RTO_MAX_MS = 44
+#: SIOCOUTQ (Linux, ``man 7 tcp``): bytes in the send queue that the other end has not confirmed.
+_SIOCOUTQ = 0x5411
+_int = struct.Struct("i")
+#: Seconds without confirmation after which a connection counts as stalled, and between two looks.
+_STALL_TIMEOUT_S, _STALL_POLL_S = 0.5, 0.05
+
+
+def outlast(sock: socket.socket) -> None:
+    """Keep a subscriber's connection for three minutes of silence, and go on soon after it.
+
+    Without that, what was published in an outage, such as a stop, is sent again only after as long
+    as the outage took: TCP waits twice as long each time.
+    """
+    for name, value in _SUBSCRIBER_KEEPALIVE:
+        if (option := getattr(socket, name, None)) is not None:
+            sock.setsockopt(socket.IPPROTO_TCP, option, value)
+    if sys.platform == "linux":
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _OUTAGE_LIMIT_S * 1000)
+        with suppress(OSError):  # an older Linux
+            sock.setsockopt(socket.IPPROTO_TCP, _TCP_RTO_MAX_MS, 1000)
+
+
+class UnackedBytes:
+    """Whether the other end has stopped confirming what it is sent.
+
+    The system takes some megabytes more all the same, and delivers them when the outage is over: a
+    robot would carry out the commands of minutes ago before the one that stops it.
+
+    Attributes:
+        written: Bytes that the system took so far; counted by the owner.
+    """
+
+    def __init__(self, sock: socket.socket) -> None:
+        self._sock = sock
+        self.written = 0
+        self._confirmed = -1
+        self._moved = self._looked = 0.0
+        self._stalled = False
+
+    def stalled(self) -> bool:
+        """Return whether something was sent, and nothing confirmed for half a second."""
+        now = time.monotonic()
+        if now - self._looked < _STALL_POLL_S:
+            return self._stalled
+        self._looked = now
+        waiting = self._waiting()
+        confirmed = self.written - waiting
+        if not waiting or confirmed != self._confirmed:
+            self._confirmed, self._moved = confirmed, now
+        self._stalled = now - self._moved > _STALL_TIMEOUT_S
+        return self._stalled
+
+    def _waiting(self) -> int:
+        if sys.platform != "linux":
+            return 0  # nobody tells
+        import fcntl  # noqa: PLC0415 - not everywhere
+
+        try:
+            (waiting,) = _int.unpack(fcntl.ioctl(self._sock, _SIOCOUTQ, bytes(_int.size)))
+        except OSError:
+            return 0
+        return int(waiting)
+
+
+#: Parts of a frame that the system takes at once.
+_MAX_PARTS = 256
+
+
+class Frame:
+    """A frame on its way to any number of connections.
+
+    Its parts may be somebody else's memory as long as they are being handed to the system; what
+    has to wait is copied, once for all connections.
+
+    Args:
+        parts: The bytes, length and all.
+
+    Attributes:
+        parts: As given, as views of bytes.
+        size: Bytes in all.
+        kept: Whether it must not make room for others: the last message of a latched publisher.
+    """
+
+    __slots__ = ("_copied", "_start", "kept", "parts", "size")
+
+    def __init__(self, parts: Sequence[Buffer], kept: bool = False) -> None:
+        views = [memoryview(part).cast("B") for part in parts]
+        if len(views) > _MAX_PARTS:
+            views = [memoryview(b"".join(views))]
+        self.parts = views
+        self.size = sum(map(len, views))
+        self.kept = kept
+        self._copied: memoryview | None = None
+        self._start = 0
+
+    def rest(self, sent: int) -> memoryview:
+        """Return what follows the first `sent` bytes, in memory that nobody else changes."""
+        copied = self._copied
+        if copied is None or sent < self._start:
+            copied = self._copied = memoryview(b"".join(after(self.parts, sent)))
+            self._start = sent
+        return copied[sent - self._start :]
+
+
+class Outgoing:
+    """The frames that wait on one connection; guarded by its owner's lock.
+
+    Attributes:
+        lost: Frames that made room for newer ones.
+        held: Bytes that wait.
+    """
+
+    __slots__ = ("_begun", "_frames", "held", "lost")
+
+    def __init__(self) -> None:
+        #: What is left of each frame.
+        self._frames: deque[tuple[Frame, memoryview]] = deque()
+        #: Whether the first frame was sent in part: it cannot be taken back.
+        self._begun = False
+        self.lost = self.held = 0
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    def add(self, frame: Frame, sent: int, most: int, most_bytes: int) -> None:
+        """Queue what is left of a frame.
+
+        Args:
+            frame: The frame.
+            sent: How many of its bytes are sent already; more than none only when nothing waits.
+            most: How many frames may wait; 0 for any number.
+            most_bytes: How many bytes may wait, besides the frame; 0 for any number.
+        """
+        left = frame.rest(sent)
+        self._frames.append((frame, left))
+        self._begun = self._begun or sent > 0
+        self.held += len(left)
+        while most and len(self._frames) - self._begun > most and self._drop():
+            pass
+        while most_bytes and self.held > most_bytes and self._drop():
+            pass
+
+    def _drop(self) -> bool:
+        """Drop the oldest frame that may be dropped; return whether there was one."""
+        for index in range(self._begun, len(self._frames) - 1):
+            frame, left = self._frames[index]
+            if not frame.kept:
+                del self._frames[index]
+                self.held -= len(left)
+                self.lost += 1
+                return True
+        return False
+
+    def send(self, write: Callable[[Sequence[memoryview]], int]) -> None:
+        """Send what `write` takes; it returns how many bytes that were."""
+        while self._frames:
+            frame, left = self._frames[0]
+            sent = write((left,))
+            self.held -= sent
+            if sent < len(left):
+                if sent:
+                    self._begun = True
+                    self._frames[0] = (frame, left[sent:])
+                return
+            self._frames.popleft()
+            self._begun = False
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self._frames.clear()
+        self._begun, self.held = False, 0
+
+
+def after(parts: Sequence[memoryview], sent: int) -> list[memoryview]:
+    """Return what is left of `parts` after so many bytes."""
+    rest = []
+    for part in parts:
+        if sent >= len(part):
+            sent -= len(part)
+        else:
+            rest.append(part[sent:] if sent else part)
+            sent = 0
+    return rest
+
+
+#: Longest frame taken in bytes: what a length says beyond it is garbage, as roscpp has it.
+MAX_FRAME = 1_000_000_000
+#: Bytes to read at once as long as there is no :attr:`Incoming.room`.
+CHUNK = 64 * 1024
+#: A frame of which only the beginning came gets a buffer of its own if it is longer.
+_SMALL_FRAME_BYTES = 4 * 1024
+#: Bytes that a peer gets on its word alone, when it has sent nothing of that size before.
+_TRUSTED_BYTES = 1024 * 1024
+#: Buffers that are used again once nobody looks at them: to touch new memory costs as much as to
+#: receive into it.
+_MAX_SPARE_BUFFERS = 4
+#: Frames of one size that are cut at once: most topics have messages of one size.
+_RUN_FRAMES = 32
+
+
+class Incoming:
+    """Cuts one connection's bytes into frames.
+
+    Args:
+        peer: For errors.
+        lead: Bytes in front of each frame's length once the header has come: 1 or 0.
+        take: Called with some frames and the byte in front of them; the header comes alone, and so
+            does each frame with a byte in front. Frames above 64 KiB are read-only views of a
+            buffer that stays as it is as long as somebody has a view of it.
+
+    Attributes:
+        room: Where to receive into, then to call :meth:`filled`; None to call :meth:`feed`.
+        stopped: Set to True to have nothing more handed on; what is there already is kept.
+        total: Bytes received in all.
+        take: As given; may be replaced.
+    """
+
+    def __init__(self, peer: str, lead: int, take: Callable[[list[Received], int], None]) -> None:
+        self.room: memoryview | None = None
+        self.stopped = False
+        self.total = 0
+        self.take = take
+        self._peer, self._lead = peer, lead
+        self._headed = False
+        #: The beginning of a small frame whose end has not come.
+        self._rest = b""
+        self._big = bytearray()
+        self._size = self._there = self._first = 0
+        self._credit = _TRUSTED_BYTES
+        self._spare: list[bytearray] = []
+        self._run: struct.Struct | None = None
+
+    def feed(self, data: bytes) -> None:
+        """Take what came; raises DecodeError when it is no TCPROS."""
+        end = len(data)
+        self.total += end
+        if (
+            self._headed
+            and end >= 4
+            and _length.unpack_from(data)[0] == end - 4
+            and not (self._rest or self._lead or self.stopped)
+        ):
+            # One message, whole: what comes at a moderate rate comes like this.
+            self.take([data[4:]], 0)
+            return
+        if self._rest:
+            data = self._rest + data
+            self._rest = b""
+        start, end = 0, len(data)
+        if not self._headed:
+            start = self._feed_header(data)
+            if start < 0:
+                return
+        if self._lead:
+            self._cut_led(data, start)
+            return
+        frames: list[Received] = []
+        unpack, append = _length.unpack_from, frames.append
+        beginning, before, patience = False, -1, 0
+        # Every line of this is paid for by each message of the fastest topics.
+        while not self.stopped:
+            body = start + 4
+            if body > end:
+                break
+            (size,) = unpack(data, start)
+            if size == before and not patience and start + _RUN_FRAMES * (size + 4) <= end:
+                run = self._run_of(size).unpack_from(data, start)
+                if run[::2].count(size) == _RUN_FRAMES:
+                    frames += run[1::2]
+                    start += _RUN_FRAMES * (size + 4)
+                    continue
+                patience = _RUN_FRAMES
+            stop = body + size
+            if stop > end:
+                beginning = True
+                break
+            append(data[body:stop])
+            start, before = stop, size
+            if patience:
+                patience -= 1
+        if frames:
+            self.take(frames, 0)
+        if beginning:
+            self._begin(data, start, body, size)
+        else:
+            self._rest = data[start:]
+
+    def _run_of(self, size: int) -> struct.Struct:
+        """Return what cuts many frames of one size at once, each with its length."""
+        if self._run is None or self._run.size != _RUN_FRAMES * (size + 4):
+            self._run = struct.Struct(f"<{f'I{size}s' * _RUN_FRAMES}")
+        return self._run
+
+    def _cut_led(self, data: bytes, start: int) -> None:
+        while not self.stopped and start + 1 + _length.size <= len(data):
+            body = start + 1 + _length.size
+            (size,) = _length.unpack_from(data, start + 1)
+            if body + size > len(data):
+                self._begin(data, start, body, size)
+                return
+            first, start = data[start], body + size
+            self.take([data[body:start]], first)
+        self._rest = data[start:]
+
+    def filled(self, count: int) -> None:
+        """Take what came into :attr:`room`."""
+        room, self.room = self.room, None
+        if room is not None:
+            room.release()  # or the buffer cannot grow
+        self.total += count
+        self._there += count
+        if self._there < min(self._size, len(self._big)):
+            self._open()
+        elif self._there < self._size:
+            # It has sent as much as it was trusted with: as much again.
+            self._big.extend(bytes(min(self._size - self._there, self._there)))
+            self._open()
+        else:
+            self._complete()
+
+    def _feed_header(self, data: bytes) -> int:
+        """Hand on the connection header; returns where it ends, -1 when it is not complete."""
+        if len(data) < _length.size:
+            self._rest = data
+            return -1
+        (size,) = _length.unpack_from(data)
+        stop = int(size) + _length.size
+        if stop > len(data):
+            self._begin(data, 0, _length.size, size)
+            return -1
+        self._headed = True
+        self.take([data[_length.size : stop]], 0)
+        return stop
+
+    def _begin(self, data: bytes, start: int, body: int, size: int) -> None:
+        """Prepare for the rest of a frame."""
+        if size > (MAX_FRAME if self._headed else MAX_HEADER):
+            what = "a message" if self._headed else "the connection header"
+            raise DecodeError(f"TCPROS from {self._peer}", f"{what} claims to have {size} bytes")
+        if size <= _SMALL_FRAME_BYTES:
+            self._rest = data[start:]
+            return
+        self._big = self._buffer(min(size, self._credit))
+        self._size, self._there, self._first = size, len(data) - body, data[start]
+        self._big[: self._there] = data[body:]
+        self._open()
+
+    def _open(self) -> None:
+        self.room = memoryview(self._big)[self._there : self._size]
+
+    def _complete(self) -> None:
+        big, self._big = self._big, bytearray()
+        self._credit = max(self._credit, self._size)
+        view = memoryview(big)[: self._size].toreadonly()
+        self._spare.append(big)
+        del self._spare[:-_MAX_SPARE_BUFFERS]
+        first = self._first if self._headed and self._lead else 0
+        if self._headed and self._size > CHUNK:
+            self.take([view], first)
+        else:
+            self._headed = True
+            self.take([bytes(view)], first)
+
+    def _buffer(self, size: int) -> bytearray:
+        """Return a buffer of at least that size, one that nobody looks at any more if possible."""
+        for index, spare in enumerate(self._spare):
+            if size <= len(spare) <= 2 * size:
+                with suppress(BufferError):
+                    # Python itself says whether somebody has a view of it: it cannot grow then.
+                    spare.append(0)
+                    spare.pop()
+                    return self._spare.pop(index)
+        return bytearray(size)
+
+
+_log = logging.getLogger("rosglass.ros1")
+#: Most reads in a row: other sockets must have their turn.
+_MAX_READS = 16
+#: Seconds that the other end may take to connect and to send its header.
+_HEADER_TIMEOUT_S = 10.0
+#: Seconds of silence before the other end is asked for a sign of life, between such questions, and
+#: how many: a robot without power is noticed after some 15 s.
+_KEEPALIVE = (("TCP_KEEPIDLE", 5), ("TCP_KEEPINTVL", 3), ("TCP_KEEPCNT", 3))
+#: Seconds to wait, in :meth:`Connection.drain`, for another thread that reads just now.
+_TURN_TIMEOUT_S = 0.1
+#: Bytes read at once as long as little comes.
+_SMALL_READ_BYTES = 4096
+#: Bytes at one look after which a connection is not left to itself any more: the other end must not
+#: be held up by a full socket.
+_HURRY_BYTES = 64 * 1024
+#: Seconds between looks whether a stalled connection goes on.
+_STALLED_POLL_S = 0.1
+_serials = itertools.count(1)
+_PENDING = (errno.EINPROGRESS, errno.EWOULDBLOCK, errno.EAGAIN)
+
+
+class Connection:
+    """One TCPROS connection.
+
+    Args:
+        loop: Waits for the socket.
+        sock: Connected, or about to be; belongs to the connection from now on.
+        on_header: Called with the peer's header, before anything else is handed on.
+        on_frame: Called with each frame's content, and the byte in front of its length; big
+            contents are read-only views. From another thread than the loop's in :meth:`drain`.
+        on_closed: Called once with the reason, empty when it was closed from here.
+        lead: Bytes in front of each frame's length: 1 for a service's responses, else 0.
+
+    Attributes:
+        peer: The other end's name once it is known, else its address; for people.
+        header: The peer's header; empty before it came.
+        serial: Tells it from all others of this process, also those that are gone.
+        on_room: Called when everything is sent; None for nobody.
+    """
+
+    def __init__(
+        self,
+        loop: IoLoop,
+        sock: socket.socket,
+        on_header: Callable[[dict[str, str]], None],
+        on_frame: Callable[[Received, int], None],
+        on_closed: Callable[[str], None],
+        *,
+        lead: int = 0,
+        peer: str = "",
+    ) -> None:
+        self.peer, self.header = peer, dict[str, str]()
+        self.serial = next(_serials)
+        self.on_room: Callable[[], None] | None = None
+        self._loop, self._sock = loop, sock
+        self._on_header, self._on_frame, self._on_closed = on_header, on_frame, on_closed
+        self._incoming = Incoming(peer, lead, self._take)
+        #: Held while another thread than the loop's reads from the socket, which the loop closes.
+        self._io = threading.Lock()
+        #: Held while frames are handed on, in order; outside of the loop by this thread.
+        self._turn = threading.Lock()
+        self._turn_of = 0
+        self._lock = threading.Lock()
+        self._outgoing = Outgoing()
+        self._unacked = UnackedBytes(sock)
+        #: Whether what waits is for topics, so that it is held back while the other end is silent.
+        self._holds = self._held = False
+        self._connected = False
+        #: Bytes to read at once: memory that stays empty has to be had all the same.
+        self._ask = _SMALL_READ_BYTES
+        self._reading = self._hurried = True
+        self._closed = False
+        self._limit: Later | None = None
+        sock.setblocking(False)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        for name, value in _KEEPALIVE:
+            if (option := getattr(socket, name, None)) is not None:
+                sock.setsockopt(socket.IPPROTO_TCP, option, value)
+
+    @classmethod
+    def dial(
+        cls,
+        loop: IoLoop,
+        address: tuple[str, int],
+        header: Mapping[str, str],
+        on_header: Callable[[dict[str, str]], None],
+        on_frame: Callable[[Received, int], None],
+        on_closed: Callable[[str], None],
+        *,
+        lead: int = 0,
+    ) -> Connection:
+        """Connect to a resolved address and send a header; from the loop's thread.
+
+        Raises:
+            OSError: There can be no more sockets.
+        """
+        family = socket.AF_INET6 if ":" in address[0] else socket.AF_INET
+        sock = socket.socket(family, socket.SOCK_STREAM)
+        place = f"{address[0]}:{address[1]}"
+        made = cls(loop, sock, on_header, on_frame, on_closed, lead=lead, peer=place)
+        failure = sock.connect_ex(address)
+        made.send_header(header)
+        if failure not in (0, *_PENDING):
+            loop.call(lambda: made.end(os.strerror(failure)))
+            return made
+        made._connected = failure == 0
+        made._begin()
+        return made
+
+    def accept(self) -> None:
+        """Begin with a socket that was accepted."""
+        self._connected = True
+        self._begin()
+
+    def _begin(self) -> None:
+        self._limit = self._loop.after(_HEADER_TIMEOUT_S, self._expire)
+        self._watch()
+
+    def _expire(self) -> None:
+        what = "it sent no connection header" if self._connected else "no answer"
+        self.end(f"{what} within {_HEADER_TIMEOUT_S:.0f} s")
+
+    @property
+    def closed(self) -> bool:
+        """Whether it has ended."""
+        return self._closed
+
+    @property
+    def lost(self) -> int:
+        """How many frames made room for newer ones before they were sent."""
+        return self._outgoing.lost
+
+    @property
+    def info(self) -> str:
+        """The connection as ``rosnode info`` shows it; empty when it is not made, or ended."""
+        try:
+            port, number = self._sock.getsockname()[1], self._sock.fileno()
+            host, theirs = self._sock.getpeername()[:2]
+        except OSError:
+            return ""
+        return f"TCPROS connection on port {port} to [{host}:{theirs} on socket {number}]"
+
+    @property
+    def received(self) -> int:
+        """How many bytes have come."""
+        return self._incoming.total
+
+    def waiting(self) -> int:
+        """Return how many frames wait to be sent; from any thread."""
+        return len(self._outgoing)
+
+    def quiet(self) -> bool:
+        """Return whether nothing waits in the socket, nor its end; from any thread."""
+        with self._io:
+            if self._closed:
+                return False
+            try:
+                self._sock.recv(1, socket.MSG_PEEK)
+            except (BlockingIOError, InterruptedError):
+                return True
+            except OSError:
+                pass  # whoever reads it next tells why
+            return False
+
+    # -- sending ---------------------------------------------------------------------------------
+
+    def send_header(self, fields: Mapping[str, str]) -> None:
+        """Send this end's header; from any thread."""
+        self.send_frame(Frame([encode_header(fields)], kept=True))
+
+    def send(self, parts: Sequence[Buffer], keep: int = 0) -> None:
+        """Send a frame, of which the parts carry length and all; see :meth:`send_frame`."""
+        self.send_frame(Frame(parts), keep)
+
+    def send_frame(self, frame: Frame, keep: int = 0, keep_bytes: int = 0) -> None:
+        """Send a frame; from any thread, without waiting.
+
+        What the socket does not take at once is copied: the caller may reuse its buffers.
+
+        Args:
+            frame: The frame.
+            keep: How many frames may wait to be sent; the oldest makes room. 0 for any number.
+            keep_bytes: How many bytes may wait, besides the newest frame; 0 for any number.
+        """
+        with self._lock:
+            if self._closed:
+                return
+            sent = 0
+            first = not self._outgoing
+            self._holds = self._holds or keep > 0 or keep_bytes > 0
+            if first and self._connected and not (self._holds and self._unacked.stalled()):
+                sent = self._write(frame.parts)
+                if sent == frame.size:
+                    return
+            self._outgoing.add(frame, sent, keep, keep_bytes)
+        if first:
+            self._loop.call(self._watch)
+
+    def _write(self, parts: Sequence[memoryview]) -> int:
+        """Send what the socket takes; return how much."""
+        try:
+            sent = self._sock.sendmsg(parts)
+        except (BlockingIOError, InterruptedError):
+            return 0
+        except OSError as error:
+            reason = error.strerror or str(error)
+            self._loop.call(lambda: self.end(reason))
+            return 0
+        self._unacked.written += sent
+        return sent
+
+    def _send_waiting(self) -> None:
+        emptied = False
+        with self._lock:
+            if self._closed or not self._outgoing:
+                emptied = not self._closed
+            elif self._holds and self._unacked.stalled():
+                self._hold()
+            else:
+                self._outgoing.send(self._write)
+                emptied = not self._outgoing
+        if emptied:
+            self._watch()
+            if self.on_room is not None:
+                self.on_room()
+
+    @property
+    def stalled(self) -> bool:
+        """Whether the other end has not confirmed anything for half a second; from any thread."""
+        with self._lock:
+            return not self._closed and self._connected and self._unacked.stalled()
+
+    def _hold(self) -> None:
+        """Send nothing for a moment: only what is newest then is of use."""
+        if self._held:
+            return
+        self._held = True
+
+        def look() -> None:
+            self._held = False
+            self._watch()
+
+        self._loop.after(_STALLED_POLL_S, look)
+        self._loop.call(self._watch)
+
+    # -- receiving -------------------------------------------------------------------------------
+
+    def pause(self, reading: bool) -> None:
+        """Say whether to read and hand on; what comes meanwhile waits. In the loop's thread."""
+        self._reading = reading
+        self._incoming.stopped = self._closed or not reading
+        self._watch()
+        if reading:
+            self._loop.call(self._go_on)
+
+    def _go_on(self) -> None:
+        if self._reading and not self._closed and self._turn.acquire(blocking=False):
+            self._receive(self._sock.recv, self._sock.recv_into, go_on=True)
+
+    def take_together(self, take: Callable[[list[Received], int], None]) -> None:
+        """Have frames handed on as they come, several at once; `take` must not raise anything."""
+        self._incoming.take = take
+
+    def hurry(self, hurried: bool) -> None:
+        """Say whether to read as soon as something comes, or about ten times a second."""
+        if hurried != self._hurried and not self._closed:
+            self._hurried = hurried
+            self._watch()
+
+    def ready(self, events: int) -> None:
+        """Send and receive; called by the loop."""
+        if self._closed:
+            return
+        if not self._connected:
+            failure = self._sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
+            if failure:
+                self.end(os.strerror(failure))
+                return
+            if self._sock.getsockname() == self._sock.getpeername():
+                # Nobody listens there: TCP found the port to come from free to go to.
+                self.end(os.strerror(errno.ECONNREFUSED))
+                return
+            self._connected = True
+            events |= WRITE
+        if events & WRITE:
+            self._send_waiting()
+        if events & READ and self._turn.acquire(blocking=False):
+            before = self._incoming.total
+            self._receive(self._sock.recv, self._sock.recv_into)
+            if not self._hurried and self._incoming.total - before > _HURRY_BYTES:
+                self.hurry(True)
+
+    def drain(self) -> None:
+        """Hand on what waits in the socket; from any thread, while nobody hurries."""
+        me = threading.get_ident()
+        if self._hurried or self._closed or self._turn_of == me:
+            return
+        # Whoever reads just now hands on the same messages.
+        if self._turn.acquire(timeout=_TURN_TIMEOUT_S):
+            self._turn_of = me
+            self._receive(self._recv, self._recv_into)
+
+    def _recv(self, size: int) -> bytes:
+        """Read in a thread other than the loop's, which may close the socket at any time."""
+        with self._io:
+            if self._closed:
+                raise BlockingIOError
+            return self._sock.recv(size)
+
+    def _recv_into(self, room: memoryview) -> int:
+        with self._io:
+            if self._closed:
+                raise BlockingIOError
+            return self._sock.recv_into(room)
+
+    def _receive(
+        self,
+        recv: Callable[[int], bytes],
+        recv_into: Callable[[memoryview], int],
+        go_on: bool = False,
+    ) -> None:
+        """Take in what has come; with the turn, which ends here."""
+        incoming = self._incoming
+        try:
+            if go_on:
+                incoming.feed(b"")
+            for _ in range(_MAX_READS):
+                if self._closed or not self._reading:
+                    return
+                room = incoming.room
+                if room is None:
+                    most = self._ask
+                    data = recv(most)
+                    count = len(data)
+                    self._ask = CHUNK if count == most else _SMALL_READ_BYTES
+                    if count:
+                        incoming.feed(data)
+                else:
+                    most = len(room)
+                    count = recv_into(room)
+                    if count:
+                        incoming.filled(count)
+                if not count:
+                    self._lose("the other end closed the connection")
+                if count < most:
+                    return
+        except (BlockingIOError, InterruptedError):
+            return
+        except DecodeError as error:
+            self._lose(str(error))
+        except OSError as error:
+            self._lose(error.strerror or str(error))
+        finally:
+            self._turn_of = 0
+            self._turn.release()
+
+    def _take(self, frames: list[Received], first: int) -> None:
+        if not self.header:
+            self._take_header(bytes(frames[0]))
+            return
+        try:
+            for frame in frames:
+                self._on_frame(frame, first)
+        except Exception as error:
+            _log.exception("%s: a message could not be taken", self.peer)
+            self._lose(f"an error of ours, {error!r}")
+
+    def _take_header(self, data: bytes) -> None:
+        fields = parse_header(data)
+        if not fields:
+            raise DecodeError(f"TCPROS from {self.peer}", "the connection header is empty")
+        self.header = fields
+        self.peer = fields.get("callerid", "") or self.peer
+        if self._limit is not None:
+            self._limit.cancel()
+        if (error := fields.get("error")) is not None:
+            self.end(f"{self.peer} refuses: {error or 'it does not say why'}")
+            return
+        self._on_header(fields)
+
+    def _lose(self, reason: str) -> None:
+        """End it, from whichever thread noticed."""
+        if self._loop.is_current:
+            self.end(reason)
+        else:
+            self._loop.call(lambda: self.end(reason))
+
+    # -- the end ---------------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """End it from here; from any thread."""
+        self._loop.call(lambda: self.end(""))
+
+    def finish(self, patience: float) -> None:
+        """End it once everything is sent, or after `patience` seconds; in the loop's thread."""
+        if self._closed:
+            return
+        if not self._outgoing:
+            self.end("")
+            return
+        self.on_room = lambda: self.end("")
+        # The system goes on trying to deliver what it has: the last word may be a stop.
+        self._holds = self._held = False
+        self._watch()
+        self._loop.linger(self, True)
+        self._loop.after(patience, lambda: self.end(""))
+
+    def end(self, reason: str) -> None:
+        """End it, and say why; in the loop's thread."""
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = self._incoming.stopped = True
+            self._outgoing.clear()
+        if self._limit is not None:
+            self._limit.cancel()
+        self._loop.linger(self, False)
+        self._loop.watch(self._sock, 0, self)
+        with self._io:
+            with suppress(OSError):
+                # A process that was forked has the socket, too, and would keep the other end.
+                self._sock.shutdown(socket.SHUT_RDWR)
+            self._sock.close()
+        self._on_closed(reason)
+
+    def _watch(self) -> None:
+        if self._closed:
+            return
+        sending = bool(self._outgoing and not self._held) or not self._connected
+        events = (READ if self._reading else 0) | (WRITE if sending else 0)
+        self._loop.watch(self._sock, events, self, hurry=self._hurried)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} with {self.peer}>"

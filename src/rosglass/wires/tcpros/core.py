@@ -1,0 +1,325 @@
+"""What everything created from one ROS 1 node shares: master, connections, graph, threads."""
+
+from __future__ import annotations
+
+import atexit
+import logging
+import threading
+from collections import deque
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from rosglass.comm import ConnectionState, Handle, Status
+from rosglass.comm.core import NodeCore
+from rosglass.errors import Error
+from rosglass.wires.tcpros.address import bracketed, own_address
+from rosglass.wires.tcpros.graph import Graph
+from rosglass.wires.tcpros.io_loop import Acceptor, IoLoop, listen
+from rosglass.wires.tcpros.master import Master
+from rosglass.wires.tcpros.registrations import Member, Registrations
+from rosglass.wires.tcpros.slave import Slave
+from rosglass.wires.tcpros.topic_subscription import UnreachableLog
+
+if TYPE_CHECKING:
+    import socket
+    from collections.abc import Callable
+
+    from rosglass.comm import NodeName
+    from rosglass.wires.tcpros.slave import SlaveApi
+
+__all__ = ["BlockingPool", "TcprosCore", "TcprosOptions"]
+
+_log = logging.getLogger("rosglass.ros1")
+#: Seconds that closing waits until listeners were told that somebody else has closed the node.
+_TELLING = 1.0
+#: Jobs under way at once: nodes that are gone, but registered still, answer only by a time-out,
+#: and others must not wait for that.
+_MAX_THREADS = 32
+#: Seconds after which a thread without job ends.
+_IDLE_TIMEOUT_S = 5.0
+
+
+@dataclass(frozen=True)
+class TcprosOptions:
+    """Where a node's master is, and under which address and ports others reach the node.
+
+    Attributes:
+        master: URI of the master.
+        address: Host or address under which others reach this node; empty to find it out.
+        source: Who gave the address, for messages, such as ``ROS_IP``; empty when nobody did.
+        tcpros_port: Where connections are accepted; 0 for any free port.
+        slave_port: Where the node's API is served; 0 for any free port.
+    """
+
+    master: str
+    address: str = ""
+    source: str = ""
+    tcpros_port: int = 0
+    slave_port: int = 0
+
+
+class TcprosCore(NodeCore[Handle]):
+    """Holds what a node consists of, and keeps its members registered and informed.
+
+    Args:
+        name: The node's name.
+        url: What it was connected with, for people to read.
+        options: Master, own address, remappings.
+        types: Finds types; see :class:`rosglass.ros1.types.Types`.
+
+    Attributes:
+        master: Called from threads that may wait.
+        graph: What the master knew at the last look.
+        types: Finds types.
+        loop: Waits for all sockets.
+        pool: Runs what waits for others.
+        unreachable: Told of publishers that cannot be reached.
+        lookups: Runs what calls of services wait for: they must not queue behind what topics wait
+            for.
+        uri: The node's own API.
+        address: Host and port where connections are accepted.
+        services: Who takes a connection to a service, by its name; see :class:`Server`.
+        topics: Who takes a connection to a topic, by its name.
+
+    Raises:
+        ConnectionLostError: This machine cannot listen for connections.
+    """
+
+    wire = "ros1"
+    graph: Graph
+
+    def __init__(self, name: NodeName, url: str, options: TcprosOptions, types: Any) -> None:
+        super().__init__(name, url, _log)
+        self.options = options
+        self.master = Master(options.master, name.full)
+        self.graph, self.types = Graph(), types
+        self.pool = BlockingPool(f"{name.name} pool")
+        self.lookups = BlockingPool(f"{name.name} lookups")
+        self.address, self.uri = ("", 0), ""
+        self._acceptors: list[Acceptor] = []
+        self._api: Slave | None = None
+        self._telling = threading.Lock()
+        self._status = Status(ConnectionState.CONNECTING, f"looking for {options.master}")
+        sockets: list[socket.socket] = []
+        try:
+            for port in (options.tcpros_port, options.slave_port):
+                sockets += [listen(options.address, port, url)]
+        except BaseException:
+            for sock in sockets:
+                sock.close()
+            raise
+        self._tcpros, self._slave = sockets
+        #: All addresses that the node's own API has had.
+        self.uris: set[str] = set()
+        self.move(options.address or own_address())
+        self.loop = IoLoop(f"{name.name} connections")
+        self.unreachable = UnreachableLog(self.loop, self.pool)
+        self._registrations = Registrations(self)
+        self._worker = self._start_following()
+
+    def start(self, api: SlaveApi, accept: Callable[[socket.socket, str], None]) -> None:
+        """Begin to listen, and to look for the master.
+
+        Args:
+            api: What the master and others can ask.
+            accept: Called in the loop's thread with each connection and its address.
+        """
+        self._api = Slave(api)
+        self._acceptors = [
+            Acceptor(self.loop, self._tcpros, accept),
+            Acceptor(self.loop, self._slave, self._api.accept),
+        ]
+        for acceptor in self._acceptors:
+            self.loop.call(acceptor.open)
+        # Threads that hand on messages must not meet an interpreter that is being taken down.
+        atexit.register(self.close)
+        self._registrations.start()
+
+    def move(self, host: str) -> bool:
+        """Let the node be reached under another host name or address; return whether it is."""
+        place = (host, self._tcpros.getsockname()[1])
+        moved = place != self.address
+        if moved:
+            self.address = place
+            self.uri = f"http://{bracketed(host)}:{self._slave.getsockname()[1]}/"
+            self.uris.add(self.uri)
+        return moved
+
+    def runs_here(self) -> bool:
+        """Return whether the calling thread is one of the node's own."""
+        threads = (
+            self._worker,
+            self._registrations,
+            self.dispatcher,
+            self.own_dispatcher,
+            self.loop,
+        )
+        return any(thread.is_current for thread in threads)
+
+    def add(self, member: Handle, follow: Callable[[bool, bool], None] | None = None) -> None:
+        """Register a member and let it follow the graph; raises NodeClosedError after closing."""
+        super().add(member, follow)
+        if isinstance(member, Member):
+            self._registrations.wake()
+        self.wake()
+
+    def remove(self, member: Handle) -> None:
+        """Unregister a member that was closed, soon."""
+        with self._lock:
+            known = self._members.pop(member, None) is not None
+        if known and not self._closed and isinstance(member, Member):
+            self._registrations.forget(member)
+
+    def registrable(self) -> list[Member]:
+        """Return the members that the master knows, or is to know."""
+        return [member for member in self.members() if isinstance(member, Member)]
+
+    def _state(self) -> Status:
+        return self._status
+
+    def tell(self, status: Status) -> None:
+        """Take a new status, and tell it; one that comes after the end is ignored."""
+        with self._telling:
+            if status == self._status or self._status.state is ConnectionState.CLOSED:
+                return
+            self._status = status
+        self.status_listeners.notify(status)
+
+    def shut_down(self, caller: str, reason: str) -> None:
+        """Close the node soon, because somebody else says so; from any thread.
+
+        Args:
+            caller: Who says so.
+            reason: Why, in the caller's words.
+        """
+        threading.Thread(
+            target=self._shut_down, args=(caller, reason), name="shutdown", daemon=True
+        ).start()
+
+    def _shut_down(self, caller: str, reason: str) -> None:
+        told = f"closed by {caller}: {reason or 'no reason given'}"
+        owner = ""
+        with suppress(Error):
+            owner = self._registrations.owner()
+        if not owner and len(self.uris) > 1 and "same name" in reason:
+            return  # who has the name now is this node, under its new address
+        if owner and owner not in told:
+            told += f"; {owner} has the name {self.name} now"
+        _log.warning("%s: %s", self.name, told)
+        self.close(told, killed=not owner and "same name" not in reason)
+
+    def close(self, reason: str = "closed", *, killed: bool = False) -> None:
+        """Close every member, leave the graph and end the threads; safe to call twice.
+
+        Takes about two seconds when the master does not answer.
+
+        Args:
+            reason: What the status says from now on.
+            killed: As of the status.
+        """
+        if self.forked:
+            self._closed = True
+            return  # the threads did not come along
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+            members = list(self._members)
+        atexit.unregister(self.close)
+        self.clock.close()
+        for member in reversed(members):
+            try:
+                member.close()
+            except Exception:  # noqa: PERF203 - the others must be closed all the same
+                _log.exception("%s cannot be closed", member)
+        self.timers.close()
+        self._registrations.close()
+        self._worker.close()
+        self.pool.close()
+        self.lookups.close()
+        for acceptor in self._acceptors:
+            self.loop.call(acceptor.end)
+        self.loop.close()
+        if self._api is not None:
+            self._api.close()
+        self.graph.clear()
+        self.tell(Status(ConnectionState.CLOSED, reason, killed))
+        self.graph_listeners.clear()
+        if reason != "closed":
+            # Nobody here has asked for it: who listens must know.
+            told = threading.Event()
+            self.dispatcher.post(told.set)
+            told.wait(_TELLING)
+        else:
+            self.status_listeners.clear()
+        self.dispatcher.close()
+        self.own_dispatcher.close()
+
+
+class BlockingPool:
+    """Runs jobs that may take seconds on daemon threads, several at a time.
+
+    Args:
+        name: Of the threads.
+    """
+
+    # Its threads may wait for what others receive, unlike all that begin in io_loop.py; see
+    # rosglass.comm.node.check_may_wait.
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._changed = threading.Condition()
+        self._jobs: deque[Callable[[], None]] = deque()
+        self._threads = self._idle = 0
+        self._closed = False
+
+    def run(self, job: Callable[[], None]) -> None:
+        """Run `job` as soon as a thread is free; forgotten after :meth:`close`."""
+        with self._changed:
+            if self._closed:
+                return
+            self._jobs.append(job)
+            if self._idle >= len(self._jobs):
+                self._changed.notify()
+                return
+            if self._threads == _MAX_THREADS:
+                return
+            self._threads += 1
+            number = self._threads
+        thread = threading.Thread(target=self._work, name=f"{self._name} {number}", daemon=True)
+        try:
+            thread.start()
+        except RuntimeError as error:  # no more threads, or the interpreter is at its end
+            with self._changed:
+                self._threads -= 1
+            _log.warning("%s: a job has to wait: %s", self._name, error)
+
+    def close(self) -> None:
+        """Forget the jobs that wait; those under way end by their own time-outs."""
+        with self._changed:
+            self._closed = True
+            self._jobs.clear()
+            self._changed.notify_all()
+
+    def _work(self) -> None:
+        while (job := self._next()) is not None:
+            self._run(job)
+
+    def _run(self, job: Callable[[], None]) -> None:
+        try:
+            job()
+        except Exception:
+            _log.exception("%s: a job failed", self._name)
+
+    def _next(self) -> Callable[[], None] | None:
+        with self._changed:
+            self._idle += 1
+            try:
+                self._changed.wait_for(lambda: bool(self._jobs) or self._closed, _IDLE_TIMEOUT_S)
+                if self._jobs:
+                    return self._jobs.popleft()
+                self._threads -= 1
+                return None
+            finally:
+                self._idle -= 1
