@@ -6,7 +6,6 @@ comes from the library, from other clients, or from servers that tell it (those 
 
 from __future__ import annotations
 
-import threading
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
@@ -128,7 +127,7 @@ class GoalProbe(Member):
 
     def __init__(self, core: Core, topics: Topics, topic: str, name: str) -> None:
         self._core, self._topics, self._topic, self._name = core, topics, topic, name
-        self._lock = threading.Lock()
+        #: Replaced, never changed, and in the loop's thread only.
         self._waiting: list[tuple[Connection, dict[str, str]]] = []
         self._closed = False
         topics.stand_in(topic, self._accept)
@@ -136,9 +135,7 @@ class GoalProbe(Member):
 
     def look(self) -> MessageType | None:
         """Return the type, None while it is not known."""
-        with self._lock:
-            headers = [header for _, header in self._waiting]
-        for header in headers:
+        for _, header in self._waiting:
             text = header.get("message_definition", "")
             if header.get("type") == ros1_name(self._name) and text.strip():
                 with suppress(Error):
@@ -146,10 +143,8 @@ class GoalProbe(Member):
         return None
 
     def _accept(self, link: Connection, header: dict[str, str]) -> str:
-        with self._lock:
-            if not self._closed:
-                self._waiting = [each for each in self._waiting[-_MOST:] if not each[0].closed]
-                self._waiting.append((link, header))
+        waiting = [each for each in self._waiting[-_MOST:] if not each[0].closed]
+        self._waiting = [*waiting, (link, header)]
         self._core.wake()
         return ""
 
@@ -171,16 +166,15 @@ class GoalProbe(Member):
 
     def close(self) -> None:
         """Hand over the subscribers that wait; safe to call twice."""
-        with self._lock:
-            if self._closed:
-                return
-            self._closed = True
-            waiting, self._waiting = self._waiting, []
+        if self._closed:
+            return
+        self._closed = True
         self._topics.stand_in(self._topic, None)
-        self._core.loop.call(lambda: self._hand_over(waiting))
+        self._core.loop.call(self._hand_over)
         self._core.remove(self)
 
-    def _hand_over(self, waiting: list[tuple[Connection, dict[str, str]]]) -> None:
+    def _hand_over(self) -> None:
+        waiting, self._waiting = self._waiting, []
         for link, header in waiting:
             reason = "" if link.closed else self._topics.accept(link, header)
             if reason:

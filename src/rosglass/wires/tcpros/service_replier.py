@@ -9,7 +9,6 @@ from __future__ import annotations
 import itertools
 import logging
 import struct
-import threading
 import time
 from collections import deque
 from typing import TYPE_CHECKING, Any
@@ -73,8 +72,8 @@ class TcprosReplier(Replier, Member):
     ) -> None:
         self._core, self.name, self.type = core, name, type
         self._on_request, self._on_close = on_request, on_close
-        self._lock = threading.Lock()
         self._closed = False
+        #: Both are changed in the loop's thread only.
         self._sessions: dict[Connection, _Session] = {}
         #: Why clients were refused lately, and when, by their names.
         self._refused: dict[str, tuple[str, float]] = {}
@@ -90,9 +89,7 @@ class TcprosReplier(Replier, Member):
         """Why some clients cannot be served, in words; empty when all is well."""
         if conflict := self._conflict():
             return conflict
-        with self._lock:
-            refused = list(self._refused.values())
-        now = time.monotonic()
+        now, refused = time.monotonic(), self._refused.copy().values()
         return "; ".join(dict.fromkeys(text for text, when in refused if now - when < _REFUSAL_S))
 
     def reply(self, request: RequestId, data: bytes | bytearray) -> None:
@@ -118,19 +115,21 @@ class TcprosReplier(Replier, Member):
         return _session_of(request).client
 
     def close(self) -> None:
-        """Withdraw the service; safe to call twice."""
-        with self._lock:
-            if self._closed:
-                return
-            self._closed = True
-            sessions = list(self._sessions.values())
-        for session in sessions:
-            self._core.loop.call(session.close)
+        """Withdraw the service; safe to call twice, also at once."""
+        if self._closed:
+            return
+        self._closed = True
+        self._core.loop.call(self._end)
         self._core.remove(self)
         # Last: unregistering this server must not remove the registration of the next one.
         self._on_close(self)
 
     # -- connections, in the loop's thread ---------------------------------------------------------
+
+    def _end(self) -> None:
+        # A client that was taken just before is among them: that runs in this thread, too.
+        for session in list(self._sessions.values()):
+            session.close()
 
     def accept(self, link: Connection, header: dict[str, str]) -> str:
         """Take a client's connection; return why not, empty when it is taken."""
@@ -139,15 +138,14 @@ class TcprosReplier(Replier, Member):
         client, md5 = header.get("callerid", "") or link.peer, header["md5sum"]
         if md5 not in (ANY, self.type.md5):
             return self._refuse_type(client, header.get("type", ANY), md5)
-        with self._lock:
-            if self._closed:
-                return f"{self.name} is not offered here any more"
-            is_probe = header.get("probe", "").lower() in _TRUE
-            if not is_probe:
-                self._refused.pop(client, None)
-                persistent = header.get("persistent", "").lower() in _TRUE
-                session = _Session(self._core.loop, link, persistent, self._on_request)
-                self._sessions[link] = session
+        if self._closed:
+            return f"{self.name} is not offered here any more"
+        is_probe = header.get("probe", "").lower() in _TRUE
+        if not is_probe:
+            self._refused.pop(client, None)
+            persistent = header.get("persistent", "").lower() in _TRUE
+            session = _Session(self._core.loop, link, persistent, self._on_request)
+            self._sessions[link] = session
         name = ros1_name(self.type.name)
         link.send_header(
             {
@@ -169,11 +167,10 @@ class TcprosReplier(Replier, Member):
             f"{self.name} is {ros1_name(self.type.name)} with md5 {self.type.md5} on "
             f"{self._core.name}, but {client} calls it as {called} with md5 {md5}"
         )
-        with self._lock:
-            self._refused.pop(client, None)
-            self._refused[client] = (problem, time.monotonic())
-            if len(self._refused) > _MAX_REFUSED:
-                del self._refused[next(iter(self._refused))]
+        self._refused.pop(client, None)
+        self._refused[client] = (problem, time.monotonic())
+        if len(self._refused) > _MAX_REFUSED:
+            del self._refused[next(iter(self._refused))]
         if self._complaints.fresh((client, md5)):
             ours = self._core.types.text(self.type).strip()
             _log.warning("%s: it is not served. Ours:\n%s", problem, ours)
@@ -187,8 +184,7 @@ class TcprosReplier(Replier, Member):
 
     def on_disconnected(self, link: Connection) -> None:
         """Forget a client that has gone."""
-        with self._lock:
-            self._sessions.pop(link, None)
+        self._sessions.pop(link, None)
 
     # -- as a member, which the master shows -------------------------------------------------------
 

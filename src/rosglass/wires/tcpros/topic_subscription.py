@@ -11,7 +11,6 @@ from __future__ import annotations
 import logging
 import socket
 import struct
-import threading
 import time
 from itertools import repeat
 from typing import TYPE_CHECKING
@@ -80,7 +79,7 @@ class TopicSubscription(Member):
 
     Attributes:
         readers: One for each subscription; replaced, never changed: the loop's thread goes through
-            them for each message.
+            them for each message. :meth:`join` and :meth:`leave` are called under the topics' lock.
         eager: Whether messages are waited for.
     """
 
@@ -90,7 +89,7 @@ class TopicSubscription(Member):
         self.readers: tuple[TypeNegotiation, ...] = ()
         self.eager = True
         self._topics = topics
-        self._lock = threading.Lock()
+        #: By URI; changed in the loop's thread only.
         self._links: dict[str, PublisherLink] = {}
         self._closed = False
         #: Which master knows it, counted from 0, and how often one has named publishers.
@@ -104,8 +103,7 @@ class TopicSubscription(Member):
 
     def join(self, reader: TypeNegotiation) -> None:
         """Hand on messages to a subscription, latched ones first; from any thread."""
-        with self._lock:
-            self.readers = (*self.readers, reader)
+        self.readers = (*self.readers, reader)
         self.core.loop.call(lambda: self._join(reader))
 
     def _join(self, reader: TypeNegotiation) -> None:
@@ -125,9 +123,8 @@ class TopicSubscription(Member):
 
     def leave(self, reader: TypeNegotiation) -> bool:
         """Hand on nothing more to a subscription; return whether it was the last one."""
-        with self._lock:
-            self.readers = tuple(one for one in self.readers if one is not reader)
-            return not self.readers
+        self.readers = tuple(one for one in self.readers if one is not reader)
+        return not self.readers
 
     def attend(self) -> None:
         """Hand on messages as they come only while they are waited for; from any thread."""
@@ -252,13 +249,11 @@ class TopicSubscription(Member):
             self.core.loop.call(self._attend)
 
     def close(self) -> None:
-        """End the subscriptions and the connections."""
-        with self._lock:
-            if self._closed:
-                return
-            self._closed = True
-            readers = self.readers
-        for reader in readers:
+        """End the subscriptions and the connections; safe to call twice, also at once."""
+        if self._closed:
+            return
+        self._closed = True
+        for reader in self.readers:
             reader.feed.close()
         self.core.loop.call(self._end)
         self.core.remove(self)

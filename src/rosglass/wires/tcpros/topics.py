@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import threading
+import time
 from contextlib import suppress
 from dataclasses import replace
+from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointKind, QoS
@@ -160,24 +162,24 @@ class Topics:
         """
         limit = _ANSWER_TIMEOUT_S if timeout is None else min(timeout, _ANSWER_TIMEOUT_S)
         ends = self._core.graph.endpoints(EndpointKind.PUBLISHER, topic)
-        told: dict[NodeName, dict[str, str]] = {}
-        left, answered = len(ends), threading.Condition()
+        headers: dict[NodeName, dict[str, str]] = {}
+        answers: SimpleQueue[tuple[NodeName, dict[str, str]]] = SimpleQueue()
 
         def ask(node: NodeName) -> None:
-            nonlocal left
             header = {}
             with suppress(Error):
                 header = self.header(topic, node, limit)
-            with answered:
-                told[node] = header
-                left -= 1
-                answered.notify_all()
+            answers.put((node, header))
 
         for end in ends:
             self._core.pool.run(lambda node=end.node: ask(node))  # type: ignore[misc]
-        with answered:
-            answered.wait_for(lambda: not left, timeout)
-            return [_described(end, told.get(end.node, {})) for end in ends]
+        until = None if timeout is None else time.monotonic() + timeout
+        with suppress(Empty):
+            for _ in ends:
+                wait = None if until is None else max(0.0, until - time.monotonic())
+                node, header = answers.get(timeout=wait)
+                headers[node] = header
+        return [_described(end, headers.get(end.node, {})) for end in ends]
 
     def header(self, topic: str, node: NodeName, timeout: float) -> dict[str, str]:
         """Return the connection header with which a node publishes a topic; waits for it.
