@@ -14,7 +14,6 @@ from rosglass.comm import (
     Subscription,
 )
 from rosglass.comm.builtin_services import BuiltinServices
-from rosglass.comm.complaints import Complaints
 from rosglass.comm.core import CoreNode
 from rosglass.comm.node import check_flag, check_may_wait
 from rosglass.comm.promise import check_timeout
@@ -27,12 +26,8 @@ from rosglass.ros1.names import absolute_namespace, split, validate_node_name
 from rosglass.ros1.parameter_server import ParameterServer
 from rosglass.ros1.roscpp_services import RoscppServices
 from rosglass.ros1.services import Services
-from rosglass.wires.tcpros.connection import Connection, outlast
-from rosglass.wires.tcpros.slave import NodeApi
-from rosglass.wires.tcpros.topics import Topics
 
 if TYPE_CHECKING:
-    import socket
     from collections.abc import Awaitable, Callable, Mapping
 
     from rosglass.comm import (
@@ -58,9 +53,6 @@ if TYPE_CHECKING:
 __all__ = ["Ros1Node"]
 
 _log = logging.getLogger("rosglass.ros1")
-#: Connections at a time whose other end has not sent its header. More than wait to be accepted
-#: (``_BACKLOG``): after a pause, as many honest ones come at once.
-_MAX_SILENT_CONNECTIONS = 300
 
 
 class Ros1Node(CoreNode):
@@ -99,20 +91,14 @@ class Ros1Node(CoreNode):
         namespace = absolute_namespace(namespace, "namespace", relative=False)
         self.url, self.name, self.namespace = url, name, namespace
         self._core = Core(NodeName(namespace, name), url, options, library)
-        self._topics = Topics(self._core)
-        #: Connections that others have made; those without a header, the oldest first.
-        self._connections: set[Connection] = set()
-        self._silent: dict[Connection, None] = {}
-        self._max_connections, self._complaints = _max_connections(), Complaints()
+        self._topics = self._core.topics
         self._services = Services(self._core)
         self._parameter_server = ParameterServer(self._core, parameters or {})
         self._builtin_services = BuiltinServices(
             self._core,
             RoscppServices(self, self._core, self._parameter_server, self._topic_names),
         )
-        self._core.start(
-            NodeApi(self._core, self._topics, self._parameter_server.changed), self._accept
-        )
+        self._core.start(self._parameter_server.changed)
         self._builtin_services.open(own_services)
 
     # -- topics ----------------------------------------------------------------------------------
@@ -385,70 +371,12 @@ class Ros1Node(CoreNode):
         """
         self._core.close()
 
-    # -- connections, in the loop's thread -------------------------------------------------------
-
-    def _accept(self, sock: socket.socket, address: str) -> None:
-        """Take a connection in; its header says what it is for."""
-        link: Connection
-        if len(self._connections) >= self._max_connections:
-            if self._complaints.fresh("crowded"):
-                text = "%s: refused, for this node has %d connections; others are not named"
-                _log.warning(text, address, len(self._connections))
-            sock.close()
-            return
-
-        def refuse(reason: str) -> None:
-            link.send_header({"error": reason})
-            link.finish(1.0)
-
-        def on_header(header: dict[str, str]) -> None:
-            self._silent.pop(link, None)
-            if "topic" in header:
-                outlast(sock)
-                reason = self._topics.accept(link, header)
-            elif "service" in header:
-                reason = self._services.accept(link, header)
-            else:
-                reason = "neither topic nor service is named in the connection header"
-            if reason:
-                refuse(reason)
-
-        link = Connection(
-            self._core.loop,
-            sock,
-            on_header,
-            lambda data, _: self._services.on_frame(link, data),  # subscribers have nothing to say
-            lambda _: self._drop(link),
-            peer=address,
-        )
-        if len(self._silent) >= _MAX_SILENT_CONNECTIONS:
-            next(iter(self._silent)).end("others want to connect, and it has sent no header")
-        self._connections.add(link)
-        self._silent[link] = None
-        link.accept()
-
-    def _drop(self, link: Connection) -> None:
-        self._connections.discard(link)
-        self._silent.pop(link, None)
-        self._topics.drop(link)
-        self._services.on_disconnected(link)
-
     def _node_name(self, node: str | NodeName) -> str:
         """Return a node's full name; raises InvalidNameError."""
         return node.full if isinstance(node, NodeName) else self._core.expand(node)
 
     def _topic_names(self) -> list[str]:
         return sorted({*self._topics.published(), *self._topics.subscribed()})
-
-
-def _max_connections() -> int:
-    """Return how many connections of others to hold: half of the files that may be open."""
-    try:
-        import resource  # noqa: PLC0415 - not on Windows
-    except ImportError:
-        return 1000
-    soft = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
-    return 10_000 if soft == resource.RLIM_INFINITY else min(10_000, soft // 2)
 
 
 def _profile(qos: QoS | int) -> QoS:

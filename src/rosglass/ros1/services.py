@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import threading
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointKind, QoS
 from rosglass.comm.service_client import ServiceClient
 from rosglass.comm.service_server import ServiceServer
-from rosglass.errors import ConversionError, ServiceError
+from rosglass.errors import ConversionError
 from rosglass.ros1.service_types import ServiceTypes
-from rosglass.wires.tcpros.service_replier import TcprosReplier
 from rosglass.wires.tcpros.service_requester import TcprosRequester
 
 if TYPE_CHECKING:
@@ -22,13 +20,13 @@ if TYPE_CHECKING:
     from rosglass.messages import Message, ServiceType
     from rosglass.ros1.core import Core
     from rosglass.wires.base import OnReply, OnRequest
-    from rosglass.wires.tcpros.connection import Connection
+    from rosglass.wires.tcpros.service_replier import TcprosReplier
 
 __all__ = ["Services"]
 
 
 class Services:
-    """Repliers by name, and what clients share.
+    """Makes clients and servers, and knows the types of others' services.
 
     Args:
         core: The node.
@@ -39,8 +37,6 @@ class Services:
 
     def __init__(self, core: Core) -> None:
         self._core = core
-        self._lock = threading.Lock()
-        self._repliers: dict[str, TcprosReplier] = {}
         self.types = ServiceTypes(core, core.lookups)
 
     # -- making ----------------------------------------------------------------------------------
@@ -77,46 +73,9 @@ class Services:
 
         # A request is only put aside for the callback, or it is taken at once: both are quick.
         def create(on_request: OnRequest, _quick: bool) -> TcprosReplier:
-            made = TcprosReplier(core, name, kind, on_request, self._on_close)
-            with self._lock:
-                taken = name in self._repliers
-                if not taken:
-                    self._repliers[name] = made
-            if taken:
-                raise ServiceError(
-                    f"{core.name} offers {name} already, and in ROS 1 a service has one server: "
-                    "close that one first"
-                )
-            core.add(made)
-            return made
+            return core.create_replier(name, kind, on_request)
 
         return ServiceServer(core, name, kind, callback, profile, executor, create)
-
-    # -- connections, in the loop's thread -------------------------------------------------------
-
-    def accept(self, link: Connection, header: dict[str, str]) -> str:
-        """Take a client's connection; return why not, empty when it is taken."""
-        replier = self._repliers.get(header.get("service", ""))
-        if replier is None:
-            return f"{self._core.name} does not offer {header.get('service')}"
-        return replier.accept(link, header)
-
-    def on_frame(self, link: Connection, data: bytes | memoryview) -> None:
-        """Take a request."""
-        replier = self._repliers.get(link.header.get("service", ""))
-        if replier is not None:
-            replier.on_frame(link, data)
-
-    def on_disconnected(self, link: Connection) -> None:
-        """Forget a client's connection that has ended."""
-        replier = self._repliers.get(link.header.get("service", ""))
-        if replier is not None:
-            replier.on_disconnected(link)
-
-    def _on_close(self, replier: TcprosReplier) -> None:
-        with self._lock:
-            if self._repliers.get(replier.name) is replier:
-                del self._repliers[replier.name]
 
     # -- what there is ---------------------------------------------------------------------------
 
@@ -140,7 +99,7 @@ class Services:
 
     def _type_of(self, name: str) -> tuple[str, str]:
         """Return a service's type and md5 sum, empty as long as they are not known."""
-        own = self._repliers.get(name)
+        own = self._core.repliers.get(name)
         nodes = self._core.graph.services().get(name, [])
         if own is not None and nodes == [self._core.name.full]:
             return own.type.name, own.type.md5

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from rosglass.ros1 import node as ros1_node
+from rosglass.wires.tcpros import core
 
 FLOOD = 1000
 HEADER = b"\x14\0\0\0\x10\0\0\0callerid=/nobody"
@@ -75,13 +75,13 @@ def test_floods_leave_threads_and_files_and_the_node_answers(node, connect, even
 
 def test_there_are_fewer_connections_than_files(node, eventually, monkeypatch):
     _, port = place(node)
-    node._max_connections = 50
+    node._core._max_connections = 50
     socks = []
     for _ in range(80):
         socks.append(socket.create_connection(("127.0.0.1", port), 20))
         socks[-1].sendall(hello("/greedy"))
     try:
-        eventually(lambda: len(node._connections) == 50)
+        eventually(lambda: len(node._core._connections) == 50)
         ended = 0
         for sock in socks:
             sock.settimeout(20)
@@ -93,8 +93,8 @@ def test_there_are_fewer_connections_than_files(node, eventually, monkeypatch):
     finally:
         for sock in socks:
             sock.close()
-    eventually(lambda: not node._connections)
-    assert 100 <= ros1_node._max_connections() <= 10_000
+    eventually(lambda: not node._core._connections)
+    assert 100 <= core.max_connections() <= 10_000
 
 
 def test_many_honest_peers_that_come_back_at_once_are_all_served(node):

@@ -843,7 +843,7 @@ def test_what_a_client_that_has_gone_asked_for_is_not_begun(connect, eventually)
     server = robot.create_service_server("/add", ADD, callback)
     kind = rosglass.load(ADD, ros=1).request
     socks = [dial(robot, callerid="/me", service="/add", md5sum=MD5)[0] for _ in range(2)]
-    replier = robot._services._repliers["/add"]
+    replier = robot._core.repliers["/add"]
     for number, sock in enumerate(socks):
         sock.sendall(struct.pack("<I", 16) + kind.encode({"a": number}))
         eventually(lambda n=number: len(seen) + server._waiting > n)

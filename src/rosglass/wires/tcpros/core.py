@@ -11,26 +11,34 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import ConnectionState, Handle, Status
+from rosglass.comm.complaints import Complaints
 from rosglass.comm.core import NodeCore
-from rosglass.errors import Error
+from rosglass.errors import Error, ServiceError
 from rosglass.wires.tcpros.address import bracketed, own_address
+from rosglass.wires.tcpros.connection import Connection, outlast
 from rosglass.wires.tcpros.graph import Graph
 from rosglass.wires.tcpros.io_loop import Acceptor, IoLoop, listen
 from rosglass.wires.tcpros.master import Master
 from rosglass.wires.tcpros.registrations import Member, Registrations
-from rosglass.wires.tcpros.slave import Slave
+from rosglass.wires.tcpros.service_replier import TcprosReplier
+from rosglass.wires.tcpros.slave import NodeApi, Slave
 from rosglass.wires.tcpros.topic_subscription import UnreachableLog
+from rosglass.wires.tcpros.topics import Topics
 
 if TYPE_CHECKING:
     import socket
     from collections.abc import Callable
 
     from rosglass.comm import NodeName
-    from rosglass.wires.tcpros.slave import SlaveApi
+    from rosglass.messages import ServiceType
+    from rosglass.wires.base import OnRequest
 
-__all__ = ["BlockingPool", "TcprosCore", "TcprosOptions"]
+__all__ = ["BlockingPool", "TcprosCore", "TcprosOptions", "max_connections"]
 
 _log = logging.getLogger("rosglass.ros1")
+#: Connections at a time whose other end has not sent its header. More than wait to be accepted
+#: (``_BACKLOG``): after a pause, as many honest ones come at once.
+_MAX_SILENT_CONNECTIONS = 300
 #: Seconds that closing waits until listeners were told that somebody else has closed the node.
 _TELLING = 1.0
 #: Jobs under way at once: nodes that are gone, but registered still, answer only by a time-out,
@@ -79,8 +87,8 @@ class TcprosCore(NodeCore[Handle]):
             for.
         uri: The node's own API.
         address: Host and port where connections are accepted.
-        services: Who takes a connection to a service, by its name; see :class:`Server`.
-        topics: Who takes a connection to a topic, by its name.
+        topics: What is published and subscribed to.
+        repliers: The services that are offered, by name.
 
     Raises:
         ConnectionLostError: This machine cannot listen for connections.
@@ -115,19 +123,23 @@ class TcprosCore(NodeCore[Handle]):
         self.move(options.address or own_address())
         self.loop = IoLoop(f"{name.name} connections")
         self.unreachable = UnreachableLog(self.loop, self.pool)
+        #: Connections that others have made; those without a header, the oldest first.
+        self._connections: set[Connection] = set()
+        self._silent: dict[Connection, None] = {}
+        self._max_connections, self._complaints = max_connections(), Complaints()
+        self.topics, self.repliers = Topics(self), dict[str, TcprosReplier]()
         self._registrations = Registrations(self)
         self._worker = self._start_following()
 
-    def start(self, api: SlaveApi, accept: Callable[[socket.socket, str], None]) -> None:
+    def start(self, on_parameter_changed: Callable[[str], None]) -> None:
         """Begin to listen, and to look for the master.
 
         Args:
-            api: What the master and others can ask.
-            accept: Called in the loop's thread with each connection and its address.
+            on_parameter_changed: Called with the name of a parameter that was subscribed to.
         """
-        self._api = Slave(api)
+        self._api = Slave(NodeApi(self, self.topics, on_parameter_changed))
         self._acceptors = [
-            Acceptor(self.loop, self._tcpros, accept),
+            Acceptor(self.loop, self._tcpros, self._accept),
             Acceptor(self.loop, self._slave, self._api.accept),
         ]
         for acceptor in self._acceptors:
@@ -135,6 +147,30 @@ class TcprosCore(NodeCore[Handle]):
         # Threads that hand on messages must not meet an interpreter that is being taken down.
         atexit.register(self.close)
         self._registrations.start()
+
+    def create_replier(self, name: str, type: ServiceType, on_request: OnRequest) -> TcprosReplier:
+        """Register a service with the master, and return its receiving end.
+
+        Raises:
+            ServiceError: The node offers it already.
+        """
+        made = TcprosReplier(self, name, type, on_request, self._on_replier_closed)
+        with self._lock:
+            taken = name in self.repliers
+            if not taken:
+                self.repliers[name] = made
+        if taken:
+            raise ServiceError(
+                f"{self.name} offers {name} already, and in ROS 1 a service has one server: "
+                "close that one first"
+            )
+        self.add(made)
+        return made
+
+    def _on_replier_closed(self, replier: TcprosReplier) -> None:
+        with self._lock:
+            if self.repliers.get(replier.name) is replier:
+                del self.repliers[replier.name]
 
     def move(self, host: str) -> bool:
         """Let the node be reached under another host name or address; return whether it is."""
@@ -255,6 +291,78 @@ class TcprosCore(NodeCore[Handle]):
             self.status_listeners.clear()
         self.dispatcher.close()
         self.own_dispatcher.close()
+
+    # -- connections, in the loop's thread -------------------------------------------------------
+
+    def _accept(self, sock: socket.socket, address: str) -> None:
+        """Take a connection in; its header says what it is for."""
+        link: Connection
+        if len(self._connections) >= self._max_connections:
+            if self._complaints.fresh("crowded"):
+                text = "%s: refused, for this node has %d connections; others are not named"
+                _log.warning(text, address, len(self._connections))
+            sock.close()
+            return
+
+        def refuse(reason: str) -> None:
+            link.send_header({"error": reason})
+            link.finish(1.0)
+
+        def on_header(header: dict[str, str]) -> None:
+            self._silent.pop(link, None)
+            if "topic" in header:
+                outlast(sock)
+                reason = self.topics.accept(link, header)
+            elif "service" in header:
+                reason = self._accept_client(link, header)
+            else:
+                reason = "neither topic nor service is named in the connection header"
+            if reason:
+                refuse(reason)
+
+        link = Connection(
+            self.loop,
+            sock,
+            on_header,
+            lambda data, _: self._on_request(link, data),  # subscribers have nothing to say
+            lambda _: self._drop(link),
+            peer=address,
+        )
+        if len(self._silent) >= _MAX_SILENT_CONNECTIONS:
+            next(iter(self._silent)).end("others want to connect, and it has sent no header")
+        self._connections.add(link)
+        self._silent[link] = None
+        link.accept()
+
+    def _drop(self, link: Connection) -> None:
+        self._connections.discard(link)
+        self._silent.pop(link, None)
+        self.topics.drop(link)
+        replier = self.repliers.get(link.header.get("service", ""))
+        if replier is not None:
+            replier.on_disconnected(link)
+
+    def _accept_client(self, link: Connection, header: dict[str, str]) -> str:
+        """Take the connection of a service's client; return why not, empty when it is taken."""
+        replier = self.repliers.get(header.get("service", ""))
+        if replier is None:
+            return f"{self.name} does not offer {header.get('service')}"
+        return replier.accept(link, header)
+
+    def _on_request(self, link: Connection, data: bytes | memoryview) -> None:
+        replier = self.repliers.get(link.header.get("service", ""))
+        if replier is not None:
+            replier.on_frame(link, data)
+
+
+def max_connections() -> int:
+    """Return how many connections of others to hold: half of the files that may be open."""
+    try:
+        import resource  # noqa: PLC0415 - not on Windows
+    except ImportError:
+        return 1000
+    soft = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+    return 10_000 if soft == resource.RLIM_INFINITY else min(10_000, soft // 2)
 
 
 class BlockingPool:
