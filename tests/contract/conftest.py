@@ -9,16 +9,12 @@ from __future__ import annotations
 import importlib.util
 import itertools
 import random
-import socket
-import subprocess
-from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 from ports import free_port
-from waiting import eventually
+from rosmaster import RosMaster
 
 import rosglass
 
@@ -27,7 +23,6 @@ if TYPE_CHECKING:
 
     from rosglass import Node
 
-_ROSMASTER = Path("/usr/bin/rosmaster")
 _names = itertools.count(1)
 
 
@@ -79,42 +74,13 @@ def wire(
         with Router(f"tcp/127.0.0.1:{free_port()}") as router:
             yield Wire("zenoh", router.url)
     else:
-        with _RosMaster(tmp_path_factory.mktemp("master")) as url:
-            yield Wire("tcpros", url)
+        with RosMaster(tmp_path_factory.mktemp("master")) as master:
+            yield Wire("tcpros", master.url)
 
 
 def _need(module: str, extra: str) -> None:
     if importlib.util.find_spec(module) is None:
         pytest.skip(f'needs pip install "rosglass[{extra}]"')
-
-
-class _RosMaster:
-    """A ROS 1 master, as Debian has it, on a free port."""
-
-    def __init__(self, home: Path) -> None:
-        if not _ROSMASTER.exists():
-            pytest.skip("ROS 1 is not installed: sudo apt-get install python3-rosmaster")
-        self._home = home
-
-    def __enter__(self) -> str:
-        port = free_port()
-        home = str(self._home)
-        env = {"PATH": "/usr/bin:/bin", "HOME": home, "ROS_HOME": home, "ROS_IP": "127.0.0.1"}
-        command = [str(_ROSMASTER), "--core", "-p", str(port)]
-        with (self._home / "output").open("wb") as output:
-            self._process = subprocess.Popen(command, env=env, stdout=output, stderr=output)
-
-        def answers() -> bool:
-            with suppress(OSError), socket.create_connection(("127.0.0.1", port), 1):
-                return True
-            return False
-
-        eventually(answers, (self._home / "output").read_text)
-        return f"ros1://127.0.0.1:{port}?ip=127.0.0.1"
-
-    def __exit__(self, *_: object) -> None:
-        self._process.kill()
-        self._process.wait()
 
 
 @pytest.fixture
