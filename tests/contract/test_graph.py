@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 import subprocess
 import sys
 import threading
+import time
 
 import pytest
 
@@ -92,11 +95,35 @@ def test_a_closed_node_does_nothing_more(connect, topic):
     node.close()
     assert node.status().state is ConnectionState.CLOSED
     assert subscription.closed
-    for create in (node.create_publisher, node.create_subscription):
+    for use in (
+        lambda: node.create_publisher(topic, TEXT),
+        lambda: node.create_subscription(topic),
+        lambda: node.on_graph_change(print),
+        lambda: node.on_status_change(print),
+        lambda: publisher.publish(data="x"),
+        lambda: publisher.publish_serialized(b""),
+    ):
         with pytest.raises(rosglass.NodeClosedError, match="closed"):
-            create(topic, TEXT)
-    with pytest.raises(rosglass.NodeClosedError):
-        publisher.publish(data="x")
+            use()
+
+
+@pytest.mark.parametrize("take", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_what_lives_in_the_graph_cannot_be_copied(console, topic, take):
+    for made in (
+        console,
+        console.create_publisher(topic, TEXT),
+        console.create_subscription(topic),
+        console.create_service_client(f"{topic}_client"),
+        console.create_service_server(f"{topic}_server", "std_srvs/srv/Empty", print),
+        console.create_action_client(f"{topic}_action"),
+        console.parameters,
+        console.create_parameter_client("/robot"),
+        console.clock,
+    ):
+        with pytest.raises(rosglass.UnsupportedError, match="neither be copied nor") as refused:
+            take(made)
+        # A clock shows its time, too.
+        assert str(refused.value).startswith(repr(made).partition(":")[0])
 
 
 def test_closing_ends_waiting(connect, topic):
@@ -171,8 +198,11 @@ def test_timers_and_time(console):
     with console.create_timer(0.02, tick):
         assert enough.wait(30)
     assert ticks == sorted(ticks)
+    assert abs(console.now().nanoseconds - time.time_ns()) < 1_000_000_000
     with pytest.raises(rosglass.ConversionError):
         console.create_timer(0, tick)
+    with pytest.raises(rosglass.ConversionError, match="executor"):
+        console.create_timer(1.0, tick, executor=7)
 
 
 @pytest.mark.parametrize("name", ["a b", "", "1st", "x-y"])

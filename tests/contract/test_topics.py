@@ -486,19 +486,87 @@ def test_two_types_on_a_topic_are_a_problem_that_names_both(robot, console, topi
     assert "std_msgs" in problem
 
 
+@pytest.mark.parametrize("create", ["create_publisher", "create_subscription"])
+@pytest.mark.parametrize("name", ["a b", ""])
+def test_bad_names_are_refused(robot, create, name):
+    with pytest.raises(rosglass.InvalidNameError):
+        getattr(robot, create)(name, TEXT)
+
+
+@pytest.mark.parametrize("create", ["create_publisher", "create_subscription"])
+def test_types_that_cannot_be_used_are_refused_at_creation(robot, wire, create):
+    other = 2 if wire.is_ros1 else 1
+    for kind, error, reason in (
+        ("nowhere_msgs/msg/Nothing", rosglass.TypeNotFoundError, "nowhere_msgs"),
+        ("std_srvs/srv/Trigger", rosglass.TypeNotFoundError, "is not a message type"),
+        (7, rosglass.TypeNotFoundError, "7 is not a message type"),
+        (rosglass.load(TEXT, ros=other), rosglass.UnsupportedError, f"is ROS {other}'s definition"),
+    ):
+        with pytest.raises(error, match=reason):
+            getattr(robot, create)("/t", kind)
+
+
 @pytest.mark.parametrize(
-    ("name", "kind", "error"),
+    ("options", "reason"),
     [
-        ("a b", TEXT, rosglass.InvalidNameError),
-        ("", TEXT, rosglass.InvalidNameError),
-        ("/x", "nowhere_msgs/msg/Nothing", rosglass.TypeNotFoundError),
+        ({"callback": 3}, "callback: expected .* got 3"),
+        ({"raw_callback": 3}, "raw_callback: expected .* got 3"),
+        ({"callback": print, "executor": 3}, "executor: expected .* got 3"),
+        ({"callback": print, "raw_callback": print}, "raw_callback: expected None"),
+        ({"ignore_local": "no"}, "ignore_local: expected True or False"),
     ],
 )
-def test_bad_arguments_are_refused(robot, name, kind, error):
-    with pytest.raises(error):
-        robot.create_publisher(name, kind)
-    with pytest.raises(error):
-        robot.create_subscription(name, kind)
+def test_odd_options_of_a_subscription_are_refused(console, topic, options, reason):
+    with pytest.raises(rosglass.ConversionError, match=f"{topic}: {reason}"):
+        console.create_subscription(topic, TEXT, **options)
+
+
+def test_odd_arguments_of_a_subscription_are_refused(console, topic):
+    subscription = console.create_subscription(topic)
+    with pytest.raises(rosglass.ConversionError, match=f"{topic}: sample: expected"):
+        subscription.lateness(7)
+    with pytest.raises(rosglass.ConversionError, match=f"{topic}: patient: expected True or False"):
+        subscription.set_patient(1)
+
+
+async def _coroutine(*_):
+    """Would never run."""
+
+
+@pytest.mark.parametrize("callback", [7, _coroutine])
+@pytest.mark.parametrize(
+    "register",
+    [
+        lambda node, callback: node.create_subscription("/t", TEXT, callback),
+        lambda node, callback: node.create_subscription("/t", TEXT, raw_callback=callback),
+        lambda node, callback: node.create_subscription("/t", TEXT).on_matched(callback),
+        lambda node, callback: node.create_timer(1.0, callback),
+        lambda node, callback: node.on_graph_change(callback),
+        lambda node, callback: node.on_status_change(callback),
+    ],
+    ids=["subscription", "raw", "event", "timer", "graph", "status"],
+)
+def test_callbacks_that_would_never_run_are_refused(console, register, callback):
+    with pytest.raises(rosglass.ConversionError, match="callback: expected"):
+        register(console, callback)
+
+
+def test_reprs_name_the_thing(console, topic):
+    assert repr(console.create_publisher(topic, TEXT)) == f"<Publisher {topic} [{TEXT}]>"
+    subscription = console.create_subscription(f"{topic}_other")
+    assert repr(subscription) == f"<Subscription {topic}_other [type not known yet]>"
+    subscription.close()
+    assert repr(subscription).endswith(" closed>")
+
+
+def test_closing_one_subscription_leaves_the_others(robot, console, topic):
+    one, two = (console.create_subscription(topic, TEXT, qos=QoS.latched()) for _ in range(2))
+    publisher = robot.create_publisher(topic, TEXT, QoS.latched())
+    publisher.publish(data="first")
+    assert one.wait(30).message().data == two.wait(30).message().data == "first"
+    one.close()
+    publisher.publish(data="second")
+    assert two.wait(30).message().data == "second"
 
 
 def test_names_are_resolved(connect):
