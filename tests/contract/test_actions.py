@@ -91,10 +91,13 @@ def test_without_a_server_a_goal_ends_after_its_time(client, topic):
         client.send_goal({"order": 1}, timeout=0.2).result(30)
 
 
-def test_what_does_not_fit_is_refused_naming_the_field(offer, client):
-    offer()
-    with pytest.raises(rosglass.ConversionError, match="order"):
+def test_what_does_not_fit_is_refused_naming_the_field_and_not_sent(offer, client):
+    orders = []
+    offer(lambda goal: orders.append(goal.goal.order))
+    with pytest.raises(rosglass.ConversionError, match="order: expected an integer"):
         client.send_goal({"order": "many"})
+    client.send_goal({"order": 2}).result(30)
+    assert orders == [2]
 
 
 def test_the_graph_shows_the_action(offer, console, topic, wire, eventually):
@@ -197,6 +200,7 @@ def test_slow_callbacks_get_the_newest_feedback(offer, client, caplog, eventuall
 
 def test_goals_sent_before_the_type_is_known(robot, console, topic, wire):
     client = console.create_action_client(topic)
+    assert "type not known yet" in repr(client)
     wanted = {"order": 3}
     goal = client.send_goal(wanted, timeout=None)
     wanted["order"] = 99  # of no concern any more
@@ -217,6 +221,7 @@ def test_goals_sent_before_the_type_is_known(robot, console, topic, wire):
     robot.create_action_server(topic, wire.count, count)
     assert list(goal.result(30).result.sequence) == [0, 1, 2]
     assert goal.goal.order == 3
+    assert client.type.name == wire.count
     with pytest.raises(rosglass.ConversionError, match="order: expected"):
         wrong.result(30)
     assert list(client.goals) == []

@@ -98,11 +98,14 @@ def test_a_client_without_type_takes_the_servers(robot, console, topic, wire):
     request["a"] = 100
     with pytest.raises(rosglass.ConversionError, match="a message or a dict"):
         client.call_async(7)
+    with pytest.raises(rosglass.ServiceUnavailableError, match=f"no server offers {topic} on"):
+        client.call(timeout=0.02)
     robot.create_service_server(topic, wire.add, add)
     assert early.result(30).sum == 42
     assert client.type == rosglass.load(wire.add, ros=1 if wire.is_ros1 else 2)
     with pytest.raises(rosglass.ConversionError, match="a: expected an integer"):
         wrong.result(30)
+    assert console.create_service_client(topic).wait_for_server(30)
 
 
 def test_the_node_calls_its_own_service(robot, topic, wire, offer):
@@ -447,6 +450,20 @@ def test_a_callback_may_call_what_runs_elsewhere(robot, console, topic, wire):
     outer = console.create_service_client(f"{topic}_twice", wire.add)
     assert outer.call({"a": 4}, timeout=30).sum == 8
     own.close()
+
+
+def test_a_callback_of_a_client_may_call_and_wait(
+    robot, console, offer, client, topic, wire, eventually
+):
+    """The response does not need the thread that waits for it."""
+    offer()
+    sums = []
+    other = console.create_service_client(f"{topic}_other", wire.add)
+    other.on_ready_change(
+        lambda ready: ready and sums.append(client.call({"a": 5}, timeout=30).sum)
+    )
+    robot.create_service_server(f"{topic}_other", wire.add, add)
+    eventually(lambda: sums == [5], lambda: (sums, other.problem))
 
 
 def test_a_callback_in_the_receiving_thread_may_not_wait(offer, client, wire):

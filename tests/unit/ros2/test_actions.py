@@ -234,25 +234,6 @@ def test_what_cannot_be_used_is_refused_at_creation(node, create, name, type_, e
         getattr(node, create)(*arguments)
 
 
-@pytest.mark.parametrize(
-    ("goal", "options", "told"),
-    [
-        ({"order": "x"}, {}, "order: expected an integer"),
-        ({"speed": 1}, {}, "speed"),
-        ({}, {"timeout": -1}, "timeout: expected seconds"),
-        ({}, {"executor": "gui"}, "executor: expected a rosglass.comm.Executor"),
-        ({}, {"on_feedback": 7}, "callback: expected something that can be called"),
-        ({}, {"on_status_change": 7}, "callback: expected something that can be called"),
-        ({}, {"on_done": 7}, "on_done: expected something that can be called"),
-    ],
-)
-def test_what_does_not_fit_is_refused_and_not_sent(client, peer, goal, options, told):
-    with pytest.raises(rosglass.ConversionError, match=told):
-        client.send_goal(goal, **options)
-    assert peer.send_goal.sent == []
-    assert list(client.goals) == []
-
-
 def test_feedback_and_status_never_come_before_the_acceptance(client, peer, eventually):
     told = []
     goal = client.send_goal(
@@ -395,22 +376,6 @@ def test_without_a_server_a_goal_ends_after_its_time(client, connect):
     with pytest.raises(rosglass.ServiceUnavailableError, match=told):
         goal.result(5)
     assert goal.status is LOST
-
-
-def test_a_goal_cancelled_before_it_was_sent_is_not_sent(client, middleware, eventually):
-    told = []
-    goal = client.send_goal(on_status_change=told.append, on_done=told.append)
-    assert goal.cancel().result(0) == CancelAnswer((goal.id,))
-    assert goal.result(0) == ActionResult(CANCELED, rosglass.load(FIB).result.create())
-    assert goal.acceptance.result(0) is False
-    eventually(lambda: told == [CANCELED, goal])
-    queued = client.send_goal()
-    client.cancel_all()
-    assert queued.result(30).status is CANCELED
-    peer = Peer(middleware)
-    client.wait_for_server(30)
-    eventually(lambda: peer.cancel_goal.sent)
-    assert peer.send_goal.sent == []
 
 
 def test_a_goal_cancelled_before_it_was_accepted_is_cancelled_then(client, peer, eventually):
@@ -599,15 +564,6 @@ def test_a_result_that_cannot_be_decoded(client, peer, eventually):
 
 
 # -- types ---------------------------------------------------------------------------------------
-
-
-def test_the_type_is_discovered(node, robot, eventually):
-    client = node.create_action_client("/fib")
-    assert "type not known yet" in repr(client)
-    robot.create_action_server("/fib", FIB, fibonacci)
-    assert client.wait_for_server(30)
-    assert client.type.name == FIB
-    assert client.send_goal({"order": 3}).result(30).status is SUCCEEDED
 
 
 def test_types_that_do_not_fit_are_named(node, middleware, caplog, eventually):

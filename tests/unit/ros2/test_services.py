@@ -95,12 +95,6 @@ def test_a_server_that_is_seen_before_it_is_linked_is_called_when_it_is(
     assert call.result(30).sum == 3
 
 
-def test_a_reply_may_come_before_sending_returns(connect):
-    node, robot = connect("one"), connect("two")
-    robot.create_service_server("/add", ADD, add, executor=rosglass.comm.IMMEDIATE)
-    assert node.create_service_client("/add", ADD).call({"a": 1, "b": 2}).sum == 3
-
-
 def test_calls_in_flight_are_answered_in_any_order(client, requester):
     requester.linked = True
     calls = [client.call_async({"a": value}) for value in range(8)]
@@ -430,26 +424,6 @@ def test_a_middleware_that_cannot_send(client, requester, caplog):
 # -- types ---------------------------------------------------------------------------------------
 
 
-def test_the_type_is_discovered(node, robot, eventually):
-    client = node.create_service_client("/add")
-    assert client.type is None
-    assert "type not known yet" in repr(client)
-    request = {"a": 1, "b": 2}
-    call = client.call_async(request)
-    wrong = client.call_async({"a": "text"})
-    request["a"] = 100
-    with pytest.raises(rosglass.ConversionError, match="a message or a dict of fields, got 7"):
-        client.call_async(7)
-    with pytest.raises(rosglass.ServiceUnavailableError, match="no server offers /add on fake"):
-        client.call(timeout=0.02)
-    robot.create_service_server("/add", ADD, add)
-    assert call.result(5).sum == 3
-    assert client.type.name == ADD
-    with pytest.raises(rosglass.ConversionError, match="a: expected an integer"):
-        wrong.result(30)
-    assert node.create_service_client("/add").type.name == ADD
-
-
 def test_a_type_that_nobody_has_is_named(node, middleware, eventually):
     client = node.create_service_client("/x")
     middleware.appear(SERVER, "/x", "nowhere_msgs/srv/Nothing")
@@ -554,17 +528,6 @@ def test_giving_up_in_asyncio_cancels_the_call(client, requester, eventually):
     with pytest.raises((asyncio.TimeoutError, TimeoutError)):
         asyncio.run(main())
     eventually(lambda: requester.forgotten == [1])
-
-
-def test_callbacks_may_call_and_wait(node, robot, client, eventually):
-    """The reply does not need the thread that waits for it."""
-    robot.create_service_server("/add", ADD, add)
-    results = []
-    node.create_service_client("/x", ADD).on_ready_change(
-        lambda _: results.append(client.call({"a": 5}).sum)
-    )
-    robot.create_service_server("/x", ADD, add)
-    eventually(lambda: results == [5])
 
 
 def test_threads_that_everything_waits_for_must_not_wait(node, robot, client, eventually):
@@ -713,28 +676,6 @@ def test_a_second_server_and_strange_clients_are_named(robot, middleware, caplog
 
 
 # -- the end -------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("close", ["client", "node"])
-def test_closing_ends_pending_calls(node, client, requester, close, eventually):
-    waiting = client.call_async(timeout=None)
-    requester.linked = True
-    sent = client.call_async(timeout=None)
-    told = []
-    sent.add_done_callback(told.append)
-    (client if close == "client" else node).close()
-    for call in (waiting, sent):
-        with pytest.raises(rosglass.NodeClosedError, match="client of /add was closed during a c"):
-            call.result(0)
-    assert told == [sent]
-    assert requester.closed
-    client.close()
-    assert (client.ready, client.pending, client.problem) == (False, 0, "the client is closed")
-    for use in (client.call, client.call_async, client.wait_for_server):
-        with pytest.raises(rosglass.NodeClosedError, match="closed"):
-            use()
-    with pytest.raises(rosglass.NodeClosedError, match="closed"):
-        client.on_ready_change(print)
 
 
 def test_closing_a_server(robot, client, eventually):
