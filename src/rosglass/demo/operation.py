@@ -53,6 +53,11 @@ class Operation:
         dock: Where it charges.
         mode: The first one.
 
+    Attributes:
+        mode: The one it is in.
+        goal: What is driven to in mode supervised.
+        next_waypoint: Index of the mission's waypoint that is driven to.
+
     Raises:
         Error: There is no such mode.
     """
@@ -71,8 +76,8 @@ class Operation:
         self.mode = mode
         self._state, self._drive, self._flippers, self._dock = state, drive, flippers, dock
         self._ending = threading.Event()
-        self._paused, self._next = False, 0
-        self._goal = DriveGoal(node, self._refusal)
+        self._paused, self.next_waypoint = False, 0
+        self.goal = DriveGoal(node, self._refusal)
         self._behaviour, self._lock = "", threading.Lock()
         #: Why a behaviour is to end.
         self._interruption = ""
@@ -96,7 +101,7 @@ class Operation:
         self._parts += [
             node.create_service_server("/mission/pause", "std_srvs/srv/SetBool", self._on_pause),
             node.create_service_server("/mission/restart", trigger, self._on_restart),
-            self._goal,
+            self.goal,
         ]
         if node.wire == "ros1":
             kind = "flexbe_msgs/action/BehaviorExecution"
@@ -114,16 +119,16 @@ class Operation:
         while not self._ending.wait(_PERIOD):
             state = self._state()
             self._tell("/mode", self.mode)
-            self._tell("/mission/waypoint", self._next)
-            self._tell("/mission/state", self._proceed(state))
-            self._goal.confirm()
+            self._tell("/mission/waypoint", self.next_waypoint)
+            self._tell("/mission/state", self.proceed(state))
+            self.goal.confirm()
 
     def take_over(self) -> None:
         """Leave the driving to the operator, who has just driven."""
         if self.mode == "autonomous":
             self.mode = "supervised"
         self._interruption = "the operator drives"
-        self._goal.end(PREEMPTED, self._interruption)
+        self.goal.end(PREEMPTED, self._interruption)
 
     def close(self) -> None:
         """Withdraw all; safe to call twice."""
@@ -131,23 +136,23 @@ class Operation:
         for part in self._parts:
             part.close()
 
-    def _proceed(self, state: RobotState) -> str:
+    def proceed(self, state: RobotState) -> str:
         """Drive on for a moment; returns what the robot is about."""
         if state.emergency_stop:
-            self._goal.end(ABORTED, "the emergency stop was pressed")
+            self.goal.end(ABORTED, "the emergency stop was pressed")
             return "emergency stop"
         if self._behaviour:
             return self._behaviour.lower()
-        if (place := self._goal.place) is not None:
+        if (place := self.goal.place) is not None:
             if self._steer(state, place):
-                self._goal.end(SUCCEEDED, "the goal is reached")
+                self.goal.end(SUCCEEDED, "the goal is reached")
             return "driving to the goal"
         if self.mode != "autonomous":
             return "waiting for mode autonomous"
         if self._paused:
             return "paused"
-        if self._steer(state, WAYPOINTS[self._next]):
-            self._next = (self._next + 1) % len(WAYPOINTS)
+        if self._steer(state, WAYPOINTS[self.next_waypoint]):
+            self.next_waypoint = (self.next_waypoint + 1) % len(WAYPOINTS)
         return "on patrol"
 
     def _steer(self, state: RobotState, target: tuple[float, float]) -> bool:
@@ -175,7 +180,7 @@ class Operation:
             if name == "safe":
                 self._interruption = "the mode is safe now"
             if name != "supervised":
-                self._goal.end(PREEMPTED, f"the mode is {name} now")
+                self.goal.end(PREEMPTED, f"the mode is {name} now")
             self._drive(0.0, 0.0)
             self._tell("/mode", name)
             return {"success": True, "message": name}
@@ -188,7 +193,7 @@ class Operation:
         return {"success": True, "message": "paused" if self._paused else "going on"}
 
     def _on_restart(self, _: Message) -> dict[str, Any]:
-        self._next, self._paused = 0, False
+        self.next_waypoint, self._paused = 0, False
         return {"success": True, "message": "from the first waypoint"}
 
     def _refusal(self) -> str:
@@ -221,7 +226,7 @@ class Operation:
                 raise Error(f"busy with {self._behaviour!r}; cancel it first")
             self._behaviour, self._interruption = name, ""
         try:
-            self._goal.end(PREEMPTED, f"the behaviour {name!r} was started")
+            self.goal.end(PREEMPTED, f"the behaviour {name!r} was started")
             start = self._state()
             {
                 "Look around": lambda: self._turn(goal, math.tau),

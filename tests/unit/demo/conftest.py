@@ -14,6 +14,8 @@ from rosglass.comm import ParameterEvent, QoS
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from rosglass.demo.robot import Robot
+
 
 class Recorder:
     """A publisher that encodes, as a real one does, and keeps what it was given."""
@@ -110,3 +112,14 @@ class StubNode:
 @pytest.fixture(scope="session")
 def stub_node() -> type[StubNode]:
     return StubNode
+
+
+@pytest.fixture(scope="session")
+def lives_on() -> Callable[[Robot, float], None]:
+    """Wait until a robot has lived on for some seconds of its own, however busy the machine is."""
+
+    def lives_on(robot: Robot, seconds: float) -> None:
+        end = robot.state.time + seconds
+        eventually(lambda: robot.state.time > end)
+
+    return lives_on

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 
 pytest.importorskip("cv2", reason="the simulated camera needs the extra `camera`")
 
-from waiting import eventually, nothing_happens
+from waiting import eventually
 
 from rosglass.demo.equipment import CAMERAS
 from rosglass.demo.robot import Robot, RobotOptions
@@ -64,14 +63,14 @@ def test_cameras_show_different_moving_pictures(alive: tuple[Any, Robot], name: 
     assert all(bytes(other.data) != bytes(told.data) for other in others)
 
 
-def test_nothing_is_drawn_while_nobody_looks(alive: tuple[Any, Robot]) -> None:
-    node, _ = alive
+def test_nothing_is_drawn_while_nobody_looks(alive: tuple[Any, Robot], lives_on: Any) -> None:
+    node, robot = alive
     topics = ["/points", *(f"/{name}_camera/image_raw" for name in CAMERAS)]
     for topic in topics:
         node.publishers[topic].listeners = 0
-    nothing_happens(0.2)
+    lives_on(robot, 0.2)
     before = [len(node.publishers[topic].sent) for topic in topics]
-    nothing_happens(1.0)
+    lives_on(robot, 1.0)
     assert [len(node.publishers[topic].sent) for topic in topics] == before
     for topic in topics:
         node.publishers[topic].listeners = 1
@@ -83,18 +82,20 @@ def test_the_cloud_grows_into_what_the_laser_sees(alive: tuple[Any, Robot]) -> N
     eventually(lambda: alive[0].last("/points").width > 500)
 
 
-def test_safe_is_slow(alive: tuple[Any, Robot]) -> None:
+def test_safe_is_slow(alive: tuple[Any, Robot], lives_on: Any) -> None:
     node, robot = alive
     node.ask("/mode/safe")
     eventually(lambda: node.command("/cmd_vel", linear={"x": 1.0}) or robot.state.speed > 0.2)
     for _ in range(30):
         node.command("/cmd_vel", linear={"x": 1.0})
-        time.sleep(0.01)
+        lives_on(robot, 0.01)
     assert robot.state.speed < 0.31
     node.ask("/mode/supervised")
 
 
-def test_the_emergency_stop_ends_the_mission_and_holds(alive: tuple[Any, Robot]) -> None:
+def test_the_emergency_stop_ends_the_mission_and_holds(
+    alive: tuple[Any, Robot], lives_on: Any
+) -> None:
     node, robot = alive
     node.ask("/mode/autonomous")
     eventually(lambda: abs(robot.state.speed) + abs(robot.state.turn) > 0.1)
@@ -106,7 +107,7 @@ def test_the_emergency_stop_ends_the_mission_and_holds(alive: tuple[Any, Robot])
     for command in ("/mode/supervised", "/mode/autonomous"):
         node.ask(command)
         node.command("/cmd_vel", linear={"x": 0.5})
-        nothing_happens(0.2)
+        lives_on(robot, 0.2)
     assert (robot.state.x, robot.state.y) == place
     node.command("/emergency_stop", data=False)
     eventually(lambda: node.last("/mission/state").data == "waiting for mode autonomous")

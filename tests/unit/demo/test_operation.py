@@ -38,7 +38,7 @@ class Rig:
         return self.simulation.state
 
     def proceed(self) -> str:
-        return self.operation._proceed(self.look())
+        return self.operation.proceed(self.look())
 
     def until(self, condition: Any) -> None:
         for _ in range(PATIENCE):
@@ -112,7 +112,7 @@ def test_the_mission_leads_round_in_mode_autonomous(rig: Rig) -> None:
     start = rig.place
     assert rig.proceed() == "waiting for mode autonomous"
     rig.node.ask("/mode/autonomous")
-    rig.until(lambda: rig.operation._next == 2)
+    rig.until(lambda: rig.operation.next_waypoint == 2)
     assert math.dist(rig.place, WAYPOINTS[1]) < 0.3
     assert rig.node.ask("/mission/pause", data=True)["message"] == "paused"
     assert rig.proceed() == "paused"
@@ -120,7 +120,7 @@ def test_the_mission_leads_round_in_mode_autonomous(rig: Rig) -> None:
     assert rig.node.ask("/mission/pause", data=False)["success"]
     assert rig.proceed() == "on patrol"
     rig.node.ask("/mission/restart")
-    assert rig.operation._next == 0
+    assert rig.operation.next_waypoint == 0
     assert math.dist(start, rig.place) > 0.5
     path = rig.node.publishers["/mission/path"].sent[-1]
     assert [(p.pose.position.x, p.pose.position.y) for p in path.poses][:-1] == list(WAYPOINTS)
@@ -149,7 +149,7 @@ def test_a_goal_is_driven_to(rig: Rig) -> None:
 def test_a_goal_in_another_mode_is_refused_with_the_reason(rig: Rig, mode: str) -> None:
     rig.node.ask(f"/mode/{mode}")
     assert rig.send(1, 1) == (REJECTED, f"no goals in mode {mode}; choose supervised")
-    assert rig.operation._goal.place is None
+    assert rig.operation.goal.place is None
 
 
 def test_goals_that_are_refused(rig: Rig) -> None:
@@ -177,7 +177,7 @@ def test_what_ends_a_goal_is_told(rig: Rig, event: Any, status: int, reason: str
     rig.proceed()
     assert rig.told[0] == status
     assert reason in rig.told[1]
-    assert rig.operation._goal.place is None
+    assert rig.operation.goal.place is None
 
 
 def test_the_newest_goal_counts(rig: Rig) -> None:
@@ -187,9 +187,9 @@ def test_the_newest_goal_counts(rig: Rig) -> None:
     told = rig.node.publishers["/move_base/status"].sent
     assert told[-2].status_list[0].text == "another goal came"
     assert told[-2].status_list[0].goal_id.id != told[-1].status_list[0].goal_id.id
-    rig.operation._goal.end(SUCCEEDED, "x")
+    rig.operation.goal.end(SUCCEEDED, "x")
     count = len(told)
-    rig.operation._goal.end(ABORTED, "nothing is driven to")
+    rig.operation.goal.end(ABORTED, "nothing is driven to")
     assert len(told) == count
 
 

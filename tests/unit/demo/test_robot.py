@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("cv2", reason="the simulated camera needs the extra `camera`")
 
-from waiting import eventually, nothing_happens
+from waiting import eventually
 
 from rosglass.comm import Durability, QoS
 from rosglass.demo.robot import Robot, RobotOptions
@@ -116,7 +116,7 @@ def test_it_drives_and_stops_when_commands_cease(node: StubNode, robot: Robot) -
     eventually(lambda: robot.state.speed == 0.0)
 
 
-def test_a_stop_is_confirmed_at_once_and_holds(node: StubNode, robot: Robot) -> None:
+def test_a_stop_is_confirmed_at_once_and_holds(node: StubNode, robot: Robot, lives_on: Any) -> None:
     confirmations = node.publishers["/emergency_stop/state"].sent
     count = len(confirmations)
     node.command("/emergency_stop", data=True)
@@ -124,7 +124,7 @@ def test_a_stop_is_confirmed_at_once_and_holds(node: StubNode, robot: Robot) -> 
     assert confirmations[-1].data is True
     for _ in range(8):
         node.command("/cmd_vel", linear={"x": 0.3})
-        time.sleep(0.03)
+        lives_on(robot, 0.03)
     assert robot.state.speed == 0.0
     assert node.last("/diagnostics").status[0].message == "emergency stop latched"
 
@@ -145,6 +145,7 @@ def test_garbage_is_logged_and_does_not_move_it(
     caplog: pytest.LogCaptureFixture,
     fields: dict[str, Any],
     named: str,
+    lives_on: Any,
 ) -> None:
     robot._logged_at = -math.inf
     eventually(lambda: robot.state.speed == 0.0)
@@ -154,7 +155,7 @@ def test_garbage_is_logged_and_does_not_move_it(
     assert len(caplog.records) == 1, "one line, not one for each message"
     assert "/cmd_vel" in caplog.text
     assert named in caplog.text
-    nothing_happens(0.1)
+    lives_on(robot, 0.1)
     assert robot.state.speed == 0.0
 
 
@@ -168,7 +169,7 @@ def test_malformed_bytes_are_refused(
     assert "/cmd_vel" in caplog.text
 
 
-def test_flippers_and_lamp(node: StubNode, robot: Robot) -> None:
+def test_flippers_and_lamp(node: StubNode, robot: Robot, lives_on: Any) -> None:
     node.command("/flashlight", data=True)
     assert node.publishers["/flashlight/state"].sent[-1].data is True
     node.command("/flashlight", data=False)
@@ -177,18 +178,19 @@ def test_flippers_and_lamp(node: StubNode, robot: Robot) -> None:
     message = node.last("/joint_states")
     assert tuple(message.name) == FLIPPERS
     node.command("/flipper_controller/commands", data=[9.0] * 4)
-    nothing_happens(0.1)
+    lives_on(robot, 0.1)
     assert robot.state.flippers == (0.5, 0.5, 0.3, 0.3)
 
 
-def test_a_network_that_blocks_does_not_stop_the_body(node: StubNode, robot: Robot) -> None:
+def test_a_network_that_blocks_does_not_stop_the_body(
+    node: StubNode, robot: Robot, lives_on: Any
+) -> None:
     stuck = [node.publishers["/camera/image_raw"], node.publishers["/odom"]]
     for recorder in stuck:
         recorder.blocked.clear()
     try:
-        time.sleep(0.1)
-        before = robot.state.time
-        eventually(lambda: robot.state.time - before > 0.5)
+        lives_on(robot, 0.1)  # the threads that send stand by then
+        lives_on(robot, 0.5)
         eventually(lambda: node.command("/cmd_vel", linear={"x": 0.2}) or robot.state.speed > 0.05)
     finally:
         for recorder in stuck:
