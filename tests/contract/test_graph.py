@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import copy
+import gc
 import pickle
 import subprocess
 import sys
 import threading
 import time
+import weakref
 
 import pytest
 
 import rosglass
 from rosglass import QoS
-from rosglass.comm import ConnectionState
+from rosglass.comm import ConnectionState, GoalStatus
 
 TEXT = "std_msgs/msg/String"
 
@@ -158,6 +160,48 @@ def test_closing_ends_the_threads(connect, topic, eventually):
         return [t for t in set(threading.enumerate()) - before if "threads" in t.name]
 
     eventually(lambda: not left(), left)
+
+
+def publish(robot, console, topic, wire):
+    with (
+        console.create_subscription(topic, TEXT, qos=QoS.latched()) as subscription,
+        robot.create_publisher(topic, TEXT, QoS.latched()) as publisher,
+    ):
+        publisher.publish(data="x")
+        assert subscription.wait(30) is not None
+        return weakref.ref(publisher), weakref.ref(subscription)
+
+
+def call(robot, console, topic, wire):
+    with (
+        robot.create_service_server(topic, wire.add, lambda r: {"sum": r.a}) as server,
+        console.create_service_client(topic, wire.add) as client,
+    ):
+        assert client.call({"a": 1}, timeout=30).sum == 1
+        return weakref.ref(server), weakref.ref(client)
+
+
+def act(robot, console, topic, wire):
+    with (
+        robot.create_action_server(topic, wire.count, lambda _: None) as server,
+        console.create_action_client(topic, wire.count) as client,
+    ):
+        assert client.send_goal({"order": 3}).result(30).status is GoalStatus.SUCCEEDED
+        return weakref.ref(server), weakref.ref(client)
+
+
+@pytest.mark.parametrize("use", [publish, call, act])
+def test_what_is_closed_leaves_nothing_behind(robot, console, topic, wire, eventually, use):
+    use(robot, console, topic, wire)  # what nodes make at a first use stays
+    threads = threading.active_count()
+    used = [made for _ in range(5) for made in use(robot, console, topic, wire)]
+
+    def left():
+        gc.collect()
+        return [made() for made in used if made() is not None]
+
+    eventually(lambda: not left(), left)
+    eventually(lambda: threading.active_count() <= threads, threading.enumerate)
 
 
 def test_a_program_ends_by_itself_without_closing_its_node(wire):

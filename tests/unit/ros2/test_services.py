@@ -700,18 +700,6 @@ def test_closing_a_server(robot, client, eventually):
     assert not client.ready
 
 
-def test_clients_and_servers_leave_nothing_behind(node, robot, middleware):
-    before = [list(each._core._members) for each in (node, robot)]
-    for _ in range(50):
-        with (
-            robot.create_service_server("/add", ADD, add),
-            node.create_service_client("/add", ADD) as client,
-        ):
-            assert client.call({"a": 1}, timeout=30).sum == 1
-    assert middleware.graph.services() == {}
-    assert [list(each._core._members) for each in (node, robot)] == before
-
-
 def test_timers_of_ended_calls_are_forgotten(client, requester, node):
     requester.linked = True
     for number in range(1, 1001):
