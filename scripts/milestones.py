@@ -41,6 +41,8 @@ _GLOSSARY = re.compile(
     r"|_(?:PATIENCE|LEISURE|HURRY)\b|\bput_off\b",
     re.IGNORECASE,
 )
+#: What a NamedTuple has for everybody.
+_OF_TUPLES = {"_replace", "_asdict", "_fields", "_make"}
 _MESSAGES = 300
 
 
@@ -128,6 +130,7 @@ def private_reaches(sources: list[Source]) -> int:
     return sum(
         node.attr.startswith("_")
         and not node.attr.startswith("__")
+        and node.attr not in _OF_TUPLES
         and getattr(node.value, "id", "") not in {"self", "cls", "os", "sys", "ctypes"}
         for source in sources
         for node in ast.walk(source.tree)
