@@ -23,16 +23,33 @@ from rosglass.comm import (
 from rosglass.errors import ConversionError, NodeClosedError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
 
 @pytest.fixture
-def clock() -> Iterator[Clock]:
-    timers = Timers("tester")
+def timers() -> Iterator[Timers]:
+    made = Timers("tester")
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def clock(timers: Timers) -> Iterator[Clock]:
     made = Clock("tester", IMMEDIATE, timers)
     yield made
     made.close()
-    timers.close()
+
+
+@pytest.fixture
+def settle(timers: Timers) -> Callable[[], None]:
+    """Wait until the timers' thread has done what is due."""
+
+    def settle() -> None:
+        done = threading.Event()
+        timers.after(0, done.set)
+        assert done.wait(30)
+
+    return settle
 
 
 def seconds(value: float) -> Time:
@@ -165,17 +182,18 @@ def test_a_timer_calls_back_at_its_rate(clock: Clock) -> None:
     timer.close()
     timer.close()
     assert 0.07 < calls[4] - calls[0] < 1
-    count = len(calls)
-    nothing_happens(0.06)
+    count, turns = len(calls), []
+    clock.create_timer(0.02, lambda: turns.append(1))
+    eventually(lambda: len(turns) >= 3)
     assert len(calls) <= count + 1
 
 
-def test_a_timer_follows_simulated_time(clock: Clock) -> None:
+def test_a_timer_follows_simulated_time(clock: Clock, settle: Callable[[], None]) -> None:
     clock.simulate(True)
     clock.advance(seconds(100))
     calls: list[Time] = []
     clock.create_timer(Duration.from_seconds(1), lambda: calls.append(clock.now()))
-    nothing_happens(0.05)
+    settle()
     assert not calls
     clock.advance(seconds(101))
     eventually(lambda: len(calls) == 1)
@@ -183,7 +201,7 @@ def test_a_timer_follows_simulated_time(clock: Clock) -> None:
     eventually(lambda: len(calls) == 2)
     clock.advance(seconds(1))  # set back: the period counts from here
     clock.advance(seconds(1.9))
-    nothing_happens(0.05)
+    settle()
     assert len(calls) == 2
     clock.advance(seconds(2))
     eventually(lambda: len(calls) == 3)
@@ -191,17 +209,20 @@ def test_a_timer_follows_simulated_time(clock: Clock) -> None:
 
 def test_a_slow_callback_misses_turns_instead_of_piling_up(clock: Clock) -> None:
     dispatcher = Dispatcher("slow")
-    release, calls = threading.Event(), []
+    release, calls, turns = threading.Event(), [], []
 
     def slow() -> None:
         calls.append(1)
         release.wait(30)
 
     timer = clock.create_timer(0.005, slow, dispatcher)
-    time.sleep(0.1)
+    clock.create_timer(0.005, lambda: turns.append(1))
+    eventually(lambda: len(turns) >= 10)
     timer.close()
     release.set()
-    nothing_happens(0.05)
+    done = threading.Event()
+    dispatcher.post(done.set)
+    assert done.wait(30)
     dispatcher.close()
     assert len(calls) == 1
 
