@@ -7,7 +7,6 @@ import re
 import threading
 
 import pytest
-from waiting import nothing_happens
 
 import rosglass
 from rosglass import Duration, QoS
@@ -303,19 +302,36 @@ def test_a_publisher_without_subscriptions_hints_at_a_name_that_is_alike(
     assert publisher.hint == ""
 
 
-def test_a_publisher_that_pauses_misses_its_deadline(robot, topic, eventually):
-    profile = QoS(deadline=rosglass.Duration.from_seconds(0.05))
+@pytest.fixture
+def miss_deadlines(robot, topic, eventually):
+    """Wait until another publisher of the robot has missed deadlines of 0.05 s."""
+    other = robot.create_publisher(
+        f"{topic}_pausing", TEXT, QoS(deadline=Duration.from_seconds(0.05))
+    )
+    events = []
+    other.on_deadline_missed(events.append)
+
+    def miss_deadlines(count):
+        before = len(events)
+        other.publish(data="x")
+        eventually(lambda: len(events) >= before + count)
+
+    return miss_deadlines
+
+
+def test_a_publisher_that_pauses_misses_its_deadline(robot, topic, eventually, miss_deadlines):
+    profile = QoS(deadline=Duration.from_seconds(0.05))
     publisher = robot.create_publisher(topic, TEXT, profile)
     events = []
     publisher.on_deadline_missed(events.append)
-    nothing_happens(0.1)
+    miss_deadlines(2)
     assert events == [], "time runs from the first message"
     publisher.publish(data="x")
     eventually(lambda: len(events) >= 2)
     assert events[-1].total == sum(event.change for event in events)
     publisher.close()
     count = len(events)
-    nothing_happens(0.12)
+    miss_deadlines(3)
     assert len(events) <= count + 1
 
 
@@ -459,7 +475,9 @@ def test_waiting_ends_with_the_node(console, topic):
     later.join()
 
 
-def test_manual_liveliness_is_lost_once_for_each_silence(robot, topic, wire, eventually):
+def test_manual_liveliness_is_lost_once_for_each_silence(
+    robot, topic, wire, eventually, miss_deadlines
+):
     lease = rosglass.Duration.from_seconds(0.05)
     profile = QoS(liveliness=Liveliness.MANUAL_BY_TOPIC, lease_duration=lease)
     publisher = robot.create_publisher(topic, TEXT, profile)
@@ -472,7 +490,7 @@ def test_manual_liveliness_is_lost_once_for_each_silence(robot, topic, wire, eve
     else:
         publisher.assert_liveliness()
     eventually(lambda: events)
-    nothing_happens(0.15)
+    miss_deadlines(3)
     assert events == [LivelinessLost(1)]
     publisher.publish(data="x")
     eventually(lambda: events == [LivelinessLost(1), LivelinessLost(2)])
