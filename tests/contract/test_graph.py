@@ -15,7 +15,7 @@ import pytest
 
 import rosglass
 from rosglass import QoS
-from rosglass.comm import ConnectionState, GoalStatus
+from rosglass.comm import IMMEDIATE, ConnectionState, Executor, GoalStatus
 
 TEXT = "std_msgs/msg/String"
 
@@ -76,6 +76,30 @@ def test_changes_of_the_graph_are_reported(robot, console, topic):
     changed.clear()
     robot.create_publisher(topic, TEXT)
     assert changed.wait(30)
+
+
+def test_changes_of_the_graph_are_merged_while_a_callback_waits_for_its_turn(
+    robot, console, topic, eventually
+):
+    class Later(Executor):
+        def post(self, job):
+            jobs.append(job)
+
+    jobs, calls, looks = [], [], []
+    listener = console.on_graph_change(lambda: calls.append(1), Later())
+    console.on_graph_change(lambda: looks.append(1), IMMEDIATE)
+    for number in range(3):
+        count = len(looks)
+        robot.create_publisher(f"{topic}_{number}", TEXT)
+        eventually(lambda count=count: len(looks) > count)
+    assert len(jobs) == 1
+    jobs.pop()()
+    assert calls == [1]
+    robot.create_publisher(f"{topic}_more", TEXT)
+    eventually(lambda: jobs)
+    listener.close()
+    jobs.pop()()
+    assert calls == [1]
 
 
 def test_a_type_is_fetched_by_its_name(robot, console, topic, wire):

@@ -1,10 +1,8 @@
 from __future__ import annotations
 
 import threading
-import time
 
 import pytest
-from waiting import nothing_happens
 
 import rosglass
 from rosglass.comm import IMMEDIATE, ConnectionState, EndpointKind, NodeName
@@ -257,30 +255,6 @@ def test_the_graph(node, middleware):
     assert node.publishers("/t")[0].type == STRING
     assert node.subscriptions("x")[0].node.full == "/robot"
     assert node.publishers("x") == []
-
-
-def test_graph_changes_are_told_and_merged(node, middleware, eventually):
-    go_on, started = threading.Event(), threading.Event()
-    calls = []
-    settled = []
-    with node.on_graph_change(lambda: settled.append(1)):
-        middleware.appear(PUBLISHER, "/first", STRING)
-        eventually(lambda: settled)
-    handle = node.on_graph_change(lambda: (calls.append(1), started.set(), go_on.wait(30)))
-    middleware.appear(PUBLISHER, "/t", STRING)
-    assert started.wait(30)
-    for number in range(50):
-        middleware.appear(PUBLISHER, f"/t{number}", STRING)
-        time.sleep(0.001)
-    go_on.set()
-    eventually(lambda: len(calls) >= 2)
-    nothing_happens(0.05)
-    assert len(calls) <= 3
-    handle.close()
-    count = len(calls)
-    middleware.appear(PUBLISHER, "/more", STRING)
-    nothing_happens(0.05)
-    assert len(calls) == count
 
 
 def test_status_changes_are_told_in_order_and_once(node, middleware, eventually):
