@@ -404,12 +404,15 @@ def test_a_publisher_is_alive_while_it_is_there(robot, console, topic, eventuall
     eventually(lambda: events[1:] == [(-1, 0, 0)], lambda: events)
 
 
-def test_a_deadline_that_passes_without_message_is_reported(robot, console, topic, eventually):
+def test_a_deadline_that_passes_without_message_is_reported(
+    robot, console, topic, eventually, miss_deadlines
+):
     qos = QoS(deadline=Duration.from_seconds(0.2))
     subscription = console.create_subscription(topic, TEXT, qos=qos)
     events = []
     subscription.on_deadline_missed(events.append)
     subscription.on_matched(events.append)
+    miss_deadlines(6)
     assert robot.create_publisher(topic, TEXT, qos)
     eventually(lambda: len(events) >= 3, lambda: events)
     matched, first, second = events[:3]

@@ -277,8 +277,6 @@ def test_a_deadline_that_passes_without_message_is_told(node, middleware, robot,
     subscription = node.create_subscription("/t", STRING, qos=qos)
     events = []
     subscription.on_deadline_missed(events.append, IMMEDIATE)
-    nothing_happens(0.3)
-    assert events == [], "nobody is there to be late"
     key = robot(qos=qos)
     eventually(lambda: len(events) >= 2)
     assert all(isinstance(event, DeadlineMissed) and event.change >= 1 for event in events)
