@@ -180,8 +180,9 @@ def test_changes_can_be_watched(start, node, eventually) -> None:
 
 def test_a_callback_that_waits_does_not_hold_up_the_parameters(start, node) -> None:
     robot = start()
-    release = threading.Event()
-    robot._core.dispatcher.post(lambda: release.wait(30))
+    waits, release = threading.Event(), threading.Event()
+    robot.create_timer(0.001, lambda: waits.set() or release.wait(30))
+    assert waits.wait(30)
     client = node.create_parameter_client("/robot")
     assert client.get(["use_sim_time"], timeout=30) == {"use_sim_time": False}
     release.set()

@@ -424,7 +424,9 @@ def test_patient_callbacks_get_samples_late_and_may_look_themselves(node, middle
 @pytest.fixture
 def lost_node(middleware):
     """A node with a library of its own, and nobody who could be asked for definitions."""
-    made = Ros2Node(middleware, "fake://", "cockpit", library=Library())
+    library = Library()
+    made = Ros2Node(middleware, "fake://", "cockpit", library=library)
+    made.library = library
     made._core.types.fetcher = None
     yield made
     made.close()
@@ -448,7 +450,7 @@ def test_what_cannot_be_decoded_comes_as_bytes_with_the_reason(
     with pytest.raises(rosglass.TypeNotFoundError, match=r"only bytes: .*robot cannot be asked"):
         sample.message()
     # As soon as there is a definition, samples can be decoded.
-    library = lost_node._core.types.library
+    library = lost_node.library
     library.add_text(SECRET, "uint8 a\nuint8 b\n")
     known = rosglass.load(SECRET, library=library)
     library.definition = lambda *_, **__: known.definition

@@ -28,7 +28,7 @@ from rosglass.ros2.type_descriptions import TypeDescriptionServer, compose_actio
 from rosglass.ros2.types import Types
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
 TRIGGER = "type_description_interfaces/srv/GetTypeDescription"
 GO = "my_msgs/action/Go"
@@ -50,19 +50,30 @@ def types(library: Library) -> Types:
 
 
 @pytest.fixture
-def ask(connect: Callable[..., Any], library: Library) -> Callable[..., Any]:
-    """Ask a node over the local graph, as other nodes do."""
-    server = connect("robot")
-    server._core.types._library = library
-    offered = TypeDescriptionServer(server._core)
-    offered.open()
-    client = connect("asker").create_service_client("/robot/get_type_description", TRIGGER)
+def client_of(url: str, connect: Callable[..., Any]) -> Iterator[Callable[[Library], Any]]:
+    """Connect a node with a library; returns a client that asks it, as other nodes do."""
+    nodes = []
+
+    def client_of(library: Library) -> Any:
+        nodes.append(rosglass.connect(url, "robot", library=library))
+        client = connect("asker").create_service_client("/robot/get_type_description", TRIGGER)
+        client.node = nodes[0]
+        return client
+
+    yield client_of
+    for node in nodes:
+        node.close()
+
+
+@pytest.fixture
+def ask(client_of: Callable[[Library], Any], library: Library) -> Callable[..., Any]:
+    """Ask a node over the local graph for a type's description."""
+    client = client_of(library)
 
     def ask(name: str, type_hash: str = "", **more: Any) -> Any:
-        return client.call({"type_name": name, "type_hash": type_hash, **more})
+        return client.call({"type_name": name, "type_hash": type_hash, **more}, timeout=30)
 
-    ask.node = server  # type: ignore[attr-defined]
-    ask.offered = offered  # type: ignore[attr-defined]
+    ask.client = client  # type: ignore[attr-defined]
     return ask
 
 
@@ -143,23 +154,19 @@ def test_failures_have_a_reason(
 
 
 def test_closing(ask: Callable[..., Any]) -> None:
-    offered = ask.offered  # type: ignore[attr-defined]
-    offered.close()
-    offered.close()
+    client = ask.client  # type: ignore[attr-defined]
+    assert client.wait_for_server(30)
+    client.node.close()
+    assert not client.wait_for_server(0)
     with pytest.raises(rosglass.Error):
-        ask("my_msgs/msg/Part")
-    node = ask.node  # type: ignore[attr-defined]
-    node.close()
+        client.call({"type_name": "my_msgs/msg/Part"}, timeout=0.05)
     with pytest.raises(NodeClosedError):
-        TypeDescriptionServer(node._core).open()
+        TypeDescriptionServer(client.node._core).open()
 
 
-def test_a_bare_library_is_no_obstacle(connect: Callable[..., Any]) -> None:
+def test_a_bare_library_is_no_obstacle(client_of: Callable[[Library], Any]) -> None:
     """The node's own services need types that its library may not have."""
-    server = connect("robot")
-    server._core.types._library = Library(MemoryProvider())
-    TypeDescriptionServer(server._core).open()
-    client = connect("asker").create_service_client("/robot/get_type_description", TRIGGER)
+    client = client_of(Library(MemoryProvider()))
     assert "no definition" in client.call({"type_name": "std_msgs/msg/String"}).failure_reason
 
 

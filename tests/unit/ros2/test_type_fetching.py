@@ -192,8 +192,9 @@ def test_a_node_that_appears_later_is_asked(join: Callable[..., Ros2Node]) -> No
 
 
 def test_local_types_are_taken_when_the_robot_has_the_same(join: Callable[..., Ros2Node]) -> None:
-    user = join("cockpit", serves=False)
-    local = rosglass.load("std_msgs/msg/String", library=user._core.types.library)
+    library = Library()
+    user = join("cockpit", library, serves=False)
+    local = rosglass.load("std_msgs/msg/String", library=library)
     use(user, "std_msgs/msg/String", local.rihs01, "robot")
     assert user.fetch_type("std_msgs/String") is local
     # Nobody uses it: what is known is right, once the graph had time to show.
