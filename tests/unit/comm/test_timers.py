@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import queue
 import sys
 import threading
+import weakref
 
 import pytest
 
@@ -16,6 +18,10 @@ def timers():
     made = Timers("timers of the test")
     yield made
     made.close()
+
+
+def threads():
+    return [thread for thread in threading.enumerate() if thread.name == "timers of the test"]
 
 
 def test_jobs_run_in_order_of_time_on_one_thread(timers):
@@ -51,9 +57,13 @@ def test_a_job_that_fails_is_logged_and_the_others_run(timers, caplog):
 
 def test_jobs_called_off_take_no_memory(timers):
     kept = timers.after(60, print)
+    ended = []
     for _ in range(1000):
-        timers.after(60, print).close()
-    assert len(timers._jobs) < 100
+        job = timers.after(60, print)
+        ended.append(weakref.ref(job))
+        job.close()
+    gc.collect()
+    assert sum(job() is not None for job in ended) < 100
     kept.close()
 
 
@@ -68,13 +78,15 @@ def test_closing_forgets_jobs_and_may_be_done_by_one(timers):
     timers.after(0, close)
     assert ended.wait(30)
     timers.close()
-    assert not timers._thread.is_alive()
+    assert not threads()
     timers.after(0, done.set)
     assert not done.wait(0.1)
 
 
 def test_without_jobs_there_is_no_thread(timers):
-    assert timers._thread is None
+    assert not threads()
+    timers.after(60, print)
+    assert threads()
 
 
 def test_a_job_that_calls_exit_ends_no_other(timers):
