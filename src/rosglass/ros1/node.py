@@ -128,6 +128,7 @@ class Ros1Node(CoreNode):
         self._core.check_open()
         check_order("create_subscription", topic, type)
         full = self.resolve(topic)
+        check_flag(ignore_local, "ignore_local", full)
         kind = find_subscribed_type(self._core, full, type)
         subscription = Subscription(
             full,

@@ -107,7 +107,7 @@ def test_types_in_use_need_no_name(ask: Callable[..., Any]) -> None:
     """A type that no library has, given as an object; rcl is asked by the hash alone, too."""
     kind = MessageType(parse_message("int64 secret", "my_msgs/Secret"))
     assert not ask("", kind.rihs01).successful
-    ask.node.create_publisher("/secret", kind)  # type: ignore[attr-defined]
+    ask.client.node.create_publisher("/secret", kind)  # type: ignore[attr-defined]
     for name in ("", "my_msgs/msg/Secret", "other_msgs/msg/Spelling"):
         answer = ask(name, kind.rihs01)
         assert answer.successful
@@ -164,10 +164,14 @@ def test_closing(ask: Callable[..., Any]) -> None:
         TypeDescriptionServer(client.node._core).open()
 
 
-def test_a_bare_library_is_no_obstacle(client_of: Callable[[Library], Any]) -> None:
+def test_a_bare_library_is_no_obstacle(url: str, connect: Callable[..., Any]) -> None:
     """The node's own services need types that its library may not have."""
-    client = client_of(Library(MemoryProvider()))
-    assert "no definition" in client.call({"type_name": "std_msgs/msg/String"}).failure_reason
+    client = connect("asker").create_service_client("/robot/get_type_description", TRIGGER)
+    bare = Library(MemoryProvider())
+    with rosglass.connect(url, "robot", library=bare, own_services=False) as server:
+        TypeDescriptionServer(server._core).open()
+        asked = client.call({"type_name": "std_msgs/msg/String"}, timeout=30)
+    assert "no definition" in asked.failure_reason
 
 
 def test_every_part_of_an_action_is_checked(library: Library, types: Types) -> None:
