@@ -1,14 +1,15 @@
-"""Waiting in tests: for what must come, and for what must not."""
+"""Waiting in tests and their peers: for what must come, and for what must not."""
 
 from __future__ import annotations
 
 import inspect
+import itertools
 import reprlib
 import time
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
 _POLL_S = 0.005
 _short = reprlib.Repr()
@@ -46,6 +47,18 @@ def eventually(
             raise AssertionError(f"not within {timeout:g} s: {_describe(condition, value, said)}")
         turn()
     return value
+
+
+def at_rate(period: float, count: int | None = None) -> Iterator[int]:
+    """Yield 0, 1, 2 and so on, with a pause after each.
+
+    Args:
+        period: The pause, in seconds.
+        count: How many times; None for as long as the caller takes more.
+    """
+    for number in itertools.count() if count is None else range(count):
+        yield number
+        time.sleep(period)
 
 
 def nothing_happens(seconds: float, *, turn: Callable[[], object] = _sleep) -> None:

@@ -110,13 +110,14 @@ def on_two_machines() -> Callable[..., dict[str, Any]]:
     """Run a script in a network namespace of its own; return what it printed last, as JSON.
 
     Skips the test where namespaces are not permitted; fails it when the script fails. The script
-    can import ``two_machines``.
+    can import ``two_machines`` and ``waiting``.
     """
 
     def on_two_machines(
         script: Path, *arguments: str, env: Mapping[str, str] | None = None, timeout: float = 100.0
     ) -> dict[str, Any]:
-        places = (str(Path(__file__).parent), os.environ.get("PYTHONPATH", ""))
+        here = Path(__file__).parent
+        places = (str(here), str(here.parent / "helpers"), os.environ.get("PYTHONPATH", ""))
         done = subprocess.run(
             [*_private_network(), sys.executable, "-W", "ignore", str(script), *arguments],
             capture_output=True,

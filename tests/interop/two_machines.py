@@ -7,9 +7,10 @@ makes the robot's with :class:`Cable`. What it sees, it prints as JSON on its la
 from __future__ import annotations
 
 import subprocess
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from waiting import eventually
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -28,8 +29,8 @@ class Cable:
         self._machine = subprocess.Popen(["unshare", "-n", "cat"], stdin=subprocess.PIPE)
         self._programs: list[subprocess.Popen[bytes]] = []
         own = Path("/proc/self/ns/net").readlink()
-        while Path(f"/proc/{self._machine.pid}/ns/net").readlink() == own:
-            time.sleep(0.01)
+        its = Path(f"/proc/{self._machine.pid}/ns/net")
+        eventually(lambda: its.readlink() != own)
         self._there = ["nsenter", "-t", str(self._machine.pid), "-n"]
         _do("ip link set lo up")
         self._do_there("ip link set lo up")

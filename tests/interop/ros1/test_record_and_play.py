@@ -5,14 +5,13 @@ from __future__ import annotations
 import base64
 import subprocess
 import sys
-import time
 from typing import TYPE_CHECKING
 
 import pytest
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag1 import Reader, Writer
-from waiting import eventually
+from waiting import at_rate, eventually
 
 import rosglass
 from rosglass.bags import Player, Recorder, open_bag
@@ -39,14 +38,12 @@ def recording(request, connect, rospy_peer, tmp_path) -> Path:
     with Recorder(ears, path, ["/words", "/map"], compression=compression) as recorder:
         eventually(ours.subscription_count)
         eventually(lambda: rospy_peer.call("connections", topic="/words"))
-        for number in range(5):
+        for number in at_rate(0.05, 5):
             value = {"data": f"rospy {number}"}
             rospy_peer.call("publish", topic="/words", type=STRING, value=value)
-            time.sleep(0.05)
         eventually(lambda: recorder.status().messages == 6)
-        for number in range(5):
+        for number in at_rate(0.05, 5):
             ours.publish(data=f"ours {number}")
-            time.sleep(0.05)
         eventually(lambda: recorder.status().messages == 11)
     status = recorder.status()
     assert status.topics == {"/map": 1, "/words": 10}

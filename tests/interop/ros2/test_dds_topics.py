@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from waiting import eventually
+from waiting import at_rate, eventually
 
 import rosglass
 from rosglass.comm import IMMEDIATE, Durability, Duration, History, QoS, Reliability
@@ -164,9 +164,8 @@ def test_profiles_that_match_exchange_everything(dds_connect, cyclone, qos):
     eventually(lambda: subscription.publisher_count() and publisher.subscription_count())
     process.event("linked")
     process.ask(begin=True)
-    for number in range(50):
+    for number in at_rate(0.002, 50):
         publisher.publish(data=str(number))
-        time.sleep(0.002)
     expected = [str(number) for number in range(50)]
     assert [process.event("value")["data"] for _ in expected] == expected
     assert [subscription.wait(30).message().data for _ in expected] == expected
@@ -359,9 +358,8 @@ def test_nothing_is_lost_at_full_speed(dds_connect):
 def test_what_nobody_takes_is_dropped_and_counted(dds_connect):
     subscription = dds_connect("hears").create_subscription("/idle", STRING, qos=QoS(3))
     publisher = linked(dds_connect("talks").create_publisher("/idle", STRING))
-    for number in range(1000):
+    for number in at_rate(0.0005, 1000):
         publisher.publish(data=str(number))
-        time.sleep(0.0005)
     eventually(lambda: subscription.statistics().received == 1000, what="all of them counted")
     assert subscription.statistics().dropped == 997
     texts = [subscription.take().message().data for _ in range(3)]
@@ -379,8 +377,7 @@ def test_best_effort_is_fresh(dds_connect):
         executor=IMMEDIATE,
     )
     publisher = linked(dds_connect("talks").create_publisher("/scan", STRING, BEST_EFFORT))
-    for _ in range(50):
+    for _ in at_rate(0.005, 50):
         publisher.publish(data="x")
-        time.sleep(0.005)
     eventually(lambda: len(got) == 50)
     assert sorted(got)[25] < 1_000_000_000

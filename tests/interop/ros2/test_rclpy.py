@@ -255,9 +255,11 @@ def test_rclpy_gets_fifty_replies_that_are_ready_at_once(peer, node):
 
     with node.create_service_server("/own/late", SWITCH, answer_all_when_all_have_asked):
         requests = [{"data": n % 3 == 0} for n in range(50)]
-        answers = do(
-            peer, "call", service="/own/late", type=SWITCH, requests=requests, at_once=True
-        )
+        for sent, request in enumerate(requests, 1):
+            do(peer, "send_request", service="/own/late", type=SWITCH, request=request)
+            # Its own writer keeps but 10 that have not arrived yet.
+            eventually(lambda sent=sent: len(promised) == sent)
+        answers = do(peer, "take_replies")
     assert [answer["success"] for answer in answers] == [n % 3 != 0 for n in range(50)]
 
 

@@ -15,7 +15,7 @@ import pytest
 from mcap_ros2.reader import read_ros2_messages
 from rosbags import rosbag1
 from rosbags.typesys import Stores, get_typestore
-from waiting import eventually
+from waiting import at_rate, eventually
 
 from rosglass.bags import Player, PlayerState, Recorder, open_bag
 from rosglass.comm import QoS
@@ -49,10 +49,9 @@ def recording(join: Callable[..., Node], tmp_path: Path) -> Path:
     path = tmp_path / "a.mcap"
     with Recorder(ears, path, exclude="/rosout|/parameter_events") as recorder:
         eventually(lambda: texts.subscription_count() and secret.subscription_count())
-        for i in range(10):
+        for i in at_rate(0.1, 10):
             texts.publish(data=f"n{i}")
             secret.publish_serialized(b"\0\1\0\0" + bytes([i]))
-            time.sleep(0.1)
         eventually(lambda: recorder.status().messages >= 21)
         assert not recorder.status().dropped
     robot.close()

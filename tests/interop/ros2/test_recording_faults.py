@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader
-from waiting import eventually
+from waiting import at_rate, eventually
 
 from rosglass.bags import Recorder, open_bag
 from rosglass.comm import QoS
@@ -141,9 +141,10 @@ def test_the_command_ends_with_the_reason_on_a_full_disk(connect, router, tmp_pa
     )
     try:
         generator = random.Random(1)
-        while process.poll() is None:
+        for _ in at_rate(0.01):
             publisher.publish(data=generator.randbytes(20_000))
-            time.sleep(0.01)
+            if process.poll() is not None:
+                break
     finally:
         process.kill()
         _, said = process.communicate()

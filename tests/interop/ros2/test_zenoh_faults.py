@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 
 import pytest
-from waiting import eventually
+from waiting import at_rate, eventually
 
 import rosglass
 from rosglass.comm import ConnectionState, NodeName
@@ -172,11 +172,9 @@ def test_what_a_stalled_link_hands_on_too_late_is_dropped_if_it_says_so(start_ro
     eventually(lambda: all(p.subscription_count() for p in publishers))
 
     def publish(seconds):
-        end = time.monotonic() + seconds
-        while time.monotonic() < end:
+        for _ in at_rate(0.02, round(seconds / 0.02)):
             for publisher in publishers:
                 publisher.publish()
-            time.sleep(0.02)
 
     publish(0.5)
     os.kill(router.pid, signal.SIGSTOP)

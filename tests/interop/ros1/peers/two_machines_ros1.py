@@ -13,16 +13,13 @@ import time
 import xmlrpc.client
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from two_machines import THERE, Cable
+from waiting import eventually
 
 import rosglass
 from rosglass.comm import IMMEDIATE
 from rosglass.wires.tcpros import connection
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 MASTER, PORT = f"http://{THERE}:11311", "11311"
 ROBOT = """
@@ -39,14 +36,6 @@ while not rospy.is_shutdown():
     words.publish("here")
     rate.sleep()
 """
-
-
-def wait_for(condition: Callable[[], object]) -> None:
-    """Wait until something is true, for half a minute."""
-    deadline = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < deadline, "not within 30 s"
-        time.sleep(0.01)
 
 
 def answers() -> bool:
@@ -76,7 +65,7 @@ connection._KEEPALIVE = (("TCP_KEEPIDLE", 1), ("TCP_KEEPINTVL", 1), ("TCP_KEEPCN
 
 with Cable() as cable:
     cable.start("/usr/bin/rosmaster", "--core", "-p", PORT, env=env)
-    wait_for(answers)
+    eventually(answers)
     cable.start("/usr/bin/python3", "-c", ROBOT, str(got), env=env)
     node = rosglass.connect(f"ros1://{THERE}:{PORT}", "operator", own_services=False)
     states: list[str] = []
@@ -94,9 +83,9 @@ with Cable() as cable:
             time.sleep(0.05)
         return count
 
-    wait_for(lambda: publisher.subscription_count() and client.ready and words.take())
+    eventually(lambda: publisher.subscription_count() and client.ready and words.take())
     drive(time.monotonic() + 0.5, 1.0)
-    wait_for(lambda: commands(0.0))
+    eventually(lambda: commands(0.0))
     states.clear()
     cable.unplug()
     cut = time.monotonic()
@@ -109,9 +98,9 @@ with Cable() as cable:
     cable.plug()
     if what == "idle":
         publisher.publish(linear={"x": 0.0})
-    wait_for(lambda: any(x == 0.0 for _, x in commands(back)))
+    eventually(lambda: any(x == 0.0 for _, x in commands(back)))
     late = commands(back)
-    wait_for(lambda: node.status().state.name == "CONNECTED" and client.ready)
+    eventually(lambda: node.status().state.name == "CONNECTED" and client.ready)
     while words.take() is not None:
         pass
     fresh = words.wait(20) is not None

@@ -7,7 +7,6 @@ It writes and reads what the plan says until its standard input ends.
 import json
 import sys
 import threading
-import time
 from dataclasses import dataclass
 
 from cyclonedds.core import Qos
@@ -20,6 +19,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 from summary import VALUES, summary, tell
+from waiting import at_rate, eventually
 
 # What is in the plan: "domain"; types by topic to "publish" and "subscribe"; how many to publish in
 # "count", seconds between them in "period"; "asked" to begin when a line comes on standard input
@@ -126,31 +126,26 @@ def profile(writer: bool) -> Qos:
 
 def subscribe(name: str, kind: type, reader: DataReader) -> None:
     linked = False
-    while True:
+    for _ in at_rate(0.002):
         if not linked and reader.get_matched_publications():
             linked = True
             tell(linked=name)
         for sample in reader.take(100):
             if isinstance(sample, kind):
                 tell(received=name, value=summary(sample))
-        time.sleep(0.002)
 
 
 def publish(name: str, type_name: str, kind: type, writer: DataWriter) -> None:
     samples = [value(kind, VALUES.get(type_name, {"data": 7}))] if kind is not Rubbish else []
     samples += [Rubbish(2**32 - 1 - size, [size] * size) for size in plan.get("rubbish", ())]
     begin.wait()
-    while "asked" in plan and not writer.get_matched_subscriptions():
-        time.sleep(0.01)
-    count = plan.get("count", -1)
-    number = 0
-    while number != count:
+    if "asked" in plan:
+        eventually(writer.get_matched_subscriptions)
+    for number in at_rate(plan.get("period", 0.1), plan.get("count")):
         for sample in samples:
             if plan.get("texts"):
                 sample.data = f"{number}"
             writer.write(sample)
-        number += 1
-        time.sleep(plan.get("period", 0.1))
     tell(published=name)
     kept.append(writer)
 

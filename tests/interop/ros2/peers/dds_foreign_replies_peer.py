@@ -7,7 +7,6 @@ replies come before each answer, which comes twice. Their headers are those of r
 import json
 import random
 import sys
-import time
 from dataclasses import dataclass
 
 from cyclonedds.core import Qos
@@ -20,6 +19,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 from summary import tell
+from waiting import at_rate
 
 plan = json.loads(sys.argv[1])
 srv = "example_interfaces::srv::dds_::AddTwoInts"
@@ -54,7 +54,7 @@ replies = DataWriter(
 )
 chance = random.Random(1)
 sent = 0
-while True:
+for _ in at_rate(0.005):
     for request in requests.take(10):
         client, number = request.client, request.number
         for turn in range(plan["foreign"]):
@@ -65,4 +65,3 @@ while True:
         for _ in range(2):
             replies.write(Response(client, number, request.a + request.b))
         tell(sent=sent)
-    time.sleep(0.005)

@@ -19,6 +19,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 from summary import tell
+from waiting import at_rate, eventually
 
 plan = json.loads(sys.argv[1])
 srv = "example_interfaces::srv::dds_::AddTwoInts"
@@ -47,14 +48,12 @@ odd = DataReader(participant, Topic(participant, f"rq{plan['replies']}Request", 
 replies = DataWriter(
     participant, Topic(participant, f"rr{plan['replies']}Reply", Response), qos=qos
 )
-while not (requests.get_matched_subscriptions() and replies.get_matched_subscriptions()):
-    time.sleep(0.01)
+eventually(lambda: requests.get_matched_subscriptions() and replies.get_matched_subscriptions())
 time.sleep(0.2)
 for number in range(20):
     requests.write(Request(number))
     replies.write(Response(number))
 tell(sent=True)
-while True:
+for _ in at_rate(0.01):
     for _ in odd.take(10):
         replies.write(Response(4711))
-    time.sleep(0.01)

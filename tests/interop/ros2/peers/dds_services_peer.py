@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from summary import tell
+from waiting import at_rate, eventually
 
 # The plan: "kind" (below), "domain", "name", "serve" (which of "add" and "blob" it offers), "call"
 # (services that it calls), "interfaces" (a prefix with the types), "fastdds" (that program).
@@ -201,7 +202,7 @@ class Cyclone:
         request_type, response = self.types[kind]
 
         def work() -> None:
-            while True:
+            for _ in at_rate(0.001):
                 taken = reader.take(100)
                 # Others only tell that a client is gone.
                 for request in (item for item in taken if isinstance(item, request_type)):
@@ -209,17 +210,13 @@ class Cyclone:
                     value = answer(kind, given)
                     if value is not None:
                         writer.write(response(request.client, request.number, value))
-                time.sleep(0.001)
 
         threading.Thread(target=work, daemon=True).start()
 
     def open(self, service: str, kind: str) -> None:
         self.clients[service] = self.ends(service, kind, f"clientid= 1.10.{kind};", False)
-        deadline = time.monotonic() + 30
         reader, writer = self.clients[service]
-        while not (reader.get_matched_publications() and writer.get_matched_subscriptions()):
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
+        eventually(lambda: reader.get_matched_publications() and writer.get_matched_subscriptions())
 
     def call(self, service: str, kind: str, requests: list[Any]) -> list[Any]:
         reader, writer = self.clients[service]
@@ -227,14 +224,15 @@ class Cyclone:
         me, answers = 4711, {}
         for number, given in enumerate(requests):
             writer.write(request(me, number, *([given] if kind == "blob" else given)))
-        deadline = time.monotonic() + 30
-        while len(answers) < len(requests):
+
+        def all_came() -> bool:
             for reply in reader.take(100):
                 if getattr(reply, "client", None) == me:
                     value = bytes(reply.data) if kind == "blob" else reply.sum
                     answers[reply.number] = value
-            assert time.monotonic() < deadline, f"{len(answers)} of {len(requests)} answers"
-            time.sleep(0.001)
+            return len(answers) == len(requests)
+
+        eventually(all_came, lambda: f"{len(answers)} of {len(requests)} answers")
         return [answers[number] for number in range(len(requests))]
 
 

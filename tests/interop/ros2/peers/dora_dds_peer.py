@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-import time
 
 import dora
 from summary import tell
@@ -24,4 +23,4 @@ def topic(name: str, type_name: str):
 kept = [node.create_publisher(topic(*item)) for item in plan.get("publish", {}).items()]
 kept += [node.create_subscription(topic(*item)) for item in plan.get("subscribe", {}).items()]
 tell(ready=True)
-time.sleep(600)
+sys.stdin.read()  # until the tests end

@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 import dora
 import pyarrow as pa
 from summary import VALUES, summary, tell
+from waiting import at_rate
 
 # {"port", "domain", "interfaces", "profile": "humble" or "rep2016" over Zenoh, "dds" without port,
 #  "publish": {topic: type}, "subscribe": {topic: type}, "latched": bool, "count": how many messages
@@ -68,14 +68,11 @@ publishers = [
     for name, type_name in plan.get("publish", {}).items()
 ]
 tell(ready=True)
-left, told = plan.get("count", -1), False
-while True:
-    for publisher, message in publishers if left else []:
+count = plan.get("count")
+for number in at_rate(0.1):
+    for publisher, message in publishers if count is None or number < count else []:
         publisher.publish(message)
-    left -= bool(left)
-    time.sleep(0.1)
-    if left == 0 and not told:
-        told = True
+    if number == count:
         tell(published=True)
     for name, subscription in subscriptions.items():
         while (message := subscription.next()) is not None:

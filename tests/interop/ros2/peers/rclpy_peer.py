@@ -24,6 +24,7 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from summary import summary, tell
+from waiting import at_rate, eventually
 
 #: Seconds that the peer waits for what its task needs.
 LIMIT_S = 60.0
@@ -35,6 +36,8 @@ node.declare_parameter("name", "rover")
 group = ReentrantCallbackGroup()
 publishers: dict[str, Any] = {}
 clients: dict[str, Any] = {}
+#: Replies that ``take_replies`` waits for.
+replies: list[Any] = []
 #: Subscriptions, servers and action clients.
 kept: list[Any] = []
 
@@ -80,14 +83,6 @@ def plain(value: Any) -> Any:
     return value[0] if isinstance(value, bytes) else summary(value)
 
 
-def until(condition: Any) -> None:
-    deadline = time.monotonic() + LIMIT_S
-    while not condition():
-        if time.monotonic() > deadline:
-            raise TimeoutError(condition)
-        time.sleep(0.01)
-
-
 def finish(future: Any) -> Any:
     done: Future[Any] = Future()
     future.add_done_callback(lambda f: done.set_result(f.result()))
@@ -104,10 +99,9 @@ def advertise(topic: str, type: str, **qos: Any) -> None:
 def publish(topic: str, values: list[Any], period: float = 0.0, matched: int = 1) -> None:
     """Publish values on an advertised topic, once it has that many subscriptions."""
     kind, publisher = publishers[topic]
-    until(lambda: publisher.get_subscription_count() >= matched)
-    for value in values:
-        publisher.publish(fill(kind(), value))
-        time.sleep(period)
+    eventually(lambda: publisher.get_subscription_count() >= matched, timeout=LIMIT_S)
+    for number in at_rate(period, len(values)):
+        publisher.publish(fill(kind(), values[number]))
 
 
 def subscribe(topic: str, type: str, quiet: bool = False, **qos: Any) -> None:
@@ -136,23 +130,29 @@ def serve(service: str, type: str, delay: float = 0.0) -> None:
     kept.append(node.create_service(load(type), service, respond))
 
 
-def call(service: str, type: str, requests: list[Any], at_once: bool = False) -> Any:
-    """Call, one after the other, or all at once."""
+def send_request(service: str, type: str, request: dict[str, Any]) -> None:
+    """Call without waiting; ``take_replies`` does."""
     kind = load(type)
     if service not in clients:
         clients[service] = node.create_client(kind, service)
-    client = clients[service]
-    assert client.wait_for_service(LIMIT_S), service
-    filled = [fill(kind.Request(), value) for value in requests]
-    if at_once:
-        futures = []
-        for request in filled:
-            futures.append(client.call_async(request))
-            time.sleep(0.01)  # its own writer keeps but 10 that are not sent yet
-        answers = [finish(future) for future in futures]
-    else:
-        answers = [finish(client.call_async(request)) for request in filled]
-    return [plain(answer) for answer in answers]
+    assert clients[service].wait_for_service(LIMIT_S), service
+    replies.append(clients[service].call_async(fill(kind.Request(), request)))
+
+
+def take_replies() -> Any:
+    """Return the replies to all requests that were sent, in the order of these."""
+    answers = [plain(finish(reply)) for reply in replies]
+    replies.clear()
+    return answers
+
+
+def call(service: str, type: str, requests: list[Any]) -> Any:
+    """Call, one after the other."""
+    answers = []
+    for request in requests:
+        send_request(service, type, request)
+        answers += take_replies()
+    return answers
 
 
 # -- actions ---------------------------------------------------------------------------------------
@@ -262,8 +262,8 @@ def endpoints(topic: str) -> Any:
 TASKS = {
     task.__name__: task
     for task in (
-        advertise, publish, subscribe, serve, call, act, send_goal, parameters, own_parameter,
-        graph, endpoints
+        advertise, publish, subscribe, serve, send_request, take_replies, call, act, send_goal,
+        parameters, own_parameter, graph, endpoints
     )
 }  # fmt: skip
 

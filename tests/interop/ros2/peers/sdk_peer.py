@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 import sys
 import threading
-import time
 from pathlib import Path
 
 from summary import VALUES, summary, tell
+from waiting import at_rate
 from zenoh_ros2_sdk import message_registry
 from zenoh_ros2_sdk.discovery import get_topic_info
 from zenoh_ros2_sdk.publisher import ROS2Publisher
@@ -65,13 +65,11 @@ def answer() -> None:
         tell(info=[[e.node_namespace, e.node_name, e.topic_type, e.type_hash, e.qos] for e in ends])
 
 
-threading.Thread(target=answer, daemon=True).start()
+answering = threading.Thread(target=answer, daemon=True)
+answering.start()
 tell(ready=True)
 built = {topic: build(name, VALUES[name]) for topic, (_, name) in publishers.items()}
-left = plan.get("count", -1)
-while left:
+for _ in at_rate(0.1, plan.get("count")):
     for topic, (publisher, _) in publishers.items():
         publisher.publish(**built[topic])
-    time.sleep(0.1)
-    left -= 1
-time.sleep(600)
+answering.join()  # until the tests end

@@ -12,6 +12,7 @@ import time
 from concurrent.futures import Future
 
 from summary import tell
+from waiting import eventually
 
 import rosglass
 
@@ -55,8 +56,7 @@ def use():
     client.wait_for_server(10)
     goal = client.send_goal({"order": 4}, on_feedback=lambda m: feedback.append(len(m.sequence)))
     status, result = goal.result(10)
-    while len(feedback) < 3:
-        time.sleep(0.01)
+    eventually(lambda: len(feedback) >= 3)
     tell(goal=[status.value, list(map(int, result.sequence)), feedback])
 
 

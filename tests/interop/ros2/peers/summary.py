@@ -7,7 +7,10 @@ import json
 import sys
 import threading
 import zlib
+from pathlib import Path
 from typing import Any
+
+sys.path.append(str(Path(__file__).parents[3] / "helpers"))  # for waiting
 
 WIDTH, HEIGHT = 640, 480
 

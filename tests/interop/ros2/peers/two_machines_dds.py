@@ -11,6 +11,7 @@ import time
 
 from summary import tell
 from two_machines import Cable
+from waiting import eventually
 
 import rosglass
 from rosglass.comm import IMMEDIATE
@@ -59,8 +60,7 @@ with Cable() as cable:
     client = node.create_service_client("/add", ADD)
     assert client.wait_for_server(20), client.problem
     before = client.call({"a": 1, "b": 2}).sum
-    while not (maps and got):
-        time.sleep(0.01)
+    eventually(lambda: maps and got)
     states.clear()
     cable.unplug()
     unplugged = now()
@@ -76,8 +76,7 @@ with Cable() as cable:
     time.sleep(0.2)
     cable.plug()
     plugged = now()
-    while got[-1][0] < plugged + 1 and now() < plugged + 15:
-        time.sleep(0.05)
+    eventually(lambda: got[-1][0] >= plugged + 1 or now() >= plugged + 15)
     count = [number for _, number in got]
     tell(
         before=before,

@@ -12,6 +12,7 @@ import time
 
 from summary import tell
 from two_machines import THERE, Cable
+from waiting import eventually
 
 import rosglass
 from rosglass.comm import IMMEDIATE
@@ -66,8 +67,7 @@ with Cable() as cable:
     time.sleep(float(sys.argv[1]))
     cable.plug()
     plugged = time.monotonic() - began
-    while got[-1][0] < plugged + 1 and time.monotonic() - began < plugged + 10:
-        time.sleep(0.05)
+    eventually(lambda: got[-1][0] >= plugged + 1 or time.monotonic() - began >= plugged + 10)
     numbers = [number for _, number in got]
     times = [when for when, _ in got]
     tell(

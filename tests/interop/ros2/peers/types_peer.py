@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import json
 import sys
-import threading
-import time
 
 from summary import tell
+from waiting import at_rate
 
 import rosglass
 from rosglass.ros2.type_descriptions import describe
@@ -58,16 +57,6 @@ def go(goal):
 if plan.get("action"):
     node.create_action_server("/go", "my_msgs/action/Go", go)
 
-stop = threading.Event()
-
-
-def publish():
-    number = 0
-    while not stop.wait(0.05):
-        number += 1
-        state.publish(state=number % 200, parts=[{"a": -1}, {"a": 2}], name="Grüße")
-
-
-threading.Thread(target=publish, daemon=True).start()
 tell(ready=True)
-time.sleep(600)
+for number in at_rate(0.05, 12_000):
+    state.publish(state=number % 200, parts=[{"a": -1}, {"a": 2}], name="Grüße")

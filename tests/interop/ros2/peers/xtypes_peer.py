@@ -2,7 +2,6 @@
 
 import json
 import sys
-import time
 from dataclasses import dataclass
 from typing import Optional
 
@@ -13,6 +12,7 @@ from cyclonedds.idl import IdlEnum, IdlStruct, make_idl_struct
 from cyclonedds.pub import DataWriter
 from cyclonedds.topic import Topic
 from summary import tell
+from waiting import at_rate
 
 # The plan: "domain".
 plan = json.loads(sys.argv[1])
@@ -70,7 +70,6 @@ writers = [
     for name, sample in samples.items()
 ]
 tell(ready=True)
-while True:
+for _ in at_rate(0.1):
     for writer, sample in writers:
         writer.write(sample)
-    time.sleep(0.1)
