@@ -309,7 +309,7 @@ def show(app: Any, frames: Callable[[int], None], tmp_path: Path) -> Callable[..
         file.write_text(IMPORTS + text)
         overlay = app.add_qml(file, **options)
         frames(3)
-        return overlay._root
+        return overlay.root
 
     return show
 
@@ -410,6 +410,19 @@ def show_file(request: pytest.FixtureRequest, app: Any, file: Path) -> Callable[
     return show_file
 
 
+@pytest.fixture
+def error_panels(app: Any) -> Callable[[], list[Any]]:
+    """Return the items over the 3D view that show errors of interfaces."""
+    from rosglass.rviz.qt5 import QtQuick
+
+    def error_panels() -> list[Any]:
+        windows = [w for w in app.qt.allWindows() if isinstance(w, QtQuick.QQuickWindow)]
+        items = [item for window in windows for item in window.contentItem().childItems()]
+        return [item for item in items if item.property("heading")]
+
+    return error_panels
+
+
 class Qml:
     """An overlay, and JavaScript that runs in its context."""
 
@@ -417,7 +430,7 @@ class Qml:
         from rosglass.rviz.qt5 import QtCore
 
         self.overlay, self.wait, self._core = overlay, wait, QtCore
-        self.root = overlay._root
+        self.root = overlay.root
 
     def run(self, script: str) -> Any:
         """Return what a script gives, as Python has it; JavaScript's errors are raised."""

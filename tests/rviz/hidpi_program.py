@@ -49,7 +49,7 @@ def main() -> None:
     seen = {
         "ratio": ratio,
         "stretched": (width, height) != (picture.width(), picture.height()),
-        "units": [overlay._root.width() * ratio == width, overlay._root.height() * ratio == height],
+        "units": [overlay.root.width() * ratio == width, overlay.root.height() * ratio == height],
         "inside": [colour(41, 31), colour(138, 88), colour(right - 9, bottom - 9)],
         "outside": [colour(38, 60), colour(142, 60), colour(right - 12, bottom - 2)],
         "widget": [colour(21, 121), colour(59, 149)],

@@ -69,7 +69,7 @@ def robot(master: str) -> Iterator[subprocess.Popen[bytes]]:
 @pytest.fixture
 def dashboard(app: Any, wait: Any, robot: subprocess.Popen[bytes]) -> Dashboard:
     app.load_config(FOLDER / "figure1.rviz")
-    dashboard = Dashboard(app.add_qml(FOLDER / "Dashboard.qml")._root)
+    dashboard = Dashboard(app.add_qml(FOLDER / "Dashboard.qml").root)
     wait(lambda: live(dashboard), timeout=60.0)
     return dashboard
 

@@ -192,7 +192,7 @@ def test_an_overlay_that_goes_leaves_the_node_to_others(
 
 
 def test_errors_are_shown_over_the_last_good_interface(
-    show: Any, file: Path, wait: Any, grab: Any, mouse: Any, caplog: Any
+    show: Any, file: Path, wait: Any, grab: Any, mouse: Any, caplog: Any, error_panels: Any
 ) -> None:
     overlay = show(BLUE_UI, watch=True)
     root = overlay.root
@@ -204,7 +204,7 @@ def test_errors_are_shown_over_the_last_good_interface(
     picture = grab()
     assert seen(picture) == BLUE
     assert seen(picture, 20, 24) != GREY
-    panel = overlay._errors.items[0]
+    panel = error_panels()[0]
     assert "last one without errors" in panel.property("heading")
     assert panel.property("text") == overlay.problem
     # The mouse is the panel's above it, and RViz's beside it.
@@ -223,13 +223,13 @@ def test_errors_are_shown_over_the_last_good_interface(
 
 
 def test_errors_can_be_put_away_for_what_is_below_them(
-    show: Any, file: Path, wait: Any, grab: Any, mouse: Any
+    show: Any, file: Path, wait: Any, grab: Any, mouse: Any, error_panels: Any
 ) -> None:
     overlay = show("Item { MouseArea { anchors.fill: parent } }")
     file.write_text(f"{IMPORTS}Item {{ x: }}")
     assert not overlay.reload()
     grab()
-    panel = overlay._errors.items[0]
+    panel = error_panels()[0]
     x = panel.x() + panel.width() - 20
     mouse("press", x, panel.y() + 20)
     mouse("release", x, panel.y() + 20)
@@ -242,7 +242,7 @@ def test_errors_can_be_put_away_for_what_is_below_them(
 
 
 def test_errors_from_the_start_are_shown_until_they_are_mended(
-    app: Any, file: Path, wait: Any, grab: Any, mouse: Any
+    app: Any, file: Path, wait: Any, grab: Any, mouse: Any, error_panels: Any
 ) -> None:
     from rosglass.errors import QmlError
     from rosglass.rviz import QmlOverlay
@@ -255,7 +255,7 @@ def test_errors_from_the_start_are_shown_until_they_are_mended(
     assert not overlay.loaded
     assert "Ui.qml:1:" in overlay.problem
     assert seen(grab(), 20, 24) != GREY
-    assert "shown once they are mended" in overlay._errors.items[0].property("heading")
+    assert "shown once they are mended" in error_panels()[0].property("heading")
     assert not mouse("press", 90, 400)
     mouse("release", 90, 400)
     file.write_text(IMPORTS + BLUE_UI)
@@ -429,7 +429,7 @@ def test_reloads_leave_nothing_behind(show: Any, file: Path, wait: Any, grab: An
     # A reload that kept its interface would take about 300 KB.
     assert memory() - before < 15_000
     wait(lambda: not any(is_alive(root) for root in gone))
-    window = overlay._window.contentItem()
+    window = overlay.root.window().contentItem()
     assert len(window.childItems()) <= 2
     assert len(overlay.engine.findChildren(QtCore.QObject)) < 50
     assert seen(grab()) == BLUE

@@ -105,7 +105,7 @@ def test_hidden_overlays_are_not_drawn_and_show_the_newest_when_shown_again(
     overlay = show(
         f"Rectangle {{ width: 9; height: 9; color: 'transparent'; {square(40, 40, 'red')} }}"
     )
-    rectangle = overlay._root.childItems()[0]
+    rectangle = overlay.root.childItems()[0]
     grab()
     for hide, back in (({"visible": False}, {"visible": True}), ({"opacity": 0}, {"opacity": 1.0})):
         for name, value in hide.items():
@@ -137,7 +137,7 @@ def test_nothing_is_drawn_when_nothing_changes_and_little_uploaded_when_little_d
     count = len(drawn)
     frames(10)
     assert len(drawn) == count
-    overlay._root.childItems()[1].setProperty("color", "lime")
+    overlay.root.childItems()[1].setProperty("color", "lime")
     frames(3)
     assert len(drawn) == count + 1
     assert [tuple(rect) for rect in uploads[-1]] == [(496, 496, 512, 512)]
@@ -151,7 +151,7 @@ def test_panels_grow_and_shrink_by_pixels_with_what_is_on_them(
     app: Any, show: Any, grab: Any, wait: Any
 ) -> None:
     overlay = show(f"Item {{ {square(43, 43, '#0080ff', 8)} }}")
-    item = overlay._root.childItems()[0]
+    item = overlay.root.childItems()[0]
     width, height, _ = app.window.view_size()
     grab()
     assert app.overlays.covered * width * height == pytest.approx(8 * 8)
@@ -189,7 +189,7 @@ def test_scaled_overlays_have_as_many_units_less(show: Any, grab: Any, app: Any)
         scale=2.0,
     )
     picture = grab()
-    root = overlay._root
+    root = overlay.root
     assert (root.width(), root.height()) == (width / 2, height / 2)
     assert abs(root.property("window") - width / 2) <= 1
     assert colour(picture, 81, 201) == BLUE
@@ -223,7 +223,7 @@ def test_text_is_as_sharp_as_text_of_the_size_that_it_is_seen_in(
     def ink(size: float, scale: float) -> Any:
         overlay = show(text % round(size), f"Text{size:.0f}x{scale:.0f}", scale=scale)
         frames(3)
-        pixels = np.array(overlay._scene.draw() >> 24, np.float64)
+        pixels = np.array(overlay.draw() >> 24, np.float64)
         app.overlays.remove(overlay)
         return pixels
 
@@ -252,7 +252,7 @@ def test_resized_views_show_no_stretched_picture(app: Any, show: Any, grab: Any,
             picture = grab()
             width, height, _ = app.window.view_size()
             assert (picture.width(), picture.height()) == (width, height)
-            assert (overlay._root.width(), overlay._root.height()) == (width, height)
+            assert (overlay.root.width(), overlay.root.height()) == (width, height)
             assert colour(picture, width - 49, height - 49) == BLUE
             assert colour(picture, width - 2, height - 2) == BLUE
             assert colour(picture, width - 52, height - 2) != BLUE
@@ -272,7 +272,7 @@ def test_minimised_rviz_draws_no_overlay(
         window.showMinimized()
         frames(1)
         count = len(drawn)
-        overlay._root.childItems()[0].setProperty("color", "lime")
+        overlay.root.childItems()[0].setProperty("color", "lime")
         frames(3)
         assert len(drawn) == count
     finally:
@@ -373,8 +373,8 @@ def test_controls_popups_canvas_and_clipped_items_are_drawn(
             Rectangle { width: 200; height: 200; color: "#ff0000" } }
         }"""
     )
-    overlay._root.setProperty("wanted", True)
-    wait(lambda: overlay._root.property("opened"))
+    overlay.root.setProperty("wanted", True)
+    wait(lambda: overlay.root.property("opened"))
     picture = grab()
     assert colour(picture, 340, 70) == BLUE
     assert colour(picture, 230, 160) == (255, 255, 255)
@@ -391,7 +391,7 @@ def test_items_without_a_size_fill_the_view(show: Any, app: Any, frames: Any) ->
     overlay = show("Item { }")
     frames(2)
     width, height, _ = app.window.view_size()
-    assert (overlay._root.width(), overlay._root.height()) == (width, height)
+    assert (overlay.root.width(), overlay.root.height()) == (width, height)
     assert app.overlays.covered == 0
 
 
@@ -429,7 +429,7 @@ def test_overlays_that_come_and_go_leave_nothing_behind(
     assert textures() == used
     # One picture of the view alone has 4 MB.
     assert memory() - before < 20_000
-    steady._root.childItems()[1].setProperty("text", "QWERTZ")
+    steady.root.childItems()[1].setProperty("text", "QWERTZ")
     assert colour(grab(), 70, 70) == BLUE
 
 

@@ -63,7 +63,7 @@ def server(master: str, messages: Path, tmp_path: Path) -> Iterator[None]:
 
 
 def test_goals_feedback_cancelling_and_failures(app: Any, wait: Any, server: None) -> None:
-    root = app.add_qml(HERE / "Behaviours.qml")._root
+    root = app.add_qml(HERE / "Behaviours.qml").root
     behaviours = root.childItems()[0]
 
     def texts() -> list[str]:

@@ -142,9 +142,10 @@ def test_displays_removed_by_the_user(app: Any, displays: Any, qml: Any, wait: A
 
     here = qml("Item { property var axes: null }")
     group = displays.add("rviz/Group", "Group")
-    inner = app.rviz.displays._root.getGroupAt(1)
+    outer = app.window.manager.getRootDisplayGroup()
+    inner = outer.getGroupAt(1)
     axes = displays.add("rviz/Axes")
-    inner.addChild(displays._root.takeChild(axes.handle))
+    inner.addChild(outer.takeChild(axes.handle))
     assert not axes.exists
     assert sorted(display.name for display in displays.all) == ["Axes", "Grid", "Group", "Overlay0"]
     here.run("root.axes = rviz.displays.find(d => d.name === 'Axes')")

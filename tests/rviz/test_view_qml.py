@@ -76,7 +76,7 @@ def run(
     wait.frames(3)
     engine = overlay.engine
     engine.globalObject().setProperty("rviz", engine.newQObject(overlay.properties))
-    engine.globalObject().setProperty("root", engine.newQObject(overlay._root))
+    engine.globalObject().setProperty("root", engine.newQObject(overlay.root))
 
     def run(script: str) -> Any:
         tried = f"try {{ return JSON.stringify([{script}]) }} catch (e) {{ return '' + e }}"
@@ -121,12 +121,14 @@ def test_what_the_operator_sets_is_told(
     wait.frames(2)
     run("root.told = []")
     app.view_entry.shown = True
-    (entry,) = app.view_entry._shown
-    entry.display.subProp("Animation Duration").setValue(2.5)
-    entry.display.subProp("Tracking Gain").setValue(5.0)
+    group = app.window.manager.getRootDisplayGroup()
+    shown = [group.getDisplayAt(at) for at in range(group.numDisplays())]
+    (entry,) = (display for display in shown if display.getName() == "View Controller")
+    entry.subProp("Animation Duration").setValue(2.5)
+    entry.subProp("Tracking Gain").setValue(5.0)
     assert run("root.told") == [2.5, 5.0]
     run("rviz.view.animationDuration = 0.5")
-    assert entry.display.subProp("Animation Duration").getValue() == 0.5
+    assert entry.subProp("Animation Duration").getValue() == 0.5
     app.view_entry.shown = False
 
 

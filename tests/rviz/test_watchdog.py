@@ -23,6 +23,7 @@ def test_a_loop_without_end_is_ended_and_told_in_the_overlay(
     show_file: Any,
     caplog: Any,
     monkeypatch: Any,
+    error_panels: Any,
 ) -> None:
     monkeypatch.setattr(app.session, "longest_script", 0.5)
     overlay = show_file(UI)
@@ -37,13 +38,13 @@ def test_a_loop_without_end_is_ended_and_told_in_the_overlay(
     frames(3)
     wait(lambda: overlay.root.property("ticks") > ticks)
     assert not overlay.root.property("went")
-    (panel,) = overlay._errors.items
+    (panel,) = error_panels()
     assert panel.property("text") == overlay.problem
     # The interface that is mended has nothing to say.
     overlay.file.write_text(IMPORTS + "Item {}")
     assert overlay.reload()
     assert not overlay.problem
-    assert not overlay._errors.items
+    wait(lambda: not error_panels())
 
 
 LOADED = """Item {

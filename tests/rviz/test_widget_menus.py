@@ -65,6 +65,16 @@ def panel(app: Any, hand: Any) -> Any:
             menu.addAction("custom", lambda: self.chosen.append("custom"))
             menu.popup(self.custom.mapToGlobal(at))
 
+        def opened(self) -> list[Any]:
+            """Return the menus that are open over the view."""
+            windows = QtWidgets.QApplication.topLevelWidgets()
+            menus = [w for w in windows if w.windowType() == QtCore.Qt.Popup and w.isVisible()]
+            return [menu for menu in menus if menu.graphicsProxyWidget() is not None]
+
+        def room(self) -> Any:
+            """Return the view, in units of the scene."""
+            return self.root.graphicsProxyWidget().scene().sceneRect()
+
     overlay = app.add(Panel())
     hand.wait.frames(6)
     return overlay
@@ -123,35 +133,35 @@ def test_submenus_are_inside_the_view(panel: Any, act: Any) -> None:
             return False
         shown = panel.sub.graphicsProxyWidget()
         boxes.append(shown.mapRectToScene(shown.rect()))
-        return bool(panel._scene.sceneRect().contains(boxes[-1]))
+        return bool(panel.room().contains(boxes[-1]))
 
     keys = [("key", key) for key in ("Down", "Right")]
     act(at(panel.bar, -60), LEFT, *keys, opened, ("key", "Return"))
     assert panel.chosen == ["deep"]
     assert boxes[-1].left() > 0
-    assert panel._scene.sceneRect().contains(boxes[-1])
+    assert panel.room().contains(boxes[-1])
 
 
 def test_context_menus(panel: Any, act: Any, view: Any) -> None:
-    act(at(panel.custom), RIGHT, panel._popups, at(panel.custom, 10, 10), LEFT)
-    act(at(panel.actions), RIGHT, panel._popups, at(panel.actions, 10, 10), LEFT)
+    act(at(panel.custom), RIGHT, panel.opened, at(panel.custom, 10, 10), LEFT)
+    act(at(panel.actions), RIGHT, panel.opened, at(panel.actions, 10, 10), LEFT)
     assert panel.chosen == ["custom", "action"]
     # By the keyboard, beside what has the keys.
-    act(at(panel.custom), LEFT, ("at", 500, 500), ("key", "Menu"), panel._popups)
-    box = panel._popups()[0].graphicsProxyWidget().sceneBoundingRect()
+    act(at(panel.custom), LEFT, ("at", 500, 500), ("key", "Menu"), panel.opened)
+    box = panel.opened()[0].graphicsProxyWidget().sceneBoundingRect()
     assert abs(box.top() - panel.custom.geometry().center().y()) < 20
     act(("key", "Down"), ("key", "Return"))
     assert panel.chosen == ["custom", "action", "custom"]
     # Qt's own; after it, keys are the field's again.
-    act(at(panel.text), RIGHT, panel._popups, ("key", "Escape"), panel.text.hasFocus)
+    act(at(panel.text), RIGHT, panel.opened, ("key", "Escape"), panel.text.hasFocus)
     act(("key", "End"), ("key", "s"))
     assert panel.text.text() == "hello worlds"
     # Beside it, the mouse leaves it open until it presses; keys are the field's then as well.
     beside = ("at", 500, 500)
-    act(at(panel.text), RIGHT, panel._popups, beside, ("at", 520, 500))
-    assert panel._popups()
+    act(at(panel.text), RIGHT, panel.opened, beside, ("at", 520, 500))
+    assert panel.opened()
     act(LEFT, panel.text.hasFocus, ("key", "End"), ("key", "t"))
-    assert not panel._popups()
+    assert not panel.opened()
     assert panel.text.text() == "hello worldst"
     # What has no menu leaves the button to RViz, which zooms.
     distance = view("Distance")
@@ -164,8 +174,8 @@ def test_context_menus(panel: Any, act: Any, view: Any) -> None:
 def test_long_lists_are_inside_the_view(panel: Any, act: Any) -> None:
     act(at(panel.combo), LEFT, panel.combo.view().isVisible)
     shown = panel.combo.view().window().graphicsProxyWidget()
-    act(lambda: panel._scene.sceneRect().contains(shown.sceneBoundingRect()))
-    assert panel._scene.sceneRect().contains(shown.sceneBoundingRect())
+    act(lambda: panel.room().contains(shown.sceneBoundingRect()))
+    assert panel.room().contains(shown.sceneBoundingRect())
     act(("key", "End"), ("key", "Return"))
     assert panel.combo.currentText() == "item 59"
     act(panel.combo.hasFocus, ("key", "Up"))

@@ -149,27 +149,29 @@ def test_widget_that_raises_is_told(
 
 
 def test_style_sheets(app: Any, panel: Any, wait: Callable[..., None], tmp_path: Path) -> None:
-    from rosglass.rviz.qt5 import QtGui
+    from rosglass.rviz import WidgetOverlay
+    from rosglass.rviz.qt5 import QtGui, QtWidgets
 
-    def colour() -> str:
-        panel.label.ensurePolished()
-        name: str = panel.label.palette().color(QtGui.QPalette.WindowText).name()
+    def colour(label: Any) -> str:
+        label.ensurePolished()
+        name: str = label.palette().color(QtGui.QPalette.WindowText).name()
         return name
 
     panel.style_sheet = "QLabel { color: #ff0000 }"
-    assert colour() == "#ff0000"
+    assert colour(panel.label) == "#ff0000"
     file = tmp_path / "look.qss"
     file.write_text("QLabel { color: #00ff00; image: url(a.png) }")
-    panel._style.use(str(file), watch=True)
-    assert colour() == "#00ff00"
-    assert f'url("{tmp_path}/a.png")' in panel.root.styleSheet()
+    label = QtWidgets.QLabel("styled")
+    watching = app.add(WidgetOverlay(label, "Styled", style_sheet=str(file), watch=True))
+    assert colour(label) == "#00ff00"
+    assert f'url("{tmp_path}/a.png")' in label.styleSheet()
     file.write_text("QLabel { color: #0000ff }")
-    wait(lambda: colour() == "#0000ff")
+    wait(lambda: colour(label) == "#0000ff")
     file.write_text("QLabel { color: #0000ff")
-    wait(lambda: "look.qss" in panel.problem)
-    assert colour() == "#0000ff"
-    panel.style_sheet = str(tmp_path / "none.qss")
-    assert "none.qss" in panel.problem
+    wait(lambda: "look.qss" in watching.problem)
+    assert colour(label) == "#0000ff"
+    watching.style_sheet = str(tmp_path / "none.qss")
+    assert "none.qss" in watching.problem
 
 
 def test_what_is_no_widget_is_refused(app: Any) -> None:
