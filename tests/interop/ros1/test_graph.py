@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 
 import pytest
+from tcpros import publisher_address
 from waiting import eventually
 
 from rosglass.comm import EndpointKind, NodeName
@@ -83,7 +84,7 @@ def test_rosnode_tells_our_connections_by_node_and_port(connect, start_rospy, to
     )
     assert inbound[0].split()[:3] == ["*", "to:", "/peer"]
     assert outbound[0].split()[:3] == ["*", "to:", "/peer"]
-    ours, theirs = node._core.address[1], peer.call("names")[0]
+    (_, ours), theirs = publisher_address(node, "/out"), peer.call("names")[0]
     assert theirs == "/peer"
     assert outbound[1].startswith(f"    * direction: outbound ({ours} - 127.0.0.1:")
     assert inbound[1].startswith("    * direction: inbound (")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from ports import free_port
+from tcpros import publisher_address
 from waiting import eventually
 
 import rosglass
@@ -119,7 +120,7 @@ def test_the_master_of_the_command_line_and_fixed_ports(start_master):
         node.create_publisher("/fixed", "std_msgs/Empty")
         eventually(lambda: node.publishers("/fixed"))
         assert master.call("lookupNode", "/fixed") == f"http://127.0.0.1:{api}/"
-        assert node._core.address == ("127.0.0.1", port)
+        assert publisher_address(node, "/fixed") == ("127.0.0.1", port)
 
 
 def test_nodes_without_a_name_do_not_end_each_other(connect, master):

@@ -8,10 +8,10 @@ import socket
 import struct
 import threading
 import time
-import xmlrpc.client
 from pathlib import Path
 
 import pytest
+from tcpros import publisher_address
 from waiting import eventually
 
 import rosglass
@@ -24,9 +24,7 @@ STRING = "std_msgs/String"
 
 def dial(node, published, **fields):
     """Connect to a node of ours as a subscriber would; return the socket and the answer."""
-    with xmlrpc.client.ServerProxy(node._core.uri) as api:
-        _, _, (_, host, port) = api.requestTopic("/raw", published, [["TCPROS"]])
-    sock = socket.create_connection((host, port))
+    sock = socket.create_connection(publisher_address(node, published))
     sock.settimeout(10)
     if fields:
         sock.sendall(encode_header({"callerid": "/raw", "topic": published} | fields))
