@@ -75,6 +75,12 @@ class RosMaster:
 
         eventually(answers, log.read_text)
 
+    @property
+    def pid(self) -> int:
+        """The running process."""
+        assert self._process is not None
+        return self._process.pid
+
     def kill(self) -> None:
         """Kill it: nodes get no farewell, and the next one has forgotten everything."""
         if self._process:

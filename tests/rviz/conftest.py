@@ -8,14 +8,13 @@ import os
 import subprocess
 import sys
 import xmlrpc.client
-from contextlib import closing, suppress
+from contextlib import closing
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from ports import free_port
-from waiting import eventually
+from rosmaster import RosMaster
 
 from rosglass.demo.processes import VirtualScreen
 
@@ -73,27 +72,8 @@ def screen() -> str:
 @pytest.fixture(scope="session")
 def master(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """The URI of a rosmaster of the test's own."""
-    port = free_port()
-    home = str(tmp_path_factory.mktemp("ros_home"))
-    env = {"PATH": "/usr/bin:/bin", "HOME": home, "ROS_HOME": home, "ROS_IP": "127.0.0.1"}
-    server = subprocess.Popen(
-        ["setpriv", "--pdeathsig", "KILL", "/usr/bin/rosmaster", "--core", "-p", str(port)],
-        env=env,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    uri = f"http://127.0.0.1:{port}"
-
-    def answers() -> bool:
-        with suppress(OSError, xmlrpc.client.Error), xmlrpc.client.ServerProxy(uri) as proxy:
-            proxy.getPid("/test")
-            return True
-        return False
-
-    eventually(answers, "an answer of rosmaster")
-    yield uri
-    server.kill()
-    server.wait()
+    with RosMaster(tmp_path_factory.mktemp("ros_home")) as master:
+        yield master.uri
 
 
 @pytest.fixture(scope="session")

@@ -8,12 +8,10 @@ import signal
 import subprocess
 import sys
 import time
-import xmlrpc.client
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from ports import free_port
+from rosmaster import RosMaster
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -386,49 +384,32 @@ def test_a_node_finds_its_master_again(
     from rosglass.qml import Session
     from rosglass.rviz import QmlOverlay
 
-    port = free_port()
-    uri = f"http://127.0.0.1:{port}"
-    servers = [start_master(port, tmp_path)]
+    master = RosMaster(tmp_path)
+    master.start()
     file.write_text(
         f"{IMPORTS}import Ros2 1.0\nItem {{ property QtObject s: Subscription {{ topic: '/again'\n"
         "messageType: 'std_msgs/msg/String' }\nComponent.onCompleted: Ros2.init('again') }"
     )
-    session = Session(f"ros1://127.0.0.1:{port}")
+    session = Session(master.url)
 
     def known() -> bool:
-        with suppress(OSError, xmlrpc.client.Error), xmlrpc.client.ServerProxy(uri) as proxy:
-            _, _, state = proxy.getSystemState("/test")  # type: ignore[misc,str-unpack]
-            return ["/again", ["/again"]] in state[1]  # type: ignore[index]
-        return False
+        return ["/again", ["/again"]] in master.call("getSystemState")[1]
 
     try:
         overlay = QmlOverlay(file, session)
         overlay.load()
         app.add(overlay)
         wait(known)
-        servers[0].kill()
-        servers[0].wait()
+        master.kill()
         wait(lambda: session.state != "connected")
-        servers.append(start_master(port, tmp_path))
+        master.start()
         wait(known)
         wait(lambda: session.state == "connected")
         app.overlays.remove(overlay)
     finally:
         session.close()
-        for server in servers:
-            server.kill()
-            server.wait()
+        master.kill()
     goes_on()
-
-
-def start_master(port: int, home: Path) -> subprocess.Popen[bytes]:
-    env = {"PATH": "/usr/bin:/bin", "HOME": str(home), "ROS_HOME": str(home), "ROS_IP": "127.0.0.1"}
-    return subprocess.Popen(
-        ["/usr/bin/rosmaster", "--core", "-p", str(port)],
-        env=env,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
 
 
 PROGRAM = """

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 from ports import free_port
+from rosmaster import RosMaster
 from waiting import eventually
 
 from rosglass.demo.processes import VirtualScreen
@@ -207,28 +208,16 @@ def test_ends_when_the_node_of_overlays_is_killed(
 def test_tells_when_the_master_is_gone_and_when_another_one_came(
     start: Callable[..., Program], tmp_path: Path
 ) -> None:
-    port = free_port()
-    home = str(tmp_path / "ros")
-
-    def roscore() -> subprocess.Popen[bytes]:
-        env = {"PATH": "/usr/bin:/bin", "HOME": home, "ROS_HOME": home, "ROS_IP": "127.0.0.1"}
-        command = ["/usr/bin/rosmaster", "--core", "-p", str(port)]
-        null = subprocess.DEVNULL
-        return subprocess.Popen(command, env=env, stdout=null, stderr=null)
-
+    master = RosMaster(tmp_path / "ros")
     # It waits for the master, and starts as soon as there is one.
     overlay = interface(tmp_path, "console.warn('up')")
-    program = start("--overlay", overlay, ROS_MASTER_URI=f"http://127.0.0.1:{port}")
-    program.wait_for(f"start one: roscore -p {port}")
+    program = start("--overlay", overlay, ROS_MASTER_URI=master.uri)
+    program.wait_for(f"start one: roscore -p {master.port}")
     for message in ("up", "started anew"):
-        server = roscore()
-        try:
+        with master:
             program.wait_for(message)
             # The watch has asked the first one by then, too.
             time.sleep(2.5)
-        finally:
-            server.kill()
-            server.wait()
         program.wait_for("nothing new is found")
     assert program.end() == 130
 

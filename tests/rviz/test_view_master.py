@@ -8,7 +8,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from ports import free_port
+from rosmaster import RosMaster
 from waiting import eventually
 
 from rosglass.errors import ConnectionLostError
@@ -22,29 +22,13 @@ SERVICE = "/rviz/hector_view_controller/set_view_mode"
 
 
 @pytest.fixture
-def address(tmp_path: Path) -> Iterator[tuple[str, Any]]:
-    """Address of a master of the test's own, and what starts it, after its end as well."""
-    port = free_port()
-    home = str(tmp_path / "ros")
-    running: list[subprocess.Popen[bytes]] = []
-
-    def start() -> None:
-        for server in running:
-            server.kill()
-            server.wait()
-        env = {"PATH": "/usr/bin:/bin", "HOME": home, "ROS_HOME": home, "ROS_IP": "127.0.0.1"}
-        command = ["/usr/bin/rosmaster", "--core", "-p", str(port)]
-        null = subprocess.DEVNULL
-        running.append(subprocess.Popen(command, env=env, stdout=null, stderr=null))
-
-    start()
-    yield f"127.0.0.1:{port}", start
-    running[-1].kill()
-    running[-1].wait()
+def own_master(tmp_path: Path) -> Iterator[RosMaster]:
+    with RosMaster(tmp_path / "ros") as master:
+        yield master
 
 
 @pytest.fixture
-def rviz(screen: str, address: tuple[str, Any], tmp_path: Path) -> Iterator[Any]:
+def rviz(screen: str, own_master: RosMaster, tmp_path: Path) -> Iterator[Any]:
     home = tmp_path / "home"
     home.mkdir(mode=0o700)
     env = {
@@ -57,19 +41,21 @@ def rviz(screen: str, address: tuple[str, Any], tmp_path: Path) -> Iterator[Any]
     command = [sys.executable, "-m", "rosglass.cli", "rviz", "--name", "rviz"]
     with (tmp_path / "log").open("w") as log:
         process = subprocess.Popen(
-            [*command, "--url", f"ros1://{address[0]}"], env=env, stdout=log, stderr=log
+            [*command, "--url", f"ros1://127.0.0.1:{own_master.port}"],
+            env=env,
+            stdout=log,
+            stderr=log,
         )
     yield process
     process.kill()
     process.wait()
 
 
-def test_the_services_come_back_without_a_restart(rviz: Any, address: tuple[str, Any]) -> None:
+def test_the_services_come_back_without_a_restart(rviz: Any, own_master: RosMaster) -> None:
     import rosglass
 
-    url, start = address
     for mode in (1, 0):
-        with rosglass.connect(f"ros1://{url}", "robot") as robot:
+        with rosglass.connect(own_master.url, "robot") as robot:
             client = robot.create_service_client(SERVICE, "hector_rviz_plugins/srv/SetViewMode")
             assert client.wait_for_server(PATIENCE)
             client.call({"mode": {"mode": mode}}, timeout=PATIENCE)
@@ -81,7 +67,7 @@ def test_the_services_come_back_without_a_restart(rviz: Any, address: tuple[str,
             )
             eventually(lambda mode=mode, heard=heard: mode in heard, timeout=PATIENCE)
             assert heard[-1] == mode
-        start()
+        own_master.restart()
     assert rviz.poll() is None
 
 

@@ -51,7 +51,7 @@ def connect(master: Any, router: Router) -> Iterator[Callable[..., Node]]:
     nodes: list[Node] = []
 
     def connect(world: str, name: str, url: str = "", *, described: bool = False) -> Node:
-        usual = f"{master.url}?ip=127.0.0.1" if world == "ros1" else router.url
+        usual = master.url if world == "ros1" else router.url
         node = rosglass.connect(url or usual, name, own_services=described)
         nodes.append(node)
         return node

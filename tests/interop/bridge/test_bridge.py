@@ -275,7 +275,7 @@ def test_an_unused_topic_costs_nothing(bridge, connect):
 
 def test_the_master_restarts(bridge, connect, start_master, start_rospy):
     master = start_master()
-    url = f"{master.url}?ip=127.0.0.1"
+    url = master.url
     bridge(["/steady"], urls=(url, ""))
     two = connect("ros2", "steady_two")
     peer = start_rospy("steady_peer", master=master)
@@ -339,7 +339,7 @@ def test_a_ros2_client_that_is_not_ours(bridge, start_peer, router, rospy_peer, 
 
 def test_a_chain_of_bridges(bridge, connect, start_master):
     """What one bridge brings is not its own to those who go on to a third world."""
-    far = f"{start_master().url}?ip=127.0.0.1"
+    far = start_master().url
     bridge(["*"])
     bridge(["*"], urls=(far, ""))
     talker = connect("ros1", "near").create_publisher("/chain", STRING)
@@ -356,7 +356,7 @@ def test_a_chain_of_bridges(bridge, connect, start_master):
 def test_other_pairs_of_worlds(bridge, connect, router, request, kind):
     """Between worlds of one ROS messages pass as they are, those of unknown types, too."""
     if kind == "ros1":
-        ours, other = "", f"{request.getfixturevalue('start_master')().url}?ip=127.0.0.1"
+        ours, other = "", request.getfixturevalue("start_master")().url
         near, world = connect("ros1", "pair_near"), "ros1"
     else:
         pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')

@@ -29,7 +29,7 @@ def test_it_relays_until_it_is_ended(master, router, connect, start_program):
     one, two = connect("ros1", "cli_one"), connect("ros2", "cli_two")
     talker = one.create_publisher("/cli", STRING)
     listener = two.create_subscription("/cli", STRING)
-    command = (*COMMAND, f"{master.url}?ip=127.0.0.1", router.url, "--topic", "/cli->")
+    command = (*COMMAND, master.url, router.url, "--topic", "/cli->")
     process = start_program(*command, "--statistics", "0.5", env=dict(os.environ))
 
     def heard():
@@ -50,7 +50,7 @@ def test_it_lists_what_maps(master, router, connect):
     two.create_publisher("/list/markers", "visualization_msgs/msg/Marker")
     two.create_service_server("/list/go", "std_srvs/srv/Trigger", lambda _: {})
     eventually(lambda: one.topics().get("/list/logs"))
-    urls = (f"{master.url}?ip=127.0.0.1", router.url)
+    urls = (master.url, router.url)
     asked = ("--list", "--topic", "/list/*", "--service", "/list/*")
     found = {one["name"]: one for one in json.loads(run(*urls, *asked, "--json").stdout)}
     assert found["/list/logs"]["other_type"] == "rcl_interfaces/msg/Log"
@@ -79,7 +79,7 @@ def test_nonsense(arguments, told):
 def test_what_is_nowhere_is_told(master, router, connect, start_program):
     two = connect("ros2", "two")
     two.create_publisher("/odometry", STRING)
-    command = (*COMMAND, f"{master.url}?ip=127.0.0.1", router.url, "--topic", "/odometri")
+    command = (*COMMAND, master.url, router.url, "--topic", "/odometri")
     process = start_program(*command, env=dict(os.environ))
     told = "/odometri ->: nobody publishes it; did you mean /odometry?"
     eventually(lambda: any(told in line for line in process.output))
@@ -96,7 +96,7 @@ def test_nobody_answers(router, free_port):
 def test_the_documented_program(master, router):
     page = (Path(__file__).parents[3] / "docs" / "bridge.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
-    code = code.replace("ros1://robot:11311", f"{master.url}?ip=127.0.0.1")
+    code = code.replace("ros1://robot:11311", master.url)
     code = code.replace("zenoh://127.0.0.1:7447", router.url)
     code += "robot.close()\noffice.close()\n"
     done = subprocess.run(

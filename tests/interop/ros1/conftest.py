@@ -7,13 +7,12 @@ import shutil
 import signal
 import subprocess
 import sys
-import xmlrpc.client
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from ports import free_port
+from rosmaster import RosMaster
 from waiting import eventually
 
 import rosglass
@@ -41,68 +40,6 @@ def needs(*programs: str) -> None:
     missing = [name for name in programs if not Path("/usr/bin", name).exists()]
     if missing:
         pytest.skip(f"{INSTALL} (missing: {', '.join(missing)})")
-
-
-class RosMaster:
-    """A rosmaster process on a port of its own.
-
-    Attributes:
-        port: Where it listens.
-        uri: As in ROS_MASTER_URI.
-        url: As :func:`rosglass.connect` takes it.
-        home: ROS_HOME of everything that runs with it: logs, pid files.
-    """
-
-    def __init__(self, start_program: Callable[..., Any], home: Path) -> None:
-        self.port, self.home = free_port(), home
-        self.uri, self.url = f"http://127.0.0.1:{self.port}", f"ros1://127.0.0.1:{self.port}"
-        self._start_program = start_program
-        self._process: Any = None
-        self.start()
-
-    def env(self, **more: str) -> dict[str, str]:
-        """Return an environment that has nothing but ROS 1 and this master."""
-        return {
-            "PATH": "/usr/bin:/bin",
-            "HOME": str(self.home),
-            "ROS_HOME": str(self.home),
-            "ROS_LOG_DIR": str(self.home / "log"),
-            "ROS_MASTER_URI": self.uri,
-            "ROS_IP": "127.0.0.1",
-            "LANG": "C.UTF-8",
-            "PYTHONUNBUFFERED": "1",
-            **more,
-        }
-
-    def start(self) -> None:
-        """Start it, and return when it answers."""
-        command = ("/usr/bin/rosmaster", "--core", "-p", str(self.port))
-        self._process = self._start_program(*command, env=self.env())
-        for _ in range(1000):
-            with suppress(OSError, xmlrpc.client.Error):
-                self.call("getPid")
-                return
-            if self._process.popen.poll() is not None:
-                break
-            with suppress(subprocess.TimeoutExpired):
-                self._process.popen.wait(0.02)
-        pytest.fail(f"rosmaster does not start:\n{''.join(self._process.output)}")
-
-    def kill(self) -> None:
-        """Kill it: nodes get no farewell, and the next one has forgotten everything."""
-        self._process.end()
-
-    def restart(self) -> None:
-        """Kill it and start another one on the same port."""
-        self.kill()
-        self.start()
-
-    def call(self, method: str, *arguments: Any, caller: str = "/test") -> Any:
-        """Call its XML-RPC API as a node; return the value, fail the test without success."""
-        with xmlrpc.client.ServerProxy(self.uri) as server:
-            code, told, value = getattr(server, method)(caller, *arguments)
-        assert code == 1, f"{method}{arguments}: {told}"
-        return value
 
 
 class Peer:
@@ -139,12 +76,10 @@ class Peer:
 
 
 @pytest.fixture(scope="module")
-def start_master(
-    start_program: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory
-) -> Callable[[], RosMaster]:
+def start_master(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[], RosMaster]]:
     """Start a master of the test's own; killed when the module's tests are done."""
-    needs("rosmaster")
-    return lambda: RosMaster(start_program, tmp_path_factory.mktemp("ros_home"))
+    with ExitStack() as running:
+        yield lambda: running.enter_context(RosMaster(tmp_path_factory.mktemp("ros_home")))
 
 
 @pytest.fixture(scope="module")
@@ -161,10 +96,9 @@ def connect(request: pytest.FixtureRequest) -> Iterator[Callable[..., Node]]:
     def connect(
         name: str, namespace: str = "/", *, url: str = "", wait: bool = True, **more: Any
     ) -> Node:
-        where = url or request.getfixturevalue("master").url
-        if "ip=" not in where:
-            where += ("&" if "?" in where else "?") + "ip=127.0.0.1"
-        node = rosglass.connect(where, name, namespace, **more)
+        node = rosglass.connect(
+            url or request.getfixturevalue("master").url, name, namespace, **more
+        )
         nodes.append(node)
         if wait:
             eventually(lambda: node.status().state.value == "connected", node.status)

@@ -50,7 +50,7 @@ def run(robot: Any, master: Any, monkeypatch: pytest.MonkeyPatch, run_command: A
 @pytest.fixture
 def start_command(master: Any, start_command_at: Any) -> Any:
     """Start a command as a process of its own."""
-    return partial(start_command_at, f"{master.url}?ip=127.0.0.1")
+    return partial(start_command_at, master.url)
 
 
 def test_topic_list_and_info(run, master, monkeypatch):

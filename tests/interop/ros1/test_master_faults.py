@@ -105,7 +105,7 @@ def test_a_master_that_hangs_holds_up_neither_topics_nor_closing(own_master, con
     publisher = one.create_publisher("/count", "std_msgs/Int32")
     subscription = two.create_subscription("/count")
     eventually(publisher.subscription_count)
-    pid = own_master._process.pid
+    pid = own_master.pid
     os.kill(pid, signal.SIGSTOP)
     try:
         publisher.publish(data=1)
@@ -141,7 +141,7 @@ def test_closing_while_connecting_leaves_nothing_behind(own_master, connect):
 
 def test_many_nodes_come_and_go_without_a_trace(own_master, connect):
     def cycle():
-        node = rosglass.connect(f"{own_master.url}?ip=127.0.0.1", "brief")
+        node = rosglass.connect(own_master.url, "brief")
         publisher = node.create_publisher("/brief", "std_msgs/Empty")
         subscription = node.create_subscription("/brief")
         if publisher.subscription_count() == 0:
@@ -177,7 +177,7 @@ def test_the_master_is_told_again_of_what_it_forgot_alone(own_master, connect):
 
 def test_publishers_are_found_though_the_master_cannot_call_us(own_master, connect):
     # Nothing leads to that address: calls of the master's get lost.
-    node = connect("behind_a_firewall", url=f"{own_master.url}?ip={NOWHERE}")
+    node = connect("behind_a_firewall", url=f"ros1://127.0.0.1:{own_master.port}?ip={NOWHERE}")
     subscription = node.create_subscription("/talk")
     eventually(lambda: registered(own_master, "/talk")[1])
     talker = connect("talker", url=own_master.url)
@@ -213,7 +213,7 @@ def test_the_older_of_two_nodes_of_a_name_ends(own_master, connect, request, pee
 
 
 def test_a_node_ends_although_the_master_cannot_tell_it_that_its_name_is_taken(own_master, connect):
-    older = connect("twin", url=f"{own_master.url}?ip={NOWHERE}")
+    older = connect("twin", url=f"ros1://127.0.0.1:{own_master.port}?ip={NOWHERE}")
     older.create_publisher("/old", "std_msgs/Empty")
     eventually(lambda: registered(own_master, "/old")[0])
     newer = connect("twin", url=own_master.url)
@@ -268,7 +268,7 @@ print('{"done": true}', flush=True)
 
 
 def test_a_fork_keeps_nothing_alive_and_an_end_without_closing_leaves_nothing(own_master, start):
-    process = start("-c", _FORK, f"{own_master.url}?ip=127.0.0.1")
+    process = start("-c", _FORK, own_master.url)
     assert process.event("done")
     assert process.popen.wait(30) == 0
     assert "".join(process.output) == ""

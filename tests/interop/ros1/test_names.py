@@ -84,7 +84,7 @@ def test_we_are_reached_where_we_say(arguments, env, host, start_rospy, monkeypa
         monkeypatch.delenv(name, raising=False)
     for name, value in env.items():
         monkeypatch.setenv(name, value)
-    with rosglass.connect(master.url, "placed", arguments=arguments) as node:
+    with rosglass.connect(f"ros1://127.0.0.1:{master.port}", "placed", arguments=arguments) as node:
         publisher = node.create_publisher("/placed", "std_msgs/Int32", rosglass.QoS.latched())
         publisher.publish(data=4)
         eventually(lambda: node.publishers("/placed"))
@@ -98,7 +98,7 @@ def test_we_are_reached_where_we_say(arguments, env, host, start_rospy, monkeypa
 def test_without_being_told_we_announce_what_others_reach(start_rospy, monkeypatch, master):
     for name in ("ROS_IP", "ROS_HOSTNAME"):
         monkeypatch.delenv(name, raising=False)
-    with rosglass.connect(master.url, "found") as node:
+    with rosglass.connect(f"ros1://127.0.0.1:{master.port}", "found") as node:
         publisher = node.create_publisher("/found", "std_msgs/Int32", rosglass.QoS.latched())
         publisher.publish(data=5)
         eventually(lambda: node.publishers("/found"))

@@ -21,7 +21,7 @@ def robot(start_rospy) -> Any:
 @pytest.fixture
 def run(robot: Any, master: Any, monkeypatch: pytest.MonkeyPatch, run_command: Any) -> Any:
     """Run a command that looks at the robot."""
-    monkeypatch.setenv("ROSGLASS_URL", f"{master.url}?ip=127.0.0.1")
+    monkeypatch.setenv("ROSGLASS_URL", master.url)
     return run_command
 
 
