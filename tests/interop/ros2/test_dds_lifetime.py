@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import gc
-import os
 import signal
 import subprocess
 import sys
 import textwrap
 import threading
 import time
-from pathlib import Path
 from typing import Any
 
 import pytest
+from usage import native_threads
 from waiting import eventually, nothing_happens
 
 import rosglass
@@ -24,14 +23,6 @@ STRING, IMAGE = "std_msgs/msg/String", "sensor_msgs/msg/Image"
 KEEP_ALL = QoS(history=History.KEEP_ALL)
 
 pytestmark = pytest.mark.peers
-
-
-def resources() -> tuple[int, int, int]:
-    """Threads, file descriptors and kilobytes of this process."""
-    gc.collect()
-    tasks, files = os.listdir("/proc/self/task"), os.listdir("/proc/self/fd")  # noqa: PTH208
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return len(tasks), len(files), pages * os.sysconf("SC_PAGE_SIZE") // 1024
 
 
 def program(text: str, domain: int) -> subprocess.Popen[str]:
@@ -204,11 +195,13 @@ def test_a_node_can_be_closed_from_a_callback(dds_connect):
     node.create_subscription("/t", STRING, raw_callback=lambda _: node.close(), executor=IMMEDIATE)
     publisher = talker.create_publisher("/t", STRING)
     eventually(publisher.subscription_count)
-    threads = resources()[0]
+    gc.collect()
+    threads = native_threads()
 
     def gone() -> bool:
         publisher.publish(data="x")
-        return resources()[0] < threads
+        gc.collect()
+        return native_threads() < threads
 
     eventually(gone, what="the node's threads to end")
     with pytest.raises(NodeClosedError):

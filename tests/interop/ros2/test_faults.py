@@ -14,6 +14,7 @@ from operator import le
 from pathlib import Path
 
 import pytest
+from usage import memory, native_threads, open_files
 from waiting import eventually
 
 import rosglass
@@ -60,11 +61,6 @@ def program(text: str, url: str, **env: str) -> subprocess.Popen[str]:
     assert process.stdout is not None
     assert process.stdout.readline() == "begun\n"
     return process
-
-
-def memory() -> int:
-    """Return the bytes of physical memory that this process uses."""
-    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
 def test_a_cable_that_is_unplugged_for_ten_seconds_over_dds(on_two_machines):
@@ -161,8 +157,7 @@ def test_a_thousand_of_everything_leave_nothing_behind_over_dds(dds_connect):
         return not other.service_servers("/add") and not other.publishers("/count")
 
     def resources() -> tuple[int, int]:
-        tasks, files = Path("/proc/self/task"), Path("/proc/self/fd")
-        return len(list(tasks.iterdir())), len(list(files.iterdir()))
+        return native_threads(), open_files()
 
     for _ in range(60):
         cycle()

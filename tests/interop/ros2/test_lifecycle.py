@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 from ports import free_port
+from usage import native_threads, open_files
 from waiting import eventually, nothing_happens
 
 import rosglass
@@ -232,14 +233,6 @@ def test_every_new_connection_receives(router, start_peer):
     peer.end()
 
 
-def own_descriptors():
-    return len(list(Path("/proc/self/fd").iterdir()))
-
-
-def native_threads():
-    return len(list(Path("/proc/self/task").iterdir()))
-
-
 def test_nodes_leave_no_threads_and_no_descriptors_behind(router):
     def cycle():
         with rosglass.connect(router.url, "brief") as node:
@@ -252,7 +245,7 @@ def test_nodes_leave_no_threads_and_no_descriptors_behind(router):
     for _ in range(5):
         cycle()
     time.sleep(0.5)
-    threads, native, descriptors = threading.active_count(), native_threads(), own_descriptors()
+    threads, native, descriptors = threading.active_count(), native_threads(), open_files()
     before = time.monotonic()
     for _ in range(100):
         cycle()
@@ -261,7 +254,7 @@ def test_nodes_leave_no_threads_and_no_descriptors_behind(router):
     eventually(lambda: threading.active_count() <= threads)
     # Zenoh's thread pools breathe a little.
     assert native_threads() < native + 20
-    assert own_descriptors() < descriptors + 20
+    assert open_files() < descriptors + 20
 
 
 def listening_addresses():

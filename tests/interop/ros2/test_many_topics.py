@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
 import time
-from pathlib import Path
 
 import pytest
 import zenoh
+from usage import memory
 from waiting import eventually
 
 from rosglass.comm import ConnectionState
@@ -18,10 +17,6 @@ TOPICS = 10_000
 MEMORY, CPU = 10_000, 120.0
 #: Seconds; Zenoh alone takes four for a program that joins, on an idle machine.
 LONG = 120.0
-
-
-def memory():
-    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGESIZE")
 
 
 def count(node):

@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import pytest
+from usage import memory, open_files
 from waiting import at_rate, eventually
 
 import rosglass
@@ -24,15 +25,6 @@ ADD, TWIST = "example_interfaces/srv/AddTwoInts", "geometry_msgs/msg/Twist"
 IMAGE, STRING = "sensor_msgs/msg/Image", "std_msgs/msg/String"
 #: Seconds within which everything works again after a router has come back; two are usual.
 RECOVERY = 20.0
-
-
-def memory():
-    """Return the bytes of physical memory that this process uses."""
-    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGESIZE")
-
-
-def descriptors():
-    return len(list(Path("/proc/self/fd").iterdir()))
 
 
 @pytest.fixture
@@ -331,14 +323,14 @@ def test_a_thousand_of_everything_leave_nothing_behind(start_router, connect):
     eventually(settled)
     gc.collect()
     threads, files, objects, before = (
-        threading.active_count(), descriptors(), len(gc.get_objects()), memory(),
+        threading.active_count(), open_files(), len(gc.get_objects()), memory(),
     )  # fmt: skip
     for number in range(250):
         cycle(number)
     eventually(settled)
     eventually(lambda: threading.active_count() <= threads)
     gc.collect()
-    assert descriptors() <= files + 2
+    assert open_files() <= files + 2
     assert len(gc.get_objects()) < objects + 500
     assert memory() - before < 10e6
     assert subscription.statistics().lost == 0, "endpoints that follow each other are told apart"
@@ -362,11 +354,11 @@ def test_nodes_that_call_each_other_leave_nothing_behind(router):
     for _ in range(4):
         cycle()
     time.sleep(0.5)
-    threads, files, before = threading.active_count(), descriptors(), memory()
+    threads, files, before = threading.active_count(), open_files(), memory()
     for _ in range(12):
         cycle()
     eventually(lambda: threading.active_count() <= threads)
-    eventually(lambda: descriptors() <= files)
+    eventually(lambda: open_files() <= files)
     assert memory() - before < 30e6
 
 
@@ -379,11 +371,11 @@ def test_nodes_that_come_and_go_beside_others_leave_no_links_behind(router, conn
 
     cycle()
     eventually(lambda: all(len(node.nodes()) == 3 for node in stay))
-    threads, files = threading.active_count(), descriptors()
+    threads, files = threading.active_count(), open_files()
     for _ in range(20):
         cycle()
     eventually(lambda: all(len(node.nodes()) == 3 for node in stay))
-    eventually(lambda: descriptors() <= files)
+    eventually(lambda: open_files() <= files)
     eventually(lambda: threading.active_count() <= threads)
 
 
