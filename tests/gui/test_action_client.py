@@ -85,9 +85,11 @@ def test_a_goal(client: Client, counter: Counter, wait: Any) -> None:
     assert client.run("handle.status === ActionGoalStatus.Succeeded")
 
 
-def test_a_goal_waits_for_the_server(client: Client, counter: Counter, wait: Any) -> None:
+def test_a_goal_waits_for_the_server(
+    live: Bench, client: Client, counter: Counter, wait: Any
+) -> None:
     client.run("send(3)")
-    wait.nothing_happens(0.3)
+    wait.settled(live.session)
     counter.offer()
     assert client.until("result")[:3] == [True, 4, 3]
 

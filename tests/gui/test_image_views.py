@@ -114,7 +114,7 @@ def test_a_view_changes_without_a_gap(running: Any, camera: Any, wait: Any) -> N
     sub = root.property("sub0")
     show(running, camera, wait, root, quarters())
     sub.setProperty("rotation", 180)
-    wait.nothing_happens(0.1)
+    wait.settled(running.session)
     assert seen(root) is not None
     assert not sub.property("stale")
     assert len(running.world.subscriptions) == 1
@@ -568,9 +568,9 @@ def test_an_item_lets_a_source_go_that_is_gone_already() -> None:
     from rosglass.qt import QtCore, send_deferred_deletes
 
     item, source = ImageItem(), QtCore.QObject()
-    item._set_source(source)
+    item.setProperty("source", source)
     assert source.property("videoSink") is item
     source.deleteLater()
     send_deferred_deletes()
-    item._set_source(None)
+    item.setProperty("source", None)
     assert item.property("source") is None

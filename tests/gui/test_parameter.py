@@ -72,7 +72,7 @@ def test_refusals_are_told(ros2: Bench, wait: Any, caplog: Any) -> None:
 
 def test_a_node_that_comes_and_goes(live: Bench, wait: Any) -> None:
     root: Any = live.load(QML.replace("/robot", "/arm"))
-    wait.nothing_happens(0.3)
+    wait.settled(live.session)
     assert root.shown() is None or root.shown() in {"undefined", ""}
     arm = live.world.connect(None, "arm")
     arm.parameters.declare("speed", 3)

@@ -286,7 +286,7 @@ def test_commands_do_not_go_on_after_an_outage(
     assert "paused" in caplog.text
     node.set_status(ConnectionState.CONNECTED)
     wait(lambda: running.session.state == "connected")
-    wait.nothing_happens(0.3)
+    wait.settled(running.session)
     assert root.state() == "true,false,3.0"
     root.play()
     wait(lambda: root.state() == "true,true,3.0")

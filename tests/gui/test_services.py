@@ -52,7 +52,7 @@ def test_requests_wait_for_a_server(live: Bench, wait: Any) -> None:
                 client.sendRequestAsync({}, function (r) { answer = r.message })
         }
     """)
-    wait.nothing_happens(0.3)
+    wait.settled(live.session)
     live.robot.create_service_server(
         "/late", "std_srvs/srv/Trigger", lambda request: {"message": "here"}
     )

@@ -190,7 +190,7 @@ def test_a_set_from_before_an_outage_stays_stale(running: Bench, wait: Any) -> N
     wait(lambda: root.state().startswith("true"))
     node.set_status(ConnectionState.CONNECTED)
     wait(lambda: running.session.state == "connected")
-    wait.nothing_happens(0.3)
+    wait.settled(running.session)
     assert root.state().startswith("true")
     robot.send(0, 500, "LEFT")
     robot.send(1, 500, "RIGHT")
