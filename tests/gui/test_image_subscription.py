@@ -9,6 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from waiting import at_rate
 
 from rosglass.comm import Time
 
@@ -242,9 +243,8 @@ def test_the_newest_wins_and_drops_are_counted(running: Any, camera: Any, wait: 
     sub = root.property("sub")
     wait(lambda: sub.property("subscribed"))
     # The GUI thread is busy: only the last of these can be shown.
-    for i in range(10):
+    for i in at_rate(0.02, 10):
         camera.publish(picture((i, i, i)))
-        time.sleep(0.02)
     wait(lambda: colour(root) == (9, 9, 9))
     wait(lambda: sub.property("dropped") == 9)
 

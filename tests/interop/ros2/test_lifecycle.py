@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from ports import free_port
 from usage import native_threads, open_files
-from waiting import eventually, nothing_happens
+from waiting import at_rate, eventually, nothing_happens
 
 import rosglass
 from rosglass.comm import IMMEDIATE, ConnectionState, NodeName
@@ -294,12 +294,11 @@ def test_a_stalled_link_drops_pictures_but_no_command(router, start_peer, connec
     picture = rosglass.load("sensor_msgs/msg/Image").encode(data=bytes(900_000))
     os.kill(peer.pid, signal.SIGSTOP)
     slowest = 0.0
-    for number in range(60):
+    for number in at_rate(0.01, 60):
         before = time.monotonic()
         pictures.publish_serialized(picture)
         commands.publish(linear={"x": number})
         slowest = max(slowest, time.monotonic() - before)
-        time.sleep(0.01)
     commands.publish(linear={"x": -1})
     os.kill(peer.pid, signal.SIGCONT)
     numbers = []
