@@ -103,11 +103,11 @@ class Client(Handle):
 
 
 class Readiness:
-    """Looks whether somebody is there, and tells.
+    """Whether the server of a service or action is there: waited for, and told when it changes.
 
     Args:
         name: Of the service or action, for messages.
-        ready: Says whether somebody is there.
+        ready: Says whether the server is there.
         check_open: Raises NodeClosedError when it makes no sense to wait any more.
         default: Where callbacks run unless told otherwise.
     """
@@ -126,7 +126,7 @@ class Readiness:
         self._listeners: Listeners[bool] = Listeners(where=name)
 
     def wait(self, timeout: float | None) -> bool:
-        """Wait up to `timeout` seconds, None for ever; return whether somebody is there."""
+        """Wait up to `timeout` seconds, None for ever; return whether the server is there."""
         timeout = check_timeout(timeout, self._name)
         deadline = None if timeout is None else time.monotonic() + timeout
         while True:
@@ -156,7 +156,7 @@ class Readiness:
             self._listeners.notify(ready)
 
     def close(self) -> None:
-        """Tell nobody any more, and let who waits find out."""
+        """Forget the listeners, and let those who wait find out."""
         self._wake()
         self._listeners.clear()
 

@@ -197,7 +197,7 @@ def _ignore(moved: bool, idle: bool) -> None:
 
 
 class CoreNode(Node):
-    """A node that keeps time, and tells its status and changes of the graph, by its core."""
+    """A node with a core, which keeps its clock, its status and the changes of the graph."""
 
     _core: NodeCore[Any]
 

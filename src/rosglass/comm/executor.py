@@ -1,4 +1,4 @@
-"""Where callbacks run: a node's own dispatcher thread, or the middleware's thread at once."""
+"""Executors, which run callbacks: a dispatcher thread, an event loop, or the caller's at once."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """A node's log: a logger of Python's whose messages go to its handlers, and to ``/rosout``.
 
 Behaviour: ROS wiki, "rosout"; design article "Logging" and ``rcl``'s ``logging_rosout``. What a
-message on ``/rosout`` looks like is ROS 1's or ROS 2's own: a :class:`RosoutTopic` says it.
+message on ``/rosout`` looks like is ROS 1's or ROS 2's own: a :class:`RosoutTopic` says it. The
+terminal shows messages where the program has not configured `logging`.
 """
 
 from __future__ import annotations

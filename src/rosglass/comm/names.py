@@ -1,5 +1,7 @@
 """ROS 2's names: which are valid, what they expand to, and how types are spelled on the wire.
 
+Also what names of either ROS are compared and made with: :func:`similar`, :func:`anonymous_name`.
+
 Rules: design article "Topic and Service name mapping to DDS" and the behaviour of ``rcl`` and
 ``rmw`` (``rcl_expand_topic_name``, ``rmw_validate_full_topic_name``, ``rmw_validate_node_name``,
 ``rmw_validate_namespace``).

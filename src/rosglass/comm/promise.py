@@ -1,4 +1,4 @@
-"""What comes later: a response, a goal's end, an answer; to wait for, to await, to be told."""
+"""Promises of what comes later (a response, a goal's end, an answer), and limits of waiting."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "MARK_PERIOD",
-    "Lateness",
+    "LatencyEstimator",
     "Meter",
     "Statistics",
     "fading_rate",
@@ -33,6 +33,12 @@ MARK_PERIOD = 1 / 30
 _LATE_PERIODS = 1.5
 #: ... and is 0 so many periods or seconds after that, whichever is longer.
 _FADE_PERIODS, _FADE_S = 2.0, 2.0
+#: Publishers remembered; more come only from a robot that restarts for days.
+_MAX_PUBLISHERS = 256
+#: By how much two clocks run apart at worst; NTP lets a clock run wrong by no more (500 ppm).
+_MAX_DRIFT = 500e-6
+#: Steps of this machine's clock below this many nanoseconds are not looked for.
+_MIN_STEP_NS = 50_000_000
 
 
 def fading_rate(period: float, age: float) -> float:
@@ -98,7 +104,7 @@ class Meter:
     def __init__(self) -> None:
         self._marks: deque[tuple[float, int, int]] = deque(maxlen=_MARKS)
         self._took: deque[tuple[int, int]] = deque(maxlen=_MARKS)
-        self._lateness = Lateness()
+        self._lateness = LatencyEstimator()
 
     def mark(self, now: float, last: float, count: int, size: int, sample: Sample) -> None:
         """Note where the counts stood when the last sample before `sample`, of `now`, had come."""
@@ -149,14 +155,6 @@ class Meter:
         return fading_rate((last - start) / (received - count), now - last)
 
 
-#: Publishers remembered; more come only from a robot that restarts for days.
-_MAX_PUBLISHERS = 256
-#: By how much two clocks run apart at worst; NTP lets a clock run wrong by no more (500 ppm).
-_DRIFT = 500e-6
-#: Steps of this machine's clock below this many nanoseconds are not looked for.
-_STEP = 50_000_000
-
-
 class _Publisher(NamedTuple):
     """What is known of a publisher, in nanoseconds."""
 
@@ -169,11 +167,16 @@ class _Publisher(NamedTuple):
     behind: bool
 
 
-class Lateness:
-    """Compares each publisher's samples with its fastest one.
+class LatencyEstimator:
+    """How much longer than usual samples were on their way, whatever the clocks say.
 
-    What a publisher's first sample cannot tell: it may be late itself. Either clock may be set
-    meanwhile: a step of ours is measured, a publisher's step back shows in its stamps, and one
+    A link that was silent for ten seconds may hand on, all at once, what was sent in that time. By
+    its reception such a sample is new, by its contents it is old. The time stamps of publisher and
+    receiver come from two clocks, so that their difference says nothing by itself; but the fastest
+    sample of a publisher took about no time, and how much more another one took is its lateness.
+
+    What a publisher's first sample cannot tell: it may be late itself. Either clock may be set in
+    between: a step of ours is measured, a publisher's step back shows in its stamps, and one
     forward makes its samples look faster than any before.
     """
 
@@ -192,7 +195,7 @@ class Lateness:
             fastest = took
             known = None
         else:
-            fastest = min(took, known.fastest + round(max(0, received - known.at) * _DRIFT))
+            fastest = min(took, known.fastest + round(max(0, received - known.at) * _MAX_DRIFT))
         behind = known is not None and sent < known.newest
         newest = sent if known is None else max(sent, known.newest)
         self._publishers[publisher] = _Publisher(fastest, received, newest, behind)
@@ -207,7 +210,7 @@ class Lateness:
     def _follow_clock(self) -> None:
         offset = _offset()
         step = offset - self._offset
-        if abs(step) < _STEP:
+        if abs(step) < _MIN_STEP_NS:
             return
         self._offset = offset
         for publisher, known in self._publishers.items():

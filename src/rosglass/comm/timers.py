@@ -1,4 +1,4 @@
-"""Jobs that run after a while, on one thread for all of them."""
+"""A node's scheduler: jobs that run later or again and again, and limits that are watched."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ def test_a_job_may_close_its_dispatcher(dispatcher):
 
 
 def test_a_job_that_hangs_does_not_hang_closing(dispatcher, monkeypatch, caplog):
-    monkeypatch.setattr("rosglass.comm.executor._PATIENCE", 0.05)
+    monkeypatch.setattr("rosglass.comm.executor._CLOSE_TIMEOUT_S", 0.05)
     started, go_on = threading.Event(), threading.Event()
     dispatcher.post(lambda: (started.set(), go_on.wait(30)))
     assert started.wait(30)
@@ -135,7 +135,7 @@ def test_a_worker_survives_an_error_in_its_job(caplog):
 
 
 def test_a_worker_that_hangs_does_not_hang_closing(monkeypatch, caplog):
-    monkeypatch.setattr("rosglass.comm.timers._PATIENCE", 0.05)
+    monkeypatch.setattr("rosglass.comm.timers._CLOSE_TIMEOUT_S", 0.05)
     started, go_on = threading.Event(), threading.Event()
     worker = Worker("test worker", lambda _: (started.set(), go_on.wait(30)), pause=10)
     worker.wake()

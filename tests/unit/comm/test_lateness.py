@@ -5,7 +5,7 @@ import pytest
 from rosglass import Duration, QoS
 from rosglass.comm import IMMEDIATE, Sample, Subscription
 from rosglass.comm import lateness as module
-from rosglass.comm.statistics import Lateness
+from rosglass.comm.statistics import LatencyEstimator
 
 P = b"p" * 16
 MS = 1_000_000
@@ -27,7 +27,7 @@ def offset(monkeypatch):
 
 def lateness_of(*samples):
     """Return the lateness in ms of samples given by (received, sent), in ms."""
-    seen = Lateness()
+    seen = LatencyEstimator()
     return [seen.see(P, received * MS, sent * MS) / MS for received, sent in samples]
 
 
@@ -83,7 +83,7 @@ def test_one_sample_that_was_overtaken_does_not_count_as_a_clock_set_back(offset
 
 @pytest.mark.parametrize("step", [3600 * S, -3600 * S])
 def test_a_step_of_our_own_clock_is_measured(offset, step):
-    seen = Lateness()
+    seen = LatencyEstimator()
     assert seen.see(P, 100 * S, 100 * S) == 0
     offset[0] = step
     assert seen.see(P, 101 * S + step, 101 * S) == pytest.approx(0, abs=MS)
@@ -91,7 +91,7 @@ def test_a_step_of_our_own_clock_is_measured(offset, step):
 
 
 def test_unknown_publishers_and_many_of_them(offset):
-    seen = Lateness()
+    seen = LatencyEstimator()
     assert seen.of(P, 10, 5) == 0
     for number in range(2000):
         seen.see(number.to_bytes(16, "big"), 10, 5)

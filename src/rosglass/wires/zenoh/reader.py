@@ -20,7 +20,7 @@ import zenoh
 import zenoh.ext
 
 from rosglass.comm import Durability, EndpointKind, Reliability
-from rosglass.comm.statistics import Lateness
+from rosglass.comm.statistics import LatencyEstimator
 from rosglass.wires.base import OnSample, Reader
 from rosglass.wires.zenoh.endpoints import Declaration, Owner, Pump
 from rosglass.wires.zenoh.keys import ATTACHMENT, HUMBLE_HASH, NO_ATTACHMENT
@@ -278,7 +278,7 @@ class ZenohReader(Declaration, Reader):
         self._way = _Way.DIRECT
         self._eager, self._moving = True, False
         self._known: dict[bytes, tuple[str, int]] = {}
-        self._lateness = Lateness()
+        self._lateness = LatencyEstimator()
         self._warned = self._anonymous = False
         self._count = self._largest = self._marked = 0
         self._marked_at, self._rate = time.monotonic(), 0.0
