@@ -27,16 +27,16 @@ RANK = {
     "ros1": 5,
     "ros2": 5,
     "wires": 6,
-    "connection": 7,
-    "bags": 6,
+    "connection": 8,
+    "bags": 7,
     "bridge": 6,
     "tf": 6,
     "images": 6,
     "qt": 6,
-    "qml": 8,
-    "rviz": 9,
-    "cli": 11,
-    "demo": 10,
+    "qml": 9,
+    "rviz": 10,
+    "cli": 12,
+    "demo": 11,
 }
 QT = {"PySide6", "PySide2", "PyQt5", "PyQt6", "shiboken6", "shiboken2"}
 MODULES = sorted(ROOT.rglob("*.py"))

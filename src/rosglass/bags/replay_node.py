@@ -2,38 +2,58 @@
 
 from __future__ import annotations
 
-import threading
+import time
+import uuid
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl, quote, unquote
 
 from rosglass.bags.bag import open_bag
-from rosglass.bags.local_world import LocalNode, LocalWorld, SilentPublisher
 from rosglass.bags.playback import Playback
-from rosglass.comm import ConnectionState, Publisher, QoS, Status, Time
-from rosglass.errors import ConversionError, NodeClosedError, UnsupportedError
+from rosglass.comm import (
+    IMMEDIATE,
+    ConnectionState,
+    Durability,
+    Node,
+    Publisher,
+    QoS,
+    Status,
+    Time,
+)
+from rosglass.errors import (
+    ConversionError,
+    TypeNotFoundError,
+    UnsupportedError,
+)
+from rosglass.interfaces.names import join_name
+from rosglass.messages import MessageType, OpaqueType
+from rosglass.ros2.node import Ros2Node
+from rosglass.ros2.types import Types
+from rosglass.wires.base import Writer
+from rosglass.wires.local import LocalMiddleware, LocalWriter
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
-    from rosglass.comm import NodeName, Sample
-    from rosglass.messages import Message, MessageType
+    from rosglass.comm import EndpointInfo, Executor, NodeName, Sample, Subscription
+    from rosglass.messages import Message
 
 __all__ = ["ReplayNode", "connect_replay", "replay_url"]
 
 #: How the address of a recording begins.
 _SCHEME = "replay:"
-#: Seconds until the first message: whoever connects subscribes meanwhile.
-_DELAY = 0.5
+#: Seconds until the first message: subscriptions are made meanwhile.
+_DELAY_S = 0.5
 #: Seconds of which the newest messages are shown at a place that was sought out.
-_CONTEXT = 3.0
+_CONTEXT_S = 3.0
 _OPTIONS = "rate=2, loop=true, paused=true"
 
 
-class ReplayNode(LocalNode):
+class ReplayNode(Ros2Node):
     """A node to which a recording is played.
 
     Its subscriptions receive what was recorded, its clock shows the recording's time, and what it
-    publishes reaches nobody. A recorded ``/clock`` is the time; without one, the times at which
+    publishes is sent nowhere. A recorded ``/clock`` is the time; without one, the times at which
     the messages were recorded.
 
     Args:
@@ -64,11 +84,21 @@ class ReplayNode(LocalNode):
         paused: bool = False,
     ) -> None:
         bag = open_bag(path)
-        # What is of both worlds is translated.
+        # Messages of both ROS in one recording are translated to ROS 2's.
         ros1 = bool(bag.channels) and all(channel.wire == "ros1" for channel in bag.channels)
-        super().__init__(LocalWorld("ros1" if ros1 else "cdr"), url, name, namespace)
-        self._stage = LocalNode(self.world, url, "recording")
-        self._closing = threading.Lock()
+        wire = "ros1" if ros1 else "cdr"
+        local = f"local://replay-{uuid.uuid4().hex}"
+        try:
+            super().__init__(_ReplayWire(local, wire), url, name, namespace)
+        except BaseException:
+            bag.close()
+            raise
+        self._played = _ReplayWire(local, wire)
+        self._played.arrival = lambda: self.clock.now().nanoseconds
+        self._stage = _Stage(self._played, url, "recording")
+        self._core.types = _RecordedTypes(url, 1 if ros1 else 2, self._stage.types)
+        self._core.create_writer = lambda *_: _DiscardingWriter()
+        self._core.clock.simulate(True)
         try:
             self.playback = Playback(
                 self._stage,
@@ -77,21 +107,33 @@ class ReplayNode(LocalNode):
                 loop=loop,
                 paused=paused,
                 clock=True,
-                delay=_DELAY,
-                context=_CONTEXT,
+                delay=_DELAY_S,
+                context=_CONTEXT_S,
             )
+            if not self.playback.has_clock:
+                # The clock ticks; messages came in between.
+                self._played.arrival = lambda: self.playback.moment
+                self._core.clock.advance(Time(self.playback.start))
+            super().create_subscription(
+                "/clock", "rosgraph_msgs/msg/Clock", qos=QoS.clock(),
+                raw_callback=self._on_tick, executor=IMMEDIATE,
+            )  # fmt: skip
         except BaseException:
-            self.world.close()
+            super().close()
+            self._stage.close()
             raise
-        if not self.playback.has_clock:
-            # The clock ticks; messages came in between.
-            self.world.arrival = lambda: self.playback.moment
-            self.world.clock.advance(Time(self.playback.start))
-        self._status = Status(ConnectionState.CONNECTED, f"playing the recording {path}")
+        self._path = path
 
     def choose(self, topics: Iterable[str]) -> None:
         """Play these topics only; all when there are none."""
-        self.world.choose(self.resolve(topic) for topic in topics)
+        self._played.choose({self.resolve(topic) for topic in topics})
+
+    def status(self) -> Status:
+        """Return which recording is played."""
+        found = super().status()
+        if found.state is not ConnectionState.CONNECTED:
+            return found
+        return Status(ConnectionState.CONNECTED, f"playing the recording {self._path}")
 
     def steady(self) -> float:
         """Return seconds that pass only while the recording is played."""
@@ -101,69 +143,198 @@ class ReplayNode(LocalNode):
         self, topic: str, type: str | MessageType, qos: QoS | int = 10
     ) -> Publisher:
         """Return a publisher whose messages reach nobody, and which says so."""
-        self._check_open()
-        kind = self.world.find(type) if isinstance(type, str) else type
+        self._core.check_open()
+        kind = self._core.types.message(type)
         profile = qos if isinstance(qos, QoS) else QoS(depth=qos)
-        return _Nowhere(self.resolve(topic), kind, profile)
+        return _UnheardPublisher(self._core, self.resolve(topic), kind, profile)
+
+    def create_subscription(
+        self,
+        topic: str,
+        type: str | MessageType | None = None,
+        callback: Callable[[Message], None] | None = None,
+        qos: QoS | int = 10,
+        *,
+        raw_callback: Callable[[Sample], None] | None = None,
+        executor: Executor | None = None,
+        ignore_local: bool = False,
+    ) -> Subscription:
+        """Subscribe to a topic; arguments and errors as for every node."""
+        publishers = self.publishers(topic)
+        # Known at once: a recording that is paused sends nothing a second time.
+        known = publishers[0].type if type is None and publishers else type
+        if self.wire == "ros1":
+            # ROS 1 sends what is latched to every subscriber.
+            profile = qos if isinstance(qos, QoS) else QoS(depth=qos)
+            qos = replace(profile, durability=Durability.BEST_AVAILABLE)
+        return super().create_subscription(
+            topic,
+            known,
+            callback,
+            qos,
+            raw_callback=raw_callback,
+            executor=executor,
+            ignore_local=ignore_local,
+        )
 
     def fetch_type(
         self,
         name: str,
         *,
-        hash: str = "",  # noqa: ARG002 - a recording has one version
-        node: str | NodeName | None = None,  # noqa: ARG002 - the same
-        timeout: float | None = 5.0,  # noqa: ARG002 - nobody is waited for
+        hash: str = "",
+        node: str | NodeName | None = None,  # noqa: ARG002 - the recording has no nodes
+        timeout: float | None = 5.0,  # noqa: ARG002 - it answers at once
     ) -> MessageType:
         """Return a type as it was recorded, else as this machine knows it."""
-        return self.world.find(name)
+        return self._core.types.message(name, hash)
 
     def close(self) -> None:
         """Stop playing; safe to call twice."""
-        with self._closing:
-            if self._closed:
-                return
-            super().close()
         self.playback.close()
         self._stage.close()
-        self.world.close()
+        super().close()
+
+    # A recording answers no requests.
+    create_service_client = Node.create_service_client
+    create_service_server = Node.create_service_server
+    create_action_client = Node.create_action_client
+    create_action_server = Node.create_action_server
+    create_parameter_client = Node.create_parameter_client
+    create_lifecycle_client = Node.create_lifecycle_client
+    fetch_type_async = Node.fetch_type_async
+    parameters = Node.parameters  # type: ignore[assignment]
 
     def _unsupported(self, what: str) -> UnsupportedError:
         return UnsupportedError(
             f"{what}: {self.playback.path} is a recording, which answers nobody"
         )
 
+    def _on_tick(self, sample: Sample) -> None:
+        self._core.clock.advance(Time(sample.message().clock.nanoseconds))
 
-class _Nowhere(SilentPublisher):
-    """Takes what an interface publishes while it shows a recording."""
 
-    def __init__(self, topic: str, kind: MessageType, qos: QoS) -> None:
-        self.topic, self.type, self.qos = topic, kind, qos.for_publisher()
-        self._closed = False
+class _Stage(Ros2Node):
+    """The node that publishes what was recorded.
 
-    def publish(self, message: Message | dict[str, Any] | None = None, /, **fields: Any) -> None:
-        """Check a message as a robot would."""
-        self.publish_serialized(self.type.encode(fields if message is None else message))
+    Attributes:
+        types: What it publishes.
+    """
 
-    def publish_serialized(
-        self,
-        data: bytes | bytearray | memoryview | Sample,  # noqa: ARG002 - it goes nowhere
-    ) -> None:
-        """Take what is encoded already."""
-        if self._closed:
-            raise NodeClosedError(f"the publisher of {self.topic} is closed")
+    def __init__(self, middleware: LocalMiddleware, url: str, name: str) -> None:
+        super().__init__(middleware, url, name)
+        self.types: list[MessageType] = []
 
-    def subscription_count(self) -> int:
-        """Return that nobody listens."""
-        return 0
+    def create_publisher(
+        self, topic: str, type: str | MessageType, qos: QoS | int = 10
+    ) -> Publisher:
+        """Announce a topic of the recording."""
+        if isinstance(type, MessageType):
+            self.types.append(type)
+        return super().create_publisher(topic, type, qos)
+
+
+class _ReplayWire(LocalMiddleware):
+    """A node's end of the wire between a recording and those who watch it.
+
+    Args:
+        url: ``local://NAME``.
+        wire: Wire format of the recording.
+
+    Attributes:
+        arrival: Returns when a message that is sent now arrived, nanoseconds since the Unix epoch.
+    """
+
+    # Recorded are messages that were received, whatever was asked for then.
+    matches_qos = False
+
+    arrival: Callable[[], int] = time.time_ns
+
+    def __init__(self, url: str, wire: str) -> None:
+        super().__init__(url, wire)
+        self._writers: list[LocalWriter] = []
+
+    def create_writer(self, endpoint: EndpointInfo) -> LocalWriter:
+        """Announce a recorded topic."""
+        self._writers.append(super().create_writer(endpoint))
+        return self._writers[-1]
+
+    def stamp(self) -> tuple[int, int | None]:
+        """Return when the sample that is sent now was recorded."""
+        return self.arrival(), None
+
+    def choose(self, topics: set[str]) -> None:
+        """Show these topics, and ``/clock``; all when there are none."""
+        for writer in self._writers:
+            writer.hide()
+            if not topics or writer.info.name in {*topics, "/clock"}:
+                writer.show()
+
+
+class _RecordedTypes(Types):
+    """Finds types as they were recorded, others in the library.
+
+    Args:
+        url: The node's URL, for messages.
+        ros: The ROS of the recording.
+        recorded: The types that are played.
+    """
+
+    def __init__(self, url: str, ros: int, recorded: list[MessageType]) -> None:
+        super().__init__(None, url, ros)
+        self._recorded = recorded
+
+    def message(self, wanted: str | MessageType, hash: str = "") -> MessageType:
+        """Return a message type; arguments and errors as for :class:`Types`."""
+        if isinstance(wanted, str):
+            found = self._find_recorded(join_name(wanted), hash)
+            if isinstance(found, OpaqueType):
+                raise TypeNotFoundError(found.reason)
+            if found is not None:
+                return found
+        return super().message(wanted, hash)
+
+    def opaque(self, name: str, hash: str, reason: str) -> OpaqueType:
+        """Return what stands for a message type without definition."""
+        found = self._find_recorded(name, hash)
+        return found if isinstance(found, OpaqueType) else super().opaque(name, hash, reason)
+
+    def request(self, *_: Any) -> str:
+        """Say that no robot is there to be asked."""
+        return "a recording cannot be asked for it"
+
+    def _find_recorded(self, name: str, hash: str) -> MessageType | None:
+        for found in self._recorded:
+            if found.name == name and hash in ("", found.type_hash):
+                return found
+        return None
+
+
+class _UnheardPublisher(Publisher):
+    """Checks what an interface publishes while it shows a recording."""
 
     @property
     def problem(self) -> str:
-        """Why nobody gets anything."""
+        """Why no robot gets anything."""
         return "this is a recording: what is published reaches no robot"
 
+    @property
+    def hint(self) -> str:
+        """Nothing: the recording has no subscriptions."""
+        return ""
+
+
+class _DiscardingWriter(Writer):
+    """The sending end of a publisher without robot."""
+
+    def write(self, data: bytes | bytearray) -> None:
+        """Send nothing."""
+
+    def subscribers(self) -> list[EndpointInfo]:
+        """Return none."""
+        return []
+
     def close(self) -> None:
-        """Take no more; safe to call twice."""
-        self._closed = True
+        """Do nothing."""
 
 
 def connect_replay(url: str, name: str, namespace: str) -> ReplayNode:

@@ -65,7 +65,7 @@ class Publisher(Handle):
     def __init__(self, core: NodeCore[Any], topic: str, type: MessageType, qos: QoS) -> None:
         self.topic, self.type = topic, type
         self._core, self._wire = core, core.wire
-        self._hash = type.md5 if self._wire == "ros1" else type.rihs01
+        self._hash = type.type_hash
         self._closed = False
         self._process = os.getpid()
         self._problem = ""

@@ -132,6 +132,11 @@ class MessageType:
         return interfaces.rihs01(self.definition)
 
     @property
+    def type_hash(self) -> str:
+        """What peers tell versions of the type apart by: RIHS01, in ROS 1 the md5 sum."""
+        return self.md5 if self.ros == 1 else self.rihs01
+
+    @property
     def fields(self) -> tuple[Field, ...]:
         """The fields in wire order."""
         return self.definition.fields

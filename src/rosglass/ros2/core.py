@@ -50,7 +50,6 @@ class Core(NodeCore[Handle]):
         RosArgumentError: A remapping rule makes a name that is not valid.
     """
 
-    wire = "cdr"
     graph: Graph
     types: Types
 
@@ -63,13 +62,13 @@ class Core(NodeCore[Handle]):
         arguments: Arguments = NO_ARGUMENTS,
     ) -> None:
         super().__init__(name, url, _log)
-        self.middleware, self.arguments = middleware, arguments
+        self.middleware, self.wire, self.arguments = middleware, middleware.wire, arguments
         self.create_writer = lambda endpoint, _: middleware.create_writer(endpoint)
         self._new_names = {
             kind: arguments.remappings(kind, name.name, name.namespace)
             for kind in ("topic", "service")
         }
-        self.types = Types(library, url)
+        self.types = Types(library, url, ros=1 if self.wire == "ros1" else 2)
         self.windows: WeakValueDictionary[str, RequestWindow] = WeakValueDictionary()
         self._moved = True
         self._told = middleware.status()

@@ -170,7 +170,7 @@ class GraphMatching(TopicMatching):
             message_type.name,
             self._core.name,
             self._feed.qos,
-            message_type.rihs01,
+            message_type.type_hash,
         )
         reader = self._core.middleware.create_reader(endpoint, self._receiver())
         with self._lock:
@@ -189,6 +189,7 @@ class GraphMatching(TopicMatching):
         accepted, find_type = self._types.accepted, self._types.find_type
         ignored = self._ignored
         seen, deliver = self._repeats.seen, self._feed.deliver
+        wire = self._core.wire
         # As Sample(...) does, in half the time.
         make = tuple.__new__
 
@@ -203,6 +204,6 @@ class GraphMatching(TopicMatching):
             kind = accepted.get(hash) or find_type(hash)
             if kind is None or seen(gid, sequence, sent) or gid in ignored:
                 return
-            deliver(make(Sample, (data, "cdr", kind, received, sent, gid, sequence)))
+            deliver(make(Sample, (data, wire, kind, received, sent, gid, sequence)))
 
         return receive

@@ -68,7 +68,6 @@ class Ros2Node(CoreNode):
         RosArgumentError: A remapping rule makes a name that is not valid.
     """
 
-    wire = "cdr"
     _core: Core
 
     def __init__(
@@ -85,6 +84,7 @@ class Ros2Node(CoreNode):
         validate_node_name(name)
         validate_namespace(namespace)
         self.url, self.name, self.namespace = url, name, namespace
+        self.wire = middleware.wire
         self._core = Core(NodeName(namespace, name), url, middleware, library, arguments)
         self._fetcher = TypeFetcher(self._core)
         self._builtin_services = BuiltinServices(self._core, RclServices(self, self._core))

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rosglass.comm import EndpointInfo
-    from rosglass.messages import MessageType, OpaqueType
+    from rosglass.messages import MessageType
     from rosglass.ros2.types import Types
 
 __all__ = ["TopicTypes"]
@@ -81,7 +81,7 @@ class TopicTypes:
         if ours is not None and not self._hash:
             # Opaque without hash: any will do, and is kept for passing the samples on.
             if len(self.accepted) <= _MAX_STRANGERS:
-                self.accepted[type_hash] = _opaque(
+                self.accepted[type_hash] = self._types.opaque(
                     ours.name, type_hash, getattr(ours, "reason", "")
                 )
             return self.accepted.get(type_hash, ours)
@@ -164,7 +164,7 @@ class TopicTypes:
                 failure = self._failures[name, version]
                 if not failure.pending and version not in self._undefined:
                     self._undefined.add(version)
-                    self.accepted[version] = _opaque(name, version, failure.reason)
+                    self.accepted[version] = self._types.opaque(name, version, failure.reason)
 
     def _load(
         self, name: str, version: str, publishers: Sequence[EndpointInfo], retry: bool
@@ -185,11 +185,11 @@ class TopicTypes:
         self._makeshift = False
         self._strangers.clear()
         self._undefined.clear()
-        self.type, self._hash = found, found.rihs01
+        self.type, self._hash = found, found.type_hash
         self.accepted = {"": found, self._hash: found}
 
     def _take_opaque(self, name: str, type_hash: str, reason: str) -> None:
-        made = _opaque(name, type_hash, reason)
+        made = self._types.opaque(name, type_hash, reason)
         if self.type != made:
             self._take(made)
         self._makeshift = True
@@ -241,12 +241,6 @@ class _Failure:
             f"{who} publishes {name}, which cannot be decoded: {self.reason}; {effect}this is "
             "tried again until a definition is found"
         )
-
-
-def _opaque(name: str, type_hash: str, reason: str) -> OpaqueType:
-    from rosglass.messages import OpaqueType  # noqa: PLC0415 - numpy
-
-    return OpaqueType(name, type_hash, reason)
 
 
 def _full_name(name: str) -> str:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from rosglass.comm import EndpointInfo, Promise
     from rosglass.interfaces import InterfaceDefinition, Library
-    from rosglass.messages import ActionType, MessageType, ServiceType
+    from rosglass.messages import ActionType, MessageType, OpaqueType, ServiceType
 
     _T = TypeVar("_T", MessageType, ServiceType, ActionType)
 
@@ -50,13 +50,14 @@ class Types:
     Args:
         library: Where definitions come from; None for the shared library.
         url: The node's URL, for messages.
+        ros: The ROS whose types these are.
 
     Attributes:
         fetcher: Asks the robot; None while nobody can.
     """
 
-    def __init__(self, library: Library | None, url: str) -> None:
-        self._library, self._url = library, url
+    def __init__(self, library: Library | None, url: str, ros: int = 2) -> None:
+        self._library, self._url, self._ros = library, url, ros
         self.fetcher: Fetcher | None = None
         #: Each once: those of an action are derived anew for each server and client.
         self._used: list[InterfaceDefinition] = []
@@ -78,12 +79,18 @@ class Types:
 
         Raises:
             TypeNotFoundError: Nobody has it, or it is not a message.
-            UnsupportedError: It is ROS 1's.
+            UnsupportedError: It is the other ROS's.
             DefinitionConflictError: Nobody's definition has `hash`.
         """
         from rosglass.messages import MessageType  # noqa: PLC0415 - numpy
 
         return self._find(wanted, MessageType, hash, "message", "std_msgs/msg/String")
+
+    def opaque(self, name: str, hash: str, reason: str) -> OpaqueType:
+        """Return what stands for a message type without definition."""
+        from rosglass.messages import OpaqueType  # noqa: PLC0415 - numpy
+
+        return OpaqueType(name, hash, reason, ros=self._ros)
 
     def service(self, wanted: str | ServiceType, hash: str = "") -> ServiceType:
         """Return a service type; arguments and errors as in :meth:`message`."""
@@ -161,7 +168,7 @@ class Types:
 
         if not isinstance(wanted, str):
             return self._check(wanted, kind, word, example)
-        found = load(wanted, ros=2, library=self._library, hash=hash)
+        found = load(wanted, ros=self._ros, library=self._library, hash=hash)
         return self._check(found, kind, word, example)
 
     def _check(self, found: object, kind: type[_T], word: str, example: str) -> _T:
@@ -171,10 +178,10 @@ class Types:
                 f"{found!r} is not {article} {word} type; give a name such as {example} "
                 f"or what rosglass.load() returns for {article} {word}"
             )
-        if found.ros != 2:
+        if found.ros != self._ros:
             raise UnsupportedError(
-                f"{found.name} is ROS 1's definition, and {self._url} is a ROS 2 graph; "
-                f"load it with rosglass.load({found.name!r}, ros=2)"
+                f"{found.name} is ROS {found.ros}'s definition, and {self._url} is a ROS "
+                f"{self._ros} graph; load it with rosglass.load({found.name!r}, ros={self._ros})"
             )
         with suppress(TypeNotFoundError):  # opaque types have none
             if found.definition not in self._used:

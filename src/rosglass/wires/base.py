@@ -264,11 +264,13 @@ class Middleware(ABC):
         matches_hashes: Whether endpoints whose types have one name but different hashes exchange
             nothing.
         keeps_byte_order: Whether big-endian payloads arrive as such.
+        wire: Format of the payloads, ``cdr`` or ``ros1``.
     """
 
     matches_qos: bool
     matches_hashes: bool = True
     keeps_byte_order: bool = True
+    wire: str = "cdr"
     #: Whether a service's hash in the graph may be that of its request's type.
     announces_requests: bool = False
     #: Whether :meth:`describe_type` can tell anything.

@@ -107,11 +107,10 @@ class _Network:
         info = endpoint.info
         place = info.kind, info.name, info.type
         with self._lock:
-            left = tuple(one for one in self._endpoints[place] if one is not endpoint)
+            there = self._endpoints.pop(place, ())
+            left = tuple(one for one in there if one is not endpoint)
             if left:
                 self._endpoints[place] = left
-            else:
-                del self._endpoints[place]
             graphs = self._graphs
             others = self.counterparts(info)
         for graph in graphs:
@@ -143,9 +142,18 @@ class _Endpoint(Handle, Generic[_Other]):
 
     def _open(self) -> None:
         self._owner.add(self)
+        self.show()
+
+    def show(self) -> None:
+        """Join all graphs, and exchange data with the counterparts there."""
         for other in self._network.add(self):
             self.link(other)
             other.link(self)
+
+    def hide(self) -> None:
+        """Leave all graphs until :meth:`show`; safe to call twice."""
+        for other in self._network.remove(self):
+            other.unlink(self)
 
     def link(self, other: _Other) -> None:
         """Take note of a counterpart that has come, or was there first."""
@@ -159,8 +167,7 @@ class _Endpoint(Handle, Generic[_Other]):
             if self.closed:
                 return
             self.closed = True
-        for other in self._network.remove(self):
-            other.unlink(self)
+        self.hide()
         self._owner.remove(self)
 
     def _counterparts(self) -> tuple[_Other, ...]:
@@ -190,10 +197,11 @@ class LocalWriter(_Endpoint["LocalReader"], Writer):
 
     def write(self, data: bytes | bytearray) -> None:
         """Send a payload; it has arrived when this returns."""
-        now = time.time_ns()
+        received, sent = self._owner.stamp()
         with self._lock:
             self._check_open()
-            sample = (bytes(data), now, now, self.gid, next(self._numbers), self.info.type_hash)
+            number = next(self._numbers)
+            sample = (bytes(data), received, sent, self.gid, number, self.info.type_hash)
             self._kept.append((time.monotonic() + self._lifespan_s, sample))
             readers = self._readers
         for reader in readers:
@@ -203,7 +211,9 @@ class LocalWriter(_Endpoint["LocalReader"], Writer):
         """Send to a reader from now on, what was kept first."""
         # Under the lock, so that the reader gets every sample exactly once.
         with self._lock:
-            if other in self._readers or other.info.qos.conflicts(self.info.qos):
+            if other in self._readers:
+                return
+            if self._owner.matches_qos and other.info.qos.conflicts(self.info.qos):
                 return
             self._readers += (other,)
             late = other.info.qos.durability is Durability.TRANSIENT_LOCAL
@@ -213,6 +223,12 @@ class LocalWriter(_Endpoint["LocalReader"], Writer):
                 other.hold()
         if kept:
             other.catch_up(kept)
+
+    def hide(self) -> None:
+        """Leave all graphs, and send to no reader, until :meth:`show`."""
+        super().hide()
+        with self._lock:
+            self._readers = ()
 
     def unlink(self, other: LocalReader) -> None:
         """Send to a reader no more."""
@@ -373,6 +389,7 @@ class LocalMiddleware(Middleware):
 
     Args:
         url: ``local://NAME``; the name may be empty.
+        wire: Format of the payloads, ``cdr`` or ``ros1``.
 
     Attributes:
         network: What it shares with the other nodes of that name.
@@ -383,12 +400,12 @@ class LocalMiddleware(Middleware):
 
     matches_qos = True
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, wire: str = "cdr") -> None:
         name = url.partition("://")[2].rstrip("/")
         if not _NAME.fullmatch(name):
             expected = "local://NAME with a name of letters, digits, '_', '-' and '.', no options"
             raise ArgumentError("url", url, expected)
-        self._name = name
+        self._name, self.wire = name, wire
         self._lock = threading.Lock()
         self._ends: dict[Handle, None] = {}
         self._graph: Graph | None = None
@@ -408,6 +425,14 @@ class LocalMiddleware(Middleware):
         if self._closed:
             return Status(ConnectionState.CLOSED, "closed")
         return Status(ConnectionState.CONNECTED, "in this process")
+
+    def stamp(self) -> tuple[int, int | None]:
+        """Return when a sample that is sent now arrives, and when it was sent, if that is known.
+
+        Both in nanoseconds since the Unix epoch.
+        """
+        now = time.time_ns()
+        return now, now
 
     def announce(self, node: NodeName) -> Handle:
         """Show a node in the graph until the handle is closed."""

@@ -15,9 +15,10 @@ from waiting import eventually
 import rosglass
 from rosglass import load
 from rosglass.bags import Player, ReplayNode, open_bag
-from rosglass.comm import ConnectionState, QoS, Time
+from rosglass.comm import ConnectionState, Duration, QoS, Time
 from rosglass.errors import BagError, ConversionError, NodeClosedError, UnsupportedError
 from rosglass.interfaces import full_text
+from rosglass.messages import MessageType, OpaqueType
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -235,7 +236,7 @@ def test_another_type_than_recorded_is_told(drive, play):
     node = play(drive)
     other = node.create_subscription("/chatter", "std_msgs/msg/Bool")
     eventually(lambda: other.problem)
-    assert other.problem == "this is std_msgs/msg/String here, not std_msgs/msg/Bool"
+    assert other.problem == "/recording publishes std_msgs/msg/String here, not std_msgs/msg/Bool"
     assert "chatter" in node.create_subscription("/chater").hint
 
 
@@ -254,6 +255,56 @@ def test_a_ros_1_recording(tmp_path, play):
     eventually(lambda: len(found) == 5)
     assert found == ["0", "1", "2", "3", "4"]
     assert node.now() >= Time(START)
+
+
+def test_a_ros_1_recording_sends_what_is_latched_to_every_subscriber(tmp_path, play):
+    store = get_typestore(Stores.ROS1_NOETIC)
+    kind = store.types[STRING]
+    path = tmp_path / "latched.bag"
+    with rosbag1.Writer(path) as writer:
+        for topic, latching in (("/plan", 1), ("/chatter", 0)):
+            connection = writer.add_connection(topic, STRING, typestore=store, latching=latching)
+            writer.write(connection, START, store.serialize_ros1(kind(data=topic), STRING))
+    node = play(path)
+    eventually(lambda: not node.playback.is_playing)
+    plan, chatter = listen(node, "/plan"), listen(node, "/chatter")
+    eventually(lambda: plan == ["/plan"])
+    node.playback.seek(0.0)
+    eventually(lambda: not node.playback.is_playing)
+    assert set(chatter) <= {"/chatter"}
+
+
+def test_a_recording_is_received_whatever_quality_of_service_was_offered(tmp_path, play):
+    # What was received once is not withheld now.
+    node = play(write(tmp_path / "drive.mcap"), "?rate=20")
+    asked = QoS(depth=100, deadline=Duration.from_seconds(0.001))
+    found = listen(node, "/chatter", qos=asked)
+    eventually(lambda: len(found) == 21)
+
+
+def test_types_that_only_the_recording_knows(tmp_path, play):
+    path = tmp_path / "own.mcap"
+    writer = mcap_writer.Writer(str(path))
+    writer.start("ros2")
+    own = MessageType.from_text("own_msgs/msg/Height", "float64 metres")
+    schema = writer.register_schema(own.name, "ros2msg", b"float64 metres")
+    number = writer.register_channel("/height", "cdr", schema)
+    writer.add_message(number, START, own.encode(metres=2.5), START)
+    unknown = writer.register_schema("own_msgs/msg/Lost", "", b"")
+    number = writer.register_channel("/lost", "cdr", unknown)
+    writer.add_message(number, START, b"\0\1\0\0abcd", START)
+    writer.finish()
+    node = play(path, "?paused=true")
+    assert node.fetch_type("own_msgs/msg/Height").fields[0].name == "metres"
+    heights = [node.create_subscription("/height", given) for given in (None, own.name)]
+    lost = node.create_subscription("/lost", callback=lambda _: None)
+    samples = node.create_subscription("/lost")
+    eventually(lambda: "the recording has no definition of it" in lost.problem)
+    eventually(lambda: samples.type is not None)
+    node.playback.play()
+    assert [height.wait(30).message().metres for height in heights] == [2.5, 2.5]
+    assert samples.wait(30).data == b"\0\1\0\0abcd"
+    assert isinstance(samples.type, OpaqueType)
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,7 @@ def test_what_takes_the_place_of_a_member_is_there(kind):
 
 @pytest.mark.parametrize("kind", rclpy_names.MEMBERS)
 def test_errors_about_members_cover_up_no_member_and_make_no_attribute_slow(kind):
-    importlib.import_module("rosglass.bags.local_world")
+    importlib.import_module("rosglass.bags.replay_node")
     for wire in (rosglass.ros1, rosglass.ros2):
         for module in pkgutil.iter_modules(wire.__path__, f"{wire.__name__}."):
             importlib.import_module(module.name)
