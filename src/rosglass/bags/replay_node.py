@@ -96,7 +96,8 @@ class ReplayNode(Ros2Node):
         self._played = _ReplayWire(local, wire)
         self._played.arrival = lambda: self.clock.now().nanoseconds
         self._stage = _Stage(self._played, url, "recording")
-        self._core.types = _RecordedTypes(url, 1 if ros1 else 2, self._stage.types)
+        self._recorded_types = _RecordedTypes(url, 1 if ros1 else 2, self._stage.types)
+        self._core.types = self._recorded_types
         self._core.create_writer = lambda *_: _DiscardingWriter()
         self._core.clock.simulate(True)
         try:
@@ -160,13 +161,18 @@ class ReplayNode(Ros2Node):
         ignore_local: bool = False,
     ) -> Subscription:
         """Subscribe to a topic; arguments and errors as for every node."""
-        publishers = self.publishers(topic)
-        # Known at once: a recording that is paused sends nothing a second time.
-        known = publishers[0].type if type is None and publishers else type
+        recorded, known = self._played.recorded(self.resolve(topic)), type
+        if recorded and (type is None or isinstance(type, str)):
+            # Known at once, also while the topic is left out: a recording that is paused sends
+            # nothing a second time.
+            known = recorded[0].type if type is None else type
+            if callback is None:
+                known = self._recorded_types.find_opaque(known) or known
+        profile = qos if isinstance(qos, QoS) else QoS(depth=qos)
         if self.wire == "ros1":
             # ROS 1 sends what is latched to every subscriber.
-            profile = qos if isinstance(qos, QoS) else QoS(depth=qos)
-            qos = replace(profile, durability=Durability.BEST_AVAILABLE)
+            profile = replace(profile, durability=Durability.BEST_AVAILABLE)
+        qos = profile.for_subscription([info.qos for info in recorded])
         return super().create_subscription(
             topic,
             known,
@@ -265,9 +271,14 @@ class _ReplayWire(LocalMiddleware):
     def choose(self, topics: set[str]) -> None:
         """Show these topics, and ``/clock``; all when there are none."""
         for writer in self._writers:
-            writer.hide()
             if not topics or writer.info.name in {*topics, "/clock"}:
                 writer.show()
+            else:
+                writer.hide()
+
+    def recorded(self, topic: str) -> list[EndpointInfo]:
+        """Return the publishers of a topic, also while it is left out."""
+        return [writer.info for writer in self._writers if writer.info.name == topic]
 
 
 class _RecordedTypes(Types):
@@ -297,6 +308,11 @@ class _RecordedTypes(Types):
         """Return what stands for a message type without definition."""
         found = self._find_recorded(name, hash)
         return found if isinstance(found, OpaqueType) else super().opaque(name, hash, reason)
+
+    def find_opaque(self, name: str) -> OpaqueType | None:
+        """Return what stands for a type that was recorded without definition."""
+        found = self._find_recorded(join_name(name), "")
+        return found if isinstance(found, OpaqueType) else None
 
     def request(self, *_: Any) -> str:
         """Say that no robot is there to be asked."""

@@ -95,7 +95,8 @@ class _Network:
         info = endpoint.info
         with self._lock:
             there = self._endpoints.get((info.kind, info.name, info.type), ())
-            self._endpoints[info.kind, info.name, info.type] = (*there, endpoint)
+            if endpoint not in there:
+                self._endpoints[info.kind, info.name, info.type] = (*there, endpoint)
             graphs = self._graphs
             others = self.counterparts(info)
         for graph in graphs:
@@ -145,7 +146,7 @@ class _Endpoint(Handle, Generic[_Other]):
         self.show()
 
     def show(self) -> None:
-        """Join all graphs, and exchange data with the counterparts there."""
+        """Join all graphs, and exchange data with the counterparts there; safe to call twice."""
         for other in self._network.add(self):
             self.link(other)
             other.link(self)
@@ -187,10 +188,10 @@ class LocalWriter(_Endpoint["LocalReader"], Writer):
         self.gid = self.info.gid
         self._readers: tuple[LocalReader, ...] = ()
         self._numbers = itertools.count(1)
-        keeps = qos.durability is Durability.TRANSIENT_LOCAL
+        self._keeps = qos.durability is Durability.TRANSIENT_LOCAL
         depth = None if qos.history is History.KEEP_ALL else qos.depth
         #: The last samples, for readers that come later, each with the time it expires at.
-        self._kept: deque[tuple[float, tuple[Any, ...]]] = deque(maxlen=depth if keeps else 0)
+        self._kept: deque[tuple[float, tuple[Any, ...]]] = deque(maxlen=depth)
         lifespan = qos.lifespan
         self._lifespan_s = float("inf") if lifespan is None else lifespan.seconds
         self._open()
@@ -202,7 +203,8 @@ class LocalWriter(_Endpoint["LocalReader"], Writer):
             self._check_open()
             number = next(self._numbers)
             sample = (bytes(data), received, sent, self.gid, number, self.info.type_hash)
-            self._kept.append((time.monotonic() + self._lifespan_s, sample))
+            if self._keeps:
+                self._kept.append((time.monotonic() + self._lifespan_s, sample))
             readers = self._readers
         for reader in readers:
             reader.take(sample)

@@ -232,6 +232,17 @@ def test_some_topics_only(drive, play):
     eventually(lambda: chatter == ["5"])
 
 
+def test_a_topic_that_was_left_out_is_received_as_soon_as_it_is_chosen(drive, play):
+    # Not first when the node looks at the graph: what a paused recording sends comes once.
+    node = play(drive, "?paused=true")
+    node.choose(["plan"])
+    chatter = node.create_subscription("/chatter")
+    assert chatter.type.name == STRING
+    assert chatter.publisher_count() == 0
+    node.choose([])
+    assert chatter.publisher_count() == 1
+
+
 def test_another_type_than_recorded_is_told(drive, play):
     node = play(drive)
     other = node.create_subscription("/chatter", "std_msgs/msg/Bool")
