@@ -7,8 +7,8 @@ import xml.etree.ElementTree as ET
 import pytest
 
 import rosglass
-from rosglass.wires.dds import peers as dds_peers
-from rosglass.wires.dds.config import domain_config, users_part
+from rosglass.wires.dds import domain as dds_domain
+from rosglass.wires.dds.domain import domain_config, users_part
 from rosglass.wires.dds.options import DdsOptions
 
 
@@ -56,9 +56,9 @@ def test_there_is_room_for_a_hundred_programs_on_a_machine():
 
 def test_peers_are_asked_for_ever_and_by_address(monkeypatch):
     found = [(0, 0, 0, "", ("10.0.0.7", 0))]
-    look_up = dds_peers.socket.getaddrinfo
+    look_up = dds_domain.socket.getaddrinfo
     monkeypatch.setattr(
-        dds_peers.socket,
+        dds_domain.socket,
         "getaddrinfo",
         lambda host, *rest: found if host == "robot" else look_up(host, *rest),
     )
@@ -86,8 +86,8 @@ def test_a_name_server_that_does_not_answer_does_not_hang_us(monkeypatch):
         never.wait(30)
         raise OSError
 
-    monkeypatch.setattr(dds_peers, "_PATIENCE", 0.05)
-    monkeypatch.setattr(dds_peers.socket, "getaddrinfo", look_up)
+    monkeypatch.setattr(dds_domain, "_LOOK_UP_TIMEOUT_S", 0.05)
+    monkeypatch.setattr(dds_domain.socket, "getaddrinfo", look_up)
     with pytest.raises(rosglass.ConnectionLostError, match="no answer within"):
         config("dds://slow")
     never.set()

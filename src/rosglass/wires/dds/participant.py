@@ -1,19 +1,20 @@
-"""One node's place in a DDS domain, and what it tells about the nodes and endpoints in it."""
+"""One node's place in a DDS domain: its participant, and the one thread that hands things on."""
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
+from collections import deque
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from rosglass.errors import NodeClosedError
 from rosglass.wires.dds import cyclone
+from rosglass.wires.dds.cyclone_events import Event, Waitset, set_events
 from rosglass.wires.dds.cyclone_qos import Qos
 from rosglass.wires.dds.discovery_info import PARTICIPANT_USER_DATA, NodeEntities
 from rosglass.wires.dds.domain import Domain
-from rosglass.wires.dds.lingering import Lingering
-from rosglass.wires.dds.pump import Pump
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -24,8 +25,19 @@ if TYPE_CHECKING:
 
 __all__ = ["Participant"]
 
-#: Seconds that closing waits for those who are using it, which takes them milliseconds.
-_PATIENCE = 5.0
+_log = logging.getLogger("rosglass.ros2")
+#: Time that closing waits for users of the participant, which take milliseconds, and for its pump.
+_CLOSE_TIMEOUT_S = 5.0
+#: Time between two looks at readers that are polled: usually, and when much comes.
+_IDLE_POLL_S, _BUSY_POLL_S = 0.03, 0.005
+#: Time until an act of the pump that failed is repeated.
+_BACKOFF_S = 0.1
+#: Time that readers have to acknowledge what was sent last, as long as Cyclone DDS gives them.
+_ACKNOWLEDGE_TIMEOUT_S = 1.0
+#: Time between two looks at lingering writers while a participant is closed.
+_LINGER_POLL_S = 0.002
+#: What the pump knows the lingering writers by; no entity has that number.
+_LINGERING = 0
 
 
 class Participant:
@@ -108,7 +120,7 @@ class Participant:
     def in_use(self) -> Iterator[None]:
         """Keep the participant from being deleted meanwhile.
 
-        What belongs to it goes with it, and with that memory that somebody may be using.
+        What belongs to it goes with it, and with that memory that another thread may be using.
 
         Raises:
             NodeClosedError: It is being closed.
@@ -140,7 +152,7 @@ class Participant:
             self._closed = True
             self.on_nodes = lambda _: None
         with self._use:
-            self._use.wait_for(lambda: not self._users, _PATIENCE)
+            self._use.wait_for(lambda: not self._users, _CLOSE_TIMEOUT_S)
         self.pump.close()
         for end in list(self._leaving.values()):
             end()
@@ -160,3 +172,137 @@ class Participant:
             NodeEntities(node, tuple(readers.get(node, ())), tuple(writers.get(node, ())))
             for node in {**readers, **writers}
         )
+
+
+class Pump:
+    """Waits for a participant's readers and writers, and acts on one after the other.
+
+    A waitset instead of callbacks: those run on the threads that receive, where waiting for the
+    interpreter would let the socket's buffer overflow and hold up every acknowledgement.
+
+    Args:
+        participant: Whose entities it waits for.
+        name: The thread's name.
+    """
+
+    def __init__(self, participant: int, name: str) -> None:
+        self._waitset = Waitset(participant)
+        self._acts: dict[int, Callable[[], bool | None]] = {}
+        self._again: deque[int] = deque()
+        self._idle: dict[int, Callable[[], object]] = {}
+        self._closed = False
+        self._due, self._interval = 0.0, _IDLE_POLL_S
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread.start()
+
+    def watch(self, entity: int, events: Event, act: Callable[[], bool | None]) -> None:
+        """Call `act`, on the pump's thread, when one of `events` happens to an entity.
+
+        New data is reported once, and then only after some was taken: `act` returns whether there
+        may be more, and is called again after the others had their turn. A status is reported until
+        it is read. Deleting the entity ends it; :meth:`forget` lets go of `act`.
+        """
+        set_events(entity, events)
+        self._acts[entity] = act
+        self._waitset.attach(entity, entity)
+
+    def visit(self, entity: int, act: Callable[[], object] | None) -> None:
+        """Call `act` some thirty times a second, whatever happens; more often when it says so.
+
+        None ends that, and lets what :meth:`watch` was given look for data at once.
+        """
+        if act is None:
+            self._idle.pop(entity, None)
+            self._again.append(entity)
+        else:
+            self._idle[entity] = act
+        self._waitset.wake()
+
+    def forget(self, entity: int) -> None:
+        """Let go of what was to be done for an entity that was deleted."""
+        self._acts.pop(entity, None)
+        self._idle.pop(entity, None)
+
+    @property
+    def current(self) -> bool:
+        """Whether the calling thread is the pump's."""
+        return threading.current_thread() is self._thread
+
+    def close(self) -> None:
+        """End the thread; nothing is done afterwards, except what called this."""
+        self._closed = True
+        if self.current:
+            return
+        self._waitset.wake()
+        self._thread.join(_CLOSE_TIMEOUT_S)
+        self._waitset.close()
+
+    def _run(self) -> None:
+        while not self._closed:
+            self._do(self._turn)
+
+    def _turn(self) -> None:
+        again = [self._again.popleft() for _ in range(len(self._again))] if self._again else None
+        woken = self._waitset.wait(0.0 if again else self._interval if self._idle else None)
+        for entity in dict.fromkeys((*woken, *again)) if again else woken:
+            act = self._acts.get(entity)
+            if act is not None and self._do(act):
+                self._again.append(entity)
+        if self._idle and (now := time.monotonic()) >= self._due:
+            busy = [visit for visit in list(self._idle.values()) if self._do(visit)]
+            self._interval = _BUSY_POLL_S if busy else _IDLE_POLL_S
+            self._due = now + self._interval
+
+    def _do(self, act: Callable[[], object]) -> object:
+        if self._closed:
+            return None
+        try:
+            return act()
+        except BaseException:  # whatever a callback raises, the others' messages must go on
+            if not self._closed:
+                _log.exception("%s: what arrived cannot be handed on", self._thread.name)
+                time.sleep(_BACKOFF_S)
+            return True  # there may be more, which is not reported again
+
+
+class Lingering:
+    """Keeps a participant's closed writers until their readers have everything, a second at most.
+
+    Cyclone DDS can do that, too (``WriterLingerDuration``), but holds up who deletes a writer:
+    where a peer was killed, for a second, and one writer after the other. Here all wait together.
+
+    Args:
+        pump: What looks after them, some thirty times a second.
+    """
+
+    def __init__(self, pump: Pump) -> None:
+        self._pump = pump
+        self._lock = threading.Lock()
+        self._waiting: dict[int, tuple[float, Callable[[], None]]] = {}
+
+    def add(self, writer: int, delete: Callable[[], None]) -> None:
+        """Call `delete` once what a writer sent has arrived, or will not; returns at once."""
+        set_events(writer, Event.NONE)  # no thread reads them any more
+        with self._lock:
+            self._waiting[writer] = time.monotonic() + _ACKNOWLEDGE_TIMEOUT_S, delete
+            self._pump.visit(_LINGERING, self._look)
+
+    def close(self) -> None:
+        """Wait until all are deleted; for the thread that has closed the pump."""
+        while self._waiting:
+            self._look()
+            time.sleep(_LINGER_POLL_S)
+
+    def _look(self) -> None:
+        """Delete those that are done."""
+        with self._lock:
+            waiting = list(self._waiting.items())
+        now = time.monotonic()
+        for writer, (deadline, delete) in waiting:
+            if now >= deadline or cyclone.acknowledged(writer):
+                delete()
+                with self._lock:
+                    self._waiting.pop(writer, None)
+        with self._lock:
+            if not self._waiting:
+                self._pump.forget(_LINGERING)
