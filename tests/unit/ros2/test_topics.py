@@ -23,7 +23,7 @@ from rosglass.comm import (
     Reliability,
     SamplesLost,
 )
-from rosglass.comm import watchdog as watchdog_module
+from rosglass.comm import timers as timers_module
 from rosglass.comm.timers import Watchdog
 from rosglass.interfaces import Library
 from rosglass.messages import OpaqueType
@@ -340,7 +340,7 @@ def test_samples_that_never_come_are_counted_and_told(node, middleware, eventual
 
 def test_a_watchdog_counts_all_that_it_overslept(monkeypatch):
     now = [100.0]
-    monkeypatch.setattr(watchdog_module, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    monkeypatch.setattr(timers_module, "time", SimpleNamespace(monotonic=lambda: now[0]))
 
     class Late:
         """Timers that run the job when told to."""
