@@ -192,6 +192,7 @@ def test_calls_from_many_threads(offer, client):
     with concurrent.futures.ThreadPoolExecutor(8) as pool:
         found = pool.map(lambda a: client.call({"a": a, "b": 1}, timeout=30).sum, range(40))
     assert list(found) == list(range(1, 41))
+    assert client.pending == 0
 
 
 @pytest.mark.parametrize("way", ["call", "call_async"])

@@ -13,7 +13,6 @@ import pytest
 from waiting import nothing_happens
 
 import rosglass
-from rosglass.comm import IMMEDIATE
 from rosglass.interfaces import Library
 from rosglass.wires.tcpros.connection import encode_header, parse_header
 
@@ -183,18 +182,6 @@ def test_more_calls_than_connections_wait_for_their_turn(connect, node):
     connect("robot").create_service_server("/add", ADD, add)
     calls = [client.call_async({"a": value}) for value in range(300)]
     assert [call.result(30).sum for call in calls] == list(range(300))
-
-
-def test_threads_that_share_a_client_get_their_own_answers(connect, client):
-    connect("robot").create_service_server("/add", ADD, add, executor=IMMEDIATE)
-
-    def work(number):
-        return [client.call({"a": 1000 * number, "b": turn}).sum for turn in range(50)]
-
-    with concurrent.futures.ThreadPoolExecutor(8) as pool:
-        for number, sums in enumerate(pool.map(work, range(8))):
-            assert sums == [1000 * number + turn for turn in range(50)]
-    assert client.pending == 0
 
 
 def test_a_persistent_client_uses_one_connection_and_others_one_for_each_call(
@@ -560,25 +547,6 @@ def test_a_cancelled_call_waits_no_more(client, start_robot):
     assert client.call(timeout=30).sum == 3
 
 
-@pytest.mark.parametrize("what", ["client", "node"])
-def test_closing_ends_the_calls(node, client, start_robot, what, eventually):
-    robot = start_robot(silent)
-    calls = [client.call_async(), client.call_async()]
-    eventually(lambda: robot.headers)
-    (client if what == "client" else node).close()
-    for call in calls:
-        with pytest.raises(rosglass.NodeClosedError):
-            call.result(30)
-    client.close()
-    for use in (client.call, client.call_async, lambda: client.on_ready_change(print)):
-        with pytest.raises(rosglass.NodeClosedError):
-            use()
-    with pytest.raises(rosglass.NodeClosedError):
-        client.wait_for_server(30)
-    assert not client.ready
-    assert client.problem == "the client is closed"
-
-
 def test_closing_while_connecting_leaves_nothing(master, connect, eventually):
     with socket.create_server(("127.0.0.1", 0)) as listener:
         master.offer("/add", listener.getsockname()[1])
@@ -745,20 +713,6 @@ def test_an_exception_is_told_to_the_caller(connect, client, fails, told, caplog
         client.call()
     logged = [record for record in caplog.records if record.levelname == "ERROR"]
     assert bool(logged) != isinstance(fails, rosglass.ServiceError)
-
-
-@pytest.mark.parametrize(
-    ("answer", "told"),
-    [
-        ({"sum": "x"}, "no valid response.*sum"),
-        ({"total": 1}, "no valid response.*total"),
-        (7, "no valid response"),
-    ],
-)
-def test_a_response_that_does_not_fit_is_told_to_the_caller(connect, client, answer, told):
-    connect("robot").create_service_server("/add", ADD, lambda _: answer)
-    with pytest.raises(rosglass.ServiceError, match=told):
-        client.call()
 
 
 def test_a_request_that_makes_no_sense_is_refused(connect):
