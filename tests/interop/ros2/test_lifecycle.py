@@ -19,6 +19,7 @@ from waiting import at_rate, eventually, nothing_happens
 
 import rosglass
 from rosglass.comm import IMMEDIATE, ConnectionState, NodeName
+from rosglass.wires.zenoh.endpoints import Pump
 from rosglass.wires.zenoh.router import Router, is_router_reachable
 
 CONNECTING, CONNECTED = ConnectionState.CONNECTING, ConnectionState.CONNECTED
@@ -223,6 +224,24 @@ def test_closing_after_the_peer_and_the_router_have_gone(start_router, start_pee
     node.close()
     assert time.monotonic() - before < 10
     assert node.status().state is CLOSED
+
+
+def test_ctrl_c_while_a_session_opens_leaves_no_thread_behind(router, monkeypatch):
+    """One that waited in Zenoh while the interpreter ended aborted the program."""
+    made = []
+
+    class InterruptedPump(Pump):
+        def __init__(self, *arguments):
+            super().__init__(*arguments)
+            made.append(arguments[-1])
+            if len(made) == 2:
+                raise KeyboardInterrupt
+
+    monkeypatch.setattr("rosglass.wires.zenoh.middleware.Pump", InterruptedPump)
+    with pytest.raises(KeyboardInterrupt) as interrupt:
+        rosglass.connect(f"{router.url}?mode=peer", "interrupted")
+    eventually(lambda: not {thread.name for thread in threading.enumerate()} & set(made))
+    assert interrupt.traceback  # keeps the session, as that of a program's end does
 
 
 def test_every_new_connection_receives(router, start_peer):

@@ -290,14 +290,19 @@ class ZenohMiddleware(Middleware):
             raise ConnectionLostError(f"cannot open a Zenoh session: {reason(error)}") from error
         self._refused = False
         self._settled = time.monotonic() + _SETTLING
-        events = session.info.declare_transport_events_listener(CHANNEL, history=True)
-        tokens = session.liveliness().declare_subscriber(
-            graph_key(self._options.domain), CHANNEL, history=True
-        )
-        self._pumps = [
-            Pump(events, self._on_transport, f"{self._address} links"),
-            Pump(tokens, self._on_token, f"{self._address} tokens"),
-        ]
+        try:
+            events = session.info.declare_transport_events_listener(CHANNEL, history=True)
+            tokens = session.liveliness().declare_subscriber(
+                graph_key(self._options.domain), CHANNEL, history=True
+            )
+            self._pumps = [
+                Pump(events, self._on_transport, f"{self._address} links"),
+                Pump(tokens, self._on_token, f"{self._address} tokens"),
+            ]
+        except BaseException:  # Ctrl-C
+            # A pump that waits in Zenoh while the interpreter ends would abort the program.
+            close_session(session)
+            raise
         if not self._is_peer:
             self._await_history(session)
         with self._lock:
