@@ -4,7 +4,7 @@ import pytest
 
 from rosglass import Duration, QoS
 from rosglass.comm import IMMEDIATE, Sample, Subscription
-from rosglass.comm import lateness as module
+from rosglass.comm import statistics as module
 from rosglass.comm.statistics import LatencyEstimator
 
 P = b"p" * 16
