@@ -31,8 +31,9 @@ class Listeners(Generic[_T]):
 
     def __init__(self, merge: bool = False, depth: int | None = None, where: str = "") -> None:
         self._depth, self._where = 1 if merge else depth, where
-        self._lock = threading.Lock()
-        self._listeners: list[Listener[_T]] = []
+        #: In the order they came. Every use is one operation of the dictionary, which is atomic:
+        #: keys compare by identity.
+        self._listeners: dict[Listener[_T], None] = {}
 
     def __bool__(self) -> bool:
         return bool(self._listeners)
@@ -47,8 +48,7 @@ class Listeners(Generic[_T]):
         if not isinstance(executor, Executor):
             raise ArgumentError("executor", executor, "a rosglass.comm.Executor", self._where)
         listener = Listener(self, callback, executor, self._depth, self._where)
-        with self._lock:
-            self._listeners.append(listener)
+        self._listeners[listener] = None
         return listener
 
     def notify(self, value: _T) -> bool:
@@ -57,23 +57,17 @@ class Listeners(Generic[_T]):
         Returns:
             Whether everyone will be told all values; not so when one was dropped to make room.
         """
-        with self._lock:
-            told = list(self._listeners)
-        kept = [listener.tell(value) for listener in told]
+        kept = [listener.tell(value) for listener in list(self._listeners)]
         return all(kept)
 
     def clear(self) -> None:
         """Forget everyone."""
-        with self._lock:
-            told, self._listeners = self._listeners, []
-        for listener in told:
+        for listener in list(self._listeners):
             listener.close()
 
     def remove(self, listener: Listener[_T]) -> None:
         """Forget a listener; for listeners that are closed."""
-        with self._lock:
-            if listener in self._listeners:
-                self._listeners.remove(listener)
+        self._listeners.pop(listener, None)
 
 
 class Listener(Handle, Generic[_T]):

@@ -194,17 +194,14 @@ class Watchdog(Handle):
         self.limit = limit
         self._timers, self._period = timers, limit.seconds
         self._last, self._missed = last, missed
-        self._lock = threading.Lock()
         self._closed = False
         self._since = time.monotonic()
         self._timer = timers.after(self._period, self._check)
 
     def close(self) -> None:
         """Count no more; safe to call twice."""
-        with self._lock:
-            self._closed = True
-            timer = self._timer
-        timer.close()
+        self._closed = True
+        self._timer.close()
 
     def _check(self) -> None:
         if self._closed:
@@ -214,7 +211,7 @@ class Watchdog(Handle):
         if count:
             self._since += count * self._period
             self._missed(count)
-        with self._lock:
-            if not self._closed:
-                left = self._since + self._period - time.monotonic()
-                self._timer = self._timers.after(max(0.0, left), self._check)
+        left = self._since + self._period - time.monotonic()
+        self._timer = self._timers.after(max(0.0, left), self._check)
+        if self._closed:  # another thread did so just now, and may have closed the timer before
+            self._timer.close()

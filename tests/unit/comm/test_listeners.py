@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import sys
+import threading
+
 import pytest
 
 import rosglass
-from rosglass.comm import Executor, Listeners
+from rosglass.comm import IMMEDIATE, Executor, Listeners
 
 
 class Manual(Executor):
@@ -64,3 +67,39 @@ def test_closed_and_cleared_listeners_are_not_told():
     listeners.clear()
     executor.run()
     assert seen == [("second", 1)]
+
+
+@pytest.fixture
+def hasty_threads():
+    """Let threads take turns as often as Python can."""
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(interval)
+
+
+@pytest.mark.usefixtures("hasty_threads")
+def test_listeners_come_and_go_in_several_threads_while_values_are_told():
+    listeners, seen, rounds = Listeners(), [], 300
+    listeners.add(seen.append, IMMEDIATE)
+    failures = []
+
+    def come_and_go():
+        try:
+            for _ in range(rounds):
+                with listeners.add(str, IMMEDIATE):
+                    listeners.notify(-1)
+        except BaseException as error:
+            failures.append(error)
+
+    threads = [threading.Thread(target=come_and_go) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for value in range(rounds):
+        assert listeners.notify(value)
+    for thread in threads:
+        thread.join()
+    assert not failures
+    assert sorted(seen) == [-1] * 4 * rounds + list(range(rounds))
+    listeners.clear()
+    assert not listeners

@@ -10,7 +10,8 @@ import weakref
 
 import pytest
 
-from rosglass.comm import Timers
+from rosglass.comm import Duration, Timers
+from rosglass.comm.timers import Watchdog
 
 
 @pytest.fixture
@@ -94,3 +95,25 @@ def test_a_job_that_calls_exit_ends_no_other(timers):
     timers.after(0, lambda: sys.exit(1))
     timers.after(0, done.set)
     assert done.wait(30)
+
+
+def test_a_watchdog_that_is_closed_while_it_looks_looks_no_more(timers):
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    missed = []
+    try:
+        for _ in range(500):
+            dog = Watchdog(timers, Duration.from_seconds(1e-5), lambda: 0.0, missed.append)
+            dog.close()
+            dog.close()
+    finally:
+        sys.setswitchinterval(interval)
+    looks = weakref.ref(dog)
+    del dog
+    done = queue.Queue()
+    timers.after(0.0, lambda: done.put(len(missed)))
+    count = done.get(timeout=30)  # no look is under way any more
+    timers.after(0.05, lambda: done.put(len(missed)))
+    assert done.get(timeout=30) == count
+    gc.collect()
+    assert looks() is None
