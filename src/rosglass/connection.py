@@ -149,9 +149,9 @@ def connect(
             f"cannot connect to {url!r}: {reason}; known: {_KNOWN}, e.g. {_EXAMPLES}"
         )
     if scheme == "ros1":
-        from rosglass.ros1.arguments import Arguments as Ros1Arguments  # noqa: PLC0415
         from rosglass.ros1.node import Ros1Node  # noqa: PLC0415
         from rosglass.ros1.options import Ros1Options  # noqa: PLC0415
+        from rosglass.ros1.remapping_arguments import Arguments as Ros1Arguments  # noqa: PLC0415
 
         options = Ros1Options.parse(url, arguments=Ros1Arguments.parse(arguments))
         return Ros1Node(
@@ -163,7 +163,7 @@ def connect(
             options.arguments.parameters,
             own_services=own_services,
         )
-    from rosglass.ros2.arguments import Arguments  # noqa: PLC0415
+    from rosglass.ros2.ros_arguments import Arguments  # noqa: PLC0415
 
     told = Arguments.parse(arguments)
     name, namespace = _named(name, namespace, arguments)
@@ -175,7 +175,7 @@ def connect(
 
 def _named(name: str | None, namespace: str | None, arguments: Sequence[str]) -> tuple[str, str]:
     """Return what a node is called, by ROS 2's rules."""
-    from rosglass.ros2.arguments import Arguments  # noqa: PLC0415
+    from rosglass.ros2.ros_arguments import Arguments  # noqa: PLC0415
 
     if name is None:
         number = next(_anonymous)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rosglass.comm.node import Handle, Node
-    from rosglass.ros2.arguments import Arguments
+    from rosglass.ros2.ros_arguments import Arguments
 
 __all__ = ["NOT_INITIALIZED", "Session"]
 
@@ -59,7 +59,7 @@ def _parse(arguments: Sequence[str], url: str) -> Arguments | None:
     """Return what the command line tells a ROS 2 node; ROS 1's own tells its name itself."""
     if not arguments or url.startswith("ros1:"):
         return None
-    from rosglass.ros2.arguments import Arguments  # noqa: PLC0415 - few programs are told anything
+    from rosglass.ros2.ros_arguments import Arguments  # noqa: PLC0415 - few programs are told anything
 
     return Arguments.parse(arguments)
 

@@ -9,15 +9,15 @@ from urllib.parse import parse_qsl, unquote, urlsplit
 
 from rosglass.comm import anonymous_name
 from rosglass.errors import ArgumentError
-from rosglass.ros1.arguments import NO_ARGUMENTS
 from rosglass.ros1.names import absolute_namespace
+from rosglass.ros1.remapping_arguments import NO_ARGUMENTS
 from rosglass.wires.tcpros.address import bracketed, check_host, given_address, parse_uri
 from rosglass.wires.tcpros.core import TcprosOptions
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from rosglass.ros1.arguments import Arguments
+    from rosglass.ros1.remapping_arguments import Arguments
 
 __all__ = ["Ros1Options"]
 

@@ -11,14 +11,14 @@ from rosglass.comm import ConnectionState, Handle, Status
 from rosglass.comm.core import NodeCore, NodeMember
 from rosglass.comm.graph import Graph
 from rosglass.comm.names import expand
-from rosglass.ros2.arguments import NO_ARGUMENTS
+from rosglass.ros2.ros_arguments import NO_ARGUMENTS
 from rosglass.ros2.types import Types
 
 if TYPE_CHECKING:
     from rosglass.comm import NodeName
     from rosglass.interfaces import Library
-    from rosglass.ros2.arguments import Arguments
     from rosglass.ros2.pacing import RequestWindow
+    from rosglass.ros2.ros_arguments import Arguments
     from rosglass.wires.base import Middleware
 
 __all__ = ["Core", "Member"]

@@ -12,10 +12,10 @@ from rosglass.comm.node import check_flag
 from rosglass.comm.rclpy_names import check_order
 from rosglass.comm.subscription_feed import SubscriptionFeed, find_subscribed_type
 from rosglass.errors import ArgumentError
-from rosglass.ros2.arguments import NO_ARGUMENTS
 from rosglass.ros2.core import Core
 from rosglass.ros2.graph_matching import GraphMatching
 from rosglass.ros2.rcl_services import RclServices
+from rosglass.ros2.ros_arguments import NO_ARGUMENTS
 from rosglass.ros2.service_client import create_service_client
 from rosglass.ros2.service_replier import create_service_server
 from rosglass.ros2.type_fetching import TypeFetcher
@@ -41,8 +41,8 @@ if TYPE_CHECKING:
     from rosglass.comm.node import Result
     from rosglass.interfaces import Library
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
-    from rosglass.ros2.arguments import Arguments
     from rosglass.ros2.parameters import Ros2Parameters
+    from rosglass.ros2.ros_arguments import Arguments
     from rosglass.wires.base import Middleware
 
 __all__ = ["Ros2Node"]

@@ -19,8 +19,8 @@ from rosglass.qml.network_access import close_network
 from rosglass.qml.places import import_folder
 from rosglass.qml.session import Session
 from rosglass.qt import QtCore, run_event_loop
-from rosglass.ros1.arguments import Arguments
 from rosglass.ros1.options import Ros1Options
+from rosglass.ros1.remapping_arguments import Arguments
 from rosglass.rviz import roscpp
 from rosglass.rviz.access import Access
 from rosglass.rviz.cpp import cpp_function

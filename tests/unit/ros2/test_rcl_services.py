@@ -26,7 +26,7 @@ from rosglass.errors import (
     TransitionError,
 )
 from rosglass.ros2 import Ros2Node
-from rosglass.ros2.arguments import Arguments
+from rosglass.ros2.ros_arguments import Arguments
 
 from .steered import SteeredMiddleware
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from rosglass.errors import RosArgumentError
-from rosglass.ros2.arguments import Arguments
+from rosglass.ros2.ros_arguments import Arguments
 
 if TYPE_CHECKING:
     from pathlib import Path
