@@ -547,6 +547,19 @@ def test_readiness_changes_are_reported(offer, client, eventually):
         client.on_ready_change("told")
 
 
+def test_who_found_the_server_is_told_when_it_leaves_at_once(
+    offer, console, topic, wire, eventually
+):
+    for _ in range(3):
+        server, seen = offer(), []
+        late = console.create_service_client(topic, wire.add)
+        late.on_ready_change(seen.append)
+        assert late.wait_for_server(30)
+        server.close()
+        eventually(lambda seen=seen: seen and not seen[-1], lambda seen=seen: seen)
+        late.close()
+
+
 def test_closing_ends_waiting_for_the_server(client):
     threading.Timer(0.05, client.close).start()
     with pytest.raises(rosglass.NodeClosedError, match="is closed"):

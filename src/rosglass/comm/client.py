@@ -9,7 +9,7 @@ import time
 from abc import abstractmethod
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm.listeners import Listeners
+from rosglass.comm.listeners import ChangeListeners
 from rosglass.comm.node import Handle, check_may_wait
 from rosglass.comm.promise import check_timeout
 from rosglass.errors import ArgumentError, ConversionError, NodeClosedError
@@ -45,12 +45,16 @@ class Client(Handle):
         self._core, self.name = core, name
         self._closed = False
         self._warned = ""
-        self._readiness = Readiness(name, lambda: self.ready, self._check_open, core.dispatcher)
+        self._readiness = Readiness(name, self._is_ready, self._check_open, core.dispatcher)
 
     @property
-    @abstractmethod
     def ready(self) -> bool:
         """Whether a server is there that understands what it is asked."""
+        return self._readiness.read()
+
+    @abstractmethod
+    def _is_ready(self) -> bool:
+        """Return whether a server is there that understands what it is asked."""
 
     @abstractmethod
     def _conflicts(self) -> list[str]:
@@ -119,11 +123,13 @@ class Readiness:
         check_open: Callable[[], None],
         default: Executor,
     ) -> None:
-        self._name, self._ready, self._check_open = name, ready, check_open
-        self._default = default
+        self._name, self._check_open, self._default = name, check_open, default
         self._changed = threading.Condition()
-        self._told = False
-        self._listeners: Listeners[bool] = Listeners(where=name)
+        self._listeners = ChangeListeners(ready, False, where=name)
+
+    def read(self) -> bool:
+        """Return whether the server is there."""
+        return self._listeners.read()
 
     def wait(self, timeout: float | None) -> bool:
         """Wait up to `timeout` seconds, None for ever; return whether the server is there."""
@@ -131,7 +137,7 @@ class Readiness:
         deadline = None if timeout is None else time.monotonic() + timeout
         while True:
             self._check_open()
-            if self._ready():
+            if self.read():
                 return True
             check_may_wait(self._name)
             left = _WAIT_SLICE_S if deadline is None else deadline - time.monotonic()
@@ -149,11 +155,8 @@ class Readiness:
 
     def update(self) -> None:
         """Look, and tell; by one thread only."""
-        ready = self._ready()
-        changed, self._told = ready != self._told, ready
         self._wake()
-        if changed:
-            self._listeners.notify(ready)
+        self._listeners.update()
 
     def close(self) -> None:
         """Forget the listeners, and let those who wait find out."""

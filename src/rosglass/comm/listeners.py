@@ -12,7 +12,7 @@ from rosglass.errors import ArgumentError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-__all__ = ["Listener", "Listeners"]
+__all__ = ["ChangeListeners", "Listener", "Listeners"]
 
 _T = TypeVar("_T")
 #: Values that wait for a callback at most: its executor may never run it.
@@ -68,6 +68,46 @@ class Listeners(Generic[_T]):
     def remove(self, listener: Listener[_T]) -> None:
         """Forget a listener; for listeners that are closed."""
         self._listeners.pop(listener, None)
+
+
+class ChangeListeners(Listeners[_T]):
+    """A list of callbacks that are told when a value has changed.
+
+    Who reads the value and registers a callback learns of every change after that, even when it has
+    changed back before anyone looked.
+
+    Args:
+        compute: Returns the value; it can be hashed.
+        told: What callbacks take for the value as long as they were told nothing.
+        where: What they listen to, e.g. a topic; for errors.
+    """
+
+    def __init__(self, compute: Callable[[], _T], told: _T, where: str = "") -> None:
+        super().__init__(where=where)
+        self._compute, self._told = compute, told
+        #: What was read since the last look, by any thread; every use is atomic.
+        self._read: set[_T] = set()
+
+    def read(self) -> _T:
+        """Return the value."""
+        value = self._compute()
+        self._read.add(value)
+        return value
+
+    def update(self) -> bool:
+        """Look, and tell the value if it has changed; by one thread only.
+
+        Returns:
+            Whether it was told.
+        """
+        read = self._read.copy()
+        self._read.difference_update(read)  # what is read from here on is compared by the next look
+        value = self._compute()
+        if value == self._told and read <= {value}:
+            return False
+        self._told = value
+        self.notify(value)
+        return True
 
 
 class Listener(Handle, Generic[_T]):

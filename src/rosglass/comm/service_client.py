@@ -217,9 +217,8 @@ class ServiceClient(Client):
         """The service type; None while it is not discovered yet."""
         return self._requester.type
 
-    @property
-    def ready(self) -> bool:
-        """Whether a server is there that understands the requests."""
+    def _is_ready(self) -> bool:
+        """Return whether a server is there that understands the requests."""
         return not self._closed and self._requester.ready()
 
     def _conflicts(self) -> list[str]:

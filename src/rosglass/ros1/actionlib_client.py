@@ -544,9 +544,8 @@ class ActionlibClient(ActionClient, Member):
         core.add(self)
         core.wake()
 
-    @property
-    def ready(self) -> bool:
-        """Whether a server is there that understands the goals.
+    def _is_ready(self) -> bool:
+        """Return whether a server is there that understands the goals.
 
         As actionlib has it: it tells the status of its goals, and is connected on all five topics.
         """

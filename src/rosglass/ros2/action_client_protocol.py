@@ -414,9 +414,8 @@ class Ros2ActionClient(ActionClient, Member):
         core.add(self)
         core.wake()
 
-    @property
-    def ready(self) -> bool:
-        """Whether a server is there that understands the goals."""
+    def _is_ready(self) -> bool:
+        """Return whether a server is there that understands the goals."""
         ends = self._ends
         return ends is not None and not self._closed and all(end.ready for end in ends.services)
 

@@ -10,6 +10,7 @@ from weakref import WeakValueDictionary
 from rosglass.comm import ConnectionState, Handle, Status
 from rosglass.comm.core import NodeCore, NodeMember
 from rosglass.comm.graph import Graph
+from rosglass.comm.listeners import ChangeListeners
 from rosglass.comm.names import expand
 from rosglass.ros2.ros_arguments import NO_ARGUMENTS
 from rosglass.ros2.types import Types
@@ -52,6 +53,7 @@ class Core(NodeCore[Handle]):
 
     graph: Graph
     types: Types
+    status_listeners: ChangeListeners[Status]
 
     def __init__(
         self,
@@ -71,7 +73,7 @@ class Core(NodeCore[Handle]):
         self.types = Types(library, url, ros=1 if self.wire == "ros1" else 2)
         self.windows: WeakValueDictionary[str, RequestWindow] = WeakValueDictionary()
         self._moved = True
-        self._told = middleware.status()
+        self.status_listeners = ChangeListeners(middleware.status, middleware.status())
         self.graph = Graph(self.wake)
         self._worker = self._start_following()
         try:
@@ -107,7 +109,7 @@ class Core(NodeCore[Handle]):
         return self._worker.is_current or self.dispatcher.is_current
 
     def _state(self) -> Status:
-        return self.middleware.status()
+        return self.status_listeners.read()
 
     def close(self) -> None:
         """Close every member, leave the graph and end the threads; safe to call twice."""
@@ -138,9 +140,7 @@ class Core(NodeCore[Handle]):
         super()._follow(idle)
 
     def _tell_status(self) -> None:
-        status = self.middleware.status()
-        if status != self._told:
-            self._told = status
+        if self.status_listeners.update():
+            status = self.middleware.status()
             if status.state is ConnectionState.LOST:
                 _log.warning("%s: %s", self.url, status.detail)
-            self.status_listeners.notify(status)

@@ -9,6 +9,7 @@ import pytest
 
 import rosglass
 from rosglass.comm import IMMEDIATE, Executor, Listeners
+from rosglass.comm.listeners import ChangeListeners
 
 
 class Manual(Executor):
@@ -103,3 +104,27 @@ def test_listeners_come_and_go_in_several_threads_while_values_are_told():
     assert sorted(seen) == [-1] * 4 * rounds + list(range(rounds))
     listeners.clear()
     assert not listeners
+
+
+def test_who_read_a_value_is_told_that_it_changed_back_before_anyone_looked():
+    value, seen = [False], []
+    listeners = ChangeListeners(lambda: value[0], False)
+    listeners.add(seen.append, IMMEDIATE)
+    value[0] = True
+    assert listeners.read()
+    value[0] = False
+    assert listeners.update()
+    assert seen == [False]
+    assert not listeners.update()
+
+
+def test_a_value_that_was_read_and_told_is_told_once():
+    value, seen = [False], []
+    listeners = ChangeListeners(lambda: value[0], False)
+    listeners.add(seen.append, IMMEDIATE)
+    for new in (False, True, True, False):
+        value[0] = new
+        listeners.read()
+        listeners.update()
+        listeners.update()
+    assert seen == [True, False]
