@@ -291,12 +291,13 @@ class Recorder(Handle):
                 if closed and not batch:
                     break
             self._file.finish()
+            self._file.close()  # writes what is buffered
         except Exception as error:
             reason = getattr(error, "strerror", None) or error
             self._failure = f"{self.path} cannot be written: {reason}; nothing more is recorded"
             _log.error(self._failure, exc_info=not isinstance(error, OSError))
-        finally:
-            self._file.close()
+            with suppress(OSError):  # the disk is still full
+                self._file.close()
 
     def _hold(self, topic: str, sample: Sample) -> bool:
         """Keep a message whose type is not known yet; returns whether that was necessary."""
