@@ -43,6 +43,16 @@ _GLOSSARY = re.compile(
 )
 #: What a NamedTuple has for everybody.
 _OF_TUPLES = {"_replace", "_asdict", "_fields", "_make"}
+#: What rospy's generated classes have for everybody: genpy documents them, without other names.
+_OF_GENPY = {
+    "_buff",
+    "_connection_header",
+    "_full_text",
+    "_md5sum",
+    "_request_class",
+    "_response_class",
+    "_slot_types",
+}
 _MESSAGES = 300
 
 
@@ -130,7 +140,7 @@ def private_reaches(sources: list[Source]) -> int:
     return sum(
         node.attr.startswith("_")
         and not node.attr.startswith("__")
-        and node.attr not in _OF_TUPLES
+        and node.attr not in _OF_TUPLES | _OF_GENPY
         and getattr(node.value, "id", "") not in {"self", "cls", "os", "sys", "ctypes"}
         for source in sources
         for node in ast.walk(source.tree)

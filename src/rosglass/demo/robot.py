@@ -75,6 +75,10 @@ class Robot:
         options: What it sends.
         simulation: Its body; a new one in the standard world by default.
 
+    Attributes:
+        options: What it sends.
+        duties: What it does on request, and the fastest that it drives.
+
     Raises:
         ModuleNotFoundError: OpenCV is not installed.
     """
@@ -112,7 +116,7 @@ class Robot:
                 ),
             )
         ]
-        self._duties = Duties(node, lambda: self.state, self._switch, self._drive)
+        self.duties = Duties(node, lambda: self.state, self._switch, self._drive)
         self._equipment: Equipment | None = None
         if self.options.equipped:
             self._equipment = self._equip(node)
@@ -156,7 +160,7 @@ class Robot:
     def close(self) -> None:
         """Stop moving and end the threads; safe to call twice, from any thread but the robot's."""
         self._ending.set()
-        self._duties.close()
+        self.duties.close()
         if self._equipment is not None:
             self._equipment.operation.close()
         for subscription in self._subscriptions:
@@ -225,7 +229,7 @@ class Robot:
             self._simulation.command_flippers(angles)
 
     def _drive(self, speed: float, turn: float) -> None:
-        fastest = self._duties.max_speed
+        fastest = self.duties.max_speed
         if self._equipment is not None:
             fastest = min(fastest, self._equipment.operation.max_speed)
         if math.isfinite(speed) and abs(speed) <= self._simulation.limits.believable:

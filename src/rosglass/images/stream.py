@@ -35,7 +35,7 @@ _RETRY = 1.0
 #: Seconds between two log lines about the same stream.
 _LOG_EVERY = 5.0
 #: Packets of a video that may wait: more would show the past, so the next key frame is awaited.
-_BACKLOG = 60
+MAX_BACKLOG = 60
 _QUEUE = 16
 #: Arrivals from which the time between two pictures is told, and how few are enough.
 _ARRIVALS, _ENOUGH = 12, 4
@@ -211,7 +211,7 @@ class ImageStream(Handle):
         if not (transport.video or self._wanted is None or self._wanted()):
             return
         with self._wake:
-            if not transport.video or len(self._samples) >= _BACKLOG:
+            if not transport.video or len(self._samples) >= MAX_BACKLOG:
                 self._overflow |= transport.video
                 self._dropped += len(self._samples)
                 self._samples.clear()

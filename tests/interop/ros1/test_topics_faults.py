@@ -10,7 +10,7 @@ import threading
 import time
 
 import pytest
-from tcpros import publisher_address
+from tcpros import publisher_address, topics_of
 from usage import open_files
 from waiting import eventually
 
@@ -130,7 +130,7 @@ def test_a_slow_subscriber_is_told_of_and_holds_up_nobody(connect):
         publisher.publish_serialized(data)
         eventually(lambda wanted=number: len(got) > wanted)
     assert publisher.dropped >= 40
-    assert all(link.waiting() <= 6 for link in node._topics.published()["/fast"].links())
+    assert all(link.waiting() <= 6 for link in topics_of(node).published()["/fast"].links())
     eventually(lambda: "/raw is too slow" in publisher.problem)
     slow.close()
     eventually(lambda: publisher.problem == "" and publisher.subscription_count() == 1)
@@ -225,12 +225,12 @@ def test_creating_and_closing_a_thousand_times_leaves_nothing(connect):
     for _ in range(20):
         cycle()
     eventually(lambda: publisher.subscription_count() == 0)
-    time.sleep(6)  # threads for errands end after 5 s without any
+    time.sleep(6)  # threads of the pool end after 5 s without a job
 
     def alive():
         gc.collect()
         kinds = [type(one).__name__ for one in gc.get_objects()]
-        return kinds.count("Reading"), kinds.count("Connection")
+        return kinds.count("PublisherLink"), kinds.count("Connection")
 
     # Earlier tests of this process may have left some, whose failures pytest keeps.
     before, alive_before = things(), alive()

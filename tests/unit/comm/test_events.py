@@ -1,6 +1,9 @@
 from __future__ import annotations
 
+import sys
+
 import pytest
+from receiving import set_problem
 
 from rosglass import ConversionError, QoS
 from rosglass.comm import (
@@ -80,14 +83,16 @@ def test_twins_are_counted():
 
 
 def test_closing_ends_it_and_frees_it():
-    appearances = Appearances()
+    appearances, known = Appearances(), endpoint("c")
+    references = sys.getrefcount(known)
     events, handle = told(appearances)
     assert appearances
+    appearances.update([known], Matched)
     handle.close()
     appearances.update([A], Matched)
-    assert events == []
+    assert events == [("c", 1, 1, 1)]
     assert not appearances
-    assert appearances._known == {}
+    assert sys.getrefcount(known) == references
 
 
 def test_events_that_are_none_are_counted_and_not_told():
@@ -104,9 +109,9 @@ def test_a_problem_is_told_when_it_changes():
     sub = Subscription("/t", None, QoS(), IMMEDIATE)
     sub.on_problem_change(seen.append)
     for problem in ("one", "one", "two", "", ""):
-        sub._set_problem(problem)
+        set_problem(sub, problem)
     sub.close()
-    sub._set_problem("three")
+    set_problem(sub, "three")
     assert seen == ["one", "two", ""]
 
 

@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 
 import pytest
+from receiving import deliver, inbox_of
 from waiting import eventually
 
 from rosglass import QoS
@@ -19,11 +20,6 @@ from rosglass.comm.node import Executor
 from rosglass.comm.promise import Promise
 
 LIMIT = 60
-
-
-def put(sub, sample):
-    """Let a sample arrive."""
-    sub._inbox.put(sample)
 
 
 class Refusing(Executor):
@@ -60,12 +56,12 @@ def test_a_subscription_goes_on_and_the_message_that_was_refused_comes(times, ma
     keep_all = QoS(history=History.KEEP_ALL)
     sub, seen, came = receive(Refusing(times), keep_all)
     if many:
-        sub._inbox.put_many([sample(1), sample(2)])
+        inbox_of(sub).put_many([sample(1), sample(2)])
     else:
-        put(sub, sample(1))  # a stop command after which nothing else comes
+        deliver(sub, sample(1))  # a stop command after which nothing else comes
     assert came.acquire(timeout=LIMIT)
     for number in (3, 4):
-        put(sub, sample(number))
+        deliver(sub, sample(number))
     for _ in range(2 + many):
         assert came.acquire(timeout=LIMIT)
     assert seen == ([1, 2, 3, 4] if many else [1, 3, 4])
@@ -85,8 +81,8 @@ def test_a_pool_that_was_shut_down_fills_neither_the_log_nor_memory(caplog):
     sub, _, _ = receive(executor, QoS(depth=5))
     executor.pool.shutdown()
     for number in range(1000):
-        put(sub, sample(number))
-    assert (sub._inbox.waiting, sub.statistics().dropped) == (5, 995)
+        deliver(sub, sample(number))
+    assert (inbox_of(sub).waiting, sub.statistics().dropped) == (5, 995)
     assert len([one for one in caplog.records if one.levelno >= logging.ERROR]) == 1
     executor.pool = ThreadPoolExecutor()
     sub.close()
@@ -102,7 +98,7 @@ def test_sys_exit_in_a_callback_ends_neither_its_subscription_nor_the_dispatcher
 
     sub = Subscription("/t", None, QoS(), dispatcher, raw_callback=callback)
     for number in (1, 2, 3):
-        put(sub, sample(number))
+        deliver(sub, sample(number))
         assert came.acquire(timeout=LIMIT)
     dispatcher.close()
     assert "SystemExit" in caplog.text
@@ -121,7 +117,7 @@ def test_sys_exit_in_a_callback_loses_nothing_that_came_together(immediate, capl
     executor, qos = IMMEDIATE if immediate else dispatcher, QoS(depth=10)
     sub = Subscription("/t", None, qos, executor, raw_callback=callback)
     given = [sample(number) for number in range(1, 6)]
-    thread = threading.Thread(target=sub._inbox.put_many, args=(given,))
+    thread = threading.Thread(target=inbox_of(sub).put_many, args=(given,))
     thread.start()
     for _ in given:
         assert came.acquire(timeout=LIMIT)
@@ -143,7 +139,7 @@ def test_sys_exit_in_the_main_thread_ends_the_program_but_nothing_halfway(caplog
         sub = Subscription("/t", None, QoS(), executor, raw_callback=leave)
         listeners = Listeners(where="/t")
         listeners.add(leave, executor)
-        for give in (lambda sub=sub: put(sub, sample(1)), lambda ls=listeners: ls.notify(1)):
+        for give in (lambda sub=sub: deliver(sub, sample(1)), lambda ls=listeners: ls.notify(1)):
             with pytest.raises(SystemExit) if leaves else nullcontext():
                 give()
     assert len(caplog.records) == 2

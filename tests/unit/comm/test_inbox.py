@@ -8,17 +8,13 @@ import threading
 import time
 
 import pytest
+from receiving import deliver
 from waiting import eventually
 
 from rosglass import ConversionError, QoS
 from rosglass.comm import IMMEDIATE, Dispatcher, History, Sample, Subscription
 
 KEEP_ALL = QoS(history=History.KEEP_ALL)
-
-
-def put(sub, sample):
-    """Let a sample arrive."""
-    sub._inbox.put(sample)
 
 
 def sample(data=b"x", sequence=1):
@@ -36,7 +32,7 @@ def test_keep_all_is_bounded_by_bytes_counts_what_it_drops_and_complains_once(ca
     sub = subscription()
     sub.set_inbox_limit(10_000)
     for number in range(100):
-        put(sub, sample(bytes(1000), number))
+        deliver(sub, sample(bytes(1000), number))
     waiting = []
     while (taken := sub.take()) is not None:
         waiting.append(taken.sequence)
@@ -55,7 +51,7 @@ def test_the_slow_callback_is_named(caplog):
     sub = subscription(executor=dispatcher, raw_callback=much_too_slow)
     sub.set_inbox_limit(2000)
     for _ in range(10):
-        put(sub, sample(bytes(1000)))
+        deliver(sub, sample(bytes(1000)))
     go_on.set()
     dispatcher.close()
     assert "much_too_slow is too slow" in caplog.text
@@ -66,7 +62,7 @@ def test_a_slow_callback_lets_others_have_their_turn_and_goes_on_with_the_newest
         order.append(f"slow {given.sequence}")
         if len(order) == 1:
             for number in range(5, 9):
-                put(sub, sample(sequence=number))
+                deliver(sub, sample(sequence=number))
         time.sleep(0.02)
 
     order = []
@@ -74,7 +70,7 @@ def test_a_slow_callback_lets_others_have_their_turn_and_goes_on_with_the_newest
     dispatcher.post(lambda: gate.wait(30))
     sub = subscription(QoS(4), dispatcher, raw_callback=slow)
     for number in range(1, 5):
-        put(sub, sample(sequence=number))
+        deliver(sub, sample(sequence=number))
     dispatcher.post(lambda: order.append("other"))
     gate.set()
     eventually(lambda: len(order) == 6)
@@ -86,20 +82,20 @@ def test_a_slow_callback_lets_others_have_their_turn_and_goes_on_with_the_newest
 def test_one_message_beyond_the_limit_is_kept_all_the_same():
     sub = subscription()
     sub.set_inbox_limit(100)
-    put(sub, sample(bytes(1000)))
+    deliver(sub, sample(bytes(1000)))
     assert sub.take() is not None
 
 
 def test_a_smaller_limit_holds_at_once_and_taking_makes_room():
     sub = subscription()
     for _ in range(10):
-        put(sub, sample(bytes(1000)))
+        deliver(sub, sample(bytes(1000)))
     sub.set_inbox_limit(3000)
     assert sub.statistics().dropped == 8
     assert sub.take_latest() is not None
     assert sub.statistics().dropped == 9
     for _ in range(2):
-        put(sub, sample(bytes(1000)))
+        deliver(sub, sample(bytes(1000)))
     assert sub.statistics().dropped == 9
 
 
@@ -130,7 +126,7 @@ def test_samples_from_many_threads_are_called_back_with_one_at_a_time_each_once(
         threads = [
             threading.Thread(
                 target=lambda start=start: [
-                    put(sub, sample(sequence=n)) for n in range(start, start + 500)
+                    deliver(sub, sample(sequence=n)) for n in range(start, start + 500)
                 ]
             )
             for start in range(0, 2000, 500)
@@ -158,11 +154,11 @@ def test_an_immediate_callback_that_publishes_to_itself_gets_what_fits_and_count
     def callback(got):
         if got.sequence == 0:
             for number in range(1, 6):
-                put(sub, sample(sequence=number))
+                deliver(sub, sample(sequence=number))
         seen.append(got.sequence)
 
     sub = subscription(QoS(depth=3), raw_callback=callback)
-    put(sub, sample(sequence=0))
+    deliver(sub, sample(sequence=0))
     assert seen == [0, 3, 4, 5]
     assert (sub.statistics().received, sub.statistics().dropped) == (6, 2)
 
@@ -177,8 +173,8 @@ def test_an_interrupted_immediate_callback_does_not_end_the_subscription():
 
     sub = subscription(raw_callback=callback)
     with pytest.raises(KeyboardInterrupt):
-        put(sub, sample())
-    put(sub, sample())
+        deliver(sub, sample())
+    deliver(sub, sample())
     assert len(calls) == 2
 
 
@@ -190,7 +186,7 @@ def test_iterating_yields_samples_until_the_subscription_is_closed():
 
     def feed():
         for number in range(3):
-            put(sub, sample(sequence=number))
+            deliver(sub, sample(sequence=number))
         eventually(lambda: taken[2:])
         sub.close()
 
@@ -218,13 +214,7 @@ def test_asynchronous_iteration():
         task = asyncio.create_task(collect())
         await asyncio.sleep(0.02)
         for number in range(3):
-            threading.Thread(
-                target=put,
-                args=(
-                    sub,
-                    sample(sequence=number),
-                ),
-            ).start()
+            threading.Thread(target=deliver, args=(sub, sample(sequence=number))).start()
             await asyncio.sleep(0.01)
         return await asyncio.wait_for(task, 30)
 
@@ -246,7 +236,7 @@ def test_a_task_that_was_cancelled_leaves_nothing_behind():
             await task
 
     asyncio.run(run())
-    put(sub, sample())  # the loop has ended
+    deliver(sub, sample())  # the loop has ended
     assert sub.take() is not None
 
 
@@ -260,7 +250,7 @@ def test_several_threads_wait_and_each_sample_goes_to_one_of_them():
         thread.start()
     time.sleep(0.02)
     for number in range(4):
-        put(sub, sample(sequence=number))
+        deliver(sub, sample(sequence=number))
     for thread in threads:
         thread.join()
     assert sorted(taken) == [0, 1, 2, 3]
@@ -280,18 +270,6 @@ def test_waiting_for_ever_ends_with_the_subscription():
     later.join()
 
 
-def test_who_waits_is_who_watches(monkeypatch):
-    clock = [100.0]
-    monkeypatch.setattr("rosglass.comm.subscription.time.monotonic", lambda: clock[0])
-    sub = subscription()
-    assert not sub._watched
-    assert sub.wait(0) is None
-    assert sub._watched, "who polls comes back soon"
-    clock[0] += 1.5
-    assert not sub._watched
-    assert subscription(raw_callback=id)._watched
-
-
 # -- rates ---------------------------------------------------------------------------------------
 
 
@@ -302,7 +280,7 @@ def test_rates_hold_for_samples_that_come_some_at_a_time(monkeypatch):
     for _ in range(30):
         clock[0] += 0.1
         for _ in range(100):
-            put(sub, sample(bytes(10)))
+            deliver(sub, sample(bytes(10)))
     now = sub.statistics()
     assert now.frequency == pytest.approx(1000, rel=0.01)
     assert now.bandwidth == pytest.approx(10_000, rel=0.01)
@@ -316,7 +294,7 @@ def test_rates_fall_at_once_when_samples_stop(monkeypatch, rate):
     sub = subscription(QoS(depth=1))
     for _ in range(3 * rate):
         clock[0] += 1 / rate
-        put(sub, sample(bytes(10)))
+        deliver(sub, sample(bytes(10)))
     assert sub.statistics().frequency == pytest.approx(rate, rel=0.01)
     clock[0] += max(0.04, 1 / rate)
     assert sub.statistics().frequency > rate / 2, "one that is a little late is no silence"
@@ -337,6 +315,6 @@ def test_rates_are_taken_anew_after_a_silence(monkeypatch):
         clock[0] += silence
         for _ in range(5):
             clock[0] += 0.1
-            put(sub, sample(bytes(10)))
+            deliver(sub, sample(bytes(10)))
         assert sub.statistics().frequency == pytest.approx(10)
         assert sub.statistics().bandwidth == pytest.approx(100)

@@ -3,14 +3,10 @@ from __future__ import annotations
 import threading
 
 import pytest
+from receiving import deliver, set_problem
 
 from rosglass import QoS
 from rosglass.comm import IMMEDIATE, Executor, History, Sample, Subscription
-
-
-def put(sub, sample):
-    """Let a sample arrive."""
-    sub._inbox.put(sample)
 
 
 class Manual(Executor):
@@ -48,8 +44,7 @@ def subscription(executor=IMMEDIATE, **kwargs):
 
 
 def feed(target, *texts):
-    for text in texts:
-        put(target, sample(text))
+    deliver(target, *map(sample, texts))
 
 
 def test_the_inbox_keeps_the_newest_and_counts_what_it_drops():
@@ -198,7 +193,7 @@ def test_frequency_and_bandwidth_fall_when_samples_stop(monkeypatch):
 
 def test_a_problem_is_logged_once_and_goes_away():
     sub = subscription()
-    sub._set_problem("no type")
+    set_problem(sub, "no type")
     assert sub.problem == "no type"
-    sub._set_problem("")
+    set_problem(sub, "")
     assert sub.problem == ""

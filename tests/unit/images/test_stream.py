@@ -164,7 +164,7 @@ def test_a_backlog_is_given_up_and_the_decoder_told(rig: Rig, decoder: Counting)
     decoder.gate.clear()
     send(rig, "p0")
     assert decoder.entered.wait(30)
-    many = 2 * stream_module._BACKLOG
+    many = 2 * stream_module.MAX_BACKLOG
     send(rig, *(f"q{number}" for number in range(many)))
     decoder.gate.set()
     rig.until(lambda: rig.shown and rig.shown[-1] == f"q{many - 1}")

@@ -11,8 +11,12 @@ from rosglass.messages import MessageType, ServiceTranslation, ServiceType, Tran
 from rosglass.messages.schema import Kind
 
 
-def sample_values(schema):
+def sample_values(kind):
     """Return values for every field; two elements for each sequence that may have them."""
+    return _values(kind._schema)
+
+
+def _values(schema):
     return {member.name: _member(member) for member in schema.members}
 
 
@@ -29,7 +33,7 @@ def _one(member, index):
     if member.struct is not None:
         if member.struct.is_time:
             return dict(zip((m.name for m in member.struct.members), (5 + index, 7), strict=True))
-        return sample_values(member.struct)
+        return _values(member.struct)
     if member.kind is Kind.TEXT:
         return f"text {index}"
     if member.number.python is bool:
@@ -58,7 +62,7 @@ def test_there_and_back(ros, name):
     there = Translation(ours)
     back = Translation(there.type, [ours])
     assert (there.type.ros, back.type) == (3 - ros, ours)
-    values = sample_values(ours._schema)
+    values = sample_values(ours)
     if name.endswith("/Log"):
         values["level"] = 8 if ros == 1 else 40
     data = ours.encode(values)
@@ -79,7 +83,7 @@ def test_there_and_back(ros, name):
 def test_views_and_garbage(name):
     ours = load(name, ros=1)
     there = Translation(ours)
-    data = ours.encode(sample_values(ours._schema))
+    data = ours.encode(sample_values(ours))
     assert there.encode(memoryview(data)) == there.encode(bytearray(data)) == there.encode(data)
     for end in range(len(data)):
         with pytest.raises(DecodeError):
@@ -238,9 +242,9 @@ def test_services(ros, name, other):
     found = ServiceTranslation(server)
     assert (found.type.name, found.type.ros) == (other, 3 - ros)
     assert found.derived == (name in ("roscpp/GetLoggers", "lifecycle_msgs/ChangeState"))
-    asked = found.type.request.create(sample_values(found.type.request._schema))
+    asked = found.type.request.create(sample_values(found.type.request))
     server.request.validate(server.request.encode(found.request.convert(asked)))
-    answer = server.response.create(sample_values(server.response._schema))
+    answer = server.response.create(sample_values(server.response))
     told = found.type.response.encode(found.response.convert(answer))
     assert told == found.response.encode(server.response.encode(answer))
 

@@ -42,19 +42,19 @@ class FakeParameters:
         self.followers: dict[str, dict[str, str]] = {}
         self.tells = True
 
-    def _getParam(self, _: str, name: str) -> Any:  # noqa: N802 - the API's name
+    def getParam(self, _: str, name: str) -> Any:  # noqa: N802 - the API's name
         try:
             return [1, "", self._at(name)]
         except KeyError:
             return [-1, f"Parameter [{name}] is not set", 0]
 
-    def _hasParam(self, _: str, name: str) -> Any:  # noqa: N802
-        return [1, name, self._getParam("", name)[0] == 1]
+    def hasParam(self, _: str, name: str) -> Any:  # noqa: N802
+        return [1, name, self.getParam("", name)[0] == 1]
 
-    def _getParamNames(self, _: str) -> Any:  # noqa: N802
+    def getParamNames(self, _: str) -> Any:  # noqa: N802
         return [1, "", list(self._names(self.tree, ""))]
 
-    def _setParam(self, node: str, name: str, value: Any) -> Any:  # noqa: N802
+    def setParam(self, node: str, name: str, value: Any) -> Any:  # noqa: N802
         *spaces, last = name.strip("/").split("/")
         place = self.tree
         for space in spaces:
@@ -65,7 +65,7 @@ class FakeParameters:
         self._tell_followers(name, value, node)
         return [1, "", 0]
 
-    def _deleteParam(self, _: str, name: str) -> Any:  # noqa: N802
+    def deleteParam(self, _: str, name: str) -> Any:  # noqa: N802
         space, _, last = name.rpartition("/")
         try:
             del self._at(space)[last]
@@ -74,22 +74,22 @@ class FakeParameters:
         self._tell_followers(name, {}, "")
         return [1, "", 0]
 
-    def _searchParam(self, node: str, name: str) -> Any:  # noqa: N802
+    def searchParam(self, node: str, name: str) -> Any:  # noqa: N802
         first, _, rest = name.partition("/")
         space = node
         while True:
-            if self._hasParam("", f"{space}/{first}")[2]:
+            if self.hasParam("", f"{space}/{first}")[2]:
                 return [1, "", f"{space}/{first}" + (f"/{rest}" if rest else "")]
             if not space:
                 return [-1, f"Cannot find parameter [{name}]", ""]
             space = space.rpartition("/")[0]
 
-    def _subscribeParam(self, node: str, api: str, name: str) -> Any:  # noqa: N802
+    def subscribeParam(self, node: str, api: str, name: str) -> Any:  # noqa: N802
         self.followers.setdefault(name, {})[node] = api
-        code, _, value = self._getParam("", name)
+        code, _, value = self.getParam("", name)
         return [1, "", value if code == 1 else {}]
 
-    def _unsubscribeParam(self, node: str, _: str, name: str) -> Any:  # noqa: N802
+    def unsubscribeParam(self, node: str, _: str, name: str) -> Any:  # noqa: N802
         self.followers.get(name, {}).pop(node, None)
         return [1, "", 1]
 
@@ -126,12 +126,15 @@ class FakeMaster(FakeParameters):
         services: Node, service URI and the node's API's URI, by service.
         calls: Names of all methods that were called.
         answers: Functions that answer methods instead, by name; they return the whole answer.
+        running: Cleared, it answers nothing until it is set again, as a process that is stopped.
     """
 
     def __init__(self) -> None:
         self.port = 0
         self.calls: list[str] = []
         self.answers: dict[str, Callable[..., Any]] = {}
+        self.running = threading.Event()
+        self.running.set()
         self._lock = threading.Lock()
         self.start()
 
@@ -167,16 +170,17 @@ class FakeMaster(FakeParameters):
         self.services[service] = (node, f"rosrpc://{host}:{port}", f"http://{host}:1/")
 
     def _dispatch(self, method: str, arguments: tuple[Any, ...]) -> Any:
+        self.running.wait(60)
         self.calls.append(method)
         if method in self.answers:
             return self.answers[method](*arguments)
         with self._lock:
-            return getattr(self, f"_{method}")(*arguments)
+            return getattr(self, method)(*arguments)
 
-    def _getPid(self, _: str) -> Any:  # noqa: N802 - the API's name
+    def getPid(self, _: str) -> Any:  # noqa: N802 - the API's name
         return [1, "", self.pid]
 
-    def _getSystemState(self, _: str) -> Any:  # noqa: N802
+    def getSystemState(self, _: str) -> Any:  # noqa: N802
         return [
             1,
             "",
@@ -187,10 +191,10 @@ class FakeMaster(FakeParameters):
             ],
         ]
 
-    def _getTopicTypes(self, _: str) -> Any:  # noqa: N802
+    def getTopicTypes(self, _: str) -> Any:  # noqa: N802
         return [1, "", [[topic, kind] for topic, kind in self.types.items()]]
 
-    def _lookupNode(self, _: str, node: str) -> Any:  # noqa: N802
+    def lookupNode(self, _: str, node: str) -> Any:  # noqa: N802
         topics = [
             *self.publishers.values(),
             *self.subscribers.values(),
@@ -200,38 +204,38 @@ class FakeMaster(FakeParameters):
         found += [api for name, _, api in self.services.values() if name == node]
         return [1, "", found[0]] if found else [-1, f"unknown node [{node}]", ""]
 
-    def _registerService(self, node: str, name: str, uri: str, api: str) -> Any:  # noqa: N802
+    def registerService(self, node: str, name: str, uri: str, api: str) -> Any:  # noqa: N802
         self.services[name] = (node, uri, api)
         return [1, "", 1]
 
-    def _unregisterService(self, _: str, name: str, uri: str) -> Any:  # noqa: N802
+    def unregisterService(self, _: str, name: str, uri: str) -> Any:  # noqa: N802
         if self.services.get(name, ("", ""))[1] == uri:
             del self.services[name]
             return [1, "", 1]
         return [1, "", 0]
 
-    def _lookupService(self, _: str, name: str) -> Any:  # noqa: N802
+    def lookupService(self, _: str, name: str) -> Any:  # noqa: N802
         if name not in self.services:
             return [-1, "no provider", ""]
         return [1, "", self.services[name][1]]
 
-    def _registerPublisher(self, node: str, topic: str, kind: str, api: str) -> Any:  # noqa: N802
+    def registerPublisher(self, node: str, topic: str, kind: str, api: str) -> Any:  # noqa: N802
         self.publishers.setdefault(topic, {})[node] = api
         self.types[topic] = kind
         self._tell(topic)
         return [1, "", list(self.subscribers.get(topic, {}).values())]
 
-    def _unregisterPublisher(self, node: str, topic: str, _: str) -> Any:  # noqa: N802
+    def unregisterPublisher(self, node: str, topic: str, _: str) -> Any:  # noqa: N802
         found = self.publishers.get(topic, {}).pop(node, None)
         self._tell(topic)
         return [1, "", int(found is not None)]
 
-    def _registerSubscriber(self, node: str, topic: str, kind: str, api: str) -> Any:  # noqa: N802
+    def registerSubscriber(self, node: str, topic: str, kind: str, api: str) -> Any:  # noqa: N802
         self.subscribers.setdefault(topic, {})[node] = api
         self.types.setdefault(topic, kind)
         return [1, "", list(self.publishers.get(topic, {}).values())]
 
-    def _unregisterSubscriber(self, node: str, topic: str, _: str) -> Any:  # noqa: N802
+    def unregisterSubscriber(self, node: str, topic: str, _: str) -> Any:  # noqa: N802
         found = self.subscribers.get(topic, {}).pop(node, None)
         return [1, "", int(found is not None)]
 

@@ -8,6 +8,7 @@ import xmlrpc.client
 from pathlib import Path
 
 import pytest
+from tcpros import node_uri, publisher_address
 
 from rosglass.wires.tcpros import core
 
@@ -51,7 +52,7 @@ def place(node):
     """Return the ports of a node: of its API, and of its topics."""
     api = node.publishers("/speed")[0]
     assert api.node.full == "/panel"
-    return node._core.uri, node._core.address[1]
+    return node_uri(node), publisher_address(node, "/speed")[1]
 
 
 @pytest.mark.parametrize("payload", [b"", b"\xff\xff\xff\xff", b"POST / HTTP/1.1\r\n", HEADER])
@@ -73,15 +74,19 @@ def test_floods_leave_threads_and_files_and_the_node_answers(node, connect, even
     eventually(lambda: open_files() < before + 20)
 
 
-def test_there_are_fewer_connections_than_files(node, eventually, monkeypatch):
+def test_there_are_fewer_connections_than_files(connect, eventually, monkeypatch):
+    assert 100 <= core.max_connections() <= 10_000
+    monkeypatch.setattr(core, "max_connections", lambda: 50)
+    node = connect("panel", own_services=False)
+    publisher = node.create_publisher("/speed", "std_msgs/Float64")
+    eventually(lambda: node.publishers("/speed"))
     _, port = place(node)
-    node._core._max_connections = 50
     socks = []
     for _ in range(80):
         socks.append(socket.create_connection(("127.0.0.1", port), 20))
         socks[-1].sendall(hello("/greedy"))
     try:
-        eventually(lambda: len(node._core._connections) == 50)
+        eventually(lambda: publisher.subscription_count() == 50)
         ended = 0
         for sock in socks:
             sock.settimeout(20)
@@ -93,8 +98,7 @@ def test_there_are_fewer_connections_than_files(node, eventually, monkeypatch):
     finally:
         for sock in socks:
             sock.close()
-    eventually(lambda: not node._core._connections)
-    assert 100 <= core.max_connections() <= 10_000
+    eventually(lambda: publisher.subscription_count() == 0)
 
 
 def test_many_honest_peers_that_come_back_at_once_are_all_served(node):

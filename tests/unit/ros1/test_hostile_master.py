@@ -287,7 +287,7 @@ def test_every_answer_that_is_used_has_its_form():
     for file in [file for folder in folders for file in folder.glob("*.py")]:
         used |= set(re.findall(r'(?:call|_call|_ask)\([^()]*?"([a-z]+[A-Z]\w+)"', file.read_text()))
 
-    known = set(client._ANSWERS)
+    known = set(client.ANSWERS)
     assert {name for name in used if name.startswith(("get", "has", "lookup", "search"))} <= known
     assert {"subscribeParam", "registerSubscriber", "requestTopic"} <= known
 

@@ -8,6 +8,7 @@ import time
 from contextlib import suppress
 
 import pytest
+from tcpros import node_uri
 
 import rosglass
 from rosglass.comm import IMMEDIATE, ParameterDescriptor, ParameterType, Range
@@ -248,13 +249,13 @@ def test_a_subscription_is_told_the_value_and_each_change(server, master, eventu
     assert subscription.wait(30)
     eventually(lambda: told == [None])
     assert not subscription.is_set
-    master._setParam("/other", "/a/b", 1)
+    master.setParam("/other", "/a/b", 1)
     eventually(lambda: told[-1] == {"b": 1})
     assert subscription.value == {"b": 1}
-    master._setParam("/other", "/a/b", 1)  # no change
+    master.setParam("/other", "/a/b", 1)  # no change
     server.set("/a/c", 2)  # the master does not tell us what we did ourselves
     eventually(lambda: subscription.value == {"b": 1, "c": 2})
-    master._deleteParam("/other", "/a")
+    master.deleteParam("/other", "/a")
     eventually(lambda: told[-1] is None)
     assert told == [None, {"b": 1}, {"b": 1, "c": 2}, None]
     assert "not set" in repr(subscription)
@@ -271,7 +272,7 @@ def test_subscriptions_of_one_name_share_a_registration(server, master, eventual
     one.close()
     two.close()
     two.close()
-    master._setParam("/other", "/a", 2)
+    master.setParam("/other", "/a", 2)
     eventually(lambda: told == [1, 2])
     assert one.value == 1
     three.close()
@@ -288,7 +289,7 @@ def test_closing_and_following_anew_at_once_stays_registered(server, master, eve
     last = server.subscribe("/a")
     assert last.wait(30)
     eventually(lambda: master.calls.count("subscribeParam") >= 2)
-    master._setParam("/other", "/a", 5)
+    master.setParam("/other", "/a", 5)
     eventually(lambda: last.value == 5)
     eventually(lambda: master.followers["/a"])
 
@@ -302,7 +303,7 @@ def test_a_master_that_was_restarted_is_asked_again(server, master, node, eventu
     assert subscription.value == 1
     master.start()
     eventually(lambda: told == [1, None])
-    master._setParam("/other", "/a", 3)
+    master.setParam("/other", "/a", 3)
     eventually(lambda: told == [1, None, 3])
 
 
@@ -311,7 +312,7 @@ def test_a_change_that_was_not_told_is_found(server, master, eventually, monkeyp
     subscription = server.subscribe("/a")
     assert subscription.wait(30)
     master.tells = False
-    master._setParam("/other", "/a", 3)
+    master.setParam("/other", "/a", 3)
     eventually(lambda: subscription.value == 3)
 
 
@@ -402,10 +403,10 @@ def test_changes_by_others_are_reported_below_the_node(node, master, eventually)
         eventually(lambda: len(events) == 2)
     assert events[0] == events[1]
     assert (events[0].node, events[0].new, events[0].changed) == ("/left/arm", {}, {"a": 1.0})
-    master._deleteParam("/other", "/left/arm/b")
+    master.deleteParam("/other", "/left/arm/b")
     eventually(lambda: len(events) == 3)
     assert events[2].deleted == ("b",)
-    master._setParam("/other", "/left/arm/c/d", True)
+    master.setParam("/other", "/left/arm/c/d", True)
     eventually(lambda: len(events) == 4)
     assert events[3].new == {"c/d": True}
 
@@ -437,10 +438,11 @@ def test_parameters_of_the_start_win_once(master, eventually):
         assert node.parameters.get("speed") == 2.5
         eventually(lambda: master.tree["arm"] == {"speed": 2.5, "gain": {"p": 1}})
         node.parameters.set({"speed": 3.0})
+        uri = node_uri(node)
         master.stop()
         master.start({"arm": {"speed": 4.0}})
         # Such a call may be under way: the new master knows the node then, but not all of it.
-        master._subscribeParam("/arm", node._core.uri, "/arm/speed")
+        master.subscribeParam("/arm", uri, "/arm/speed")
         eventually(lambda: master.tree["arm"] == {"speed": 4.0, "gain": {"p": 1}})
     finally:
         node.close()

@@ -6,10 +6,12 @@ import logging
 import socket
 import threading
 import time
+import xmlrpc.client
 from typing import TYPE_CHECKING, Any
 
 import pytest
 from ports import free_port
+from tcpros import node_uri
 from waiting import eventually
 
 import rosglass
@@ -32,6 +34,12 @@ def node(master: FakeMaster) -> Iterator[Any]:
     made = connected(master)
     yield made
     made.close()
+
+
+def shut_down(node: Any, caller: str, reason: str) -> None:
+    """Tell a node to end, as its master does, or a tool."""
+    with xmlrpc.client.ServerProxy(node_uri(node)) as api:
+        api.shutdown(caller, reason)
 
 
 def connected(master: FakeMaster, name: str = "panel") -> Any:
@@ -111,7 +119,7 @@ def test_one_that_is_closed_while_the_master_is_told_of_the_one_before(
         first.close()
         second.append(getattr(node, create)("/a", "std_msgs/Empty"))
         del master.answers["lookupNode"]
-        return master._lookupNode("/panel", "/panel")
+        return master.lookupNode("/panel", "/panel")
 
     monkeypatch.setattr(member, "unregister", unregister_and_close)
     master.answers["lookupNode"] = hold
@@ -204,11 +212,10 @@ def test_a_new_network_address_is_announced_and_the_node_lives_on(
         monkeypatch.setattr(address, "_route_elsewhere", lambda: "127.0.0.2")
         eventually(lambda: "127.0.0.2" in master.publishers["/a"]["/panel"])
         # The master takes it for another node, and tells the old one to end.
-        core: Any = node._core
-        core.shut_down("/master", "[/panel] Reason: new node registered with same name")
+        shut_down(node, "/master", "[/panel] Reason: new node registered with same name")
         eventually(lambda: "shutdown" not in [t.name for t in threading.enumerate()])
         assert node.status().state is ConnectionState.CONNECTED
-        core.shut_down("/rosnode", "user request")
+        shut_down(node, "/rosnode", "user request")
         eventually(lambda: node.status().state is ConnectionState.CLOSED)
 
 
@@ -217,11 +224,12 @@ def test_a_node_that_somebody_else_closes_looks_nothing_up_any_more(
 ) -> None:
     master.offer("/add", 1)
     eventually(lambda: "/add" in node.services())
-    node._core.shut_down("/master", "[/panel] Reason: new node registered with same name")
+    core: Any = node._core
+    shut_down(node, "/master", "[/panel] Reason: new node registered with same name")
     eventually(lambda: node.status().state is ConnectionState.CLOSED)
     eventually(lambda: "shutdown" not in [thread.name for thread in threading.enumerate()])
     ran = threading.Event()
-    for pool in (node._core.pool, node._core.lookups):
+    for pool in (core.pool, core.lookups):
         pool.run(ran.set)
     assert not ran.wait(0.3)
 
@@ -277,26 +285,19 @@ def test_a_node_asks_little_of_its_master(master: FakeMaster, node: Ros1Node) ->
 
 
 def test_who_closes_while_the_master_hangs_is_forgotten_once_it_answers(
-    master: FakeMaster, node: Ros1Node, monkeypatch: pytest.MonkeyPatch
+    master: FakeMaster, node: Ros1Node
 ) -> None:
     hung = connected(master, "hung")
     hung.create_publisher("/a", "std_msgs/Empty")
     hung.create_subscription("/b", "std_msgs/Empty")
     hung.create_service_server("/c", "std_srvs/Empty", lambda _: None)
     eventually(lambda: "/c" in master.services and "/hung" in master.subscribers.get("/b", {}))
-    thaw, answer = threading.Event(), master._dispatch
-
-    def hang(*call: Any) -> Any:
-        # As with a process that is stopped: what was asked meanwhile is done afterwards.
-        thaw.wait(60)
-        return answer(*call)
-
-    monkeypatch.setattr(master, "_dispatch", hang)
+    master.running.clear()
     began = time.monotonic()
     hung.close()
     assert time.monotonic() - began < 8, "about two seconds on a machine that is not loaded"
     (thread,) = [one for one in threading.enumerate() if one.name == "rosglass unregister"]
-    thaw.set()
+    master.running.set()
     eventually(lambda: "/hung" not in master.publishers["/a"], lambda: master.calls[-20:])
     eventually(lambda: "/hung" not in master.subscribers["/b"] and "/c" not in master.services)
     assert node.status().state is not ConnectionState.CLOSED

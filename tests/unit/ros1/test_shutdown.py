@@ -9,6 +9,7 @@ import xmlrpc.client
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from tcpros import node_uri
 
 from rosglass.comm import ConnectionState
 from rosglass.wires.tcpros.slave import Slave
@@ -116,7 +117,10 @@ def test_a_node_of_a_machine_that_is_named_127_0_1_1_is_ended(
 ) -> None:
     url = master.url.replace("?ip=127.0.0.1", "?ip=127.0.1.1")
     node = connect("panel", url=url, own_services=False)
-    assert node._core.uri.startswith("http://127.0.1.1:")
-    with xmlrpc.client.ServerProxy(node._core.uri, transport=From(source)) as proxy:
+    node.create_publisher("/speed", "std_msgs/Float64")
+    eventually(lambda: "/panel" in master.publishers.get("/speed", {}))
+    uri = node_uri(node)
+    assert uri.startswith("http://127.0.1.1:")
+    with xmlrpc.client.ServerProxy(uri, transport=From(source)) as proxy:
         assert proxy.shutdown("/rosnode", "user request")[0] == 1  # type: ignore[index]
     eventually(lambda: node.status().state is ConnectionState.CLOSED)

@@ -34,20 +34,26 @@ def test_it_starts_and_says_how_fast_it_may_drive(robot: tuple[Any, Robot]) -> N
 )
 def test_nonsense_makes_it_slow(robot: tuple[Any, Robot], value: Any, used: float) -> None:
     node, made = robot
-    assert made._duties.max_speed == 1.2
+    assert made.duties.max_speed == 1.2
     node.parameters.set({"max_speed": value})
-    eventually(lambda: made._duties.max_speed == used)
+    eventually(lambda: made.duties.max_speed == used)
 
 
-def test_it_drives_and_stops_without_the_master(robot: tuple[Any, Robot], master: Any) -> None:
+def test_it_drives_and_stops_without_the_master(
+    robot: tuple[Any, Robot], connect: Any, master: Any
+) -> None:
     node, made = robot
+    console = connect("console")
+    drive = console.create_publisher("/cmd_vel", "geometry_msgs/Twist")
+    stop = console.create_publisher("/emergency_stop", "std_msgs/Bool")
+    eventually(lambda: drive.subscription_count() and stop.subscription_count())
     made.start()
     node.parameters.set({"max_speed": 0.4})
-    eventually(lambda: made._duties.max_speed == 0.4)
+    eventually(lambda: made.duties.max_speed == 0.4)
     master.stop()
     eventually(lambda: node.status().state is not ConnectionState.CONNECTED)
-    eventually(lambda: made._drive(1.0, 0.0) or made.state.speed > 0.3)
+    eventually(lambda: drive.publish(linear={"x": 1.0}) or made.state.speed > 0.3)
     assert made.state.speed < 0.5
-    made._on_stop(type("Bool", (), {"data": True}))
-    assert made.state.emergency_stop
+    stop.publish(data=True)
+    eventually(lambda: made.state.emergency_stop)
     assert not made.wait(0.3)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 import pytest
+from tcpros import node_uri, publisher_address
 from waiting import eventually
 
 import rosglass
@@ -40,12 +41,12 @@ def node(master: FakeMaster) -> Iterator[Ros1Node]:
 @pytest.fixture
 def api(node: Ros1Node) -> Iterator[xmlrpc.client.ServerProxy]:
     """The node's API."""
-    with xmlrpc.client.ServerProxy(node._core.uri, allow_none=True) as proxy:
+    with xmlrpc.client.ServerProxy(node_uri(node), allow_none=True) as proxy:
         yield proxy
 
 
 def place(node: Ros1Node) -> tuple[str, int]:
-    parts = urlsplit(node._core.uri)
+    parts = urlsplit(node_uri(node))
     return str(parts.hostname), int(parts.port or 0)
 
 
@@ -57,17 +58,18 @@ def test_what_tools_ask(api: Any, node: Ros1Node, master: FakeMaster) -> None:
     assert ["/words", "std_msgs/String"] in subscriptions
     assert ["/any", "*"] in subscriptions
     code, _, told = api.requestTopic("/t", "/speed", [["UDPROS", 1], ["TCPROS"]])
-    assert (code, told) == (1, ["TCPROS", *node._core.address])
+    assert (code, told[:2]) == (1, ["TCPROS", "127.0.0.1"])
+    socket.create_connection(tuple(told[1:]), 10).close()
 
 
 def test_connections_are_told_as_rospy_tells_them(api: Any, node: Ros1Node) -> None:
     reader = node.create_subscription("/speed")
     eventually(reader.publisher_count)
-    port = node._core.address[1]
+    _, port = publisher_address(node, "/speed")
     told = api.getBusInfo("/t")[2]
     inbound = next(row for row in told if row[2] == "i" and row[5])
     outbound = next(row for row in told if row[2] == "o")
-    assert inbound[1:6] == [node._core.uri, "i", "TCPROS", "/speed", True]
+    assert inbound[1:6] == [node_uri(node), "i", "TCPROS", "/speed", True]
     assert outbound[1:6] == ["/panel", "o", "TCPROS", "/speed", True]
     # rosnode's pattern for the last column.
     for row, ours in ((inbound, None), (outbound, port)):
@@ -125,11 +127,7 @@ def test_unknown_methods_and_publishers_are_harmless(api: Any, node: Ros1Node) -
         "\x7f",
     ]
     assert api.publisherUpdate("/m", "/any", strange)[0] == 1
-    subscription = next(
-        one.readers[0].feed.subscription
-        for topic, one in node._topics.subscribed().items()
-        if topic == "/any"
-    )
+    subscription = node.create_subscription("/any")
     eventually(
         lambda: all(uri in subscription.problem for uri in ("a..b", "99999")),
         lambda: subscription.problem,
@@ -204,12 +202,13 @@ def test_a_flood_of_connections_costs_no_more_than_a_hundred_threads(
 
 
 def test_closing_ends_the_connections_of_the_api(node: Ros1Node) -> None:
-    with socket.create_connection(place(node), 10) as sock:
+    address = place(node)
+    with socket.create_connection(address, 10) as sock:
         eventually(lambda: any("process_request" in t.name for t in threading.enumerate()))
         node.close()
         assert sock.recv(1) == b""
     with pytest.raises(ConnectionRefusedError):
-        socket.create_connection(place(node), 10).close()
+        socket.create_connection(address, 10).close()
 
 
 def test_who_is_told_to_shut_down_says_who_said_so(api: Any, node: Ros1Node) -> None:

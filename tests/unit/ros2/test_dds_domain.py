@@ -29,17 +29,17 @@ def join(url=URL, **env):
 @pytest.fixture(autouse=True)
 def nothing_stays_joined():
     yield
-    assert dds_domain._joined == {}
+    assert dds_domain.joined_domains == {}
 
 
 def test_users_of_a_domain_share_it_and_the_last_one_leaves_it():
     one, two = join(), join()
     one.close()
     one.close()
-    assert 57 in dds_domain._joined
+    assert 57 in dds_domain.joined_domains
     two.close()
     with join("dds://?domain=57&range=off&distro=humble"):
-        assert 57 in dds_domain._joined
+        assert 57 in dds_domain.joined_domains
 
 
 def test_one_process_cannot_have_two_configurations_for_a_domain():
@@ -137,7 +137,7 @@ def test_another_version_of_the_series_is_used_with_a_word_on_what_is_lost(
 ):
     package = Package(version)
     monkeypatch.setattr(cyclone, "distribution", lambda _: package)
-    assert "libddsc" in cyclone._path()
+    assert "libddsc" in cyclone.library_path()
     lost = "services and actions of nodes that use Fast DDS or RustDDS cannot be called"
     assert (lost in caplog.text) == (version != cyclone.VERSION)
     assert bool(cyclone.strange_version()) == (version != cyclone.VERSION)
@@ -146,13 +146,13 @@ def test_another_version_of_the_series_is_used_with_a_word_on_what_is_lost(
 def test_private_layouts_of_another_version_are_left_alone(monkeypatch):
     monkeypatch.setattr(cyclone, "distribution", lambda _: Package("11.3.0"))
     told = "cyclonedds 11.3.0 is installed instead of 11.0.1"
-    assert cyclone_origins._hook._try(0) == cyclone_inline_qos._hook._try(0) == told
+    assert cyclone_origins.hook.check(0) == cyclone_inline_qos.hook.check(0) == told
 
 
 def test_another_series_is_refused(monkeypatch):
     monkeypatch.setattr(cyclone, "distribution", lambda _: Package("0.10.5"))
     with pytest.raises(rosglass.UnsupportedError, match=r"0\.10\.5 is installed, but 11\.0\.1 is"):
-        cyclone._path()
+        cyclone.library_path()
 
 
 def _in_a_fork(answer):

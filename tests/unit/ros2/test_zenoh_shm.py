@@ -53,7 +53,7 @@ def test_a_machine_without_room_is_told_once(monkeypatch, caplog):
 
 
 def test_a_pool_is_no_bigger_than_what_the_user_may_lock(monkeypatch, caplog):
-    monkeypatch.setattr(zenoh_shm, "_lockable", lambda: 6 * 2**20)
+    monkeypatch.setattr(zenoh_shm, "lockable_bytes", lambda: 6 * 2**20)
     shared = SharedMemory()
     assert shared.place((b"x" * 2**20,)) is not None
     with caplog.at_level(logging.WARNING):
@@ -65,4 +65,4 @@ def test_a_pool_is_no_bigger_than_what_the_user_may_lock(monkeypatch, caplog):
 def test_users_other_than_root_may_lock_what_their_limit_says(monkeypatch):
     monkeypatch.setattr(zenoh_shm.os, "geteuid", lambda: 1000)
     monkeypatch.setattr(zenoh_shm.resource, "getrlimit", lambda _: (8 * 2**20, 8 * 2**20))
-    assert zenoh_shm._lockable() == 6 * 2**20
+    assert zenoh_shm.lockable_bytes() == 6 * 2**20

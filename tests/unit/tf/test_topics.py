@@ -7,6 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from receiving import deliver
 
 import rosglass
 from rosglass.comm import (
@@ -91,7 +92,7 @@ class Node:
     def deliver(self, number: int, publisher: bytes = b"gid") -> None:
         topic, data = self.sent[number]
         sample = Sample(data, self.wire, self.type, 0, None, publisher)
-        self.subscriptions[topic]._inbox.put(sample)
+        deliver(self.subscriptions[topic], sample)
 
 
 def place(child: str, sec: int = 5) -> Transform:

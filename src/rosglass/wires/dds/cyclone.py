@@ -161,7 +161,7 @@ def library() -> Any:
     Raises:
         UnsupportedError: The package is not installed, or has another interface.
     """
-    return _declare(ctypes.CDLL(_path()))
+    return _declare(ctypes.CDLL(library_path()))
 
 
 def strange_version() -> str:
@@ -181,7 +181,7 @@ def keeping() -> Any:
     back. A function that waits for a lock which a thread of the library holds while it calls us
     must not be called this way.
     """
-    return _declare(ctypes.PyDLL(_path()))
+    return _declare(ctypes.PyDLL(library_path()))
 
 
 def check_alive(result: int, call: str, place: str) -> int:
@@ -431,7 +431,12 @@ def _matched(call: str, entity: int) -> list[int]:
         room = count
 
 
-def _path() -> str:
+def library_path() -> str:
+    """Return where the installed package has Cyclone DDS's library.
+
+    Raises:
+        UnsupportedError: It is not installed, or in a version that cannot be used.
+    """
     remedy = 'install it with: pip install "rosglass[dds]"'
     try:
         found = distribution("cyclonedds")

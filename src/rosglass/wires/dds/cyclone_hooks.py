@@ -55,7 +55,7 @@ class Hook(ABC):
                 sertype = cyclone.sertype(topic)
                 if not self._tested:
                     self._tested = True
-                    self.problem = self._try(sertype)
+                    self.problem = self.check(sertype)
                     if self.problem:
                         _log.warning("%s", self.problem)
                 elif not self.problem:
@@ -83,7 +83,8 @@ class Hook(ABC):
     def test(self, sertype: int) -> None:
         """Raise when the functions do not do what they should with samples of a type."""
 
-    def _try(self, sertype: int) -> str:
+    def check(self, sertype: int) -> str:
+        """Replace a type's functions; return why that cannot be, empty when it is done."""
         if strange := cyclone.strange_version():
             return strange
         if sys.platform != "linux" or sys.byteorder != "little":

@@ -68,18 +68,18 @@ def create_topic(participant: int, name: str, type_name: str) -> int:
     The writer must not be used in the main thread: an exception raised there by a signal would end
     up in the library.
     """
-    return _hook.create_topic(participant, name, type_name)
+    return hook.create_topic(participant, name, type_name)
 
 
 def prepare(writer: int) -> None:
     """Let a writer be given to :func:`write`, before it writes anything."""
     # As its topic's type is not the library's usual one, it has a type of its own.
-    _hook.prepare(cyclone.sertype(writer))
+    hook.prepare(cyclone.sertype(writer))
 
 
 def problem() -> str:
     """Return why nothing can be sent with inline QoS on this machine; empty when it can."""
-    return _hook.problem
+    return hook.problem
 
 
 def write(
@@ -191,7 +191,7 @@ class _Writing(Hook):
         return string_at(serdata + self._header, len(_MARKED)) == _MARKED
 
 
-_hook = _Writing()
+hook = _Writing()
 
 
 def _flag(part: int, *, first: bool) -> bool:

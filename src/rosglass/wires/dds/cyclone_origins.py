@@ -50,7 +50,7 @@ _readers: dict[int, Origins] = {}
 
 def problem() -> str:
     """Return why received samples have no origin on this machine; empty when they have."""
-    return _hook.problem
+    return hook.problem
 
 
 class Origins:
@@ -67,7 +67,7 @@ class Origins:
 
     def create_topic(self, participant: int, name: str, type_name: str) -> int:
         """Create the topic of the one reader; see `cyclone.create_topic`."""
-        topic = _hook.create_topic(participant, name, type_name)
+        topic = hook.create_topic(participant, name, type_name)
         self.follow(cyclone.sertype(topic))
         return topic
 
@@ -166,7 +166,7 @@ class _Reading(Hook):
         expect(found, {serdata: sent})
 
 
-_hook = _Reading()
+hook = _Reading()
 
 
 def _read(fragments: int) -> Origin | None:

@@ -98,7 +98,8 @@ class _Joined:
     users: int = 1
 
 
-_joined: dict[int, _Joined] = {}
+#: What this process takes part in, by number.
+joined_domains: dict[int, _Joined] = {}
 _lock = threading.Lock()
 
 
@@ -123,14 +124,14 @@ class Domain(Handle):
         self._closed = False
         config = domain_config(options)
         with _lock:
-            if any(joined.process != os.getpid() for joined in _joined.values()):
+            if any(joined.process != os.getpid() for joined in joined_domains.values()):
                 raise UnsupportedError(
                     "Cyclone DDS does not work in a fork of a process that uses it; start the "
                     'process anew, with multiprocessing.set_start_method("spawn")'
                 )
-            joined = _joined.get(self.number)
+            joined = joined_domains.get(self.number)
             if joined is None:
-                _joined[self.number] = _Joined(config, _create(self.number, config))
+                joined_domains[self.number] = _Joined(config, _create(self.number, config))
             elif joined.config != config:
                 raise UnsupportedError(
                     f"this process is in DDS domain {self.number} with other settings, and "
@@ -144,14 +145,14 @@ class Domain(Handle):
     def close(self) -> None:
         """Leave the domain when this was its last user, who has deleted the participants before."""
         with _lock:
-            joined = _joined.get(self.number)
+            joined = joined_domains.get(self.number)
             if self._closed or joined is None or joined.process != os.getpid():
                 return
             self._closed = True
             joined.users -= 1
             if joined.users:
                 return
-            del _joined[self.number]
+            del joined_domains[self.number]
             # Others' participants would go with it.
             lib = cyclone.library()
             if joined.entity is not None and lib.dds_lookup_participant(self.number, 0, 0) < 1:

@@ -189,7 +189,7 @@ class _Server:
         code, message, value = answer
         if code != _SUCCESS:
             raise MasterError(f"{self.uri} refuses {method}: {message}")
-        expected, fits = _ANSWERS.get(method, _ANYTHING)
+        expected, fits = ANSWERS.get(method, _ANYTHING)
         if not fits(value):
             text = (
                 f"{self.uri} answers {method}, but not as ROS 1 does: {expected} was expected, got "
@@ -277,7 +277,7 @@ _NUMBER: _Answer = ("a whole number", lambda value: isinstance(value, int))
 _PARAMETER: _Answer = (f"a value of at most {_DEEPEST} levels", _is_shallow)
 #: For methods whose answers say nothing.
 _ANYTHING: _Answer = ("anything", lambda _: True)
-_ANSWERS: dict[str, _Answer] = {
+ANSWERS: dict[str, _Answer] = {
     "getParam": _PARAMETER,
     "getParamNames": _TEXTS,
     "getPid": _NUMBER,

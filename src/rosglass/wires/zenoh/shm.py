@@ -69,7 +69,7 @@ class SharedMemory:
         with self._lock:
             if size * 2 <= self._size:
                 return self._provider
-            wanted = min(max(_POOL, size * _PAYLOADS), _lockable())
+            wanted = min(max(_POOL, size * _PAYLOADS), lockable_bytes())
             if self._refused and wanted >= self._refused:
                 return self._provider if size <= self._size else None
             try:
@@ -103,7 +103,7 @@ def _copy(part: bytes | bytearray | memoryview, buffer: zenoh.shm.ZShmMut, start
         buffer[start + offset : start + offset + len(piece)] = piece
 
 
-def _lockable() -> int:
+def lockable_bytes() -> int:
     """Return how much of the memory that this user may lock a pool takes at most, in bytes.
 
     Zenoh locks its pools; Debian allows 8 MB to users other than root.
