@@ -100,6 +100,19 @@ def test_what_does_not_fit_is_refused_naming_the_field_and_not_sent(offer, clien
     assert orders == [2]
 
 
+def test_the_status_of_goals_is_there_for_who_comes_late(offer, client, connect, topic, wire):
+    offer()
+    goal = client.send_goal({"order": 2})
+    assert goal.result(30).status is GoalStatus.SUCCEEDED
+    name = f"{topic}/status" if wire.is_ros1 else f"{topic}/_action/status"
+    late = connect("late").create_subscription(name, qos=rosglass.QoS.latched())
+    (entry,) = late.wait(30).message().status_list
+    if wire.is_ros1:
+        assert (entry.goal_id.id, entry.status) == (goal.id_text, 3)
+    else:
+        assert (bytes(entry.goal_info.goal_id.uuid), entry.status) == (goal.id, 4)
+
+
 def test_the_graph_shows_the_action(offer, console, topic, wire, eventually):
     offer()
     eventually(lambda: topic in console.actions(), console.actions)
@@ -154,9 +167,10 @@ def test_odd_times_to_cancel_before_are_refused(client, time_):
         client.cancel_before(time_)
 
 
-@pytest.mark.parametrize(
-    ("goal", "options", "told"),
-    [
+def test_what_cannot_be_sent_is_refused_and_not_sent(offer, client):
+    executed = []
+    offer(lambda goal: executed.append(goal.id))
+    for goal, options, reason in (
         (5, {}, "expected a dict or a"),
         ({"speed": 1}, {}, "speed"),
         ({}, {"timeout": -1}, "timeout: expected seconds"),
@@ -165,12 +179,13 @@ def test_odd_times_to_cancel_before_are_refused(client, time_):
         ({}, {"on_feedback": 7}, "callback: expected something that can be called"),
         ({}, {"on_status_change": 7}, "callback: expected something that can be called"),
         ({}, {"on_done": 7}, "on_done: expected something that can be called"),
-    ],
-)
-def test_what_cannot_be_sent_is_refused(client, goal, options, told):
-    with pytest.raises(rosglass.ConversionError, match=told):
-        client.send_goal(goal, **options)
+    ):
+        with pytest.raises(rosglass.ConversionError, match=reason):
+            client.send_goal(goal, **options)
     assert list(client.goals) == []
+    last = client.send_goal()
+    last.result(30)
+    assert executed == [last.id]
 
 
 def test_cancelling_takes_seconds(client):

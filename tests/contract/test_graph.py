@@ -35,13 +35,19 @@ def test_nodes_see_each_other_come_and_go(connect, eventually):
     eventually(lambda: "/arm/other" not in [node.full for node in one.nodes()], one.nodes)
 
 
-def test_topics_and_their_ends_are_shown(robot, console, topic, eventually):
-    publisher = robot.create_publisher(topic, TEXT)
+def test_topics_and_their_ends_are_shown(robot, console, topic, wire, eventually):
+    publisher = robot.create_publisher(topic, TEXT, QoS.latched())
     subscription = robot.create_subscription(topic, TEXT)
     eventually(lambda: console.topics().get(topic) == [TEXT], console.topics)
     eventually(lambda: console.publishers(topic) and console.subscriptions(topic))
     (end,) = console.publishers(topic)
     assert (end.name, end.type, end.node.full) == (topic, TEXT, "/robot")
+    if not wire.is_ros1:  # whose master knows neither
+        assert end.qos.durability is QoS.latched().durability
+        assert len(end.gid) == 16
+    assert console.publishers(topic.strip("/")) == [end], "names are resolved"
+    with pytest.raises(rosglass.InvalidNameError):
+        console.publishers("a b")
     assert [end.node.full for end in console.subscriptions(topic)] == ["/robot"]
     publisher.close()
     subscription.close()
@@ -51,7 +57,13 @@ def test_topics_and_their_ends_are_shown(robot, console, topic, eventually):
 def test_services_are_shown(robot, console, topic, wire, eventually):
     server = robot.create_service_server(topic, wire.add, lambda _: {})
     eventually(lambda: console.services().get(topic) == [wire_type(wire)], console.services)
-    assert [end.node.full for end in console.service_servers(topic)] == ["/robot"]
+    (end,) = console.service_servers(topic)
+    assert end.node.full == "/robot"
+    if not wire.is_ros1:  # whose master knows neither clients nor hashes
+        assert end.type_hash == rosglass.load(wire.add).rihs01
+        robot.create_service_client(topic, wire.add)
+        eventually(lambda: console.service_clients(topic))
+        assert [end.node.full for end in console.service_clients(topic)] == ["/robot"]
     server.close()
     eventually(lambda: not console.service_servers(topic))
 

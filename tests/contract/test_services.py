@@ -181,10 +181,48 @@ def test_waiting_for_a_call_ends_without_ending_the_call(offer, client, topic):
     assert call.exception() is None
 
 
-def test_fifty_calls_at_once_are_all_answered(offer, client):
+def test_hundreds_of_calls_at_once_are_all_answered(offer, client):
     offer()
-    calls = [client.call_async({"a": number, "b": 1}) for number in range(50)]
-    assert [call.result(30).sum for call in calls] == list(range(1, 51))
+    calls = [client.call_async({"a": number, "b": 1}) for number in range(300)]
+    assert [call.result(30).sum for call in calls] == list(range(1, 301))
+
+
+@pytest.fixture
+def ordered_client(console, topic, wire):
+    """A client whose requests come one after the other; in ROS 1 it has one connection."""
+    options = {"persistent": True} if wire.is_ros1 else {}
+    return console.create_service_client(topic, wire.add, **options)
+
+
+def test_requests_come_in_the_order_of_the_calls(robot, ordered_client, topic, wire):
+    seen = []
+    for value in range(50):
+        ordered_client.call_async({"a": value}, timeout=30)
+    robot.create_service_server(topic, wire.add, lambda request: seen.append(request.a))
+    for value in range(50, 100):
+        ordered_client.call_async({"a": value}, timeout=30)
+    ordered_client.call({"a": 100}, timeout=30)
+    assert seen == list(range(101))
+
+
+@pytest.mark.parametrize("kept", [False, True], ids=["any connection", "one connection"])
+def test_a_server_that_ends_takes_its_calls_along_and_the_next_one_is_called(
+    robot, client, ordered_client, topic, wire, kept, eventually, monkeypatch
+):
+    monkeypatch.setattr("rosglass.ros2.service_client._GRACE_S", 0.1)  # 3 s, for a router's restart
+    used, begun = ordered_client if kept else client, threading.Event()
+    server = robot.create_service_server(topic, wire.add, lambda _: begun.set() or Future())
+    call = used.call_async(timeout=30)
+    assert begun.wait(30)
+    server.close()
+    server.close()
+    assert server.problem == "the server is closed"
+    with pytest.raises(rosglass.ConnectionLostError):
+        call.result(30)
+    eventually(lambda: f"no server offers {topic}" in used.problem, lambda: used.problem)
+    assert not used.ready
+    robot.create_service_server(topic, wire.add, lambda _: {"sum": 9})
+    assert used.call(timeout=30).sum == 9
 
 
 def test_calls_from_many_threads(offer, client):
@@ -348,7 +386,7 @@ def test_a_response_that_does_not_fit_is_logged(
         eventually(
             lambda: [str(e.node) for e in robot.service_clients(client.name)] == ["/console"]
         )
-    with refused(wire, "the server made no valid response"):
+    with refused(wire, f"the server made no valid response: .*{reason}"):
         client.call(timeout=1)
     assert "the callback's response to /console does not fit" in caplog.text
     assert reason in caplog.text

@@ -6,14 +6,16 @@ import asyncio
 import re
 import threading
 
+import numpy as np
 import pytest
 
 import rosglass
 from rosglass import Duration, QoS
-from rosglass.comm import IMMEDIATE, Liveliness, LivelinessLost, Matched, NodeName, Sample
+from rosglass.comm import IMMEDIATE, History, Liveliness, LivelinessLost, Matched, NodeName, Sample
 
 TEXT, TWIST, IMAGE = "std_msgs/msg/String", "geometry_msgs/msg/Twist", "sensor_msgs/msg/Image"
 HEADER = "std_msgs/msg/Header"
+KEEP_ALL = QoS(history=History.KEEP_ALL)
 
 
 @pytest.fixture
@@ -32,13 +34,52 @@ def link(robot, console, topic, eventually):
     return link
 
 
-def test_messages_come_once_and_in_order(link, eventually):
+def test_messages_come_once_and_in_order_and_none_is_lost_at_full_speed(link, eventually):
     received = []
-    publisher, _ = link(callback=lambda message: received.append(message.data), qos=200)
-    for number in range(100):
+    publisher, subscription = link(
+        callback=lambda message: received.append(message.data), qos=KEEP_ALL
+    )
+    for number in range(5000):
         publisher.publish(data=str(number))
-    eventually(lambda: len(received) >= 100, lambda: received)
-    assert received == [str(number) for number in range(100)]
+    eventually(lambda: len(received) >= 5000, lambda: len(received))
+    assert received == [str(number) for number in range(5000)]
+    assert subscription.statistics().dropped == 0
+
+
+def test_several_publishers_of_one_node_and_several_are_heard_in_order(
+    connect, robot, console, topic, eventually
+):
+    subscription = console.create_subscription(topic, TEXT, qos=KEEP_ALL)
+    publishers = [
+        node.create_publisher(topic, TEXT, KEEP_ALL)
+        for node in (robot, robot, connect("other"), console)
+    ]
+    eventually(lambda: all(publisher.subscription_count() for publisher in publishers))
+    eventually(lambda: subscription.publisher_count() >= 3)  # ROS 1 counts two of a node as one
+    for number in range(50):
+        for index, publisher in enumerate(publishers):
+            publisher.publish(data=f"{index} {number}")
+    heard = [subscription.wait(30).message().data for _ in range(200)]
+    for index in range(4):
+        own = [text for text in heard if text.startswith(f"{index} ")]
+        assert own == [f"{index} {number}" for number in range(50)]
+
+
+def test_a_node_hears_itself(robot, topic, eventually):
+    subscription = robot.create_subscription(topic, TEXT)
+    publisher = robot.create_publisher(topic, TEXT)
+    eventually(lambda: publisher.subscription_count() == 1)
+    publisher.publish(data="hello")
+    assert subscription.wait(30).message().data == "hello"
+
+
+def test_a_picture_outlives_the_node_that_received_it(link, console):
+    publisher, subscription = link(IMAGE)
+    publisher.publish(data=np.arange(100_000, dtype=np.uint8))
+    pixels = subscription.wait(30).message().data
+    console.close()
+    publisher.close()
+    assert np.array_equal(pixels, np.arange(100_000, dtype=np.uint8))
 
 
 @pytest.mark.parametrize("given", ["fields", "dict", "message", "bytes", "sample"])

@@ -7,7 +7,6 @@ import json
 import os
 import random
 import signal
-import threading
 import time
 from pathlib import Path
 
@@ -15,7 +14,7 @@ import pytest
 from waiting import eventually, nothing_happens
 
 import rosglass
-from rosglass.comm import IMMEDIATE, CancelAnswer, GoalStatus
+from rosglass.comm import GoalStatus
 from rosglass.wires.zenoh.router import Router
 
 HERE = Path(__file__).parent
@@ -85,77 +84,6 @@ def count(goal):
     return {"sequence": sequence}
 
 
-def test_calls_in_every_way(node, server):
-    client = node.create_service_client("/add")
-    assert client.wait_for_server(30), client.problem
-    assert client.type.name == ADD
-    assert client.call({"a": 1, "b": 2}).sum == 3
-    calls = [client.call_async({"a": value, "b": 1}) for value in range(100)]
-    assert [call.result(30).sum for call in calls] == list(range(1, 101))
-    assert client.problem == ""
-
-
-def test_a_callback_that_fails(node, server):
-    client = node.create_service_client("/fail", TRIGGER)
-    assert client.wait_for_server(30), client.problem
-    with pytest.raises((rosglass.ServiceError, rosglass.TimeoutError)):
-        client.call(timeout=1)
-
-
-def test_no_callback_waits_in_the_thread_that_receives(node, server, url):
-    client = node.create_service_client("/add", ADD)
-    assert client.wait_for_server(30), client.problem
-    told = []
-
-    def ask(_):
-        with pytest.raises(rosglass.UnsupportedError, match="in a thread that receives") as raised:
-            client.call(timeout=60)
-        told.append(raised.value)
-
-    with rosglass.connect(url, "talker") as talker:
-        node.create_subscription("/talk", TEXT, ask, executor=IMMEDIATE)
-        publisher = talker.create_publisher("/talk", TEXT)
-        eventually(lambda: publisher.publish({"data": "hello"}) or told, what="a message")
-    told.clear()
-
-    def ask_if_received(call):
-        # A call that is answered already calls back in this very thread.
-        if threading.current_thread() is not threading.main_thread():
-            ask(call)
-
-    def call():
-        client.call_async({"a": 1}).add_done_callback(ask_if_received)
-        return told
-
-    eventually(call, what="the response")
-
-
-def test_goals_in_every_way(node, server):
-    client = node.create_action_client("/count", FIBONACCI)
-    feedback, statuses = [], []
-    goal = client.send_goal(
-        {"order": 5},
-        on_feedback=lambda message: feedback.append(len(message.sequence)),
-        on_status_change=statuses.append,
-    )
-    status, result = goal.result(30)
-    assert status is GoalStatus.SUCCEEDED, client.problem
-    assert list(result.sequence) == [0, 1, 2, 3, 4]
-    eventually(lambda: statuses[-1] is GoalStatus.SUCCEEDED, what=statuses)
-    assert statuses[0] is GoalStatus.ACCEPTED
-    assert feedback == [2, 3, 4, 5]
-    with pytest.raises(rosglass.GoalRejectedError):
-        client.send_goal({"order": 1000}).result(30)
-    goals = [client.send_goal({"order": 900}) for _ in range(3)]
-    assert all(goal.acceptance.result(30) for goal in goals)
-    assert goals[0].cancel().result(30) == CancelAnswer((goals[0].id,))
-    assert goals[0].result(30).status is GoalStatus.CANCELED
-    earlier = client.cancel_before(goals[1].accepted).result(30)
-    assert earlier.accepted == (goals[1].id,)
-    assert client.cancel_all().result(30).accepted == (goals[2].id,)
-    assert {goal.result(30).status for goal in goals} == {GoalStatus.CANCELED}
-
-
 def test_the_other_way_round(node, url, run_peer):
     """The other program calls before we offer anything, and is answered when we do."""
     peer = run_peer("use", url, "user")
@@ -165,21 +93,6 @@ def test_the_other_way_round(node, url, run_peer):
     assert peer.event("sums") == list(range(1, 21))
     assert peer.event("goal") == ["succeeded", [0, 1, 2, 3], [2, 3, 4]]
     peer.end()
-
-
-def test_the_status_of_goals_is_there_for_late_listeners(node, url):
-    node.create_action_server("/late", FIBONACCI, count)
-    client = node.create_action_client("/late", FIBONACCI)
-    goal = client.send_goal({"order": 2})
-    assert goal.result(30).status is GoalStatus.SUCCEEDED
-    with rosglass.connect(url, "late") as other:
-        topic, kind = "/late/_action/status", "action_msgs/msg/GoalStatusArray"
-        subscription = other.create_subscription(topic, kind, qos=rosglass.QoS.latched())
-        sample = subscription.wait(30)
-        assert sample is not None, subscription.problem
-        entry = sample.message().status_list[0]
-        assert (bytes(entry.goal_info.goal_id.uuid), entry.status) == (goal.id, 4)
-        eventually(lambda: other.actions().get("/late") == [FIBONACCI], what=other.actions())
 
 
 def test_a_server_that_is_killed_at_work(new_url, run_peer, monkeypatch):
@@ -210,16 +123,6 @@ def test_a_server_that_is_killed_at_work(new_url, run_peer, monkeypatch):
         again.event("ready")
         assert actions.send_goal({"order": 2}).result(30).status is GoalStatus.SUCCEEDED
         again.end()
-
-
-def test_closing_a_server_tells_its_clients(node, url):
-    with rosglass.connect(url, "closing") as other:
-        other.create_action_server("/closing", FIBONACCI, count)
-        client = node.create_action_client("/closing", FIBONACCI)
-        goal = client.send_goal({"order": 900})
-        assert goal.acceptance.result(30), client.problem
-        time.sleep(0.2)  # the request for the result is on its way
-    assert goal.result(30).status is GoalStatus.ABORTED
 
 
 def test_ctrl_c_ends_a_call(url, server, run_peer):

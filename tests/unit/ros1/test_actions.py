@@ -737,14 +737,6 @@ def test_closing_ends_all_goals(offer, eventually):
     assert server.problem == "the server is closed"
 
 
-def test_the_status_is_latched(offer, connect, eventually):
-    _, hand = offer(lambda _: None)
-    hand.send("a")
-    eventually(lambda: hand.listed == {"a": "SUCCEEDED"})
-    message = connect("late").wait_for_message(f"{NAME}/status", timeout=30)
-    assert [status.goal_id.id for status in message.status_list] == ["a"]
-
-
 @pytest.mark.parametrize(
     "wrong", [{"accept": 5}, {"cancel": 5}, {"simple": "yes"}, {"executor": 5}]
 )

@@ -152,18 +152,6 @@ def test_options_of_another_kind_are_refused(node, options, told):
         node.create_service_client("/x", ADD, **options)
 
 
-def test_requests_through_one_connection_arrive_in_the_order_of_the_calls(connect, node):
-    seen = []
-    client = node.create_service_client("/add", ADD, persistent=True)
-    for value in range(20):
-        client.call_async({"a": value})
-    connect("robot").create_service_server("/add", ADD, lambda r: seen.append(r.a))
-    for value in range(20, 40):
-        client.call_async({"a": value})
-    client.call({"a": 40})
-    assert seen == list(range(41))
-
-
 def test_fifty_calls_are_answered_in_parallel(connect, node):
     client = node.create_service_client("/add", ADD)
     together, promises = threading.Event(), []
@@ -182,13 +170,6 @@ def test_fifty_calls_are_answered_in_parallel(connect, node):
     for promise, value in reversed(promises):
         promise.set_result({"sum": value})
     assert [call.result(30).sum for call in calls] == list(range(50))
-
-
-def test_more_calls_than_connections_wait_for_their_turn(connect, node):
-    client = node.create_service_client("/add", ADD)
-    connect("robot").create_service_server("/add", ADD, add)
-    calls = [client.call_async({"a": value}) for value in range(300)]
-    assert [call.result(30).sum for call in calls] == list(range(300))
 
 
 def test_a_persistent_client_uses_one_connection_and_others_one_for_each_call(
@@ -213,18 +194,6 @@ def test_a_server_that_keeps_no_connections_serves_persistent_clients_too(
     for _ in range(3):
         assert client.call().sum == 3
         eventually(lambda: not client._requester.busy)
-
-
-def test_a_connection_that_is_lost_is_made_again(connect, node, eventually):
-    client = node.create_service_client("/add", ADD, persistent=True)
-    robot = connect("robot")
-    server = robot.create_service_server("/add", ADD, add)
-    assert client.call({"a": 1}).sum == 1
-    server.close()
-    eventually(lambda: "no server offers /add" in client.problem)
-    assert not client.ready
-    robot.create_service_server("/add", ADD, lambda _: {"sum": 9})
-    assert client.call({"a": 1}).sum == 9
 
 
 # -- types ---------------------------------------------------------------------------------------
@@ -765,21 +734,6 @@ def test_closing_withdraws_the_service(connect, master, eventually):
     eventually(lambda: set(master.services) == {"/two"})
     robot.close()
     assert master.services == {}
-
-
-def test_closing_a_server_ends_the_calls_of_its_clients(connect, client):
-    begun = threading.Event()
-
-    def never(_):
-        begun.set()
-        return concurrent.futures.Future()
-
-    server = connect("robot").create_service_server("/add", ADD, never)
-    call = client.call_async(timeout=30)
-    assert begun.wait(30)
-    server.close()
-    with pytest.raises(rosglass.ConnectionLostError):
-        call.result(30)
 
 
 def test_a_service_is_registered_again_after_the_master_was_restarted(

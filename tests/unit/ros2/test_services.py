@@ -51,36 +51,11 @@ def requester(client, middleware):
     return middleware.requesters[0]
 
 
-def call_in(client, blocking, **options):
-    return client.call(**options) if blocking else client.call_async(**options).result(30)
-
-
 def answer(total=3):
     return rosglass.load(ADD).response.encode({"sum": total})
 
 
 # -- calling -------------------------------------------------------------------------------------
-
-
-def test_names_are_resolved_and_the_type_is_announced_with_its_hash(node, robot, middleware):
-    client = node.create_service_client("add", ADD)
-    assert client.name == "/arm/add"
-    info = middleware.requesters[0].info
-    assert (info.name, info.type, info.type_hash) == ("/arm/add", ADD, rosglass.load(ADD).rihs01)
-    server = robot.create_service_server("~/add", ADD, add, qos=rosglass.QoS(3))
-    assert server.name == "/robot/add"
-    assert robot.fake.repliers[0].info.qos == rosglass.QoS(3)
-
-
-def test_requests_are_sent_in_the_order_of_the_calls(robot, client):
-    seen = []
-    for value in range(50):
-        client.call_async({"a": value})
-    robot.create_service_server("/add", ADD, lambda r: seen.append(r.a))
-    for value in range(50, 100):
-        client.call_async({"a": value})
-    client.call({"a": 100})
-    assert seen == list(range(101))
 
 
 def test_a_server_that_is_seen_before_it_is_linked_is_called_when_it_is(
@@ -248,29 +223,6 @@ def test_the_middleware_is_told_how_long_a_reply_is_of_use(client, requester):
 
 
 # -- what does not come --------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("blocking", [True, False])
-def test_without_a_server_a_call_ends_after_its_time(node, connect, client, blocking):
-    connect("else").create_service_server("/base/add", TRIGGER, lambda _: None)
-    told = (
-        r"/add could not be called within 0\.05 s: no server offers /add "
-        rf"\[{ADD}\] on fake:// \(CONNECTED: in this process\); did you mean /base/add\?; nothing"
-    )
-    with pytest.raises(rosglass.ServiceUnavailableError, match=told):
-        call_in(client, blocking, timeout=0.05)
-    assert client.pending == 0
-
-
-@pytest.mark.parametrize("blocking", [True, False])
-def test_a_server_that_does_not_answer_is_given_up(client, requester, middleware, blocking):
-    requester.linked = True
-    middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01)
-    told = r"/add did not answer within 0\.05 s: /robot was sent the request 0\.\d s ago, and may"
-    with pytest.raises(rosglass.TimeoutError, match=told):
-        call_in(client, blocking, timeout=0.05)
-    assert requester.forgotten == [1]
-    assert client.pending == 0
 
 
 def test_a_cancelled_call_is_not_sent_or_its_reply_dropped(robot, client, node, middleware):
@@ -567,28 +519,6 @@ def test_ctrl_c_gives_the_call_up(client, requester, monkeypatch):
 
 
 # -- serving -------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("tells", "told"),
-    [(True, "it is told the error instead"), (False, "it gets no response, and waits")],
-)
-def test_a_callback_that_fails_is_logged_with_who_asked(robot, client, caplog, tells, told):
-    answers = iter([ValueError("the arm is off"), {"sum": 1}])
-
-    def callback(_):
-        got = next(answers)
-        if isinstance(got, Exception):
-            raise got
-        return got
-
-    robot.create_service_server("/add", ADD, callback)
-    robot.fake.repliers[0].tells_failures = tells
-    with pytest.raises(rosglass.ServiceError, match="ValueError: the arm is off"):
-        client.call(timeout=30)
-    assert f"/add: the callback failed on a request of /arm/cockpit; {told}" in caplog.text
-    assert "in callback" in caplog.text
-    assert client.call(timeout=30).sum == 1
 
 
 def test_rubbish_is_named_once_per_client_and_disturbs_nobody(robot, client, caplog):
