@@ -57,7 +57,7 @@ from rosglass.ros2.action_types import (
 )
 from rosglass.ros2.action_version import ActionVersion
 from rosglass.ros2.core import Member
-from rosglass.ros2.repeats import Repeats
+from rosglass.ros2.graph_matching import Repeats
 from rosglass.ros2.service_client import Ros2ServiceClient
 
 if TYPE_CHECKING:

@@ -1,30 +1,37 @@
-"""Matching of ROS 2 subscriptions: types and profiles as the graph announces them."""
+"""Matching of ROS 2 subscriptions: types and profiles as the graph announces them.
+
+Beside the matching itself: which publishers are alive, and which samples came twice or never.
+"""
 
 from __future__ import annotations
 
 import threading
+import time
 from typing import TYPE_CHECKING
 
-from rosglass.comm import EndpointInfo, EndpointKind, Sample
+from rosglass.comm import EndpointInfo, EndpointKind, Liveliness, Sample
 from rosglass.comm.events import conflicts, words
 from rosglass.comm.subscription_feed import Problem, TopicMatching
-from rosglass.ros2.liveliness import Liveness
-from rosglass.ros2.repeats import Repeats
 from rosglass.ros2.topic_types import TopicTypes
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from collections.abc import Set as AbstractSet
 
-    from rosglass.comm import QoS
+    from rosglass.comm import Handle, QoS, Timers
     from rosglass.comm.subscription_feed import SubscriptionFeed
     from rosglass.messages import MessageType
     from rosglass.ros2.core import Core
     from rosglass.wires.base import OnSample, Reader
 
-__all__ = ["GraphMatching"]
+__all__ = ["GraphMatching", "Repeats"]
 
 _PUBLISHER = EndpointKind.PUBLISHER
+#: Publishers remembered; more come only from a robot that restarts for days.
+_MAX_PUBLISHERS = 1024
+#: Gaps in the numbering that are remembered per publisher, in samples.
+_MAX_MISSING = 64
+_NOBODY = (-3, 0)
 
 
 class GraphMatching(TopicMatching):
@@ -207,3 +214,134 @@ class GraphMatching(TopicMatching):
             deliver(make(Sample, (data, wire, kind, received, sent, gid, sequence)))
 
         return receive
+
+
+class Liveness:
+    """Tells the publishers that are alive from those that are only there.
+
+    A publisher with automatic liveliness is alive while it is seen. One that promised to show its
+    liveliness itself (manual by topic) is alive while it does so within its lease duration: by
+    sending something, or by a word of its own, which only DDS carries and only as a count.
+
+    Args:
+        timers: Run the next look.
+        repeats: Knows the last sample of each publisher.
+        look: Called when it is time to :meth:`follow` again.
+    """
+
+    def __init__(self, timers: Timers, repeats: Repeats, look: Callable[[], None]) -> None:
+        self._timers, self._repeats, self._look = timers, repeats, look
+        self._signs: dict[bytes, tuple[tuple[int, int], float]] = {}
+        self._timer: Handle | None = None
+
+    def follow(self, there: Sequence[EndpointInfo], reader: Reader | None) -> list[EndpointInfo]:
+        """Return those of the publishers that are `there` who are alive now."""
+        manual = [
+            (endpoint, endpoint.qos.lease_duration.seconds)
+            for endpoint in there
+            if endpoint.qos.liveliness is Liveliness.MANUAL_BY_TOPIC
+            and endpoint.qos.lease_duration is not None
+        ]
+        if not manual:
+            self.close()
+            return list(there)
+        now = time.monotonic()
+        signs = {endpoint.gid: self._sign(endpoint.gid, now) for endpoint, _ in manual}
+        self._signs = {gid: (self._repeats.latest(gid), at) for gid, at in signs.items()}
+        silent = [endpoint for endpoint, lease in manual if now - signs[endpoint.gid] > lease]
+        alive = None if reader is None else reader.alive()
+        if alive is not None:
+            # The middleware knows better how many, but not which: those who sent last.
+            manual.sort(key=lambda one: signs[one[0].gid])
+            silent = [endpoint for endpoint, _ in manual[: max(0, len(there) - alive)]]
+        self.close()
+        pause = min(lease for _, lease in manual) / 2
+        self._timer = self._timers.after(pause, self._look)
+        return [endpoint for endpoint in there if endpoint not in silent]
+
+    def close(self) -> None:
+        """Look no more; safe to call twice."""
+        timer, self._timer = self._timer, None
+        if timer is not None:
+            timer.close()
+
+    def _sign(self, gid: bytes, now: float) -> float:
+        """Return when a publisher showed last that it is alive; when it was seen first, that."""
+        known = self._signs.get(gid)
+        if known is None or known[0] != self._repeats.latest(gid):
+            return now
+        return known[1]
+
+
+class Repeats:
+    """Tells whether a sample was seen before, by its publisher's identity, number and time stamp.
+
+    A sample can come twice: over an old and a new route while links change, from a publisher's
+    memory after a reconnection, or under two keys when a publisher serves two distributions. Late
+    samples that were not seen are not repeats. Safe from several threads: the worst that a race
+    does is let a repeat pass.
+
+    Attributes:
+        lost: Numbers that were left out, so far.
+        guarded: Whether samples without number are told apart by their time stamps: while one
+            reader takes the place of another, whose last samples may come again. Not longer, as a
+            publisher's clock may be set back.
+    """
+
+    def __init__(self) -> None:
+        self.lost = 0
+        self.guarded = False
+        self._last: dict[bytes, tuple[int, int]] = {}
+        self._missing: dict[bytes, set[int]] = {}
+
+    def seen(self, gid: bytes, sequence: int, sent: int | None) -> bool:
+        """Return whether the sample is a repeat, and remember it.
+
+        Samples without identity, number or time stamp are never repeats.
+        """
+        if sent is None or not gid:
+            return False
+        last = self._last.get(gid, _NOBODY)
+        if sequence == last[0] + 1:
+            self._last[gid] = (sequence, sent)
+            return False
+        return self._judge(gid, sequence, sent, last)
+
+    def latest(self, gid: bytes) -> tuple[int, int]:
+        """Return number and time stamp of a publisher's last sample, to see whether more came."""
+        return self._last.get(gid, _NOBODY)
+
+    def _judge(self, gid: bytes, sequence: int, sent: int, last: tuple[int, int]) -> bool:
+        """Decide on a sample that is not simply the next one."""
+        if sequence < 0:
+            repeated = self.guarded and sent <= last[1]
+            if not repeated:
+                self._remember(gid, -1, sent)
+            return repeated
+        if last[0] < 0:
+            self._remember(gid, sequence, sent)
+            return False
+        if sequence > last[0]:
+            self._leave_out(gid, last[0] + 1, sequence)
+        elif sent <= last[1]:
+            missing = self._missing.get(gid, set())
+            if sequence not in missing:
+                return True
+            missing.discard(sequence)
+            self.lost -= 1
+            return False
+        self._last[gid] = (sequence, sent)
+        return False
+
+    def _remember(self, gid: bytes, sequence: int, sent: int) -> None:
+        if gid not in self._last and len(self._last) >= _MAX_PUBLISHERS:
+            self._last.clear()
+            self._missing.clear()
+        self._last[gid] = (sequence, sent)
+
+    def _leave_out(self, gid: bytes, first: int, end: int) -> None:
+        self.lost += end - first
+        missing = self._missing.setdefault(gid, set())
+        missing.update(range(max(first, end - _MAX_MISSING), end))
+        if len(missing) > 2 * _MAX_MISSING:
+            self._missing[gid] = set(sorted(missing)[-_MAX_MISSING:])
