@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import threading
+from types import SimpleNamespace
 
 import pytest
 
 pytest.importorskip("zenoh")
 
-from rosglass.wires.zenoh.reader import _Collected
+from rosglass.comm import QoS
+from rosglass.wires.zenoh.local import Places
+from rosglass.wires.zenoh.reader import ZenohReader, _Collected
 
 
 class Subscriber:
@@ -63,3 +66,33 @@ def test_a_reader_is_closed_while_the_drain_takes_its_samples():
         thread.join(30)
     assert failed == []
     assert subscriber.undeclared
+
+
+def test_a_reader_closed_while_its_samples_change_their_way_ends_each_source_once(monkeypatch):
+    calls = []
+
+    class Source:
+        """A source that is closed with its reader as soon as it begins."""
+
+        def __init__(self, *_):
+            pass
+
+        def begin(self):
+            calls.append("begin")
+            reader.close()
+
+        def end(self):
+            calls.append("end")
+
+    # Any rate is high enough for a thread of their own.
+    monkeypatch.setattr("rosglass.wires.zenoh.reader._WINDOW", 0.0)
+    monkeypatch.setattr("rosglass.wires.zenoh.reader._FAST", -1.0)
+    monkeypatch.setattr("rosglass.wires.zenoh.reader._Pumped", Source)
+    first = Subscriber()
+    owner = SimpleNamespace(forget=lambda _: None, recycle=lambda _: None)
+    place, qos = ("/topic", "std_msgs/msg/Empty"), QoS()
+    reader = ZenohReader(owner, "token", place, "key", qos, print, None, Places(), None)
+    reader.declare(Session(first))
+    reader.poll()
+    assert first.undeclared
+    assert calls == ["begin", "end"]

@@ -382,13 +382,16 @@ class ZenohReader(Declaration, Reader):
         try:
             new = self._make(session, wanted)
             with self._lock:
-                old, self._source, self._way = self._source, new, wanted
-                if self._closed:
-                    self._source = None
+                # Until the new one has begun, both are this thread's to end, not close()'s.
+                old, self._source = self._source, None
             if old is not None:
                 old.end()
             new.begin()
-            if self._closed:
+            with self._lock:
+                closed = self._closed
+                if not closed:
+                    self._source, self._way = new, wanted
+            if closed:
                 new.end()
         except zenoh.ZError as error:
             _log.debug("%s: keeps receiving as before: %s", self._key, error)
