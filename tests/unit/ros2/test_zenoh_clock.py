@@ -9,8 +9,7 @@ import pytest
 zenoh = pytest.importorskip("zenoh")
 
 from rosglass.comm import Durability, Duration, EndpointInfo, EndpointKind, NodeName, QoS  # noqa: E402
-from rosglass.wires.zenoh.endpoints import ZenohWriter  # noqa: E402
-from rosglass.wires.zenoh.local import Places  # noqa: E402
+from rosglass.wires.zenoh.endpoints import LocalRegistry, ZenohWriter  # noqa: E402
 from rosglass.wires.zenoh.options import ZenohOptions  # noqa: E402
 from rosglass.wires.zenoh.reader import _Collected  # noqa: E402
 
@@ -63,7 +62,7 @@ def test_the_lifespan_of_latched_samples_is_none_of_the_system_clock(monkeypatch
     qos = QoS(durability=Durability.TRANSIENT_LOCAL, lifespan=Duration.from_seconds(600))
     node, clock = NodeName("/", "robot"), time.time_ns
     end = EndpointInfo(EndpointKind.PUBLISHER, "/map", "std_msgs/msg/String", node, qos)
-    writer = ZenohWriter(None, ZenohOptions(), "token", end, None, Places())
+    writer = ZenohWriter(None, ZenohOptions(), "token", end, None, LocalRegistry())
     writer.write(b"\0\1\0\0map")
     monkeypatch.setattr(time, "time_ns", lambda: clock() + jump)
     declare = Session.declare_publisher

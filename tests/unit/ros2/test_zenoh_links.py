@@ -7,8 +7,8 @@ import pytest
 
 zenoh = pytest.importorskip("zenoh")
 
+from rosglass.wires.zenoh.endpoints import LocalRegistry  # noqa: E402
 from rosglass.wires.zenoh.links import Pulse, limit_silence  # noqa: E402
-from rosglass.wires.zenoh.local import Places  # noqa: E402
 
 
 class FakeSession:
@@ -125,7 +125,7 @@ def test_connections_that_leave_the_machine_end_when_nothing_is_acknowledged(
 
 
 def test_places():
-    places = Places()
+    places = LocalRegistry()
     assert places.at(("/t", "type")) == ()
     places.add(("/t", "type"), "a")
     places.add(("/t", "type"), "b")

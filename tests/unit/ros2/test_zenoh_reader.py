@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("zenoh")
 
 from rosglass.comm import QoS
-from rosglass.wires.zenoh.local import Places
+from rosglass.wires.zenoh.endpoints import LocalRegistry
 from rosglass.wires.zenoh.reader import ZenohReader, _Collected
 
 
@@ -91,7 +91,7 @@ def test_a_reader_closed_while_its_samples_change_their_way_ends_each_source_onc
     first = Subscriber()
     owner = SimpleNamespace(forget=lambda _: None, recycle=lambda _: None)
     place, qos = ("/topic", "std_msgs/msg/Empty"), QoS()
-    reader = ZenohReader(owner, "token", place, "key", qos, print, None, Places(), None)
+    reader = ZenohReader(owner, "token", place, "key", qos, print, None, LocalRegistry(), None)
     reader.declare(Session(first))
     reader.poll()
     assert first.undeclared

@@ -9,7 +9,7 @@ import time
 from abc import abstractmethod
 from collections import deque
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 import zenoh
 import zenoh.ext
@@ -17,19 +17,12 @@ import zenoh.ext
 from rosglass.comm import ConnectionState, Durability, Handle, History, Reliability
 from rosglass.errors import ConnectionLostError, NodeClosedError
 from rosglass.wires.base import Writer
-from rosglass.wires.zenoh.keys import (
-    ATTACHMENT_FULL,
-    HUMBLE_HASH,
-    gid_of,
-    topic_key,
-    without_hash,
-)
+from rosglass.wires.zenoh.keys import ATTACHMENT_FULL, HUMBLE_HASH, gid_of, topic_key, without_hash
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rosglass.comm import EndpointInfo, Status
-    from rosglass.wires.zenoh.local import Places
     from rosglass.wires.zenoh.options import ZenohOptions
     from rosglass.wires.zenoh.reader import ZenohReader
     from rosglass.wires.zenoh.shm import SharedMemory
@@ -38,11 +31,46 @@ __all__ = [
     "CHANNEL",
     "Announcement",
     "Declaration",
+    "LocalRegistry",
     "Owner",
     "Pump",
     "ZenohWriter",
     "direct",
 ]
+
+_T = TypeVar("_T")
+
+
+class LocalRegistry(Generic[_T]):
+    """The node's own ends of each topic or service, to which it sends without a detour over Zenoh.
+
+    Zenoh would call back in the thread that sends. Where that is the main thread, Ctrl-C is most
+    likely to strike in the callback, and Zenoh swallows whatever that raises: a program would not
+    end.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._there: dict[tuple[str, str], tuple[_T, ...]] = {}
+
+    def add(self, place: tuple[str, str], one: _T) -> None:
+        """Add somebody."""
+        with self._lock:
+            self._there[place] = (*self._there.get(place, ()), one)
+
+    def remove(self, place: tuple[str, str], one: _T) -> None:
+        """Remove somebody, who may be gone already."""
+        with self._lock:
+            left = tuple(other for other in self._there.get(place, ()) if other is not one)
+            if left:
+                self._there[place] = left
+            else:
+                self._there.pop(place, None)
+
+    def at(self, place: tuple[str, str]) -> tuple[_T, ...]:
+        """Return who is there, in order of appearance."""
+        return self._there.get(place, ())
+
 
 _log = logging.getLogger("rosglass.ros2")
 #: Seconds between the heartbeats that let subscriptions notice a lost last sample (rmw_zenoh's).
@@ -178,7 +206,7 @@ class ZenohWriter(Declaration, Writer):
         token: str,
         endpoint: EndpointInfo,
         shared: SharedMemory | None,
-        readers: Places[ZenohReader],
+        readers: LocalRegistry[ZenohReader],
     ) -> None:
         super().__init__(owner, token)
         self._options, self._topic, self._qos = options, endpoint.name, endpoint.qos

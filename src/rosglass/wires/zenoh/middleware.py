@@ -44,16 +44,14 @@ from rosglass.wires.zenoh.endpoints import (
     CHANNEL,
     Announcement,
     Declaration,
+    LocalRegistry,
     Pump,
     ZenohWriter,
 )
 from rosglass.wires.zenoh.keys import Token, gid_of, graph_key, topic_key
 from rosglass.wires.zenoh.links import Pulse, limit_silence
-from rosglass.wires.zenoh.local import Places
 from rosglass.wires.zenoh.reader import Drain, ZenohReader
-from rosglass.wires.zenoh.replier import ZenohReplier
-from rosglass.wires.zenoh.requester import ZenohRequester
-from rosglass.wires.zenoh.services import Service
+from rosglass.wires.zenoh.services import Service, ZenohReplier, ZenohRequester
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -116,8 +114,8 @@ class ZenohMiddleware(Middleware):
             from rosglass.wires.zenoh.shm import SharedMemory  # noqa: PLC0415 - not everywhere
 
             self._shared = SharedMemory()
-        self._readers: Places[ZenohReader] = Places()
-        self._servers: Places[ZenohReplier] = Places()
+        self._readers: LocalRegistry[ZenohReader] = LocalRegistry()
+        self._servers: LocalRegistry[ZenohReplier] = LocalRegistry()
         self._drain = Drain(f"{self._address} unread")
         self._changed: Callable[[], None] = lambda: None
         self._graph: Graph | None = None

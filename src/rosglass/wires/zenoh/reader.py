@@ -28,7 +28,7 @@ from rosglass.wires.zenoh.keys import ATTACHMENT, HUMBLE_HASH, NO_ATTACHMENT
 if TYPE_CHECKING:
     from rosglass.comm import QoS
     from rosglass.comm.graph import Graph
-    from rosglass.wires.zenoh.local import Places
+    from rosglass.wires.zenoh.endpoints import LocalRegistry
 
 __all__ = ["Drain", "ZenohReader"]
 
@@ -264,7 +264,7 @@ class ZenohReader(Declaration, Reader):
         qos: QoS,
         on_sample: OnSample,
         drain: Drain,
-        readers: Places[ZenohReader],
+        readers: LocalRegistry[ZenohReader],
         graph: Graph,
     ) -> None:
         super().__init__(owner, token)
