@@ -80,6 +80,8 @@ def test_what_a_node_has_is_listed(robot, console, topic, eventually):
         lambda: console.endpoints("/robot"),
     )
     assert console.endpoints("/no_such_node") == []
+    with pytest.raises(rosglass.InvalidNameError):
+        console.endpoints("no such node")
 
 
 def test_changes_of_the_graph_are_reported(robot, console, topic):
@@ -129,10 +131,16 @@ def test_a_closed_node_does_nothing_more(connect, topic):
     node = connect("gone")
     subscription = node.create_subscription(topic, TEXT)
     publisher = node.create_publisher(topic, TEXT)
+    states = []
+    node.on_status_change(lambda status: states.append(status.state), IMMEDIATE)
     node.close()
     node.close()
     assert node.status().state is ConnectionState.CLOSED
+    assert states[-1:] == [ConnectionState.CLOSED]
     assert subscription.closed
+    assert publisher.subscription_count() == 0
+    publisher.close()
+    subscription.close()
     for use in (
         lambda: node.create_publisher(topic, TEXT),
         lambda: node.create_subscription(topic),
@@ -285,7 +293,10 @@ def test_timers_and_time(console):
         console.create_timer(1.0, tick, executor=7)
 
 
-@pytest.mark.parametrize("name", ["a b", "", "1st", "x-y"])
-def test_bad_node_names_are_refused(wire, name):
+@pytest.mark.parametrize(
+    ("name", "namespace"),
+    [("a b", "/"), ("", "/"), ("1st", "/"), ("x-y", "/"), ("arm", "left"), ("arm", "/a b")],
+)
+def test_bad_node_names_are_refused(wire, name, namespace):
     with pytest.raises(rosglass.InvalidNameError):
-        rosglass.connect(wire.url, name)
+        rosglass.connect(wire.url, name, namespace)

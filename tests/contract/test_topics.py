@@ -310,7 +310,7 @@ def test_a_publisher_reports_subscriptions_that_come_and_go(robot, console, topi
     events, before = [], console.create_subscription(topic, TEXT)
     eventually(lambda: [end.node for end in robot.subscriptions(topic)] == [name_of(console)])
     eventually(lambda: publisher.subscription_count() == 1)
-    publisher.on_matched(events.append)
+    handle = publisher.on_matched(events.append)
     eventually(lambda: events)
     before.close()
     eventually(lambda: len(events) == 2)
@@ -322,6 +322,10 @@ def test_a_publisher_reports_subscriptions_that_come_and_go(robot, console, topi
         (name_of(console), 1, 1, 2),
     ]
     assert (publisher.problem, publisher.dropped) == ("", 0)
+    handle.close()
+    console.create_subscription(topic, TEXT).close()
+    eventually(lambda: publisher.subscription_count() == 1)
+    assert len(events) == 3
 
 
 def name_of(node):
@@ -454,11 +458,16 @@ def test_a_deadline_that_passes_without_message_is_reported(
     subscription.on_deadline_missed(events.append)
     subscription.on_matched(events.append)
     miss_deadlines(6)
-    assert robot.create_publisher(topic, TEXT, qos)
+    publisher = robot.create_publisher(topic, TEXT, qos)
     eventually(lambda: len(events) >= 3, lambda: events)
     matched, first, second = events[:3]
     assert isinstance(matched, Matched), "time runs from the moment that a publisher matches"
     assert (first.total, second.total) == (first.change, first.change + second.change)
+    publisher.close()
+    eventually(lambda: isinstance(events[-1], Matched))
+    count = len(events)
+    miss_deadlines(8)
+    assert len(events) == count, "without publisher, nothing is missed"
 
 
 def test_a_subscription_says_which_publisher_left(robot, console, topic, eventually, caplog):
@@ -566,6 +575,13 @@ def test_types_that_cannot_be_used_are_refused_at_creation(robot, wire, create):
     ):
         with pytest.raises(error, match=reason):
             getattr(robot, create)("/t", kind)
+
+
+@pytest.mark.parametrize("create", ["create_publisher", "create_subscription"])
+@pytest.mark.parametrize("qos", [-1, "sensor_data", 1.5])
+def test_profiles_that_are_none_are_refused(console, topic, create, qos):
+    with pytest.raises(rosglass.ArgumentError, match=f"^{topic}: qos: expected"):
+        getattr(console, create)(topic, TEXT, qos=qos)
 
 
 @pytest.mark.parametrize(

@@ -348,6 +348,20 @@ _PRESETS: dict[str, Callable[[], QoS]] = {
 }
 
 
+def check_profile(qos: QoS | int, place: str) -> QoS:
+    """Return the profile that a user gave, or the usual one with the depth that he gave.
+
+    Raises:
+        ArgumentError: It is neither; the message names the place, such as a topic.
+    """
+    if isinstance(qos, QoS):
+        return qos
+    try:
+        return QoS(depth=qos)
+    except ArgumentError as error:
+        raise ArgumentError("qos", error.value, error.expected, place) from None
+
+
 def _limit(
     limits: list[Duration | None],
     choose: Callable[[list[Duration]], Duration],

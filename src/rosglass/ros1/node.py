@@ -17,6 +17,7 @@ from rosglass.comm.builtin_services import BuiltinServices
 from rosglass.comm.core import CoreNode
 from rosglass.comm.node import check_flag, check_may_wait
 from rosglass.comm.promise import check_timeout
+from rosglass.comm.qos import check_profile
 from rosglass.comm.rclpy_names import check_order
 from rosglass.comm.subscription_feed import find_subscribed_type
 from rosglass.errors import InvalidNameError
@@ -109,9 +110,8 @@ class Ros1Node(CoreNode):
         """Announce `topic`; see :meth:`rosglass.comm.Node.create_publisher`."""
         self._core.check_open()
         check_order("create_publisher", topic, type)
-        return Publisher(
-            self._core, self.resolve(topic), self._core.types.message(type), _profile(qos)
-        )
+        full = self.resolve(topic)
+        return Publisher(self._core, full, self._core.types.message(type), _profile(qos, full))
 
     def create_subscription(
         self,
@@ -133,7 +133,7 @@ class Ros1Node(CoreNode):
         subscription = Subscription(
             full,
             kind,
-            _profile(qos),
+            _profile(qos, full),
             executor or self._core.dispatcher,
             callback,
             raw_callback,
@@ -380,7 +380,7 @@ class Ros1Node(CoreNode):
         return sorted({*self._topics.published(), *self._topics.subscribed()})
 
 
-def _profile(qos: QoS | int) -> QoS:
+def _profile(qos: QoS | int, place: str) -> QoS:
     if type(qos) is int and qos == 0:
         return QoS(history=History.KEEP_ALL)  # as roscpp and rospy have it
-    return qos if isinstance(qos, QoS) else QoS(depth=qos)
+    return check_profile(qos, place)

@@ -9,9 +9,9 @@ from rosglass.comm.builtin_services import BuiltinServices
 from rosglass.comm.core import CoreNode
 from rosglass.comm.names import validate_namespace, validate_node_name
 from rosglass.comm.node import check_flag
+from rosglass.comm.qos import check_profile
 from rosglass.comm.rclpy_names import check_order
 from rosglass.comm.subscription_feed import SubscriptionFeed, find_subscribed_type
-from rosglass.errors import ArgumentError
 from rosglass.ros2.core import Core
 from rosglass.ros2.graph_matching import GraphMatching
 from rosglass.ros2.rcl_services import RclServices
@@ -98,7 +98,7 @@ class Ros2Node(CoreNode):
         check_order("create_publisher", topic, type)
         self._core.types.ensure(type)
         full = self.resolve(topic)
-        return Publisher(self._core, full, self._core.types.message(type), _profile(qos, full))
+        return Publisher(self._core, full, self._core.types.message(type), check_profile(qos, full))
 
     def create_subscription(
         self,
@@ -119,7 +119,7 @@ class Ros2Node(CoreNode):
         subscription = Subscription(
             full,
             find_subscribed_type(self._core, full, type),
-            _profile(qos, full),
+            check_profile(qos, full),
             executor or self._core.dispatcher,
             callback,
             raw_callback,
@@ -293,13 +293,4 @@ class Ros2Node(CoreNode):
 
 def _service_profile(qos: QoS | None, place: str) -> QoS:
     usual = QoS.services()
-    return usual if qos is None else _profile(qos, place).for_subscription((usual,))
-
-
-def _profile(qos: QoS | int, place: str) -> QoS:
-    if isinstance(qos, QoS):
-        return qos
-    try:
-        return QoS(depth=qos)
-    except ArgumentError as error:
-        raise ArgumentError("qos", error.value, error.expected, place) from None
+    return usual if qos is None else check_profile(qos, place).for_subscription((usual,))

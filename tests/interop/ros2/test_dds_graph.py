@@ -190,20 +190,6 @@ def test_humble_sees_our_nodes_too(cyclone, dds_connect, choice):
     event(observer, "info", lambda info: gid in gids_of(info, "//cockpit")["readers"])
 
 
-def test_nodes_of_one_process_see_each_other(dds_connect):
-    one, two = dds_connect("one"), dds_connect("two", namespace="/ns")
-    one.create_publisher("/chatter", STRING)
-    two.create_subscription("/chatter", STRING)
-    nodes = [NodeName("/", "one"), NodeName("/ns", "two")]
-    for node in (one, two):
-        eventually(lambda node=node: node.nodes() == nodes)
-        eventually(lambda node=node: [end.node for end in node.publishers("/chatter")] == nodes[:1])
-        eventually(lambda node=node: [e.node for e in node.subscriptions("/chatter")] == nodes[1:])
-    one.close()
-    eventually(lambda: two.nodes() == nodes[1:])
-    eventually(lambda: not two.publishers("/chatter"))
-
-
 def test_the_nodes_of_other_processes_change_without_asking(cyclone, dds_connect):
     node = dds_connect("cockpit")
     seen = []

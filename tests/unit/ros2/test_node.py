@@ -5,7 +5,7 @@ import threading
 import pytest
 
 import rosglass
-from rosglass.comm import IMMEDIATE, ConnectionState, EndpointKind, NodeName
+from rosglass.comm import ConnectionState, EndpointKind
 from rosglass.interfaces import Library
 from rosglass.ros2 import Ros2Node
 
@@ -19,50 +19,10 @@ def hash_of(name):
     return rosglass.load(name).rihs01
 
 
-@pytest.mark.parametrize(
-    ("name", "namespace", "told"),
-    [("my node", "/", "node name 'my node'"), ("n", "arm", "write '/arm'"), ("", "/", "empty")],
-)
-def test_a_node_needs_valid_names(middleware, name, namespace, told):
-    with pytest.raises(rosglass.InvalidNameError, match=told):
-        Ros2Node(middleware, "fake://", name, namespace)
-
-
-def test_names_are_resolved_against_the_node(node, middleware):
-    assert node.resolve("x") == "/arm/x"
-    assert node.resolve("~/x") == "/arm/cockpit/x"
-    assert node.create_publisher("x", STRING).topic == "/arm/x"
-    assert node.create_subscription("/y", STRING).topic == "/y"
-    assert middleware.announced == [NodeName("/arm", "cockpit")]
-    with pytest.raises(rosglass.InvalidNameError, match="contains ' '"):
-        node.create_publisher("a b", STRING)
-    with pytest.raises(rosglass.InvalidNameError, match="contains ' '"):
-        node.create_subscription("a b")
-    assert middleware.writers[1:] == []
-
-
-@pytest.mark.parametrize("create", ["create_publisher", "create_subscription"])
-def test_a_bad_depth_is_refused(node, create):
-    with pytest.raises(rosglass.ArgumentError, match="qos: expected an integer from 1"):
-        getattr(node, create)("/t", STRING, qos=0)
-
-
 # -- publishing ----------------------------------------------------------------------------------
 
 
-def test_publishing_a_message_a_dict_or_fields(node, middleware):
-    publisher = node.create_publisher("/t", STRING)
-    publisher.publish({"data": "hello"})
-    publisher.publish(data="hello")
-    publisher.publish(rosglass.load(STRING).create(data="hello"))
-    publisher.publish_serialized(HELLO)
-    publisher.publish_serialized(memoryview(bytearray(HELLO)))
-    assert middleware.writers[0].written == [HELLO] * 5
-    info = middleware.writers[0].info
-    assert (info.name, info.type, info.type_hash) == ("/t", STRING, hash_of(STRING))
-
-
-@pytest.mark.parametrize("data", [b"", b"abc", b"\x01\x00\x00\x00x", "text", None])
+@pytest.mark.parametrize("data", [b"", b"abc", b"\x01\x00\x00\x00x"])
 def test_bytes_without_an_encapsulation_header_are_not_sent(node, middleware, data):
     publisher = node.create_publisher("/t", STRING)
     with pytest.raises(rosglass.ConversionError, match=STRING):
@@ -99,36 +59,11 @@ def test_where_profiles_must_match_they_do(node, middleware):
 # -- receiving -----------------------------------------------------------------------------------
 
 
-def test_samples_say_where_they_come_from(node, middleware):
-    subscription = node.create_subscription("/t", STRING)
-    middleware.readers[0].receive(HELLO)
-    sample = subscription.wait(30)
-    assert (sample.data, sample.wire, sample.type.name) == (HELLO, "cdr", STRING)
-    assert (sample.publisher, sample.sequence) == (b"g" * 16, 1)
-    assert abs((sample.received - sample.sent).seconds) < 30
-
-
 def test_repeated_samples_are_delivered_once(node, middleware):
     subscription = node.create_subscription("/t", STRING)
     for _ in range(2):
         middleware.readers[0].on_sample(HELLO, 10, 5, b"g" * 16, 1, "")
     assert subscription.statistics().received == 1
-
-
-def test_the_type_is_taken_from_the_publisher(node, middleware, eventually):
-    seen = []
-    subscription = node.create_subscription("/t", callback=seen.append)
-    assert subscription.type is None
-    assert middleware.readers == []
-    assert subscription.problem == ""
-    middleware.appear(PUBLISHER, "/t", STRING, hash_of(STRING))
-    reader = eventually(lambda: middleware.readers)[0]
-    assert subscription.type.name == STRING
-    info = reader.info
-    assert (info.name, info.type, info.type_hash) == ("/t", STRING, hash_of(STRING))
-    reader.receive(HELLO)
-    eventually(lambda: seen)
-    assert seen[0].data == "hello"
 
 
 def test_several_types_need_a_choice(node, middleware, eventually):
@@ -247,16 +182,6 @@ def test_profiles_that_do_not_match_keep_samples_away_where_they_must_match(
 # -- graph and status ----------------------------------------------------------------------------
 
 
-def test_the_graph(node, middleware):
-    middleware.appear(PUBLISHER, "/t", STRING)
-    middleware.appear(SUBSCRIPTION, "/arm/x", TWIST)
-    assert node.nodes() == [NodeName("/", "robot"), NodeName("/arm", "cockpit")]
-    assert node.topics() == {"/arm/x": [TWIST], "/t": [STRING]}
-    assert node.publishers("/t")[0].type == STRING
-    assert node.subscriptions("x")[0].node.full == "/robot"
-    assert node.publishers("x") == []
-
-
 def test_status_changes_are_told_in_order_and_once(node, middleware, eventually):
     seen = []
     node.on_status_change(seen.append)
@@ -276,25 +201,16 @@ def test_a_lost_connection_is_logged(node, middleware, eventually, caplog):
 # -- the end -------------------------------------------------------------------------------------
 
 
-def test_closing_ends_everything(middleware):
-    before = threading.active_count()
+def test_closing_ends_what_the_wire_made(middleware):
     node = Ros2Node(middleware, "fake://", "cockpit")
-    states = []
-    node.on_status_change(states.append, IMMEDIATE)
-    publisher = node.create_publisher("/t", STRING)
-    subscription = node.create_subscription("/t", STRING, id)
+    node.create_publisher("/t", STRING)
+    node.create_subscription("/t", STRING, id)
     node.close()
     node.close()
     assert middleware.closed == 1
-    assert threading.active_count() <= before
-    assert subscription.closed
+    assert node.nodes() == []
     assert middleware.readers[0].closed
     assert middleware.writers[0].closed
-    assert [s.state for s in states] == [ConnectionState.CLOSED]
-    assert node.nodes() == []
-    assert publisher.subscription_count() == 0
-    publisher.close()
-    subscription.close()
 
 
 def test_a_middleware_that_cannot_start_leaves_no_thread(middleware):
@@ -326,23 +242,3 @@ def test_connect_says_what_is_not_installed(monkeypatch):
 def test_connect_wants_a_library():
     with pytest.raises(rosglass.ConversionError, match=r"library: expected a rosglass\.Library"):
         rosglass.connect("zenoh://127.0.0.1:7447", library=3)
-
-
-def test_services_actions_and_what_a_node_has(node, middleware):
-    server, client = EndpointKind.SERVICE_SERVER, EndpointKind.SERVICE_CLIENT
-    middleware.appear(server, "/arm/add", "p/srv/Add", node="adder")
-    middleware.appear(client, "/arm/add", "p/srv/Add")
-    middleware.appear(server, "/fib/_action/send_goal", "p/action/Fib_SendGoal")
-    assert node.services() == {
-        "/arm/add": ["p/srv/Add"],
-        "/fib/_action/send_goal": ["p/action/Fib_SendGoal"],
-    }
-    assert node.actions() == {"/fib": ["p/action/Fib"]}
-    assert [e.node.full for e in node.service_servers("add")] == ["/adder"]
-    assert [e.node.full for e in node.service_clients("/arm/add")] == ["/robot"]
-    names = ["/arm/add", "/fib/_action/send_goal"]
-    assert [e.name for e in node.endpoints("/robot")] == names
-    assert [e.name for e in node.endpoints(NodeName("/", "robot"))] == names
-    assert node.endpoints("/nobody") == []
-    with pytest.raises(rosglass.InvalidNameError):
-        node.endpoints("no body")

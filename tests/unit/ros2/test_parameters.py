@@ -32,14 +32,6 @@ def test_what_every_node_has_is_declared_from_the_start(parameters: Ros2Paramete
     assert "other" not in parameters
 
 
-def test_a_declared_parameter_has_its_default(parameters: Ros2Parameters) -> None:
-    assert parameters.declare("speed", 1.5) == 1.5
-    assert parameters.get("speed") == 1.5
-    assert parameters.describe("speed") == D("speed", T.DOUBLE)
-    with pytest.raises(ParameterError, match="/arm: parameter 'speed' is declared already"):
-        parameters.declare("speed", 2.0)
-
-
 def test_what_the_program_was_started_with_wins(parameters: Ros2Parameters) -> None:
     assert parameters.declare("given", 1) == 7
     assert parameters.overrides == {"given": 7, "wrong": "text"}
@@ -281,9 +273,7 @@ def test_names_are_found_by_prefix_and_depth(
     assert parameters.find(prefixes, depth) == names
 
 
-def test_values_are_set_by_name(parameters: Ros2Parameters) -> None:
-    with pytest.raises(ParameterError, match="set by a dict of names and values"):
-        parameters.set(["speed"])  # type: ignore[arg-type]
+def test_a_file_is_given_by_its_path(parameters: Ros2Parameters) -> None:
     with pytest.raises(ParameterError, match="given by its path, got 5"):
         parameters.load(5)  # type: ignore[arg-type]
 
@@ -295,14 +285,9 @@ def test_try_set_gives_a_reason_instead_of_raising(parameters: Ros2Parameters) -
     assert parameters.typed_value("x") == TypedValue(T.NOT_SET, None)
 
 
-def test_files(parameters: Ros2Parameters, tmp_path: Path) -> None:
+def test_files_that_do_not_fit(parameters: Ros2Parameters, tmp_path: Path) -> None:
     file = tmp_path / "arm.yaml"
     parameters.declare("a.b", 1.0)
-    parameters.declare("c", ["x"])
-    parameters.save(file)
-    parameters.set({"a.b": 2.0, "c": []})
-    parameters.load(file)
-    assert (parameters.get("a.b"), parameters.get("c")) == (1.0, ["x"])
     file.write_text("/arm: {ros__parameters: {a: {b: 1}}}")
     with pytest.raises(
         ParameterError, match=r"arm\.yaml: /arm: parameter 'a\.b' is of type double"

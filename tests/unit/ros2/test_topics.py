@@ -67,21 +67,6 @@ def asker(middleware):
 # -- who matches ---------------------------------------------------------------------------------
 
 
-def test_a_publisher_tells_which_subscriptions_match(node, middleware, asker, eventually):
-    asker(node="first")
-    publisher = node.create_publisher("/t", STRING)
-    events = []
-    handle = publisher.on_matched(events.append, IMMEDIATE)
-    eventually(lambda: events)
-    key = asker(node="second")
-    eventually(lambda: len(events) == 2)
-    handle.close()
-    middleware.graph.remove(key)
-    eventually(lambda: len(middleware.writers[0].matched) == 1)
-    told = [(e.endpoint.node.name, e.change, e.count) for e in events]
-    assert told == [("first", 1, 1), ("second", 1, 2)]
-
-
 @pytest.mark.parametrize("must_match", [True, False], ids=["dds", "zenoh"])
 def test_profiles_that_do_not_match_are_told_with_policies_and_words(
     node, middleware, robot, eventually, must_match
@@ -180,12 +165,6 @@ def test_a_subscription_says_who_left_and_when_the_connection_is_lost(
     assert never.problem == ""
 
 
-@pytest.mark.parametrize("create", ["create_subscription", "create_publisher"])
-def test_a_profile_that_is_none_is_refused_by_topic(node, create):
-    with pytest.raises(rosglass.ArgumentError, match=r"^/arm/t: qos: .*preset\('sensor_data'\)"):
-        getattr(node, create)("t", STRING, qos="sensor_data")
-
-
 # -- what is available ---------------------------------------------------------------------------
 
 
@@ -272,15 +251,14 @@ def test_changing_readers_neither_loses_nor_repeats(node, middleware, robot, eve
 # -- in time, alive, complete --------------------------------------------------------------------
 
 
-def test_a_deadline_that_passes_without_message_is_told(node, middleware, robot, eventually):
+def test_messages_in_time_keep_a_deadline(node, middleware, robot, eventually):
     qos = QoS(deadline=Duration.from_seconds(0.2))
     subscription = node.create_subscription("/t", STRING, qos=qos)
     events = []
     subscription.on_deadline_missed(events.append, IMMEDIATE)
-    key = robot(qos=qos)
+    robot(qos=qos)
     eventually(lambda: len(events) >= 2)
     assert all(isinstance(event, DeadlineMissed) and event.change >= 1 for event in events)
-    assert events[1].total == events[0].total + events[1].change
     end = time.monotonic() + 1.2
     middleware.readers[0].receive(HELLO)
     settled = len(events)
@@ -288,8 +266,6 @@ def test_a_deadline_that_passes_without_message_is_told(node, middleware, robot,
         middleware.readers[0].receive(HELLO)
         time.sleep(0.005)
     assert len(events) <= settled + 2, "six more would have come without messages"
-    middleware.graph.remove(key)
-    eventually(lambda: subscription._source._deadline is None)
 
 
 def test_publishers_that_show_themselves_are_alive_while_they_do(
