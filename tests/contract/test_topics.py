@@ -5,9 +5,11 @@ from __future__ import annotations
 import asyncio
 import re
 import threading
+import time
 
 import numpy as np
 import pytest
+from waiting import at_rate
 
 import rosglass
 from rosglass import Duration, QoS
@@ -69,8 +71,9 @@ def test_a_node_hears_itself(robot, topic, eventually):
     subscription = robot.create_subscription(topic, TEXT)
     publisher = robot.create_publisher(topic, TEXT)
     eventually(lambda: publisher.subscription_count() == 1)
-    publisher.publish(data="hello")
-    assert subscription.wait(30).message().data == "hello"
+    for text in ("hello", "end"):  # a second copy of the first would come before this
+        publisher.publish(data=text)
+        assert subscription.wait(30).message().data == text
 
 
 def test_a_picture_outlives_the_node_that_received_it(link, console):
@@ -256,6 +259,22 @@ def test_messages_are_taken_one_by_one_or_the_latest(link, eventually):
     assert subscription.take_latest().message().data == "7"
     assert subscription.take() is None
     assert subscription.statistics().dropped == 6
+
+
+def test_what_nobody_waits_for_is_there_when_somebody_looks(link):
+    publisher, subscription = link(qos=1)
+    began = time.monotonic()
+    behind = []
+    for number in at_rate(0.005, 300):
+        publisher.publish(data=str(number))
+        if number % 30 == 29 and (sample := subscription.take()) is not None:
+            behind.append(number - int(sample.message().data))
+    frequency = 300 / (time.monotonic() - began)
+    assert sorted(behind)[len(behind) // 2] <= 10, "the newest, although nobody was waiting"
+    statistics = subscription.statistics()
+    assert statistics.received >= 0.9 * 300
+    assert statistics.frequency == pytest.approx(frequency, rel=0.3)
+    assert statistics.lost == 0
 
 
 def test_async_iteration(link):

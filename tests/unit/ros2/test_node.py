@@ -46,16 +46,6 @@ def test_counting_matching_subscriptions(node, middleware, eventually, caplog):
     assert publisher.subscription_count() == 1
 
 
-def test_where_profiles_must_match_they_do(node, middleware):
-    middleware.matches_qos = True
-    best_effort = rosglass.QoS.sensor_data()
-    publisher = node.create_publisher("/t", STRING, best_effort)
-    middleware.appear(SUBSCRIPTION, "/t", STRING, hash_of(STRING))
-    assert publisher.subscription_count() == 0
-    middleware.appear(SUBSCRIPTION, "/t", STRING, hash_of(STRING), best_effort, "second")
-    assert publisher.subscription_count() == 1
-
-
 # -- receiving -----------------------------------------------------------------------------------
 
 
@@ -64,20 +54,6 @@ def test_repeated_samples_are_delivered_once(node, middleware):
     for _ in range(2):
         middleware.readers[0].on_sample(HELLO, 10, 5, b"g" * 16, 1, "")
     assert subscription.statistics().received == 1
-
-
-def test_several_types_need_a_choice(node, middleware, eventually):
-    middleware.appear(PUBLISHER, "/t", STRING, node="a")
-    key = middleware.appear(PUBLISHER, "/t", TWIST, node="b")
-    subscription = node.create_subscription("/t")
-    told = eventually(lambda: subscription.problem)
-    assert f"{TWIST} by /b, {STRING} by /a" in told
-    assert "create_subscription('/t', 'geometry_msgs/msg/Twist')" in told
-    assert middleware.readers == []
-    middleware.graph.remove(key)
-    eventually(lambda: subscription.type)
-    assert subscription.type.name == STRING
-    eventually(lambda: subscription.problem == "")
 
 
 def test_the_type_follows_a_robot_that_comes_back_with_another_one(node, middleware, eventually):
@@ -159,24 +135,6 @@ def test_the_robots_version_of_a_type_is_taken_if_it_is_known(middleware, eventu
     middleware.readers[-1].receive(robots.encode({"old": 5}), robots.rihs01)
     assert subscription.wait(30).message().old == 5
     node.close()
-
-
-def test_profiles_that_do_not_match_are_a_problem(node, middleware, eventually):
-    middleware.matches_qos = False
-    subscription = node.create_subscription("/t", STRING, qos=rosglass.QoS.latched())
-    middleware.appear(PUBLISHER, "/t", STRING, hash_of(STRING))
-    told = eventually(lambda: subscription.problem)
-    assert "durability: transient local requested, volatile offered" in told
-    assert "received without that guarantee" in told
-
-
-def test_profiles_that_do_not_match_keep_samples_away_where_they_must_match(
-    node, middleware, eventually
-):
-    middleware.matches_qos = True
-    subscription = node.create_subscription("/t", STRING)
-    middleware.appear(PUBLISHER, "/t", STRING, "", rosglass.QoS.sensor_data())
-    assert "nothing is received from it" in eventually(lambda: subscription.problem)
 
 
 # -- graph and status ----------------------------------------------------------------------------
