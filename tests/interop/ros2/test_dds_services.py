@@ -21,9 +21,8 @@ pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
 
 from waiting import eventually
 
-from rosglass.wires.dds import cyclone_origins
-from rosglass.wires.dds.replier import DdsReplier
-from rosglass.wires.dds.requester import DdsRequester
+from rosglass.wires.dds import cyclone_identity
+from rosglass.wires.dds.services import DdsReplier, DdsRequester
 
 PEERS = Path(__file__).parent / "peers"
 ADD, BLOB = "example_interfaces/srv/AddTwoInts", "blob_interfaces/srv/Blob"
@@ -226,7 +225,7 @@ def test_two_of_our_clients_in_one_process_get_their_own_replies(node, dds_conne
 
 def test_what_is_taken_while_it_is_received_does_not_stay(start_services, node, types, monkeypatch):
     """The library keeps its samples until they are taken again, and keeps only some."""
-    before = set(cyclone_origins._readers)
+    before = set(cyclone_identity._readers)
     taken: list[bool] = []
     for end in (DdsRequester, DdsReplier):
 
@@ -247,7 +246,7 @@ def test_what_is_taken_while_it_is_received_does_not_stay(start_services, node, 
             assert [other.result(30).sum for other in others] == [each, each + 1]
     assert [call.result(30).sum for call in calls] == [n + 1 for n in range(200)]
     assert peer.event("answers") == [n + 1 for n in range(200)]
-    kept = [cyclone_origins._readers[new] for new in cyclone_origins._readers.keys() - before]
+    kept = [cyclone_identity._readers[new] for new in cyclone_identity._readers.keys() - before]
     assert len(kept) >= 2
     eventually(
         lambda: len(taken) >= 600 and not any(each._noted for each in kept), what="the taking"

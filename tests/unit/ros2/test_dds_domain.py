@@ -14,7 +14,7 @@ import rosglass
 
 pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
 
-from rosglass.wires.dds import cyclone, cyclone_inline_qos, cyclone_origins
+from rosglass.wires.dds import cyclone, cyclone_identity
 from rosglass.wires.dds import domain as dds_domain
 from rosglass.wires.dds.domain import Domain
 from rosglass.wires.dds.options import DdsOptions
@@ -146,7 +146,7 @@ def test_another_version_of_the_series_is_used_with_a_word_on_what_is_lost(
 def test_private_layouts_of_another_version_are_left_alone(monkeypatch):
     monkeypatch.setattr(cyclone, "distribution", lambda _: Package("11.3.0"))
     told = "cyclonedds 11.3.0 is installed instead of 11.0.1"
-    assert cyclone_origins.hook.check(0) == cyclone_inline_qos.hook.check(0) == told
+    assert cyclone_identity.reading.check(0) == cyclone_identity.writing.check(0) == told
 
 
 def test_another_series_is_refused(monkeypatch):

@@ -18,12 +18,10 @@ pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
 
 from rosglass.wires.dds import cyclone
 from rosglass.wires.dds.cyclone_events import Event
-from rosglass.wires.dds.cyclone_origins import Origins
+from rosglass.wires.dds.cyclone_identity import Identity, Origin, Origins
 from rosglass.wires.dds.cyclone_qos import qos_of
-from rosglass.wires.dds.identity import Identity, Origin
-from rosglass.wires.dds.outbox import Outbox
-from rosglass.wires.dds.replier import DdsReplier
-from rosglass.wires.dds.service_ends import Matched
+from rosglass.wires.dds.service_ends import Matched, Outbox
+from rosglass.wires.dds.services import DdsReplier
 
 ADD = "example_interfaces/srv/AddTwoInts"
 SERVICE = "/add"

@@ -12,8 +12,7 @@ from rosglass.wires.base import Middleware, Reader, Replier, Requester, Writer
 from rosglass.wires.dds.discovery import DdsDiscovery
 from rosglass.wires.dds.endpoints import DdsReader, DdsWriter
 from rosglass.wires.dds.participant import Participant
-from rosglass.wires.dds.replier import DdsReplier
-from rosglass.wires.dds.requester import DdsRequester
+from rosglass.wires.dds.services import DdsReplier, DdsRequester
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

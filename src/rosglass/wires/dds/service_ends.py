@@ -11,32 +11,31 @@ import logging
 import math
 import threading
 import time
-from collections import Counter
+from collections import Counter, deque
 from contextlib import suppress
 from dataclasses import replace
 from enum import Enum
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.comm import EndpointKind
 from rosglass.comm.names import mangle_type
 from rosglass.errors import Error, NodeClosedError
-from rosglass.wires.dds import cyclone, cyclone_builtin, cyclone_inline_qos, cyclone_origins
+from rosglass.wires.dds import cyclone, cyclone_builtin, cyclone_identity
 from rosglass.wires.dds.cyclone import keeping
 from rosglass.wires.dds.cyclone_builtin import Discovered
 from rosglass.wires.dds.cyclone_events import Event, publication_matched
-from rosglass.wires.dds.cyclone_origins import Origins
+from rosglass.wires.dds.cyclone_identity import Origins
 from rosglass.wires.dds.cyclone_qos import qos_of
 from rosglass.wires.dds.discovery_info import format_user_data
 from rosglass.wires.dds.endpoints import SampleReader, SampleWriter, Taken
-from rosglass.wires.dds.outbox import Outbox
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from rosglass.comm import EndpointInfo
     from rosglass.comm.graph import Graph
-    from rosglass.wires.dds.identity import Origin
+    from rosglass.wires.dds.cyclone_identity import Origin
     from rosglass.wires.dds.participant import Participant
 
 __all__ = [
@@ -44,6 +43,7 @@ __all__ = [
     "REMEDY",
     "Ends",
     "Matched",
+    "Outbox",
     "Scheme",
     "in_main_thread",
     "in_this_process",
@@ -103,7 +103,7 @@ class Scheme(Enum):
     #: the client's and one of the request's, which servers return as they are.
     HEADER = "header"
     #: Everyone else's: plain payloads; a reply's inline QoS carries the identity of its request
-    #: (OMG DDS-RPC 1.0), see :mod:`rosglass.wires.dds.identity`.
+    #: (OMG DDS-RPC 1.0), see :mod:`rosglass.wires.dds.cyclone_identity`.
     IDENTITY = "identity"
 
 
@@ -284,7 +284,7 @@ class Ends:
             return found, None if stale else origin
         if origin is None:
             # What comes from this process has no origin, and is Cyclone DDS's.
-            known = not cyclone_origins.problem()
+            known = not cyclone_identity.reading.problem
             return (Discovered(False, _NOBODY, handle) if known else None), None
         return (Discovered(False, origin.guid, handle) if origin.guid else None), origin
 
@@ -346,7 +346,7 @@ class Ends:
                 self._user_data,
                 self._place,
                 # Requests need no identity beyond that which every sample has.
-                cyclone_inline_qos.create_topic if self._server else cyclone.create_topic,
+                cyclone_identity.create_reply_topic if self._server else cyclone.create_topic,
                 _PATIENCE,
             )
             with self._probing:
@@ -354,7 +354,7 @@ class Ends:
                     writer.close()
                     return
                 if self._server:
-                    cyclone_inline_qos.prepare(writer.entity)
+                    cyclone_identity.prepare_reply_writer(writer.entity)
                 self.readers = Matched(
                     writer.entity,
                     cyclone.matched_subscriptions,
@@ -506,3 +506,89 @@ def _new_id(participant: bytes) -> str:
     """Return what rmw_cyclonedds calls a client or service id, spelled as it does."""
     first, *rest = participant[:PREFIX] + next(_numbers).to_bytes(4, "big")
     return ".".join((f"{first:2x}", *(f"{byte:x}" for byte in rest)))
+
+
+class _Item(NamedTuple):
+    attempt: Callable[[], bool]
+    deadline: float
+    expired: Callable[[], None]
+
+
+class Outbox:
+    """Sends at once what can be sent, and keeps the rest to be tried again.
+
+    Args:
+        wake: Called when there is something for :meth:`retry`, with whether it can be done at once.
+        in_order: Whether nothing overtakes anything.
+    """
+
+    def __init__(self, wake: Callable[[bool], None], *, in_order: bool) -> None:
+        self._wake, self._in_order = wake, in_order
+        self._lock = threading.Lock()
+        self._items: deque[_Item] = deque()
+        self._closed = False
+
+    def put(
+        self,
+        attempt: Callable[[], bool],
+        patience: float,
+        expired: Callable[[], None],
+        *,
+        now: bool = True,
+    ) -> None:
+        """Send something now, or as soon as it can be done.
+
+        Args:
+            attempt: Sends it; returns False to be called again a little later.
+            patience: Seconds after which it is given up.
+            expired: Called then, and when it cannot be sent at all.
+            now: Whether to try it in the calling thread; what it raises comes out of here then.
+        """
+        if now and not (self._in_order and self._items) and attempt():
+            return
+        with self._lock:
+            if self._closed:
+                return
+            self._items.append(_Item(attempt, time.monotonic() + patience, expired))
+        self._wake(not now)
+
+    def retry(self) -> bool:
+        """Try again what is left; returns whether there is still something. For one thread."""
+        with self._lock:
+            items = list(self._items)
+        for item in items:
+            if self._try(item):
+                with self._lock, suppress(ValueError):
+                    self._items.remove(item)
+            elif self._in_order:
+                break
+        return bool(self._items)
+
+    def drain(self, seconds: float) -> None:
+        """Wait until nothing is left, at most so long; not in the thread that retries."""
+        until = time.monotonic() + seconds
+        while self._items and time.monotonic() < until:
+            time.sleep(0.005)
+
+    def close(self) -> None:
+        """Forget what is left."""
+        with self._lock:
+            self._closed = True
+            self._items.clear()
+
+    def _try(self, item: _Item) -> bool:
+        try:
+            if item.attempt():
+                return True
+        except NodeClosedError:
+            return True
+        except Exception as error:
+            _log.warning(
+                "what was to be sent is lost: %s", error, exc_info=not isinstance(error, Error)
+            )
+            item.expired()  # nobody is to wait for it
+            return True
+        if time.monotonic() < item.deadline:
+            return False
+        item.expired()
+        return True

@@ -1,7 +1,9 @@
-"""Service clients over DDS, for servers of every DDS implementation.
+"""The ends of a service over DDS, for peers of every DDS implementation.
 
-A service's replies go to all its clients, who pick their own. How, depends on the server; see
-:class:`rosglass.wires.dds.service_ends.Scheme`.
+A service's replies go to all its clients, who pick their own. How, depends on the other end; see
+:class:`rosglass.wires.dds.service_ends.Scheme`. rmw_cyclonedds puts 16 bytes in front of requests
+and replies, behind the encapsulation header: a number of the client's, and one of the request's; a
+server returns them as they are. Being 16, they leave everything behind them aligned.
 """
 
 from __future__ import annotations
@@ -9,20 +11,19 @@ from __future__ import annotations
 import logging
 import math
 import secrets
+import struct
 import threading
 import time
+from collections import OrderedDict
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rosglass.errors import (
-    NodeClosedError,
-    ServiceError,
-    TimeoutError,  # noqa: A004 - the field's own word
-    UnsupportedError,
-)
-from rosglass.wires.base import SERVER_LEFT, Requester
-from rosglass.wires.dds import cyclone_origins
+from rosglass.errors import NodeClosedError, ServiceError, TimeoutError, UnsupportedError  # noqa: A004
+from rosglass.wires.base import SERVER_LEFT, Replier, Requester, RequestId
+from rosglass.wires.dds import cyclone_identity
+from rosglass.wires.dds.cyclone_identity import UNKNOWN_GUID, Identity, Origin
+from rosglass.wires.dds.cyclone_samples import COPIED
 from rosglass.wires.dds.discovery_info import parse_user_data
-from rosglass.wires.dds.headers import Parts, pack, unpack, with_header, without_header
 from rosglass.wires.dds.service_ends import (
     PREFIX,
     REMEDY,
@@ -37,13 +38,60 @@ from rosglass.wires.dds.service_ends import (
 if TYPE_CHECKING:
     from rosglass.comm import EndpointInfo
     from rosglass.comm.graph import Graph
-    from rosglass.wires.base import OnReply
+    from rosglass.wires.base import OnReply, OnRequest
     from rosglass.wires.dds.cyclone_builtin import Discovered
     from rosglass.wires.dds.endpoints import Taken
-    from rosglass.wires.dds.identity import Identity, Origin
     from rosglass.wires.dds.participant import Participant
 
-__all__ = ["DdsRequester"]
+__all__ = [
+    "DdsReplier",
+    "DdsRequester",
+    "Parts",
+    "header_of",
+    "pack_header",
+    "unpack_header",
+    "with_header",
+    "without_header",
+]
+
+#: A payload in one piece or several.
+Parts = tuple["bytes | bytearray | memoryview", ...]
+
+_IDS, _IDS_BIG = struct.Struct("<Qq"), struct.Struct(">Qq")
+_ENCAPSULATION = 4
+_END = _ENCAPSULATION + _IDS.size
+
+
+def pack_header(client: int, number: int) -> bytes:
+    """Return a header, little endian."""
+    return _IDS.pack(client, number)
+
+
+def unpack_header(data: bytes | memoryview) -> tuple[int, int] | None:
+    """Return the client's number and the request's; None when the payload is too short."""
+    if len(data) < _END:
+        return None
+    client, number = (_IDS if data[1] & 1 else _IDS_BIG).unpack_from(data, _ENCAPSULATION)
+    return client, number
+
+
+def header_of(data: bytes | memoryview) -> bytes:
+    """Return the header of a payload that has one."""
+    return bytes(data[_ENCAPSULATION:_END])
+
+
+def with_header(data: bytes | bytearray, header: bytes) -> Parts:
+    """Return a payload with a header put in."""
+    if len(data) <= COPIED:
+        return (b"".join((data[:_ENCAPSULATION], header, data[_ENCAPSULATION:])),)
+    view = memoryview(data)
+    return view[:_ENCAPSULATION], header, view[_ENCAPSULATION:]
+
+
+def without_header(data: bytes | memoryview) -> bytes:
+    """Return a payload with its header taken out."""
+    return b"".join((data[:_ENCAPSULATION], data[_END:]))
+
 
 _log = logging.getLogger("rosglass.ros2")
 #: Seconds after which a reader of requests without writer of replies belongs to no server.
@@ -95,7 +143,7 @@ class DdsRequester(Requester):
         if not strangers:
             return ""
         names = names_of(strangers)
-        if reason := cyclone_origins.problem():
+        if reason := cyclone_identity.reading.problem:
             return f"{names} cannot be called: {reason}; {REMEDY}"
         if Scheme.HEADER in self._schemes():
             return (
@@ -159,7 +207,7 @@ class DdsRequester(Requester):
             return True
         parts: Parts = (data,)
         if scheme is Scheme.HEADER:
-            parts = with_header(data, pack(self._id, number))
+            parts = with_header(data, pack_header(self._id, number))
         # Replies are looked up under the lock, too: they may come before this returns.
         with self._lock:
             if number not in self._calls:
@@ -221,11 +269,11 @@ class DdsRequester(Requester):
         elif related is not None or server is None:
             pass  # somebody else's, or forgotten
         elif scheme_of(server) is Scheme.IDENTITY:
-            if not cyclone_origins.problem():
+            if not cyclone_identity.reading.problem:
                 text = "ignoring replies of %s, which do not say what they answer"
                 self._ends.name(server, text, self._ends.who(server))
         # Within this process, what says that a reply is for someone else is not told.
-        elif unpack(data) is None and not in_this_process(server):
+        elif unpack_header(data) is None and not in_this_process(server):
             text = "ignoring a reply of %s, which is too short for its header: %d bytes"
             self._ends.name(server, text, self._ends.who(server), len(data))
 
@@ -236,7 +284,7 @@ class DdsRequester(Requester):
         number, scheme = None, Scheme.IDENTITY
         if related is not None and related.guid in (self.gid, self._ends.reader.guid):
             number = self._by_sequence.get(related.sequence)
-        if number is None and (header := unpack(data)) is not None and header[0] == self._id:
+        if number is None and (header := unpack_header(data)) is not None and header[0] == self._id:
             number, scheme = header[1], Scheme.HEADER
         return None if number is None or number not in self._calls else (number, scheme)
 
@@ -260,7 +308,7 @@ class DdsRequester(Requester):
     def _route(self) -> Scheme | None:
         """Return how to send requests; None when no server is linked."""
         schemes = self._schemes()
-        if schemes.get(Scheme.IDENTITY) is not None and not cyclone_origins.problem():
+        if schemes.get(Scheme.IDENTITY) is not None and not cyclone_identity.reading.problem:
             # Servers on Cyclone DDS find such requests too short, mostly; the others would take
             # a header for arguments: nothing is sent while they are about to be ready.
             return Scheme.IDENTITY if schemes[Scheme.IDENTITY] else None
@@ -309,3 +357,216 @@ class DdsRequester(Requester):
 def _server_of(found: Discovered) -> str | bytes:
     """Return what a server's reader and writer have in common."""
     return parse_user_data(found.user_data).get("serviceid") or found.guid[:PREFIX]
+
+
+#: Seconds that a reply waits for its client's reader to be found, or to take something.
+_REPLY_PATIENCE = 3.0
+#: Clients whose newest request is remembered, beside those that are there.
+_MAX_REMEMBERED = 1024
+#: Seconds that closing waits for replies that are on their way.
+_FAREWELL = 0.5
+
+
+@dataclass(frozen=True)
+class _Answer:
+    """What a reply needs.
+
+    Attributes:
+        client: The writer of the request.
+        identity: The request's identity.
+        header: What its payload began with, where the reply's is to begin with it, too.
+        reader: The client's reader of replies, where it told.
+    """
+
+    client: Discovered
+    identity: Identity
+    header: bytes = b""
+    reader: bytes = b""
+
+
+class DdsReplier(Replier):
+    """The ends of a service server; arguments as :class:`Ends`'s.
+
+    Attributes:
+        gid: Identity of its reader of requests, by which the server is known.
+    """
+
+    def __init__(
+        self,
+        participant: Participant,
+        graph: Graph,
+        endpoint: EndpointInfo,
+        on_request: OnRequest,
+    ) -> None:
+        self._service, self._on_request = endpoint.name, on_request
+        #: Clients whose readers of replies are matched, as found out since the last change.
+        self._hearing: set[bytes] = set()
+        self._strangers = False
+        #: The newest request of each client that was taken, by its writer; not Cyclone DDS's.
+        self._newest: dict[bytes, int] = {}
+        #: Origins, by their identity, of requests left to the pump: none may overtake them.
+        self._left: OrderedDict[int, Origin] = OrderedDict()
+        self._leaving = threading.Lock()
+        self._ends = Ends(participant, graph, endpoint, self._on_requests, self._link)
+        self._pump = participant.pump
+        self.gid = self._ends.reader.guid
+        self._ends.origins.hasten(self._hasten)
+        self._ends.start()
+
+    @property
+    def problem(self) -> str:  # type: ignore[override]
+        """Why some clients in the graph cannot be served."""
+        strangers = self._ends.strangers()
+        reason = cyclone_identity.reading.problem or cyclone_identity.writing.problem
+        if not strangers or not reason:
+            return ""
+        return f"{names_of(strangers)} cannot be answered: {reason}; {REMEDY}"
+
+    def reply(self, request: RequestId, data: bytes | bytearray) -> None:
+        """Answer a request, once the client can hear it; a client that is gone is no error."""
+        answer = request.handle
+        if not isinstance(answer, _Answer):
+            return
+
+        def expired() -> None:
+            who = self._ends.who(answer.client.guid)
+            text = "%s did not get its reply: its reader of replies is not found, or takes nothing"
+            self._ends.name(answer.client.guid, text, who)
+
+        self._ends.outbox.put(
+            lambda: self._answer(answer, data),
+            _REPLY_PATIENCE,
+            expired,
+            # See cyclone_identity.create_reply_topic() for what the main thread must not do.
+            now=not in_main_thread(),
+        )
+
+    def close(self) -> None:
+        """Withdraw the server."""
+        self._ends.origins.hasten(None)
+        if not self._pump.current:
+            self._ends.outbox.drain(_FAREWELL)
+        self._ends.close()
+
+    def _hasten(self, origin: Origin, data: bytes | memoryview) -> bool:
+        """Take a request while it is received; return False when it should come again later."""
+        guid = origin.guid
+        client = self._ends.writers.by_guid.get(guid)
+        odd = client is None or (scheme_of(guid) is Scheme.HEADER and unpack_header(data) is None)
+        with self._leaving:
+            if odd or client is None or self._left or not self.quick:
+                self._left[id(origin)] = origin
+                return False
+        try:
+            self._take(client, data, origin)
+        except Exception:
+            _log.exception("%s: a request is lost", self._service)
+        return True
+
+    def _on_requests(self, taken: list[Taken]) -> None:
+        for data, _, handle, told in taken:
+            client, origin = self._ends.sender(handle, told)
+            if origin is not None and origin.taken:
+                continue
+            try:
+                if client is not None:
+                    self._take(client, data, origin)
+                else:
+                    _log.error("%s: a request is lost: who sent it is gone", self._service)
+            except Exception:
+                _log.exception("%s: a request is lost", self._service)
+            if origin is not None:
+                self._has_come(origin)
+
+    def _has_come(self, origin: Origin) -> None:
+        """Wait no longer for a request that was left, nor for those before it, which are lost."""
+        with self._leaving:
+            waiting, gone = len(self._left), 0
+            if id(origin) not in self._left:
+                return
+            while self._left.popitem(last=False)[0] != id(origin):
+                gone += 1
+        if gone and waiting > self._ends.depth:
+            text = "%s: %d requests are lost, as more than %d waited"
+            _log.error(text, self._service, gone, self._ends.depth)
+
+    def _take(self, client: Discovered, data: bytes | memoryview, origin: Origin | None) -> None:
+        if scheme_of(client.guid) is Scheme.HEADER:
+            header = unpack_header(data)
+            if header is None:
+                text = "ignoring a request of %s, which is too short for its header: %d bytes"
+                self._ends.name(client.guid, text, self._ends.who(client.guid), len(data))
+                return
+            kept = header_of(data)
+            sequence = 0 if origin is None else origin.sequence
+            answer = _Answer(client, Identity(client.guid, sequence), kept)
+            self._on_request(RequestId(client.guid, header[1], answer), without_header(data))
+        elif origin is None:
+            text = "cannot answer %s: %s; %s"
+            why = cyclone_identity.reading.problem or "its requests have no identity"
+            self._ends.name(client.guid, text, self._ends.who(client.guid), why, REMEDY)
+        elif origin.sequence > self._newest.get(client.guid, 0):
+            # A client that was out of reach and is back sends what it holds once more.
+            self._newest[client.guid] = origin.sequence
+            given = origin.related
+            reader = b"" if given is None or given.guid == UNKNOWN_GUID else given.guid
+            identity = Identity(reader or client.guid, origin.sequence)
+            answer = _Answer(client, identity, reader=reader)
+            self._on_request(RequestId(client.guid, origin.sequence, answer), data)
+
+    def _answer(self, answer: _Answer, data: bytes | bytearray) -> bool:
+        """Send a reply; return whether nothing more is to be done for it."""
+        if not self._hears(answer):
+            # Its coming may not have been told yet.
+            self._ends.look()
+        writer = self._ends.writer
+        if writer is None or not self._hears(answer):
+            # A reply to a reader that is not matched yet would be lost.
+            return answer.client not in self._ends.writers.all
+        parts = with_header(data, answer.header) if answer.header else (data,)
+        try:
+            if answer.header and not self._strangers:
+                writer.write(parts)
+            elif (
+                not cyclone_identity.write_reply(writer, answer.identity, parts)
+                and not answer.header
+            ):
+                who = self._ends.who(answer.client.guid)
+                text = "%s did not get its reply: Cyclone DDS sent it without identity; %s"
+                self._ends.name(answer.client.guid, text, who, REMEDY)
+        except TimeoutError:
+            return False
+        return True
+
+    def _link(self) -> None:
+        """Take note of the clients that are there now."""
+        self._hearing = set()
+        readers = () if self._ends.readers is None else self._ends.readers.all
+        if len(self._newest) > _MAX_REMEMBERED:
+            here = self._ends.writers.by_guid
+            self._newest = {guid: last for guid, last in self._newest.items() if guid in here}
+        # RustDDS's clients fail when they get a reply without identity, whosever it is.
+        self._strangers = not cyclone_identity.writing.problem and any(
+            scheme_of(found.guid) is Scheme.IDENTITY for found in readers
+        )
+
+    def _hears(self, answer: _Answer) -> bool:
+        """Return whether the client's reader of replies is matched."""
+        hearing = self._hearing
+        key = answer.reader or answer.client.guid
+        if key in hearing:
+            return True
+        readers = () if self._ends.readers is None else self._ends.readers.all
+        if answer.reader:
+            heard = any(found.guid == answer.reader for found in readers)
+        else:
+            client = _client_of(answer.client)
+            heard = any(_client_of(found) == client for found in readers)
+        if heard:
+            hearing.add(key)
+        return heard
+
+
+def _client_of(found: Discovered) -> str | bytes:
+    """Return what a client's reader and writer have in common."""
+    return parse_user_data(found.user_data).get("clientid") or found.guid[:PREFIX]

@@ -1,0 +1,652 @@
+"""Identities of samples over Cyclone DDS: whence requests come, which request a reply answers.
+
+DDS implementations other than Cyclone do not touch a reply's payload: it carries the identity of
+its request among the inline QoS parameters of its RTPS submessage (OMG DDS-RPC 1.0, section 7.8.2;
+RTPS 2.5, sections 8.3.8.2, 9.4.2.11 and 9.6.3), which Cyclone DDS neither hands on nor writes.
+Functions that it makes and reads samples with are replaced, to do both:
+
+- The one that makes a sample from packets (``from_ser``) notes what the first of them says: the
+  sample's number, and the inline QoS that says which request a reply answers.
+- A reply that is marked begins with its inline QoS. ``get_size`` leaves that out; ``to_ser_ref``,
+  asked for the bytes that follow a submessage's header, returns the inline QoS with them and sets
+  the header's flag for it; ``to_ser_unref`` takes them back. The library does the rest: fragments,
+  retransmissions, several networks.
+
+How functions are replaced: each topic's type points to a table of functions (``ddsi_serdata_ops``,
+meant for other languages' type support); a topic made here gets a type of its own, which points to
+a copy of that table with some functions replaced. That takes private layouts, those of Cyclone DDS
+11.0.1 on 64-bit Linux. They are tested once, on memory of our own, before anything relies on them.
+
+All types share one copy of each table. The library finds instances by the hash of a sample and by
+its table, and all samples without key have one hash: with a table for each type, the 33rd instance
+of that hash makes its hash table (hopscotch hashing with 32 slots) double until memory ends.
+
+A copy is never freed, as samples outlive readers, writers and topics.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import logging
+import struct
+import sys
+import threading
+from abc import ABC, abstractmethod
+from ctypes import (
+    CFUNCTYPE,
+    PYFUNCTYPE,
+    c_char_p,
+    c_int,
+    c_size_t,
+    c_ubyte,
+    c_uint32,
+    c_void_p,
+    string_at,
+)
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rosglass.wires.dds import cyclone
+from rosglass.wires.dds.cyclone import keeping
+from rosglass.wires.dds.cyclone_samples import COPIED, payload
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rosglass.wires.dds.endpoints import SampleWriter
+
+__all__ = [
+    "SDK_DATA",
+    "UNKNOWN_GUID",
+    "UNKNOWN_SEQUENCE",
+    "Hook",
+    "Identity",
+    "Origin",
+    "Origins",
+    "create_reply_topic",
+    "expect",
+    "inline_qos",
+    "make_sample",
+    "prepare_reply_writer",
+    "read_origin",
+    "reading",
+    "write_reply",
+    "writing",
+]
+
+_log = logging.getLogger("rosglass.ros2")
+
+#: ``ddsi_serdata_kind`` of a sample that has data.
+SDK_DATA = 2
+#: ``ddsi_sertype.serdata_ops``, and how many functions it has.
+_OPS_OF_TYPE = 8
+_OPS = 17
+
+_lock = threading.Lock()
+
+
+class Hook(ABC):
+    """Replaces functions of the types of topics."""
+
+    def __init__(self) -> None:
+        self.problem = ""
+        self._tested = False
+        #: Our tables and the functions in them, by the address of the library's table.
+        self._tables: dict[int, tuple[Any, dict[int, Any]]] = {}
+
+    def create_topic(self, participant: int, name: str, type_name: str) -> int:
+        """Create a topic whose type has functions replaced; see `cyclone.create_topic`."""
+        with _lock:
+            topic = cyclone.create_topic(participant, name, type_name, own_type=True)
+            try:
+                sertype = cyclone.sertype(topic)
+                if not self._tested:
+                    self._tested = True
+                    self.problem = self.check(sertype)
+                    if self.problem:
+                        _log.warning("%s", self.problem)
+                elif not self.problem:
+                    self._install(sertype)
+            except BaseException:
+                cyclone.delete(topic)
+                raise
+        return topic
+
+    def prepare(self, sertype: int) -> None:
+        """Replace the functions of a type that nobody else uses."""
+        with _lock:
+            if not self.problem:
+                self._install(sertype)
+
+    def function(self, sertype: int, place: int) -> Any:
+        """Return what the library calls for a type, by the place in the table."""
+        return _table_of(sertype)[place]
+
+    @abstractmethod
+    def replace(self, originals: Any) -> dict[int, Any]:
+        """Return functions by their place in the table, which call the original ones."""
+
+    @abstractmethod
+    def test(self, sertype: int) -> None:
+        """Raise when the functions do not do what they should with samples of a type."""
+
+    def check(self, sertype: int) -> str:
+        """Replace a type's functions; return why that cannot be, empty when it is done."""
+        if strange := cyclone.strange_version():
+            return strange
+        if sys.platform != "linux" or sys.byteorder != "little":
+            return f"DDS on {sys.platform} does without identities: it was never tried there"
+        pointer = c_void_p.from_address(sertype + _OPS_OF_TYPE)
+        originals = pointer.value
+        try:
+            self._install(sertype)
+            self.test(sertype)
+        except Exception as error:
+            pointer.value = originals
+            return (
+                f"Cyclone DDS {cyclone.VERSION} is built differently on this machine "
+                f"({type(self).__name__}: {error!r})"
+            )
+        return ""
+
+    def _install(self, sertype: int) -> None:
+        pointer = c_void_p.from_address(sertype + _OPS_OF_TYPE)
+        originals = pointer.value
+        assert originals is not None
+        if any(originals == ctypes.addressof(table) for table, _ in self._tables.values()):
+            return
+        if originals not in self._tables:
+            table = (c_void_p * _OPS).from_buffer_copy(_table_of(sertype))
+            replaced = self.replace(_table_of(sertype))
+            for place, function in replaced.items():
+                table[place] = ctypes.cast(function, c_void_p)
+            self._tables[originals] = table, replaced
+        pointer.value = ctypes.addressof(self._tables[originals][0])
+
+
+def _table_of(sertype: int) -> Any:
+    """Return the table of functions that a type points to."""
+    address = c_void_p.from_address(sertype + _OPS_OF_TYPE).value
+    assert address is not None
+    return (c_void_p * _OPS).from_address(address)
+
+
+def make_sample(sertype: int, data: bytes) -> int:
+    """Return the address of a new serdata, for tests; raises ValueError when there is none."""
+    part = (c_size_t * 2)(ctypes.cast(c_char_p(data), c_void_p).value or 0, len(data))
+    made = keeping().ddsi_serdata_from_ser_iov(sertype, SDK_DATA, 1, part, len(data))
+    if not made:
+        raise ValueError("no sample can be made")
+    return int(made)
+
+
+def expect(found: object, wanted: object) -> None:
+    """Raise ValueError when a test finds something else than wanted."""
+    if found != wanted:
+        raise ValueError(f"{found!r} instead of {wanted!r}")
+
+
+#: The GUID of nobody.
+UNKNOWN_GUID = bytes(16)
+#: The sequence number of nothing (RTPS 2.5, section 8.3.5.4).
+UNKNOWN_SEQUENCE = -(2**32)
+
+_DATA, _DATA_FRAG = 0x15, 0x16
+_LITTLE_ENDIAN, _INLINE_QOS = 0x01, 0x02
+#: Bytes from a submessage's beginning to where octetsToInlineQos counts from.
+_COUNTED_FROM = 8
+#: flags, octetsToInlineQos, writerId, writerSN of a DATA or DATA_FRAG submessage.
+_HEADER = struct.Struct("=xB4xH4xIiI")
+_SENTINEL = 0x0001
+#: PID_RELATED_SAMPLE_IDENTITY: the standard's number, and the one eProsima uses.
+_RELATED = (0x0083, 0x800F)
+_IDENTITY_SIZE = 24
+
+
+class Identity(NamedTuple):
+    """The identity of a sample.
+
+    Attributes:
+        guid: Of its writer (a client may put its reader of replies in that place), 16 bytes.
+        sequence: Its number there.
+    """
+
+    guid: bytes
+    sequence: int
+
+
+class Origin(NamedTuple):
+    """Where a received sample comes from.
+
+    Attributes:
+        entity: The last 4 bytes of its writer's GUID.
+        sequence: Its number there.
+        related: The request that it answers, or what a client tells of itself in a request; None
+            when it carries no such identity.
+        prefix: What its writer's GUID begins with, empty where that is not known.
+        taken: Whether it was handed on already, while it was received.
+    """
+
+    entity: bytes
+    sequence: int
+    related: Identity | None
+    prefix: bytes = b""
+    taken: bool = False
+
+    @property
+    def guid(self) -> bytes:
+        """Its writer's GUID, empty where that is not known."""
+        return self.prefix + self.entity if self.prefix else b""
+
+    def may_be_of(self, guid: bytes) -> bool:
+        """Return whether its writer may be the one with a GUID."""
+        return guid.startswith(self.prefix) and guid.endswith(self.entity)
+
+
+def inline_qos(identity: Identity) -> bytes:
+    """Return inline QoS, little endian, that relates a sample to another; always 60 bytes."""
+    sequence = identity.sequence
+    value = identity.guid + struct.pack("<iI", sequence >> 32, sequence & 0xFFFFFFFF)
+    parameters = [struct.pack("<HH", pid, _IDENTITY_SIZE) + value for pid in _RELATED]
+    return b"".join((*parameters, struct.pack("<HH", _SENTINEL, 0)))
+
+
+def read_origin(submessage: bytes) -> Origin | None:
+    """Return what a submessage tells of the sample in it; None when it carries no sample.
+
+    Args:
+        submessage: A DATA or DATA_FRAG submessage up to its payload, as Cyclone DDS leaves it once
+            it has looked at it: the numbers of its fixed part in the machine's byte order, its
+            parameters as they came.
+    """
+    if len(submessage) < _HEADER.size or submessage[0] not in (_DATA, _DATA_FRAG):
+        return None
+    flags, to_qos, entity, high, low = _HEADER.unpack_from(submessage)
+    related = None
+    if flags & _INLINE_QOS:
+        order = "<" if flags & _LITTLE_ENDIAN else ">"
+        related = _find_related(submessage, _COUNTED_FROM + to_qos, order)
+    sequence = (high << 32) + low
+    return Origin(entity.to_bytes(4, "big"), sequence, related)
+
+
+def _find_related(data: bytes, at: int, order: str) -> Identity | None:
+    """Return the identity in a parameter list, which may be any bytes."""
+    parameter = struct.Struct(f"{order}HH")
+    while at + parameter.size <= len(data):
+        pid, size = parameter.unpack_from(data, at)
+        at += parameter.size
+        if pid == _SENTINEL or at + size > len(data):
+            return None
+        if pid in _RELATED and size >= _IDENTITY_SIZE:
+            guid, high, low = struct.unpack_from(f"{order}16siI", data, at)
+            return Identity(guid, (high << 32) + low)
+        at += size + -size % 4
+    return None
+
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import TypeAlias
+
+    Take: TypeAlias = Callable[[Origin, bytes | memoryview], bool]
+
+
+#: Place in ``ddsi_serdata_ops``.
+_FROM_SER = 2
+#: ``ddsi_rdata``: rmsg, nextfrag, min, maxp1, submsg_zoff, payload_zoff, keyhash_zoff; and where
+#: the packet begins that a ``ddsi_rmsg`` holds.
+_RDATA = struct.Struct("=QQIIHHH2x")
+_PACKET = 48
+_RTPS_HEADER = 20
+_INFO_SOURCE = 0x0C
+#: Origins that a reader's samples are kept of until somebody asks for them. Those of samples that
+#: it drops unread make room when their memory is used again, or here.
+_MAX_ORIGINS = 16384
+
+_from_ser_type = c_void_p, c_void_p, c_int, c_void_p, c_size_t
+_FromSer, _FromSerFree = PYFUNCTYPE(*_from_ser_type), CFUNCTYPE(*_from_ser_type)
+
+#: By the address of their reader's type.
+_readers: dict[int, Origins] = {}
+
+
+class Origins:
+    """Where the samples of one reader come from.
+
+    Each reader has its own: a sample that is dropped unread leaves its origin behind, under an
+    address that may be another reader's sample's later.
+    """
+
+    def __init__(self) -> None:
+        self._type = 0
+        self._noted: dict[int, Origin] = {}
+        self._take: Take | None = None
+
+    def create_topic(self, participant: int, name: str, type_name: str) -> int:
+        """Create the topic of the one reader; see `cyclone.create_topic`."""
+        topic = reading.create_topic(participant, name, type_name)
+        self.follow(cyclone.sertype(topic))
+        return topic
+
+    def follow(self, sertype: int) -> None:
+        """Note the origins of the samples of a type, by its address."""
+        self._type = sertype
+        _readers[sertype] = self
+
+    def of(self, serdata: int) -> Origin | None:
+        """Return where a sample comes from, once; None when it came within this process.
+
+        A sample that came within this process may be given the origin of one that was dropped
+        unread: see :meth:`Origin.may_be_of`.
+
+        Args:
+            serdata: The sample's address, while the caller still holds a reference to it.
+        """
+        return self._noted.pop(serdata, None)
+
+    def hasten(self, take: Take | None) -> None:
+        """Have samples of other processes handed on while they are received.
+
+        It saves waking a thread, a fifth of a service call's time. The library is in the middle of
+        something then, and waits: `take` must not call it but to write, nor wait for anything.
+
+        Args:
+            take: Takes a sample's origin and payload; returns whether it did. What it did not take
+                comes later, with the same origin. None ends it.
+        """
+        self._take = take
+
+    def close(self) -> None:
+        """Forget all; for a reader that was deleted."""
+        self._take = None
+        if _readers.get(self._type) is self:
+            del _readers[self._type]
+        self._noted.clear()
+
+    def note(self, serdata: int, fragments: int) -> None:
+        """Note the origin of a sample that was just made from fragments, and hand it on."""
+        self._noted.pop(serdata, None)
+        found = _read(fragments)
+        if found is None:
+            return
+        while len(self._noted) >= _MAX_ORIGINS:
+            self._noted.pop(next(iter(self._noted)), None)
+        self._noted[serdata] = found
+        take = self._take
+        if take is not None:
+            keeping().ddsi_serdata_ref(serdata)
+            if take(found, payload(serdata)):
+                self._noted[serdata] = found._replace(taken=True)
+
+
+class _Reading(Hook):
+    """Notes where samples come from."""
+
+    def replace(self, originals: Any) -> dict[int, Any]:
+        small, big = _FromSer(originals[_FROM_SER]), _FromSerFree(originals[_FROM_SER])
+
+        def from_ser(sertype: int, kind: int, fragments: int, size: int) -> int | None:
+            make = small if size <= COPIED else big
+            serdata: int | None = make(sertype, kind, fragments, size)
+            try:
+                origins = _readers.get(sertype)
+                if serdata is not None and kind == SDK_DATA and origins is not None:
+                    origins.note(serdata, fragments)
+            except Exception:
+                _log.exception("the origin of a DDS sample cannot be noted")
+            return serdata
+
+        return {_FROM_SER: _FromSer(from_ser)}
+
+    def test(self, sertype: int) -> None:
+        data = b"\x00\x01\x00\x00rosglass"
+        related = Identity(bytes(range(16)), (5 << 32) + 6)
+        sent = Origin(b"\x00\x00\x12\x03", (3 << 32) + 4, related, bytes(range(12)))
+        header = struct.pack("=BBHHHIIiI", 0x15, 7, 0, 0, 16, 0, 0x1203, 3, 4)
+        guid = struct.pack("=3I", *struct.unpack(">3I", sent.prefix))
+        before = bytes(8) + guid + header + inline_qos(related)
+        packet = ctypes.create_string_buffer(bytes(_PACKET) + before + data)
+        place = ctypes.addressof(packet)
+        rdata = ctypes.create_string_buffer(
+            _RDATA.pack(place, 0, 0, len(data), 20, len(before), 0), _RDATA.size
+        )
+        # Through the table, as the library does it.
+        from_ser = _FromSer(self.function(sertype, _FROM_SER))
+        origins = Origins()
+        origins.follow(sertype)
+        try:
+            serdata = from_ser(sertype, SDK_DATA, ctypes.addressof(rdata), len(data))
+        finally:
+            found = dict(origins._noted)
+            origins.close()
+        expect(bytes(payload(serdata)), data)
+        expect(found, {serdata: sent})
+
+
+#: What reads the origins of received samples; its `problem` says why it cannot.
+reading = _Reading()
+
+
+def _read(fragments: int) -> Origin | None:
+    """Return the origin of a sample that was made from fragments, the first of which is given."""
+    rmsg, _, first, _, submessage, end, _ = _RDATA.unpack(string_at(fragments, _RDATA.size))
+    if first != 0 or not rmsg or end <= submessage:
+        return None
+    # The library has checked that submessage and parameters end where the payload begins.
+    found = read_origin(string_at(rmsg + _PACKET + submessage, end - submessage))
+    return None if found is None else found._replace(prefix=_prefix(rmsg, submessage))
+
+
+def _prefix(rmsg: int, submessage: int) -> bytes:
+    """Return whose submessage it is; empty where that takes a closer look at the packet."""
+    packet = string_at(rmsg + _PACKET, submessage)
+    at = _RTPS_HEADER
+    while at + 4 <= submessage:
+        name, flags, size = struct.unpack_from("=BBH", packet, at)
+        if name == _INFO_SOURCE or not flags & 1:
+            return b""
+        at += 4 + size
+    return struct.pack(">3I", *struct.unpack_from("=3I", packet, 8)) if at == submessage else b""
+
+
+#: Places in ``ddsi_serdata_ops``.
+_GET_SIZE, _TO_SER_REF, _TO_SER_UNREF = 1, 7, 8
+#: ``ddsi_xmsg``: maxsz, sz, have_params, refd_payload, which come before refd_payload_iov; and how
+#: far behind its beginning kind and data are.
+_XMSG = struct.Struct("=QQi4xQ")
+_XMSG_ROOM = 128
+_XMSG_KIND, _XMSG_DATA = 24, 112
+_XMSG_KINDS = (1, 2, 3)
+#: What an xmsg has before its payload, by whether that begins the sample and by its size: where the
+#: header of DATA or DATA_FRAG begins (a sample's first follows INFO_TS), its id, octetsToInlineQos.
+_FORMS = {(True, 36): (12, 0x15, 16), (True, 48): (12, 0x16, 28), (False, 36): (0, 0x16, 28)}
+#: ``ddsi_xmsg_data``: where INFO_SRC and INFO_DST begin, with their ids, and then the rest.
+_INFOS = ((0, 0x0C), (24, 0x0E))
+_SUBMESSAGES = 40
+_INLINE_QOS = 0x02
+#: Begins a sample with inline QoS, the payload's own header coming after that: an encapsulation
+#: header with options that nobody uses, and the first parameter.
+_MARK = b"\x00\x01\xa5\x00"
+_MARKED = _MARK + b"\x83\x00\x18\x00"
+_QOS_SIZE = 60
+_BEFORE = len(_MARK) + _QOS_SIZE
+
+_GetSize = PYFUNCTYPE(c_uint32, c_void_p)
+_ToSerRef = PYFUNCTYPE(c_void_p, c_void_p, c_size_t, c_size_t, c_void_p)
+_ToSerUnref = PYFUNCTYPE(None, c_void_p, c_void_p)
+
+_told = threading.local()
+#: Fragments with inline QoS that the library is sending, by their address.
+_fragments: dict[int, Any] = {}
+
+
+def create_reply_topic(participant: int, name: str, type_name: str) -> int:
+    """Create a topic for a writer that :func:`prepare` is applied to; see `cyclone.create_topic`.
+
+    The writer must not be used in the main thread: an exception raised there by a signal would end
+    up in the library.
+    """
+    return writing.create_topic(participant, name, type_name)
+
+
+def prepare_reply_writer(writer: int) -> None:
+    """Let a writer be given to :func:`write`, before it writes anything."""
+    # As its topic's type is not the library's usual one, it has a type of its own.
+    writing.prepare(cyclone.sertype(writer))
+
+
+def write_reply(
+    writer: SampleWriter, identity: Identity, parts: Sequence[bytes | bytearray | memoryview]
+) -> bool:
+    """Send a payload with inline QoS that relates it to another sample.
+
+    Args:
+        writer: One that :func:`prepare` was applied to.
+        identity: What it relates to.
+        parts: The payload in one piece or several; it begins with the encapsulation header.
+
+    Returns:
+        Whether it went out with inline QoS; not so if nobody outside this process is matched.
+    """
+    _told.identity = False
+    begin = _MARK + inline_qos(identity)
+    small = sum(map(len, parts)) <= COPIED
+    writer.write((b"".join((begin, *parts)),) if small else (begin, *parts))
+    return bool(_told.identity)
+
+
+class _Writing(Hook):
+    """Sends inline QoS with samples that are marked."""
+
+    #: From a serdata's beginning to its encapsulation header.
+    _header = 0
+
+    def replace(self, originals: Any) -> dict[int, Any]:
+        original_size = _GetSize(originals[_GET_SIZE])
+        original_ref = _ToSerRef(originals[_TO_SER_REF])
+        original_unref = _ToSerUnref(originals[_TO_SER_UNREF])
+
+        def get_size(serdata: int) -> int:
+            size: int = original_size(serdata)
+            return size - _BEFORE if self._marked(serdata) else size
+
+        def to_ser_ref(serdata: int, offset: int, size: int, part: int) -> int:
+            kept: int = original_ref(serdata, offset, size, part)
+            try:
+                if self._marked(serdata):
+                    self._give(serdata + self._header, offset, size, part)
+            except Exception:
+                _log.exception("a DDS sample cannot be sent with its identity")
+            return kept
+
+        def to_ser_unref(serdata: int, part: int) -> None:
+            _fragments.pop(c_void_p.from_address(part).value or 0, None)
+            original_unref(serdata, part)
+
+        return {
+            _GET_SIZE: _GetSize(get_size),
+            _TO_SER_REF: _ToSerRef(to_ser_ref),
+            _TO_SER_UNREF: _ToSerUnref(to_ser_unref),
+        }
+
+    @staticmethod
+    def _give(marked: int, offset: int, size: int, part: int) -> None:
+        """Fill in where the bytes are that follow a submessage's header, and how many."""
+        begin = marked + _BEFORE + offset
+        if _flag(part, first=offset == 0):
+            _told.identity = True
+            if offset == 0:
+                begin = marked + len(_MARK)
+            else:
+                # Each fragment has it: RustDDS looks at the last one that it gets.
+                qos = string_at(marked + len(_MARK), _QOS_SIZE)
+                held = ctypes.create_string_buffer(qos + string_at(begin, size), _QOS_SIZE + size)
+                begin = ctypes.addressof(held)
+                _fragments[begin] = held
+            size += _QOS_SIZE
+        c_void_p.from_address(part).value = begin
+        c_size_t.from_address(part + 8).value = size
+
+    def test(self, sertype: int) -> None:
+        self._measure(sertype)
+        data = b"\x00\x01\x00\x00rosglass"
+        qos = inline_qos(Identity(bytes(range(16)), 7))
+        serdata = make_sample(sertype, _MARK + qos + data)
+        lib = keeping()
+        expect(lib.ddsi_serdata_size(serdata), len(data))
+        # What stays within this process has no header to be flagged.
+        expect(_bytes_of(serdata, 0, len(data), None), data)
+        expect(_bytes_of(serdata, 4, 8, None), data[4:])
+        for first, wanted in ((True, qos + data), (False, qos + data[4:])):
+            place, name, to_qos = _FORMS[first, 36]
+            held = bytearray(_SUBMESSAGES + 36)
+            for at, info in _INFOS:
+                held[at] = info
+            struct.pack_into("=BBHHH", held, _SUBMESSAGES + place, name, 5, 0, 0, to_qos)
+            offset = 0 if first else 4
+            expect(_bytes_of(serdata, offset, len(data) - offset, held), wanted)
+            expect(held[_SUBMESSAGES + place + 1], 5 | _INLINE_QOS)
+        expect(_fragments, {})
+        lib.ddsi_serdata_unref(serdata)
+
+    def _measure(self, sertype: int) -> None:
+        part = (c_size_t * 2)()
+        serdata = make_sample(sertype, b"\x00\x01\x00\x00rosglass")
+        lib = keeping()
+        lib.ddsi_serdata_to_ser_ref(serdata, 0, 12, part)
+        self._header = part[0] - serdata
+        lib.ddsi_serdata_to_ser_unref(serdata, part)
+        lib.ddsi_serdata_unref(serdata)
+        if not 64 <= self._header <= 256:
+            raise ValueError(f"payloads begin at {self._header}")
+
+    def _marked(self, serdata: int) -> bool:
+        return string_at(serdata + self._header, len(_MARKED)) == _MARKED
+
+
+#: What writes inline QoS; its `problem` says why it cannot.
+writing = _Writing()
+
+
+def _flag(part: int, *, first: bool) -> bool:
+    """Say in a submessage's header that inline QoS follows; returns False when there is no header.
+
+    Args:
+        part: Where the library wants the payload's address; an xmsg's refd_payload_iov, unless the
+            sample is about to be copied for a reader in this process.
+        first: Whether the payload begins the sample.
+    """
+    room, size, parameters, referred = _XMSG.unpack(string_at(part - _XMSG.size, _XMSG.size))
+    form = _FORMS.get((first, size))
+    if form is None or room != _XMSG_ROOM or parameters or referred:
+        return False
+    if c_uint32.from_address(part + _XMSG_KIND).value not in _XMSG_KINDS:
+        return False
+    data = c_void_p.from_address(part + _XMSG_DATA).value
+    if not data or data % 8:
+        return False
+    held = string_at(data, _SUBMESSAGES + size)
+    if any(held[at] != name for at, name in _INFOS):
+        return False
+    place = _SUBMESSAGES + form[0]
+    name, flags, to_qos = struct.unpack_from("=BB4xH", held, place)
+    if (name, to_qos) != form[1:] or flags & _INLINE_QOS:
+        return False
+    c_ubyte.from_address(data + place + 1).value = flags | _INLINE_QOS
+    return True
+
+
+def _bytes_of(serdata: int, offset: int, size: int, packet: bytearray | None) -> bytes:
+    """Return what is sent of a sample behind the headers in `packet`, if any."""
+    room = ctypes.create_string_buffer(_XMSG.size + _XMSG_DATA + 8)
+    part = ctypes.addressof(room) + _XMSG.size
+    if packet is not None:
+        headers = (c_ubyte * len(packet)).from_buffer(packet)
+        _XMSG.pack_into(room, 0, _XMSG_ROOM, 36, 0, 0)
+        c_uint32.from_address(part + _XMSG_KIND).value = 1
+        c_void_p.from_address(part + _XMSG_DATA).value = ctypes.addressof(headers)
+    lib = keeping()
+    lib.ddsi_serdata_to_ser_ref(serdata, offset, size, part)
+    data = string_at(c_void_p.from_address(part).value or 0, c_size_t.from_address(part + 8).value)
+    lib.ddsi_serdata_to_ser_unref(serdata, part)
+    return data
