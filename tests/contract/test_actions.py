@@ -41,26 +41,47 @@ def offer(robot, topic, wire, client):
     return offer
 
 
-def test_a_goal_succeeds_with_feedback_and_result(offer, client, eventually):
-    offer()
-    feedback, statuses = [], []
+def test_a_goal_succeeds_with_feedback_and_result(offer, client, console, wire, eventually):
+    server = offer()
+    feedback, statuses, done = [], [], []
     goal = client.send_goal(
         {"order": 5},
         on_feedback=lambda message: feedback.append(len(message.sequence)),
         on_status_change=statuses.append,
+        on_done=done.append,
     )
     status, result = goal.result(30)
-    assert status is GoalStatus.SUCCEEDED
+    assert status is goal.status is GoalStatus.SUCCEEDED
     assert list(result.sequence) == [0, 1, 2, 3, 4]
-    eventually(lambda: statuses[-1:] == [GoalStatus.SUCCEEDED], lambda: statuses)
-    eventually(lambda: feedback[-1:] == [5], lambda: feedback)
-    assert feedback == sorted(feedback)
+    eventually(lambda: done == [goal])
+    if not wire.is_ros1:  # which tells no client when a goal was accepted
+        assert statuses.pop(0) is GoalStatus.ACCEPTED
+        assert abs((console.now() - goal.accepted).seconds) < 30
+    assert statuses == [GoalStatus.EXECUTING, GoalStatus.SUCCEEDED]
+    assert feedback == [2, 3, 4, 5]
+    assert len(goal.feedback.sequence) == 5
+    assert goal.acceptance.result() is True
+    assert goal.goal.order == 5
+    assert f"{goal.id_text} succeeded" in repr(goal)
+    assert client.name in repr(client)
+    assert client.name in repr(server)
+    assert list(client.goals) == list(server.goals) == []
+    assert client.problem == server.problem == ""
 
 
-def test_a_goal_is_rejected(offer, client):
-    offer(accept=lambda goal: goal.order < 10)
-    with pytest.raises(rosglass.GoalRejectedError):
-        client.send_goal({"order": 100}).result(30)
+def test_a_rejected_goal_leaves_nothing_behind(offer, client, eventually):
+    server = offer(accept=lambda goal: goal.order < 10)
+    events = []
+    goal = client.send_goal({"order": 100}, on_status_change=events.append, on_done=events.append)
+    reason = f"{client.name} does not accept goal {goal.id_text}"
+    with pytest.raises(rosglass.GoalRejectedError, match=reason):
+        goal.result(30)
+    assert goal.acceptance.result() is False
+    assert goal.status is GoalStatus.REJECTED
+    assert goal.accepted is None
+    assert goal.cancel().result(30).reason == "the goal has ended already: rejected"
+    eventually(lambda: events == [GoalStatus.REJECTED, goal], lambda: events)
+    assert list(client.goals) == list(server.goals) == []
     assert client.send_goal({"order": 2}).result(30).status is GoalStatus.SUCCEEDED
 
 
@@ -86,9 +107,27 @@ def test_a_goal_waits_for_the_server(robot, client, topic, wire):
     assert goal.result(30).status is GoalStatus.SUCCEEDED
 
 
-def test_without_a_server_a_goal_ends_after_its_time(client, topic):
-    with pytest.raises(rosglass.Error, match=topic):
-        client.send_goal({"order": 1}, timeout=0.2).result(30)
+def test_without_a_server_a_goal_ends_after_its_time(robot, client, topic, wire, eventually):
+    robot.create_action_server(f"/base{topic}", wire.count, count)
+    eventually(lambda: f"did you mean /base{topic}?" in client.problem, lambda: client.problem)
+    goal = client.send_goal({"order": 1}, timeout=0.2)
+    reason = rf"no goal could be sent to {topic} within 0\.2 s: no server offers the action {topic}"
+    with pytest.raises(rosglass.ServiceUnavailableError, match=reason):
+        goal.result(30)
+    assert goal.status is GoalStatus.LOST
+
+
+@pytest.mark.parametrize("create", ["create_action_client", "create_action_server"])
+def test_odd_names_and_types_are_refused(robot, wire, create):
+    more = (count,) if create.endswith("server") else ()
+    for name, kind, error, reason in (
+        ("a b", wire.count, rosglass.InvalidNameError, " "),
+        ("/x", "nowhere_msgs/action/No", rosglass.TypeNotFoundError, "nowhere_msgs"),
+        ("/x", "std_msgs/msg/String", rosglass.TypeNotFoundError, "is not an? action type"),
+        ("/x", 7, rosglass.TypeNotFoundError, "7 is not an? action type"),
+    ):
+        with pytest.raises(error, match=reason):
+            getattr(robot, create)(name, kind, *more)
 
 
 def test_what_does_not_fit_is_refused_naming_the_field_and_not_sent(offer, client):

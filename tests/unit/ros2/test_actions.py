@@ -10,7 +10,6 @@ from waiting import nothing_happens
 
 import rosglass
 from rosglass.comm import (
-    ActionResult,
     CancelAnswer,
     ConnectionState,
     EndpointKind,
@@ -139,50 +138,6 @@ def impatient(monkeypatch):
 # -- both ends -----------------------------------------------------------------------------------
 
 
-def test_a_goal_from_beginning_to_end(node, client, server, eventually):
-    told = []
-    goal = client.send_goal(
-        {"order": 5},
-        on_feedback=lambda message: told.append(list(message.sequence)),
-        on_status_change=told.append,
-        on_done=told.append,
-    )
-    assert goal.result(30) == ActionResult(SUCCEEDED, goal.done.result().result)
-    assert list(goal.result().result.sequence) == [0, 1, 2, 3, 4]
-    eventually(lambda: goal in told)
-    assert told == [ACCEPTED, EXECUTING, [0, 1, 2], [0, 1, 2, 3], [0, 1, 2, 3, 4], SUCCEEDED, goal]
-    assert list(goal.feedback.sequence) == [0, 1, 2, 3, 4]
-    assert goal.status is SUCCEEDED
-    assert goal.acceptance.result() is True
-    assert abs((Time.now() - goal.accepted).seconds) < 5
-    assert goal.goal.order == 5
-    assert len(goal.id) == 16
-    assert goal.id_text == goal.id.hex()
-    assert repr(goal) == f"<Ros2ClientGoal {goal.id_text} succeeded>"
-    assert list(client.goals) == list(server.goals) == []
-    assert client.problem == server.problem == ""
-    assert repr(client) == f"<Ros2ActionClient /fib [{FIB}]>"
-    assert repr(server) == f"<ActionServer /fib [{FIB}]>"
-
-
-def test_a_rejected_goal_leaves_nothing_behind(client, robot, eventually):
-    server = robot.create_action_server("/fib", FIB, fibonacci, accept=lambda g: g.order < 10)
-    told = []
-    goal = client.send_goal({"order": 10}, on_status_change=told.append, on_done=told.append)
-    with pytest.raises(
-        rosglass.GoalRejectedError, match=f"/fib does not accept goal {goal.id_text}"
-    ):
-        goal.result(30)
-    assert goal.acceptance.result() is False
-    assert goal.status is GoalStatus.REJECTED
-    assert goal.accepted is None
-    assert goal.cancel().result(30).reason == "the goal has ended already: rejected"
-    eventually(lambda: told == [GoalStatus.REJECTED, goal])
-    assert list(client.goals) == []
-    assert list(server.goals) == []
-    assert client.send_goal({"order": 3}).result(30).status is SUCCEEDED
-
-
 # -- the client ----------------------------------------------------------------------------------
 
 
@@ -216,22 +171,6 @@ def test_the_server_announces_itself_as_an_action(robot, server):
     assert topics["/fib/_action/feedback"] == (f"{FIB}_FeedbackMessage", rosglass.QoS())
     status = ("action_msgs/msg/GoalStatusArray", rosglass.QoS.latched())
     assert topics["/fib/_action/status"] == status
-
-
-@pytest.mark.parametrize("create", ["create_action_client", "create_action_server"])
-@pytest.mark.parametrize(
-    ("name", "type_", "error", "told"),
-    [
-        ("a b", FIB, rosglass.InvalidNameError, "contains ' '"),
-        ("/x", "nowhere_msgs/action/No", rosglass.TypeNotFoundError, "nowhere_msgs/action/No"),
-        ("/x", "std_msgs/msg/String", rosglass.TypeNotFoundError, "is not an? action type"),
-        ("/x", 7, rosglass.TypeNotFoundError, "7 is not an? action type"),
-    ],
-)
-def test_what_cannot_be_used_is_refused_at_creation(node, create, name, type_, error, told):
-    arguments = (name, type_) if create == "create_action_client" else (name, type_, fibonacci)
-    with pytest.raises(error, match=told):
-        getattr(node, create)(*arguments)
 
 
 def test_feedback_and_status_never_come_before_the_acceptance(client, peer, eventually):
@@ -366,18 +305,6 @@ def test_a_goal_that_nobody_answers_is_given_up_and_cancelled(client, peer, even
     assert list(client.goals) == []
 
 
-def test_without_a_server_a_goal_ends_after_its_time(client, connect):
-    connect("robot").create_action_server("/base/fib", FIB, fibonacci)
-    goal = client.send_goal(timeout=0.02)
-    told = (
-        r"no goal could be sent to /fib within 0\.02 s: no server offers the action /fib "
-        rf"\[{FIB}\] on fake:// \(CONNECTED: in this process\); did you mean /base/fib\?"
-    )
-    with pytest.raises(rosglass.ServiceUnavailableError, match=told):
-        goal.result(5)
-    assert goal.status is LOST
-
-
 def test_a_goal_cancelled_before_it_was_accepted_is_cancelled_then(client, peer, eventually):
     goal = client.send_goal()
     answer = goal.cancel()
@@ -424,15 +351,6 @@ def test_a_server_that_never_answers_requests_to_cancel(client, peer):
     with pytest.raises(rosglass.ServiceUnavailableError, match="could not be asked to cancel with"):
         client.cancel_all(timeout=0.02).result(5)
     assert not goal.done.done()
-
-
-@pytest.mark.parametrize("time_", [Time(), Time(-1), Time(2**31 * 10**9), 5, None])
-def test_odd_times_to_cancel_before_are_refused(client, peer, time_):
-    with pytest.raises(
-        rosglass.ConversionError, match=r"time: .* cancel_all\(\) cancels all goals"
-    ):
-        client.cancel_before(time_)
-    assert peer.cancel_goal.sent == []
 
 
 @pytest.mark.parametrize("topic", ["feedback", "status"])
