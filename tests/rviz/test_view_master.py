@@ -72,16 +72,19 @@ def test_the_services_come_back_without_a_restart(rviz: Any, own_master: RosMast
 
 
 def test_rviz_says_what_to_do(app: Any, wait: Any) -> None:
+    from rosglass.rviz.qt5 import QtWidgets
+
     watch = app.master
-    wait(lambda: watch._number != -1)
-    usual = watch._number
-    watch._on_answer(ConnectionLostError("http://robot:11311 does not answer"))
-    assert app._problem.text() == watch.advice
+    wait(lambda: watch.number != -1)
+    usual = watch.number
+    watch.on_answer(ConnectionLostError("http://robot:11311 does not answer"))
+    shown = app.window.widget.statusBar().findChild(QtWidgets.QLabel, "masterProblem")
+    assert shown.text() == watch.advice
     assert "start roscore and RViz anew" in watch.advice
-    assert "does not answer" in app._problem.toolTip()
-    watch._on_answer(usual + 1)
-    assert "restart RViz" in app._problem.text()
-    assert app._problem.isVisible()
-    watch._on_answer(usual)
+    assert "does not answer" in shown.toolTip()
+    watch.on_answer(usual + 1)
+    assert "restart RViz" in shown.text()
+    assert shown.isVisible()
+    watch.on_answer(usual)
     assert watch.advice == ""
-    assert not app._problem.isVisible()
+    assert not shown.isVisible()

@@ -371,6 +371,7 @@ class Application(Handle):
     def _show_problem(self, problem: str) -> None:
         if self._problem is None:
             self._problem = QtWidgets.QLabel()
+            self._problem.setObjectName("masterProblem")
             self._problem.setStyleSheet("color: white; background: #a02020; padding: 2px")
             self.window.widget.statusBar().insertWidget(0, self._problem)
         self._problem.setText(self.master.advice)

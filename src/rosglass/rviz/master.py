@@ -156,10 +156,12 @@ class MasterWatch(QtCore.QObject):
 
     def __init__(self, uri: str) -> None:
         super().__init__()
-        self._uri, self._number, self._problem = uri, -1, ""
+        self._uri, self._problem = uri, ""
+        #: The number of the master's process; -1 before its first answer.
+        self.number = -1
         #: Whether another one took its place, which knows nothing of this RViz.
         self.replaced = False
-        self._asker = _Asker(uri, _WATCHING, self._on_answer)
+        self._asker = _Asker(uri, _WATCHING, self.on_answer)
 
     @property
     def problem(self) -> str:
@@ -179,9 +181,10 @@ class MasterWatch(QtCore.QObject):
         """Watch no more."""
         self._asker.close()
 
-    def _on_answer(self, answer: Any) -> None:
+    def on_answer(self, answer: Any) -> None:
+        """Take the number of the master's process, or the error that came instead."""
         problem = ""
-        self.replaced = not isinstance(answer, Error) and self._number not in (-1, answer)
+        self.replaced = not isinstance(answer, Error) and self.number not in (-1, answer)
         if isinstance(answer, Error):
             problem = f"{answer}; what is received already goes on, nothing new is found"
         elif self.replaced:
@@ -190,7 +193,7 @@ class MasterWatch(QtCore.QObject):
                 "its displays find no new topics until RViz is started again"
             )
         else:
-            self._number = answer
+            self.number = answer
         if problem != self._problem:
             self._problem = problem
             if problem:

@@ -14,14 +14,12 @@ import pytest
 from waiting import eventually
 
 import rosglass
-from rosglass.comm import GoalStatus
 from rosglass.errors import ConnectionLostError, TimeoutError  # noqa: A004
 
 PEERS = Path(__file__).parent / "peers"
-ADD, FIBONACCI = "example_interfaces/srv/AddTwoInts", "example_interfaces/action/Fibonacci"
+ADD = "example_interfaces/srv/AddTwoInts"
 NODES = {"dora": "/dora/dora_node", "sdk": "/sdk/server_add"}
 KINDS = ["dora-humble", "dora-rep2016", "sdk"]
-DORAS = KINDS[:2]
 pytestmark = pytest.mark.peers
 
 
@@ -153,57 +151,3 @@ def test_a_peer_that_is_killed_in_mid_call(node, kind, run_peer):
     again = run_peer(kind, do="serve", suffix="2")
     assert client.call({"a": 1, "b": 1}, timeout=30).sum == 2
     again.end()
-
-
-def count(goal):
-    sequence = [0]
-    while len(sequence) < goal.goal.order and not goal.wait_for_cancel(0.05):
-        sequence.append(len(sequence))
-        goal.publish_feedback(sequence=sequence)
-    return {"sequence": sequence}
-
-
-@pytest.fixture(scope="module", params=DORAS)
-def dora(request):
-    return request.param
-
-
-def test_we_send_goals_to_dora(node, dora, run_peer):
-    process = run_peer(dora, do="serve action")
-    client = node.create_action_client("/count")
-    assert client.wait_for_server(30), client.problem
-    feedback = []
-    goal = client.send_goal({"order": 5}, on_feedback=lambda m: feedback.append(len(m.sequence)))
-    status, result = goal.result(30)
-    assert status is GoalStatus.SUCCEEDED
-    assert list(result.sequence) == [0, 1, 2, 3, 4]
-    assert feedback == [2, 3, 4, 5]
-    goal = client.send_goal({"order": 100})
-    goal.cancel()
-    status, result = goal.result(30)
-    assert status is GoalStatus.CANCELED
-    assert 0 < len(result.sequence) < 100
-    assert [process.event("status") for _ in range(2)] == ["succeeded", "canceled"]
-    process.end()
-
-
-def test_dora_sends_us_goals(node, dora, run_peer):
-    ended = []
-
-    def work(goal):
-        result = count(goal)
-        ended.append((goal.is_cancel_requested, len(result["sequence"])))
-        return result
-
-    accept = {"accept": lambda goal: goal.order < 1000}
-    server = node.create_action_server("/count", FIBONACCI, work, **accept)
-    process = run_peer(dora, do="send goals", goals=[[5, False], [5000, False], [100, True]])
-    assert process.event("status") == "succeeded"
-    assert process.event("rejected") == 5000
-    assert process.event("cancelled") == 0
-    eventually(lambda: len(ended) == 2)
-    assert ended[0] == (False, 5)
-    assert ended[1][0]
-    assert ended[1][1] < 100
-    server.close()
-    process.end()

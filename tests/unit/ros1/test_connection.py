@@ -36,12 +36,18 @@ class End:
             self.peer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         self.peer.settimeout(10)
         self.headers, self.frames, self.ended = [], [], []
+        self.on_header, self.on_frame = self.headers.append, self.take
         self.link = Connection(
-            loop, ours, self.headers.append, self._take, self.ended.append, peer="somebody"
+            loop,
+            ours,
+            lambda header: self.on_header(header),
+            lambda data, size: self.on_frame(data, size),
+            self.ended.append,
+            peer="somebody",
         )
         loop.call(self.link.accept)
 
-    def _take(self, data, _):
+    def take(self, data, _):
         self.frames.append(bytes(data))
 
 
@@ -192,7 +198,7 @@ def test_a_failing_callback_ends_its_connection_only(loop, end, caplog):
     def fail(_, __):
         raise ValueError("a fault")
 
-    end.link._on_frame = fail
+    end.on_frame = fail
     other = End(loop)
     for one in (end, other):
         one.peer.sendall(HEADER + frame(b"x"))
@@ -203,7 +209,7 @@ def test_a_failing_callback_ends_its_connection_only(loop, end, caplog):
 
 
 def test_pausing_keeps_what_came_with_the_header(loop, end):
-    end.link._on_header = lambda _: end.link.pause(reading=False)
+    end.on_header = lambda _: end.link.pause(reading=False)
     end.peer.sendall(HEADER + frame(b"latched") + frame(b"next"))
     eventually(lambda: end.link.header)
     nothing_happens(0.05)

@@ -10,6 +10,7 @@ import xmlrpc.client
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from inside import core_of
 from ports import free_port
 from tcpros import node_uri
 from waiting import eventually
@@ -224,7 +225,7 @@ def test_a_node_that_somebody_else_closes_looks_nothing_up_any_more(
 ) -> None:
     master.offer("/add", 1)
     eventually(lambda: "/add" in node.services())
-    core: Any = node._core
+    core = core_of(node)
     shut_down(node, "/master", "[/panel] Reason: new node registered with same name")
     eventually(lambda: node.status().state is ConnectionState.CLOSED)
     eventually(lambda: "shutdown" not in [thread.name for thread in threading.enumerate()])

@@ -11,6 +11,7 @@ from concurrent.futures import Future
 from dataclasses import replace
 
 import pytest
+from inside import core_of
 
 import rosglass
 from rosglass.comm import (
@@ -325,7 +326,7 @@ def test_calls_end_when_their_server_was_away_and_is_back(
 
 def test_patient_calls_wait_for_their_server_to_be_back(node, middleware, monkeypatch):
     monkeypatch.setattr("rosglass.ros2.service_client._GRACE_S", 0.05)
-    client = Ros2ServiceClient(node._core, "/add", ADD, patient=True)
+    client = Ros2ServiceClient(core_of(node), "/add", ADD, patient=True)
     (requester,) = middleware.requesters
     key = middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01, gid=b"1" * 16)
     requester.linked = True

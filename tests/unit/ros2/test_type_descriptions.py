@@ -7,6 +7,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from inside import core_of
 
 import rosglass
 from rosglass.errors import NodeClosedError
@@ -161,7 +162,7 @@ def test_closing(ask: Callable[..., Any]) -> None:
     with pytest.raises(rosglass.Error):
         client.call({"type_name": "my_msgs/msg/Part"}, timeout=0.05)
     with pytest.raises(NodeClosedError):
-        TypeDescriptionServer(client.node._core).open()
+        TypeDescriptionServer(core_of(client.node)).open()
 
 
 def test_a_bare_library_is_no_obstacle(url: str, connect: Callable[..., Any]) -> None:
@@ -169,7 +170,7 @@ def test_a_bare_library_is_no_obstacle(url: str, connect: Callable[..., Any]) ->
     client = connect("asker").create_service_client("/robot/get_type_description", TRIGGER)
     bare = Library(MemoryProvider())
     with rosglass.connect(url, "robot", library=bare, own_services=False) as server:
-        TypeDescriptionServer(server._core).open()
+        TypeDescriptionServer(core_of(server)).open()
         asked = client.call({"type_name": "std_msgs/msg/String"}, timeout=30)
     assert "no definition" in asked.failure_reason
 

@@ -1,0 +1,13 @@
+"""What is inside a node, for tests of its parts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rosglass.comm.core import CoreNode
+
+
+def core_of(node: CoreNode) -> Any:
+    """Return what everything that was created from a node shares."""
+    return node._core
