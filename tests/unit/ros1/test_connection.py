@@ -36,18 +36,25 @@ class End:
             self.peer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         self.peer.settimeout(10)
         self.headers, self.frames, self.ended = [], [], []
-        self.on_header, self.on_frame = self.headers.append, self.take
+        #: What a test may replace.
+        self.on_header, self.on_frame = self.headers.append, self._keep
         self.link = Connection(
             loop,
             ours,
-            lambda header: self.on_header(header),
-            lambda data, size: self.on_frame(data, size),
+            self._take_header,
+            self._take_frame,
             self.ended.append,
             peer="somebody",
         )
         loop.call(self.link.accept)
 
-    def take(self, data, _):
+    def _take_header(self, header):
+        self.on_header(header)
+
+    def _take_frame(self, data, _):
+        self.on_frame(data)
+
+    def _keep(self, data):
         self.frames.append(bytes(data))
 
 
@@ -195,7 +202,7 @@ def test_much_that_nobody_waits_for_holds_up_nobody(loop, end):
 
 
 def test_a_failing_callback_ends_its_connection_only(loop, end, caplog):
-    def fail(_, __):
+    def fail(_):
         raise ValueError("a fault")
 
     end.on_frame = fail
