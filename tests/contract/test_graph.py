@@ -5,8 +5,6 @@ from __future__ import annotations
 import copy
 import gc
 import pickle
-import subprocess
-import sys
 import threading
 import time
 import weakref
@@ -181,19 +179,6 @@ def test_closing_ends_waiting(connect, topic):
         node.wait_for_message(topic, TEXT, 1)
 
 
-def test_a_node_can_be_closed_in_its_own_callback(connect, robot, topic, eventually):
-    node = connect("closing")
-    done = threading.Event()
-
-    def close(_):
-        node.close()
-        done.set()
-
-    node.create_subscription(topic, TEXT, close, QoS.latched())
-    robot.create_publisher(topic, TEXT, QoS.latched()).publish(data="x")
-    assert done.wait(30)
-
-
 def test_closing_ends_the_threads(connect, topic, eventually):
     before = set(threading.enumerate())
     node = connect("threads")
@@ -246,19 +231,6 @@ def test_what_is_closed_leaves_nothing_behind(robot, console, topic, wire, event
 
     eventually(lambda: len(left()) <= 2, left)  # threads may hold what they did last
     eventually(lambda: threading.active_count() <= threads, threading.enumerate)
-
-
-def test_a_program_ends_by_itself_without_closing_its_node(wire):
-    code = f"""
-import rosglass
-node = rosglass.connect({wire.url!r}, "forgotten")
-node.create_subscription("/forgotten", {TEXT!r}, print)
-node.create_publisher("/forgotten", {TEXT!r}).publish(data="x")
-"""
-    done = subprocess.run(
-        [sys.executable, "-c", code], timeout=60, capture_output=True, text=True, check=False
-    )
-    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_the_log_goes_to_rosout(robot, console, wire, eventually):

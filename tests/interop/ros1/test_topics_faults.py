@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import os
 import socket
 import struct
 import threading
@@ -269,27 +268,6 @@ def test_closing_while_connecting(connect, start_master):
     publisher.close()
 
 
-def test_an_immediate_callback_may_publish_and_close(connect):
-    node = connect("reflex")
-    out = node.create_publisher("/reflex/out", STRING)
-    back = node.create_subscription("/reflex/out")
-    got = []
-
-    def reflex(sample):
-        got.append(sample)
-        out.publish_serialized(sample)
-        node.create_subscription("/reflex/third").close()
-        subscription.close()
-
-    source = connect("stimulus").create_publisher("/reflex/in", STRING)
-    subscription = node.create_subscription("/reflex/in", raw_callback=reflex, executor=IMMEDIATE)
-    eventually(lambda: source.subscription_count() and out.subscription_count())
-    source.publish(data="now")
-    assert back.wait(30).message().data == "now"
-    eventually(lambda: source.subscription_count() == 0)
-    assert len(got) == 1
-
-
 def test_a_host_name_that_is_unknown_is_told_with_the_remedy(connect, master):
     node = connect("lost")
     subscription = node.create_subscription("/unknown_host")
@@ -298,21 +276,3 @@ def test_a_host_name_that_is_unknown_is_told_with_the_remedy(connect, master):
     told = eventually(lambda: subscription.problem)
     assert "no-such-host.invalid" in told
     assert "ROS_HOSTNAME" in told
-
-
-def test_a_fork_does_not_publish_or_steal_messages(connect):
-    node = connect("forked")
-    publisher = node.create_publisher("/forked", STRING)
-    subscription = node.create_subscription("/forked")
-    eventually(lambda: publisher.subscription_count() == 1)
-    publisher.publish(data="before")
-    child = os.fork()
-    if child == 0:
-        try:
-            subscription.take()
-            publisher.publish(data="from the child")
-            os._exit(1)
-        except rosglass.NodeClosedError:
-            os._exit(0)
-    assert os.waitpid(child, 0)[1] == 0
-    assert subscription.wait(30).message().data == "before"

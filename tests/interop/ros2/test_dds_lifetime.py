@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import gc
 import signal
 import subprocess
 import sys
 import textwrap
 import threading
 import time
-from typing import Any
 
 import pytest
-from usage import native_threads
 from waiting import eventually, nothing_happens
 
 import rosglass
-from rosglass.comm import IMMEDIATE, History, QoS
+from rosglass.comm import History, QoS
 from rosglass.errors import Error, NodeClosedError, UnsupportedError
 
 STRING, IMAGE = "std_msgs/msg/String", "sensor_msgs/msg/Image"
@@ -138,76 +135,6 @@ for _ in range(4):
     assert used[-1] - used[1] < 5_000_000, used
 
 
-def test_closing_while_samples_arrive(dds_connect):
-    talker, stop = dds_connect("talker"), threading.Event()
-    publisher = talker.create_publisher("/flood", STRING)
-    count = [0]
-
-    def flood() -> None:
-        while not stop.is_set():
-            publisher.publish(data="x")
-
-    def hear(_: Any) -> None:
-        count[0] += 1
-
-    thread = threading.Thread(target=flood)
-    thread.start()
-    try:
-        for number in range(20):
-            node = dds_connect(f"hears{number}")
-            executor = IMMEDIATE if number % 2 else None
-            made = [
-                node.create_subscription("/flood", STRING, raw_callback=hear, executor=executor)
-                for _ in range(3)
-            ]
-            before = count[0]
-            eventually(lambda least=before + 10: count[0] > least, what="samples")
-            if number % 3:
-                made[0].close()
-            node.close()
-    finally:
-        stop.set()
-        thread.join(10)
-    assert not thread.is_alive()
-
-
-def test_a_subscription_can_be_closed_from_its_own_callback(dds_connect):
-    node = dds_connect("once")
-    heard: list[str] = []
-
-    def hear(sample: Any) -> None:
-        heard.append(sample.message().data)
-        subscription.close()
-
-    subscription = node.create_subscription(
-        "/t", STRING, raw_callback=hear, executor=IMMEDIATE, qos=KEEP_ALL
-    )
-    publisher = node.create_publisher("/t", STRING, KEEP_ALL)
-    for number in range(100):
-        publisher.publish(data=str(number))
-    eventually(lambda: heard)
-    nothing_happens(0.1)
-    assert heard == ["0"]
-
-
-def test_a_node_can_be_closed_from_a_callback(dds_connect):
-    talker, node = dds_connect("talker"), dds_connect("quits")
-    node.create_subscription("/t", STRING, raw_callback=lambda _: node.close(), executor=IMMEDIATE)
-    publisher = talker.create_publisher("/t", STRING)
-    eventually(publisher.subscription_count)
-    gc.collect()
-    threads = native_threads()
-
-    def gone() -> bool:
-        publisher.publish(data="x")
-        gc.collect()
-        return native_threads() < threads
-
-    eventually(gone, what="the node's threads to end")
-    with pytest.raises(NodeClosedError):
-        node.create_publisher("/t", STRING)
-
-
 @pytest.fixture
 def stuck(dds_connect, dds_domain):
     """A publisher whose only reader does not answer any more, but has not left either."""
@@ -283,67 +210,6 @@ while True:
     reader.wait()
     assert "KeyboardInterrupt" in told
     assert process.returncode == -signal.SIGINT
-
-
-@pytest.mark.parametrize(
-    ("end", "codes"),
-    [
-        ("", {0}),
-        ("sys.exit(3)", {3}),
-        # Python forgets why it ends when another thread runs exec() meanwhile, as for dataclasses.
-        ("raise KeyboardInterrupt", {-signal.SIGINT, 1}),
-    ],
-)
-def test_a_program_that_closes_nothing_ends_cleanly(dds_domain, end, codes):
-    text = f"""
-heard = []
-node.create_subscription('/t', '{STRING}', heard.append)
-publisher = node.create_publisher('/t', '{STRING}')
-while not heard:
-    publisher.publish(data='x')
-    time.sleep(0.01)
-keep = node.create_subscription('/big', '{IMAGE}')
-node.create_publisher('/big', '{IMAGE}').publish(data=bytes(100_000))
-picture = keep.wait(30).message().data
-"""
-    process = program(text + end, dds_domain)
-    told, _ = process.communicate(timeout=60)
-    assert process.returncode in codes, told
-    if not end.startswith("raise"):
-        assert told == ""
-
-
-def test_a_fork_is_told_to_connect_anew_and_leaves_the_parent_alone(dds_domain):
-    text = f"""
-publisher = node.create_publisher('/t', '{STRING}')
-subscription = node.create_subscription('/t', '{STRING}')
-child = os.fork()
-if not child:
-    for attempt in (
-        lambda: publisher.publish(data='x'),
-        lambda: node.create_publisher('/u', '{STRING}'),
-        lambda: rosglass.connect('dds://?domain={dds_domain}'),
-    ):
-        try:
-            attempt()
-        except rosglass.Error as error:
-            print(type(error).__name__, flush=True)
-    node.close()
-    sys.exit(0)
-print('child', os.waitpid(child, 0)[1], flush=True)
-publisher.publish(data='parent')
-print(subscription.wait(30).message().data, flush=True)
-"""
-    process = program(text, dds_domain)
-    told, _ = process.communicate(timeout=60)
-    assert told.split("\n")[:5] == [
-        NodeClosedError.__name__,
-        NodeClosedError.__name__,
-        UnsupportedError.__name__,
-        "child 0",
-        "parent",
-    ]
-    assert process.returncode == 0
 
 
 def test_a_second_configuration_of_the_domain_is_refused(dds_connect, dds_domain):

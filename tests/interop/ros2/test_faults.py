@@ -254,19 +254,3 @@ def test_ctrl_c_at_any_moment_from_the_first_import_on(url):
         assert "\nKeyboardInterrupt\n" in errors, what
         for strange in ("Exception ignored", "Exception in thread", "Fatal", "WARNING", "ERROR"):
             assert strange not in errors, what
-
-
-def test_a_node_closed_in_the_receiving_thread(url, node):
-    closed = threading.Event()
-    other = rosglass.connect(url, "short_lived")
-
-    def close(_message) -> None:
-        other.close()
-        closed.set()
-
-    other.create_subscription("/end", STRING, close, executor=rosglass.comm.IMMEDIATE)
-    publisher = node.create_publisher("/end", STRING)
-    eventually(publisher.subscription_count)
-    publisher.publish(data="now")
-    assert closed.wait(30)
-    eventually(lambda: "/short_lived" not in [found.full for found in node.nodes()], timeout=30)

@@ -6,7 +6,6 @@ import os
 import signal
 import socket
 import subprocess
-import sys
 import threading
 import time
 from contextlib import suppress
@@ -381,33 +380,3 @@ def test_the_router_command_ends_cleanly(number, start_router):
     router.popen.send_signal(number)
     assert router.popen.wait(30) == 0
     assert "Zenoh router ended\n" in router.output
-
-
-FORGETFUL = """
-import threading, time, rosglass
-node = rosglass.connect({url!r}, "forgetful")
-latched = rosglass.QoS.latched()
-for topic, qos in (("/a", 10), ("/b", latched)):
-    node.create_subscription(topic, {type!r}, id, qos)
-publishers = [node.create_publisher("/a", {type!r}), node.create_publisher("/b", {type!r}, latched)]
-
-def publish():
-    try:
-        while True:
-            for publisher in publishers:
-                publisher.publish()
-    except rosglass.NodeClosedError:
-        pass
-
-threading.Thread(target=publish, daemon=True).start()
-time.sleep(0.2)
-"""
-
-
-def test_a_program_that_forgets_to_close_its_node_ends_all_the_same(router):
-    program = FORGETFUL.format(url=router.url, type=TWIST)
-    for _ in range(3):
-        done = subprocess.run(
-            [sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False
-        )
-        assert (done.returncode, done.stderr) == (0, "")

@@ -134,26 +134,6 @@ def test_ctrl_c_ends_a_call(url, server, run_peer):
     assert caller.popen.wait(30) == 0
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
-def test_clients_stay_behind_when_a_process_forks(node, server):
-    client = node.create_service_client("/add", ADD)
-    assert client.call({"a": 1}).sum == 1
-    reading, writing = os.pipe()
-    child = os.fork()
-    if child == 0:
-        try:
-            client.call({"a": 1})
-        except rosglass.NodeClosedError as error:
-            os.write(writing, str(error).encode())
-        finally:
-            os._exit(0)
-    os.close(writing)
-    with os.fdopen(reading) as pipe:
-        assert "does not work after a fork" in pipe.read()
-    os.waitpid(child, 0)
-    assert client.call({"a": 2}).sum == 2
-
-
 @pytest.mark.parametrize("mode", ["peer", "client"])
 def test_a_goal_survives_a_router_that_is_restarted(free_port, run_peer, mode):
     listen = f"tcp/127.0.0.1:{free_port}"

@@ -17,7 +17,7 @@ from usage import memory, open_files
 from waiting import at_rate, eventually
 
 import rosglass
-from rosglass.comm import ConnectionState, NodeName
+from rosglass.comm import ConnectionState
 from rosglass.errors import ConnectionLostError, ServiceError
 
 HERE = Path(__file__).parent
@@ -377,52 +377,6 @@ def test_nodes_that_come_and_go_beside_others_leave_no_links_behind(router, conn
     eventually(lambda: all(len(node.nodes()) == 3 for node in stay))
     eventually(lambda: open_files() <= files)
     eventually(lambda: threading.active_count() <= threads)
-
-
-def test_two_nodes_in_one_process(connect):
-    one, two = connect("one"), connect("two")
-    one.create_service_server("/add", ADD, lambda r: {"sum": r.a + r.b})
-    subscription = one.create_subscription("/count", TWIST)
-    publisher = two.create_publisher("/count", TWIST)
-    eventually(publisher.subscription_count)
-    publisher.publish(linear={"x": 4.0})
-    assert subscription.wait(30).message().linear.x == 4
-    assert two.create_service_client("/add", ADD).call({"a": 1, "b": 2}).sum == 3
-    assert one.create_service_client("/add", ADD).call({"a": 2, "b": 2}).sum == 4
-    one.close()
-    eventually(lambda: NodeName("/", "one") not in two.nodes())
-    publisher.publish()
-    assert two.status().state is ConnectionState.CONNECTED
-
-
-FORK = """
-import os, rosglass
-node = rosglass.connect({url!r}, "parent")
-server = node.create_service_server("/add", {add!r}, lambda r: {{"sum": r.a + r.b}})
-client = node.create_service_client("/add", {add!r})
-assert client.call({{"a": 1, "b": 2}}).sum == 3
-child = os.fork()
-if child == 0:
-    for use in (lambda: client.call({{"a": 1}}), lambda: rosglass.connect({url!r}, "child")):
-        try:
-            use()
-        except rosglass.Error as error:
-            print(type(error).__name__, flush=True)
-    node.close()
-    os._exit(7)
-assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
-assert client.call({{"a": 3, "b": 4}}).sum == 7
-node.close()
-"""
-
-
-def test_a_fork_is_told_and_leaves_its_parent_alone(router):
-    program = FORK.format(url=router.url, add=ADD)
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=30, check=False
-    )
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.split() == ["NodeClosedError", "UnsupportedError"]
 
 
 BUSY = """

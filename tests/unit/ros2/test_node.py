@@ -182,15 +182,6 @@ def test_a_middleware_that_cannot_start_leaves_no_thread(middleware):
     assert threading.active_count() <= before
 
 
-def test_a_fork_does_not_take_the_connection_along(node, monkeypatch):
-    publisher = node.create_publisher("/cmd_vel", TWIST)
-    monkeypatch.setattr("os.getpid", lambda: 1)
-    for use in (publisher.publish, lambda: node.create_publisher("/x", TWIST)):
-        with pytest.raises(rosglass.NodeClosedError, match="after a fork; connect again"):
-            use()
-    assert str(node.status()) == "CLOSED: left behind by a fork; connect again here"
-
-
 def test_connect_says_what_is_not_installed(monkeypatch):
     monkeypatch.setattr("rosglass.connection.find_spec", lambda name: None)
     with pytest.raises(rosglass.UnsupportedError, match=r'pip install "rosglass\[zenoh\]"'):
