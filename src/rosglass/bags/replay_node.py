@@ -20,6 +20,7 @@ from rosglass.comm import (
     Status,
     Time,
 )
+from rosglass.comm.types import Types
 from rosglass.errors import (
     ConversionError,
     TypeNotFoundError,
@@ -28,7 +29,6 @@ from rosglass.errors import (
 from rosglass.interfaces.names import join_name
 from rosglass.messages import MessageType, OpaqueType
 from rosglass.ros2.node import Ros2Node
-from rosglass.ros2.types import Types
 from rosglass.wires.base import Writer
 from rosglass.wires.local import LocalMiddleware, LocalWriter
 

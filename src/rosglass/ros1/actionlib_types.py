@@ -18,7 +18,7 @@ from rosglass.ros1.action_state import ServerState
 
 if TYPE_CHECKING:
     from rosglass.messages import ActionType, Message, MessageType
-    from rosglass.ros1.types import Types
+    from rosglass.ros1.announced_types import AnnouncedTypes
     from rosglass.wires.tcpros.graph import Graph
 
 __all__ = [
@@ -71,7 +71,7 @@ class ActionTypes:
     feedback: MessageType
 
     @classmethod
-    def of(cls, action: ActionType, types: Types) -> ActionTypes:
+    def of(cls, action: ActionType, types: AnnouncedTypes) -> ActionTypes:
         """Return the types that an action implies; raises TypeNotFoundError without actionlib."""
         status = types.message(_STATUS_TYPE)
         goal, result, feedback = (

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rosglass.ros1.announced_types import AnnouncedTypes
 from rosglass.ros1.names import expand
-from rosglass.ros1.types import Types
 from rosglass.wires.tcpros.core import TcprosCore
 
 if TYPE_CHECKING:
@@ -29,12 +29,12 @@ class Core(TcprosCore):
         ConnectionLostError: This machine cannot listen for connections.
     """
 
-    types: Types
+    types: AnnouncedTypes
 
     def __init__(
         self, name: NodeName, url: str, options: Ros1Options, library: Library | None
     ) -> None:
-        super().__init__(name, url, options, Types(library, url))
+        super().__init__(name, url, options, AnnouncedTypes(library, url))
         self._new_names = options.arguments.remappings(name.name, name.namespace)
 
     def resolve(self, name: str) -> str:

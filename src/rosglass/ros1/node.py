@@ -341,7 +341,7 @@ class Ros1Node(CoreNode):
         timeout: float | None = 5.0,
     ) -> Promise[MessageType | ServiceType | ActionType]:
         """Ask for a type; see :meth:`rosglass.comm.Node.fetch_type_async`."""
-        from rosglass.ros1.type_fetching import fetch  # noqa: PLC0415 - for those who ask only
+        from rosglass.ros1.type_probe import fetch  # noqa: PLC0415 - for those who ask only
 
         self._core.check_open()
         owner = "" if node is None else self._node_name(node)

@@ -15,8 +15,8 @@ from rosglass.interfaces.definition import Definition, ServiceDefinition
 from rosglass.interfaces.derived import derive
 
 if TYPE_CHECKING:
+    from rosglass.comm.types import Types
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
-    from rosglass.ros2.types import Types
 
 __all__ = [
     "CANCEL_GOAL",

@@ -12,8 +12,8 @@ from rosglass.comm.core import NodeCore, NodeMember
 from rosglass.comm.graph import Graph
 from rosglass.comm.listeners import ChangeListeners
 from rosglass.comm.names import expand
+from rosglass.comm.types import Types
 from rosglass.ros2.ros_arguments import NO_ARGUMENTS
-from rosglass.ros2.types import Types
 
 if TYPE_CHECKING:
     from rosglass.comm import NodeName

@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rosglass.comm import EndpointInfo
+    from rosglass.comm.types import Types
     from rosglass.messages import MessageType
-    from rosglass.ros2.types import Types
 
 __all__ = ["TopicTypes"]
 

@@ -28,10 +28,10 @@ from rosglass.interfaces.derived import derive, derived_from
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from rosglass.comm.types import Types
     from rosglass.interfaces import Definition, InterfaceDefinition
     from rosglass.messages import Message, ServiceType
     from rosglass.ros2.core import Core
-    from rosglass.ros2.types import Types
 
 __all__ = [
     "ACTION_PARTS",

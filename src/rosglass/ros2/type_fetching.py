@@ -110,7 +110,7 @@ class TypeFetcher(Member):
         endpoints: Sequence[EndpointInfo],
         on_done: Callable[[], None],
     ) -> str:
-        """Start fetching; see :meth:`rosglass.ros2.types.Types.request`."""
+        """Start fetching; see :meth:`rosglass.comm.types.Types.request`."""
         if hash and self._core.types.library.version(name, hash) is not None:
             return ""
         want = self._want(name, hash, "")

@@ -31,7 +31,7 @@ from rosglass.interfaces import (
 )
 from rosglass.interfaces.type_sources import add_type_sources, type_sources
 from rosglass.messages import Message, MessageType, Translation, load
-from rosglass.ros1.types import Types
+from rosglass.ros1.announced_types import AnnouncedTypes
 from rosglass.wires.dds.types import describe_struct
 
 CPU_S, MEMORY = 4, 200 << 20
@@ -167,7 +167,7 @@ def use_library(types: list[Any], ros: int) -> None:
 def use_header(types: list[Any], _: int) -> None:
     """As from connection headers of ROS 1."""
     kind = from_text(types, 1)
-    Types(Library(), "ros1://here").learn("b/T0", kind.md5, text_of(types))
+    AnnouncedTypes(Library(), "ros1://here").learn("b/T0", kind.md5, text_of(types))
 
 
 def use_idl(types: list[Any], _: int) -> None:

@@ -10,6 +10,7 @@ import pytest
 from inside import core_of
 
 import rosglass
+from rosglass.comm.types import Types
 from rosglass.errors import NodeClosedError
 from rosglass.interfaces import (
     ActionDefinition,
@@ -26,7 +27,6 @@ from rosglass.interfaces import (
 from rosglass.messages import MessageType
 from rosglass.ros2.action_types import ActionTypes
 from rosglass.ros2.type_descriptions import TypeDescriptionServer, compose_action, describe
-from rosglass.ros2.types import Types
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -13,6 +13,7 @@ from waiting import eventually, nothing_happens
 
 import rosglass
 from rosglass.comm import EndpointKind
+from rosglass.comm.types import Types
 from rosglass.errors import (
     DefinitionConflictError,
     NodeClosedError,
@@ -22,7 +23,6 @@ from rosglass.interfaces import Library, TypeCache, announced_hashes, rihs01
 from rosglass.messages import OpaqueType
 from rosglass.ros2 import Ros2Node
 from rosglass.ros2.type_descriptions import describe
-from rosglass.ros2.types import Types
 
 from .steered import SteeredMiddleware
 

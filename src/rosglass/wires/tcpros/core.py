@@ -74,7 +74,7 @@ class TcprosCore(NodeCore[Handle]):
         name: The node's name.
         url: What it was connected with, for people to read.
         options: Master, own address, remappings.
-        types: Finds types; see :class:`rosglass.ros1.types.Types`.
+        types: Finds types; see :class:`rosglass.ros1.announced_types.AnnouncedTypes`.
 
     Attributes:
         master: Called from threads that may wait.

@@ -9,8 +9,8 @@ from summary import tell
 from waiting import at_rate
 
 import rosglass
+from rosglass.comm.types import Types
 from rosglass.ros2.type_descriptions import describe
-from rosglass.ros2.types import Types
 
 # The plan: "url", "folder" with the robot's packages, "name" of the node; "mood": "honest",
 # "mute" (no get_type_description), "silent" (never answers) or "liar" (sends other definitions,

@@ -1,12 +1,13 @@
-"""Finding the types that a node's topics, services and actions have."""
+"""Types as ROS 1's nodes announce them in their connection headers."""
 
 from __future__ import annotations
 
 import threading
 from contextlib import suppress
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
-from rosglass.errors import DefinitionConflictError, Error, TypeNotFoundError, UnsupportedError
+from rosglass.comm.types import Types
+from rosglass.errors import DefinitionConflictError, Error, TypeNotFoundError
 from rosglass.interfaces import adding_definitions, full_text, join_name, split_name
 from rosglass.wires.tcpros.connection import ANY
 
@@ -14,12 +15,10 @@ if TYPE_CHECKING:
     from rosglass.interfaces import Library
     from rosglass.messages import ActionType, MessageType, ServiceType
 
-    _T = TypeVar("_T", MessageType, ServiceType, ActionType)
-
-__all__ = ["Types"]
+__all__ = ["AnnouncedTypes"]
 
 
-class Types:
+class AnnouncedTypes(Types):
     """Finds types for one node: in its library, or in what publishers say of themselves.
 
     Args:
@@ -28,53 +27,23 @@ class Types:
     """
 
     def __init__(self, library: Library | None, url: str) -> None:
-        self._library, self._url = library, url
+        super().__init__(library, url, ros=1)
         self._lock = threading.Lock()
         self._learned: dict[tuple[str, str], MessageType] = {}
         self._texts: dict[MessageType | ServiceType, str] = {}
 
-    @property
-    def library(self) -> Library:
-        """Where definitions come from."""
-        from rosglass.messages import default_library  # noqa: PLC0415 - numpy
-
-        return default_library() if self._library is None else self._library
-
-    def message(self, wanted: str | MessageType) -> MessageType:
-        """Return a message type.
-
-        Args:
-            wanted: Its name, or the type itself.
-
-        Raises:
-            TypeNotFoundError: Nobody has it, or it is not a message.
-            UnsupportedError: It is ROS 2's.
-        """
-        from rosglass.messages import MessageType  # noqa: PLC0415 - numpy
-
-        return self._find(wanted, MessageType, "message", "std_msgs/String")
-
-    def service(self, wanted: str | ServiceType) -> ServiceType:
-        """Return a service type; arguments and errors as in :meth:`message`."""
-        from rosglass.messages import ServiceType  # noqa: PLC0415 - numpy
-
-        return self._find(wanted, ServiceType, "service", "std_srvs/Trigger")
-
-    def action(self, wanted: str | ActionType) -> ActionType:
+    def action(self, wanted: str | ActionType, hash: str = "") -> ActionType:
         """Return an action type; arguments and errors as in :meth:`message`.
 
         Its name may also be that of its message as a whole, ``pkg/TypeAction``, by which ROS 1's
         own tools know it.
         """
-        from rosglass.messages import ActionType  # noqa: PLC0415 - numpy
-
         if isinstance(wanted, str) and wanted.endswith("Action"):
             package, kind, base = split_name(wanted)
             if kind != "action" and base != "Action":
                 with suppress(TypeNotFoundError):
-                    name = f"{package}/action/{base.removesuffix('Action')}"
-                    return self._find(name, ActionType, "action", "actionlib_tutorials/Fibonacci")
-        return self._find(wanted, ActionType, "action", "actionlib_tutorials/Fibonacci")
+                    return super().action(f"{package}/action/{base.removesuffix('Action')}", hash)
+        return super().action(wanted, hash)
 
     def learn(self, name: str, md5: str, text: str) -> MessageType:
         """Return the type that a publisher's connection header describes.
@@ -160,23 +129,4 @@ class Types:
             )
         with suppress(DefinitionConflictError):
             self.library.add(found.definition)
-        return found
-
-    def _find(self, wanted: object, kind: type[_T], word: str, example: str) -> _T:
-        from rosglass.messages import load  # noqa: PLC0415 - numpy
-
-        found = wanted
-        if isinstance(wanted, str):
-            found = load(wanted, ros=1, library=self._library)
-        if not isinstance(found, kind):
-            article = "an" if word == "action" else "a"
-            raise TypeNotFoundError(
-                f"{found!r} is not {article} {word} type; give a name such as {example} "
-                f"or what rosglass.load(..., ros=1) returns for {article} {word}"
-            )
-        if found.ros != 1:
-            raise UnsupportedError(
-                f"{found.name} is ROS 2's definition, and {self._url} is a ROS 1 graph; "
-                f"load it with rosglass.load({found.name!r}, ros=1)"
-            )
         return found

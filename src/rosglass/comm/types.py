@@ -11,7 +11,8 @@ from rosglass.interfaces import announced_hashes
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from rosglass.comm import EndpointInfo, Promise
+    from rosglass.comm.graph import EndpointInfo
+    from rosglass.comm.promise import Promise
     from rosglass.interfaces import InterfaceDefinition, Library
     from rosglass.messages import ActionType, MessageType, OpaqueType, ServiceType
 
@@ -21,6 +22,20 @@ __all__ = ["Fetcher", "Types"]
 
 #: Seconds that creating something may wait for the robot to send the type.
 _PATIENCE = 2.0
+#: By the ROS: how its types are loaded, and an example of each kind.
+_LOADED = {1: "rosglass.load(..., ros=1)", 2: "rosglass.load()"}
+_EXAMPLES = {
+    1: {
+        "message": "std_msgs/String",
+        "service": "std_srvs/Trigger",
+        "action": "actionlib_tutorials/Fibonacci",
+    },
+    2: {
+        "message": "std_msgs/msg/String",
+        "service": "std_srvs/srv/Trigger",
+        "action": "example_interfaces/action/Fibonacci",
+    },
+}
 
 
 class Fetcher(Protocol):
@@ -75,7 +90,8 @@ class Types:
 
         Args:
             wanted: Its name, or the type itself.
-            hash: RIHS01 hash that a peer announced for it; picks the version that has it.
+            hash: RIHS01 hash, or md5 sum in ROS 1, that a peer announced for it; picks the version
+                that has it.
 
         Raises:
             TypeNotFoundError: Nobody has it, or it is not a message.
@@ -84,7 +100,7 @@ class Types:
         """
         from rosglass.messages import MessageType  # noqa: PLC0415 - numpy
 
-        return self._find(wanted, MessageType, hash, "message", "std_msgs/msg/String")
+        return self._find(wanted, MessageType, hash, "message")
 
     def opaque(self, name: str, hash: str, reason: str) -> OpaqueType:
         """Return what stands for a message type without definition."""
@@ -96,14 +112,13 @@ class Types:
         """Return a service type; arguments and errors as in :meth:`message`."""
         from rosglass.messages import ServiceType  # noqa: PLC0415 - numpy
 
-        return self._find(wanted, ServiceType, hash, "service", "std_srvs/srv/Trigger")
+        return self._find(wanted, ServiceType, hash, "service")
 
     def action(self, wanted: str | ActionType, hash: str = "") -> ActionType:
         """Return an action type; arguments and errors as in :meth:`message`."""
         from rosglass.messages import ActionType  # noqa: PLC0415 - numpy
 
-        example = "example_interfaces/action/Fibonacci"
-        return self._find(wanted, ActionType, hash, "action", example)
+        return self._find(wanted, ActionType, hash, "action")
 
     def request(
         self,
@@ -163,20 +178,21 @@ class Types:
             found = self._by_hash.get(hash)
         return found
 
-    def _find(self, wanted: object, kind: type[_T], hash: str, word: str, example: str) -> _T:
+    def _find(self, wanted: object, kind: type[_T], hash: str, word: str) -> _T:
         from rosglass.messages import load  # noqa: PLC0415 - numpy
 
         if not isinstance(wanted, str):
-            return self._check(wanted, kind, word, example)
+            return self._check(wanted, kind, word)
         found = load(wanted, ros=self._ros, library=self._library, hash=hash)
-        return self._check(found, kind, word, example)
+        return self._check(found, kind, word)
 
-    def _check(self, found: object, kind: type[_T], word: str, example: str) -> _T:
+    def _check(self, found: object, kind: type[_T], word: str) -> _T:
         if not isinstance(found, kind):
             article = "an" if word == "action" else "a"
             raise TypeNotFoundError(
-                f"{found!r} is not {article} {word} type; give a name such as {example} "
-                f"or what rosglass.load() returns for {article} {word}"
+                f"{found!r} is not {article} {word} type; give a name such as "
+                f"{_EXAMPLES[self._ros][word]} or what {_LOADED[self._ros]} returns for "
+                f"{article} {word}"
             )
         if found.ros != self._ros:
             raise UnsupportedError(
