@@ -680,7 +680,8 @@ def test_closing_from_execute_does_not_hang(offer, client, eventually):
     eventually(lambda: goal.status is GoalStatus.ABORTED)
 
 
-def test_a_goal_that_ignores_the_end_is_left_to_its_thread(offer, client, caplog):
+def test_a_goal_that_ignores_the_end_is_left_to_its_thread(offer, client, caplog, monkeypatch):
+    monkeypatch.setattr("rosglass.comm.action_server._CLOSE_TIMEOUT_S", 0.2)
     started, release = threading.Event(), threading.Event()
 
     def execute(_):
