@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
@@ -79,7 +81,10 @@ def test_what_can_be_no_parameter_is_refused_before_it_is_set(own, client):
     for value in (object(), 2**70):
         with pytest.raises(ParameterError):
             client.set({name: value})
-    assert own.all.get(name) == 1
+    own.all.declare(second := own.name("second"), 1)
+    with pytest.raises(ParameterError, match=second):
+        own.all.set({name: 2, second: 2**70})
+    assert own.all.get(name) == own.all.get(second) == 1, "all or none"
     for values in ("speed", None, [name]):
         with pytest.raises(ParameterError, match="set by a dict"):
             own.all.set(values)
@@ -172,7 +177,7 @@ def test_wrong_arguments_are_refused(client):
 def test_the_first_change_after_watching_begins_is_reported(
     own, client, wire, robot, console, eventually
 ):
-    name, changes = own.name("speed"), []
+    name, other, changes = own.name("speed"), own.name("other"), []
     own.all.declare(name, 1.5)
 
     def is_linked():
@@ -180,12 +185,18 @@ def test_the_first_change_after_watching_begins_is_reported(
         ends = robot.subscriptions(EVENTS)
         return wire.is_ros1 or any(end.node.full == "/console" for end in ends)
 
-    with client.watch(lambda event: changes.append(event.changed.get(name))):
+    own.all.declare(other, 1)
+    with client.watch(lambda e: changes.append((e.node, e.new, e.changed, e.deleted))):
         eventually(is_linked)
         assert client.set({name: 2.5})[name].successful
-        eventually(lambda: changes == [2.5], lambda: changes)
+        eventually(lambda: changes == [("/robot", {}, {name: 2.5}, ())], lambda: changes)
+        own.all.undeclare(other)
+        eventually(lambda: changes[1:] == [("/robot", {}, {}, (other,))], lambda: changes)
     own.all.set({name: 3.5})
-    assert changes == [2.5]
+    later = []
+    with client.watch(later.append):
+        eventually(lambda: client.set({name: time.monotonic()}) and later)
+    assert len(changes) == 2
 
 
 def test_files_of_another_node(own, client, tmp_path):
@@ -231,6 +242,7 @@ def test_parameters_of_a_closed_node_say_so(own, robot):
         lambda: own.all.on_change(print),
         lambda: own.all.load("robot.yaml"),
         lambda: own.all.save("robot.yaml"),
+        lambda: robot.parameters,
     ):
         with pytest.raises(rosglass.NodeClosedError, match="closed"):
             use()

@@ -190,6 +190,7 @@ class Ros2Node(CoreNode):
     @property
     def parameters(self) -> Ros2Parameters:
         """This node's own parameters."""
+        self._core.check_open()
         return self._builtin_services.parameters
 
     def create_parameter_client(self, node: str | NodeName) -> ParameterClient:

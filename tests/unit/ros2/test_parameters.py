@@ -148,16 +148,6 @@ def test_what_is_not_declared_is_named(
         use(parameters)
 
 
-def test_setting_is_all_or_none(parameters: Ros2Parameters) -> None:
-    parameters.declare("a", 1)
-    parameters.declare("b", 1)
-    with pytest.raises(ParameterError, match="'b'"):
-        parameters.set({"a": 2, "b": "x"})
-    assert parameters.get("a") == 1
-    parameters.set({"a": 2, "b": 3})
-    assert (parameters.get("a"), parameters.get("b")) == (2, 3)
-
-
 def test_changes_are_told(parameters: Ros2Parameters) -> None:
     events: list[ParameterEvent] = []
     handle = parameters.on_change(events.append)

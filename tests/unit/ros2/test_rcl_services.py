@@ -11,10 +11,7 @@ import pytest
 
 from rosglass import Time
 from rosglass.comm import (
-    NodeName,
     ParameterDescriptor,
-    ParameterType,
-    Range,
     State,
     Transition,
 )
@@ -71,50 +68,6 @@ def received(node: Ros2Node, topic: str, kind: str) -> list[Any]:
 # -- parameters --------------------------------------------------------------------------------
 
 
-def test_other_nodes_reach_a_nodes_parameters(start, node, eventually) -> None:
-    robot = start(namespace="/arm")
-    robot.parameters.declare("speed", 1.0, ParameterDescriptor(range=Range(0.0, 2.0)))
-    robot.parameters.declare("names", ["a"])
-    robot.parameters.declare("io.port", 5, ParameterDescriptor(read_only=True))
-    client = node.create_parameter_client("/arm/robot")
-    assert client.wait_for_server(30)
-    assert client.ready
-    describe = "start_type_description_service"
-    assert client.names() == ["io.port", "names", "speed", describe, "use_sim_time"]
-    assert client.names(["io"]) == client.names("io") == ["io.port"]
-    assert client.names(depth=1) == ["names", "speed", describe, "use_sim_time"]
-    assert client.get() == {
-        "io.port": 5,
-        "names": ["a"],
-        "speed": 1.0,
-        describe: True,
-        "use_sim_time": False,
-    }
-    assert client.get(["speed", "nix"]) == {"speed": 1.0, "nix": None}
-    assert client.get([]) == {}
-    described = client.describe(["speed", "nix"])
-    assert described["speed"].range == Range(0.0, 2.0)
-    assert described["nix"].type is ParameterType.NOT_SET
-
-    results = client.set({"speed": 1.5, "names": [], "io.port": 6, "nix": 1, "use_sim_time": "x"})
-    assert {n: r.successful for n, r in results.items()} == {
-        "speed": True,
-        "names": True,
-        "io.port": False,
-        "nix": False,
-        "use_sim_time": False,
-    }
-    assert results["io.port"].reason == "parameter 'io.port' is read-only"
-    assert robot.parameters.get("speed") == 1.5
-    assert robot.parameters.get("names") == []
-
-    assert client.set_atomically({"speed": 2.0, "names": ["b"]}).successful
-    result = client.set_atomically({"names": ["c"], "speed": 2.5})
-    assert result == (False, "parameter 'speed': 2.5 is outside 0.0 to 2.0")
-    assert robot.parameters.get("names") == ["b"]
-    assert client.set({}) == {}
-
-
 def test_the_services_have_ros_names_types_and_profiles(start, eventually) -> None:
     robot = start(namespace="/arm")
     ends = robot.fake.repliers
@@ -144,38 +97,6 @@ def test_types_are_described_unless_the_parameter_says_otherwise(start, eventual
 
     assert offered(start()) == ["/robot/get_type_description"]
     assert offered(start("-p", "start_type_description_service:=false", name="quiet")) == []
-
-
-def test_without_own_services_other_nodes_do_not_reach_the_parameters(start, node) -> None:
-    robot = start(own_services=False)
-    robot.parameters.declare("a", 1)
-    assert not robot.fake.repliers
-    with pytest.raises(ServiceUnavailableError, match="/robot/list_parameters"):
-        node.create_parameter_client("/robot").names(timeout=0.05)
-
-
-def test_changes_can_be_watched(start, node, eventually) -> None:
-    robot, other = start(), start(name="other")
-    events: list[Any] = []
-    client = node.create_parameter_client(NodeName("/", "robot"))
-    assert client.wait_for_server(30)
-    watch = client.watch(events.append)
-    robot.parameters.declare("a", 1, ParameterDescriptor(dynamic_typing=True))
-    other.parameters.declare("a", 1)
-    client.set({"a": 2})
-    robot.parameters.undeclare("a")
-    eventually(lambda: len(events) == 3)
-    assert [(e.node, e.new, e.changed, e.deleted) for e in events] == [
-        ("/robot", {"a": 1}, {}, ()),
-        ("/robot", {}, {"a": 2}, ()),
-        ("/robot", {}, {}, ("a",)),
-    ]
-    watch.close()
-    later: list[Any] = []
-    client.watch(later.append)
-    robot.parameters.declare("b", 1)
-    eventually(lambda: later)
-    assert len(events) == 3
 
 
 def test_a_callback_that_waits_does_not_hold_up_the_parameters(start, node) -> None:
@@ -248,17 +169,6 @@ def test_parameter_files_of_another_node(start, node, tmp_path: Path) -> None:
     file.write_text("/other: {ros__parameters: {a: 1}}")
     with pytest.raises(ParameterError, match="has no parameters for /arm/robot"):
         client.load(file)
-
-
-def test_a_closed_node_has_no_parameters(start) -> None:
-    robot, other = start(), start(name="other")
-    parameters = other.parameters
-    robot.close()
-    other.close()
-    with pytest.raises(NodeClosedError):
-        _ = robot.parameters
-    with pytest.raises(NodeClosedError, match="node /other is closed; connect again"):
-        parameters.on_set(print)
 
 
 # -- --ros-args --------------------------------------------------------------------------------
