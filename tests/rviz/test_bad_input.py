@@ -369,7 +369,7 @@ def test_overlays_of_ones_own_may_raise_anywhere(
     app.add(mine)
     grab()
     press(90, 290)
-    app.overlays.input._hover(None)
+    app.overlays.input.hover(None)
     app.overlays.remove(mine)
     assert list(app.overlays) == []
     assert f"{broken} is broken" in mine.problem

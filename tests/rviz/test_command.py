@@ -282,11 +282,11 @@ def nodes(master: str) -> set[str]:
 
 
 def kill_screen(screen: VirtualScreen) -> None:
-    screen._process.kill()
+    screen.process.kill()
 
 
 def close_screen(screen: VirtualScreen) -> None:
-    screen._process.terminate()
+    screen.process.terminate()
 
 
 def on_window(command: str) -> Callable[[VirtualScreen], None]:

@@ -353,10 +353,10 @@ def test_touch_works_buttons_and_leaves_the_rest(hand: Any, app: Any, show: Any,
     assert view("Yaw") == yaw
     # What is not accepted, Qt sends again as the mouse.
     taken: list[bool] = []
-    route = app.overlays.input._routes[QtCore.QEvent.TouchBegin]
-    app.overlays.input._routes[QtCore.QEvent.TouchBegin] = lambda e: bool(
+    route = app.overlays.input.routes[QtCore.QEvent.TouchBegin]
+    app.overlays.input.routes[QtCore.QEvent.TouchBegin] = lambda e: bool(
         taken.append(route(e)) or taken[-1]
     )
     stroke((300, 300), (340, 300))
-    app.overlays.input._routes[QtCore.QEvent.TouchBegin] = route
+    app.overlays.input.routes[QtCore.QEvent.TouchBegin] = route
     assert taken == [False]

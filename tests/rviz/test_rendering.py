@@ -86,7 +86,7 @@ def test_overlays_look_the_same_where_there_are_no_shaders(
 
     text = """Item { Repeater { model: 8; Rectangle { x: 40 * index; width: 90; height: 200; y: 9
         color: Qt.hsva(index / 8, 0.8, 0.9, (index + 1) / 8); radius: 20 } } }"""
-    assert layer._program() != ""
+    assert layer.fragment_program() != ""
     overlay = show(text)
     picture = grab()
     overlay.opacity = 0.999
@@ -95,7 +95,7 @@ def test_overlays_look_the_same_where_there_are_no_shaders(
     assert grab() == picture
     app.overlays.remove(overlay)
     assert grab() != picture
-    monkeypatch.setattr(layer, "_program", lambda: "")
+    monkeypatch.setattr(layer, "fragment_program", lambda: "")
     show(text, "Plain")
     assert grab() == picture
 

@@ -87,6 +87,9 @@ class VirtualScreen(Handle):
         width: Pixels.
         height: Pixels.
 
+    Attributes:
+        process: The screen's program.
+
     Raises:
         Error: Xvfb is missing or does not start; the message says what to do.
     """
@@ -101,7 +104,7 @@ class VirtualScreen(Handle):
         read, write = os.pipe()
         try:
             # It ends with us where the system can see to that, otherwise with its last window.
-            self._process = subprocess.Popen(
+            self.process = subprocess.Popen(
                 [
                     *LEASH,
                     program,
@@ -127,13 +130,13 @@ class VirtualScreen(Handle):
 
     def close(self) -> None:
         """Switch it off; safe to call twice."""
-        if self._process.poll() is None:
-            self._process.terminate()
+        if self.process.poll() is None:
+            self.process.terminate()
             try:
-                self._process.wait(_PATIENCE)
+                self.process.wait(_PATIENCE)
             except subprocess.TimeoutExpired:
-                self._process.kill()
-                self._process.wait()
+                self.process.kill()
+                self.process.wait()
 
 
 def _read_line(descriptor: int, timeout: float) -> str:

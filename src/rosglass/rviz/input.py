@@ -59,7 +59,8 @@ class Input(QtCore.QObject):
         self._focused: Overlay | None = None
         self._depth = 0
         self._later: list[Callable[[], None]] = []
-        self._routes: dict[Any, Callable[[Any], bool]] = {
+        #: What handles each kind of event; returns whether it took it.
+        self.routes: dict[Any, Callable[[Any], bool]] = {
             **dict.fromkeys(KEYS | {_E.InputMethod, _E.InputMethodQuery}, self._key),
             **dict.fromkeys(TOUCH, self._touch),
             **dict.fromkeys(DRAG | {_E.DragLeave}, self._drag),
@@ -140,7 +141,7 @@ class Input(QtCore.QObject):
             if event.type() in _LOSING or minimized:
                 self._lose()
             return False
-        route = self._routes.get(event.type())
+        route = self.routes.get(event.type())
         # Without overlays, RViz is as if this were not here.
         if route is None or not (self._owner or self._stack.topmost_first()):
             return False
@@ -198,7 +199,7 @@ class Input(QtCore.QObject):
                 self._owner = Owner.RVIZ if open_to_rviz else Owner.NOBODY
                 if open_to_rviz:
                     self.focus(None)
-                    self._hover(None)
+                    self.hover(None)
         elif not isinstance(self._owner, Owner):
             self._deliver(self._owner, event)
         return self._owner is not Owner.RVIZ
@@ -222,7 +223,7 @@ class Input(QtCore.QObject):
             return False
         if self._owner is None:
             overlay, open_to_rviz = self._offer(event)
-            self._hover(overlay)
+            self.hover(overlay)
             if overlay is None and not open_to_rviz:
                 self._panel.setCursor(Qt5Core.Qt.ArrowCursor)
             return not (overlay is None and open_to_rviz)
@@ -237,7 +238,8 @@ class Input(QtCore.QObject):
         if owner is not None and not isinstance(owner, Owner):
             self._leave(owner)
 
-    def _hover(self, overlay: Overlay | None) -> None:
+    def hover(self, overlay: Overlay | None) -> None:
+        """Let the pointer be over an overlay, or over none, and leave the one before."""
         before, self._hovered = self._hovered, overlay
         if before is not None and before is not overlay:
             self._leave(before)
@@ -253,7 +255,7 @@ class Input(QtCore.QObject):
         """Notice that the mouse is elsewhere: RViz's view is not told when it leaves it."""
         over = QtWidgets.QApplication.widgetAt(QtGui.QCursor.pos())
         if self._owner is None and over is not self._panel:
-            self._hover(None)
+            self.hover(None)
 
     def _show_cursor(self, overlay: Overlay) -> None:
         with guarded(overlay, "choosing the mouse's shape"):
@@ -262,7 +264,7 @@ class Input(QtCore.QObject):
     def _left(self, event: Any) -> bool:
         del event
         if self._owner is None:
-            self._hover(None)
+            self.hover(None)
         return False
 
     def _wheel(self, event: Any) -> bool:
@@ -358,7 +360,7 @@ class Input(QtCore.QObject):
         touched, self._touched = self._touched, None
         if touched is not None:
             self._leave(touched)
-        self._hover(None)
+        self.hover(None)
 
     def _overlays_changed(self) -> None:
         shown = self._stack.topmost_first()

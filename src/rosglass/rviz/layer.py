@@ -182,7 +182,7 @@ class Layer:
         one, faint = o.ColourValue(1, 1, 1, 1), o.ColourValue(part, part, part, part)
         self._unit.setColourOperationEx(how, o.LBS_TEXTURE, o.LBS_MANUAL, one, faint)
         self._unit.setAlphaOperation(how, o.LBS_TEXTURE, o.LBS_MANUAL, 1.0, part)
-        self._pass.setFragmentProgram(_program() if part == 1 else "")
+        self._pass.setFragmentProgram(fragment_program() if part == 1 else "")
 
     def _upload(self, pixels: NDArray[np.uint32], rect: Rect) -> None:
         o = ogre()
@@ -262,7 +262,7 @@ class Layer:
 
 
 @cache
-def _program() -> str:
+def fragment_program() -> str:
     """Return the name of Ogre's program for all layers; empty where there are no shaders."""
     o = ogre()
     name = "rosglass/picture"

@@ -417,7 +417,7 @@ class LocalMiddleware(Middleware):
         """Join the graph."""
         # Not sooner: a node whose name is refused is never opened, nor closed.
         with _networks_lock:
-            self.network = _networks.setdefault(self._name, _Network())
+            self.network = networks.setdefault(self._name, _Network())
             _members[self._name] = _members.get(self._name, 0) + 1
         self._graph = graph
         self.network.join(graph)
@@ -488,10 +488,10 @@ class LocalMiddleware(Middleware):
         with _networks_lock:
             _members[self._name] -= 1
             if not _members[self._name]:
-                del _members[self._name], _networks[self._name]
+                del _members[self._name], networks[self._name]
 
 
 #: The graphs of this process by name, and how many nodes each has.
-_networks: dict[str, _Network] = {}
+networks: dict[str, _Network] = {}
 _members: dict[str, int] = {}
 _networks_lock = threading.Lock()

@@ -37,7 +37,7 @@ def clock(monkeypatch):
 
 def test_who_confirms_nothing_for_half_a_second_has_stalled(clock, monkeypatch):
     watched, waiting = UnackedBytes(None), [0]
-    monkeypatch.setattr(watched, "_waiting", lambda: waiting[0])
+    monkeypatch.setattr(watched, "unacked", lambda: waiting[0])
 
     def later(seconds, written, unconfirmed):
         clock.now += seconds
@@ -59,9 +59,9 @@ def test_who_confirms_nothing_for_half_a_second_has_stalled(clock, monkeypatch):
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems do not tell what is confirmed")
 def test_a_silent_subscriber_gets_only_the_newest_afterwards(monkeypatch):
     silent = [False]
-    real = UnackedBytes._waiting
+    real = UnackedBytes.unacked
     # As if the network was away: what is sent stays unconfirmed.
-    monkeypatch.setattr(UnackedBytes, "_waiting", lambda u: u.written if silent[0] else real(u))
+    monkeypatch.setattr(UnackedBytes, "unacked", lambda u: u.written if silent[0] else real(u))
     loop = IoLoop("test outages")
     ours, peer = socket.socketpair()
     link = Connection(loop, _Tcp(ours), print, print, print, peer="robot")

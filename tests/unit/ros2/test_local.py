@@ -12,8 +12,8 @@ def test_a_graph_ends_with_its_last_node():
     with pytest.raises(rosglass.InvalidNameError):
         rosglass.connect("local://unit", "a b")
     with rosglass.connect("local://unit", "one"), rosglass.connect("local://unit", "two"):
-        assert "unit" in local._networks
-    assert "unit" not in local._networks
+        assert "unit" in local.networks
+    assert "unit" not in local.networks
 
 
 @pytest.mark.parametrize("url", ["local://a?x=1", "local://a b", "local://a/b"])

@@ -139,14 +139,15 @@ class UnackedBytes:
         if now - self._looked < _STALL_POLL_S:
             return self._stalled
         self._looked = now
-        waiting = self._waiting()
+        waiting = self.unacked()
         confirmed = self.written - waiting
         if not waiting or confirmed != self._confirmed:
             self._confirmed, self._moved = confirmed, now
         self._stalled = now - self._moved > _STALL_TIMEOUT_S
         return self._stalled
 
-    def _waiting(self) -> int:
+    def unacked(self) -> int:
+        """Return how many bytes the other end has not confirmed; 0 where nobody tells."""
         if sys.platform != "linux":
             return 0  # nobody tells
         import fcntl  # noqa: PLC0415 - not everywhere
