@@ -51,11 +51,11 @@ from rosglass.ros2.action_types import (
     SEND_GOAL,
     STATUS,
     STATUSES,
+    ActionVersion,
     goal_info,
     part,
     stamp_of,
 )
-from rosglass.ros2.action_version import ActionVersion
 from rosglass.ros2.core import Member
 from rosglass.ros2.graph_matching import Repeats
 from rosglass.ros2.service_client import Ros2ServiceClient
