@@ -12,7 +12,7 @@ import threading
 import time
 from collections import deque
 from contextlib import suppress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rosglass.comm import EndpointKind, Promise
 from rosglass.comm.promise import check_timeout
@@ -29,11 +29,10 @@ from rosglass.interfaces import (
     announced_hashes,
     cache_folder,
     rihs01,
-    split_name,
 )
+from rosglass.interfaces.names import KINDS, split_name
 from rosglass.ros2.announced import nodes_of
 from rosglass.ros2.core import Member
-from rosglass.ros2.type_clients import TypeClients
 from rosglass.ros2.type_descriptions import (
     ACTION_PARTS,
     SERVICE,
@@ -41,23 +40,30 @@ from rosglass.ros2.type_descriptions import (
     compose_action,
     is_hash,
     read_answer,
+    service_type,
 )
-from rosglass.ros2.type_lookup import Lookup
-from rosglass.ros2.type_wants import Ask, Trial, Want, spelled
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Container, Iterable, Mapping, Sequence
     from concurrent.futures import Future
-    from typing import Any
 
-    from rosglass.comm import EndpointInfo
-    from rosglass.interfaces import InterfaceDefinition
+    from rosglass.comm import EndpointInfo, ServiceClient
+    from rosglass.interfaces import Definition, InterfaceDefinition
+    from rosglass.messages import ActionType, MessageType, ServiceType
     from rosglass.ros2.core import Core
-    from rosglass.ros2.type_wants import AnyType
+    from rosglass.wires.base import Middleware
 
-    Users = Mapping[str, Sequence[EndpointInfo]]
+    AnyType: TypeAlias = MessageType | ServiceType | ActionType
+    _Users: TypeAlias = Mapping[str, Sequence[EndpointInfo]]
+    _Asked: TypeAlias = tuple[
+        tuple[str, str, str],
+        tuple[EndpointInfo, ...] | None,
+        Callable[[], None] | None,
+        Promise[AnyType] | None,
+    ]
 
 __all__ = ["TypeFetcher"]
+
 
 _log = logging.getLogger("rosglass.ros2")
 
@@ -70,7 +76,7 @@ _GRACE = 1.0
 _INTRODUCTION_S = 8.0
 #: Seconds until a node that did not answer is asked again: at first, and at most (it doubles).
 _AGAIN, _RARELY = 5.0, 60.0
-#: Seconds for which a definition that nobody asks for any more is still fetched.
+#: Seconds for which a definition that nobody queries for any more is still fetched.
 _INTEREST = 30.0
 #: Questions on their way at once, and definitions fetched in all: more come only from a graph gone
 #: wild.
@@ -81,7 +87,7 @@ class TypeFetcher(Member):
     """Fetches definitions for one node.
 
     All decisions are made in rounds on the node's own dispatcher; what the graph, timers and
-    answers bring only asks for the next round.
+    answers bring only queries for the next round.
 
     Args:
         core: The node.
@@ -89,9 +95,12 @@ class TypeFetcher(Member):
 
     def __init__(self, core: Core) -> None:
         self._core = core
-        self._lock = threading.Lock()
-        self._wants: dict[tuple[str, str, str], Want] = {}
-        self._answers: deque[tuple[Want, bytes | str, Future[Any]]] = deque()
+        #: Changed by rounds only.
+        self._requests: dict[tuple[str, str, str], TypeRequest] = {}
+        #: What was asked for since the last round, from any thread: a type's key, who uses it, who
+        #: is told when it has come, and what it fulfils.
+        self._asked_for: deque[_Asked] = deque()
+        self._answers: deque[tuple[TypeRequest, bytes | str, Future[Any]]] = deque()
         self._clients = TypeClients(core)
         self._cache = TypeCache(cache_folder())
         self._posted = self._closed = False
@@ -113,14 +122,12 @@ class TypeFetcher(Member):
         """Start fetching; see :meth:`rosglass.comm.types.Types.request`."""
         if hash and self._core.types.library.version(name, hash) is not None:
             return ""
-        want = self._want(name, hash, "")
-        if want is None:
+        if self._closed:
             return "the node is closed"
-        want.endpoints, want.used = tuple(endpoints), time.monotonic()
-        if on_done not in want.listeners:
-            want.listeners.append(on_done)
-        self._kick()
-        return want.problem
+        key = name, hash, ""
+        self._put((key, tuple(endpoints), on_done, None))
+        request = self._requests.get(key)
+        return "" if request is None else request.problem
 
     def knows(self, name: str) -> bool:
         """Return whether somebody in the graph uses a type."""
@@ -143,166 +150,190 @@ class TypeFetcher(Member):
             with suppress(Error):
                 promise.fulfil(self._load(name, hash))
                 return promise
-        want = self._want(name, hash, "" if hash else node)
-        if want is None:
-            promise.fail(NodeClosedError(f"node {self._core.name} is closed; connect again"))
-            return promise
-        want.since = time.monotonic()
-        want.promises.append(promise)
         if timeout is not None:
-            timer = self._core.timers.after(timeout, lambda: self._expire(want, promise, timeout))
+            timer = self._core.timers.after(timeout, lambda: self._expire(name, promise, timeout))
             promise.add_done_callback(lambda _: timer.close())
-        self._kick()
+        self._put(((name, hash, "" if hash else node), None, None, promise))
         return promise
 
     def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - time passes, too
         """Follow the graph: somebody to ask may have appeared."""
-        if self._wants or self._clients:
+        if self._requests or self._clients:
             self._kick()
 
     def close(self) -> None:
         """End all fetching; safe to call twice."""
-        with self._lock:
-            if self._closed:
-                return
-            self._closed = True
-            wants, self._wants = list(self._wants.values()), {}
-        for want in wants:
-            for promise in want.promises:
-                promise.fail(NodeClosedError(f"node {self._core.name} was closed"))
-            if want.lookup is not None:
-                want.lookup.join()
+        self._closed = True
+        self._end()
         self._clients.close()
         self._core.remove(self)
 
-    def _want(self, name: str, type_hash: str, node: str) -> Want | None:
-        with self._lock:
-            if self._closed:
-                return None
-            return self._wants.setdefault((name, type_hash, node), Want(name, type_hash, node))
+    def _end(self) -> None:
+        """End what was asked for; the last round's business when it runs while the node closes."""
+        promises = []
+        while self._asked_for:
+            with suppress(IndexError):  # the other one took it
+                promises.append(self._asked_for.popleft()[-1])
+        for request in self._requests.copy().values():
+            promises += request.promises
+            if request.lookup is not None:
+                request.lookup.join()
+        for promise in promises:
+            if promise is not None:
+                promise.fail(NodeClosedError(f"node {self._core.name} is closed; connect again"))
+
+    def _put(self, asked: _Asked) -> None:
+        """PendingQuery for a type in the next round; from any thread."""
+        self._asked_for.append(asked)
+        if self._closed:
+            self._end()
+        self._kick()
+
+    def _request(self, key: tuple[str, str, str]) -> TypeRequest:
+        return self._requests.setdefault(key, TypeRequest(*key))
 
     def _load(self, name: str, type_hash: str) -> AnyType:
         from rosglass.messages import load  # noqa: PLC0415 - numpy
 
         return load(name, ros=2, library=self._core.types.library, hash=type_hash)
 
-    def _expire(self, want: Want, promise: Promise[AnyType], timeout: float) -> None:
+    def _expire(self, name: str, promise: Promise[AnyType], timeout: float) -> None:
         if promise.done():
             return
-        reason = want.problem or (
-            f"{nodes_of(ask.server for ask in list(want.asks.values()))} did not answer yet"
-            if want.asks
-            else f"nobody in the graph uses {'this version of it' if want.hash else 'it'}"
-        )
-        promise.fail(
-            TypeNotFoundError(f"no definition of {want.name} within {timeout:g} s: {reason}")
-        )
+        reason = "nobody in the graph uses it"
+        for request in self._requests.copy().values():
+            if promise not in request.promises:
+                continue
+            if request.problem:
+                reason = request.problem
+            elif request.queries:
+                servers = [query.server for query in request.queries.copy().values()]
+                reason = f"{nodes_of(servers)} did not answer yet"
+            elif request.hash:
+                reason = "nobody in the graph uses this version of it"
+        promise.fail(TypeNotFoundError(f"no definition of {name} within {timeout:g} s: {reason}"))
 
     # -- rounds ----------------------------------------------------------------------------------
 
     def _kick(self) -> None:
-        with self._lock:
-            if self._posted or self._closed:
-                return
+        if not self._posted and not self._closed:
             self._posted = True
-        self._core.own_dispatcher.post(self._round)
+            self._core.own_dispatcher.post(self._round)
 
     def _round(self) -> None:
-        with self._lock:
-            self._posted = False
-            wants = list(self._wants.values())
+        self._posted = False  # first: what is asked for from here on has a round of its own
+        while self._asked_for and not self._closed:
+            self._take_up(*self._asked_for.popleft())
+        requests = list(self._requests.values())
         while self._answers:
             self._take(*self._answers.popleft())
         users = self._core.graph.users()
         now = time.monotonic()
-        for want in wants:
-            want.promises = [promise for promise in want.promises if not promise.done()]
-            if not want.promises and now - want.used > _INTEREST:
-                self._drop(want)
-            elif self._wants.get(want.key) is want:
+        for request in requests:
+            request.promises = [promise for promise in request.promises if not promise.done()]
+            if not request.promises and now - request.used > _INTEREST:
+                self._drop(request)
+            elif self._requests.get(request.key) is request:
                 try:
-                    self._advance(want, users, now)
+                    self._advance(request, users, now)
                 except NodeClosedError:
-                    return
+                    break
                 except Exception:
-                    _log.exception("fetching %s failed", want.name)
+                    _log.exception("fetching %s failed", request.name)
         self._clients.close_idle(now)
+        if self._closed:
+            self._end()
 
-    def _advance(self, want: Want, users: Users, now: float) -> None:
+    def _take_up(
+        self,
+        key: tuple[str, str, str],
+        endpoints: tuple[EndpointInfo, ...] | None,
+        listener: Callable[[], None] | None,
+        promise: Promise[AnyType] | None,
+    ) -> None:
+        """Begin to get a type that was asked for, or let one more wait for it."""
+        request, now = self._request(key), time.monotonic()
+        if endpoints is not None:
+            request.endpoints, request.used = endpoints, now
+        if listener is not None and listener not in request.listeners:
+            request.listeners.append(listener)
+        if promise is not None:
+            request.since = now
+            request.promises.append(promise)
+
+    def _advance(self, request: TypeRequest, users: _Users, now: float) -> None:
         """Do what can be done now to get a definition."""
-        name = next(iter(spelled(want.name, users)), want.name)
-        if name.split("/")[1] == "action" and name not in users and not want.hash:
-            self._advance_action(want, name, users, now)
+        name = next(iter(spelled(request.name, users)), request.name)
+        if name.split("/")[1] == "action" and name not in users and not request.hash:
+            self._advance_action(request, name, users, now)
             return
-        if want.hash:
-            found = self._core.types.library.version(name, want.hash)
+        if request.hash:
+            found = self._core.types.library.version(name, request.hash)
             if found is None:
-                self._ask_next(want, name, users, now)
+                self._query_next(request, name, users, now)
             else:
-                self._arrived(want, found)
+                self._arrived(request, found)
             return
-        announced = self._announced(want, name, users, now)
+        announced = self._announced(request, name, users, now)
         if announced:
-            self._hand_over(want, name, announced, users, now)
+            self._hand_over(request, name, announced, users, now)
 
-    def _hand_over(self, want: Want, name: str, announced: str, users: Users, now: float) -> None:
+    def _hand_over(
+        self, request: TypeRequest, name: str, announced: str, users: _Users, now: float
+    ) -> None:
         """Go on with the version that was found to be meant."""
-        if not want.looked:
-            want.looked = True  # the library may have it all along
+        if not request.looked:
+            request.looked = True  # the library may have it all along
             with suppress(Error):
-                self._arrived(want, self._core.types.library.definition(name, hash=announced))
+                self._arrived(request, self._core.types.library.definition(name, hash=announced))
                 return
-        target = self._want(name, announced, "")
-        if target is None:
-            return
+        target = self._request((name, announced, ""))
         target.used = now
-        target.endpoints = target.endpoints or want.endpoints
-        target.promises += want.promises
-        want.promises = []
-        target.listeners += [each for each in want.listeners if each not in target.listeners]
+        target.endpoints = target.endpoints or request.endpoints
+        target.promises += request.promises
+        request.promises = []
+        target.listeners += [each for each in request.listeners if each not in target.listeners]
         self._advance(target, users, now)
-        changed, want.problem = want.problem != target.problem, target.problem
-        if not want.listeners or self._wants.get(target.key) is not target:
-            self._drop(want)
+        changed, request.problem = request.problem != target.problem, target.problem
+        if not request.listeners or self._requests.get(target.key) is not target:
+            self._drop(request)
         elif changed:
-            for listener in list(want.listeners):
+            for listener in list(request.listeners):
                 listener()
 
-    def _announced(self, want: Want, name: str, users: Users, now: float) -> str:
+    def _announced(self, request: TypeRequest, name: str, users: _Users, now: float) -> str:
         """Return the one hash that the graph has for a type, empty when there is none (yet)."""
         known: dict[str, set[str]] = {}
         for user in users.get(name, ()):
-            if user.type_hash and want.node in ("", user.node.full):
+            if user.type_hash and request.node in ("", user.node.full):
                 known.setdefault(user.type_hash, set()).add(user.node.full)
         if len(known) == 1:
             return next(iter(known))
         if known:
             told = "; ".join(f"{key} of {', '.join(sorted(of))}" for key, of in known.items())
             problem = f"the graph has several versions ({told}); choose one by its hash or node"
-            self._settle(want, DefinitionConflictError(f"{name}: {problem}"), problem)
-        elif want.promises and now - self._since > _GRACE and self._fulfil(want, name, ""):
+            self._settle(request, DefinitionConflictError(f"{name}: {problem}"), problem)
+        elif request.promises and now - self._since > _GRACE and self._fulfil(request, name, ""):
             pass  # nobody announces another version: what the library has is right
-        elif (name in users or want.endpoints) and not self._looked_up(want, name, users):
+        elif (name in users or request.endpoints) and not self._looked_up(request, name, users):
             self._give_up(
-                want,
-                f"{nodes_of(users.get(name, want.endpoints))} announces no type hash and sends no "
-                "definitions (ROS 2 Humble and older, or a program that is not built on rcl)"
-                f"{_told(want)}; {adding_definitions(want.name, 2)}",
+                request,
+                f"{nodes_of(users.get(name, request.endpoints))} announces no type hash and sends "
+                "no definitions (ROS 2 Humble and older, or a program that is not built on rcl)"
+                f"{_told(request)}; {adding_definitions(request.name, 2)}",
                 now,
             )
         return ""
 
-    def _advance_action(self, want: Want, name: str, users: Users, now: float) -> None:
+    def _advance_action(self, request: TypeRequest, name: str, users: _Users, now: float) -> None:
         """Put an action together: only its parts are in the graph with their hashes."""
         parts: dict[str, InterfaceDefinition] = {}
         problems: list[str] = []
         for suffix in ACTION_PARTS:
-            part = self._want(name + suffix, "", want.node)
-            if part is None:
-                return
+            part = self._request((name + suffix, "", request.node))
             if self._kick not in part.listeners:
                 part.listeners.append(self._kick)
-            part.used, part.endpoints = now, users.get(part.name, want.endpoints)
+            part.used, part.endpoints = now, users.get(part.name, request.endpoints)
             announced = self._announced(part, part.name, users, now)
             found = announced and self._core.types.library.version(part.name, announced)
             if found:
@@ -314,23 +345,25 @@ class TypeFetcher(Member):
             try:
                 action = compose_action(name, parts)
                 self._core.types.library.add_version(action)
-                self._arrived(want, action)
+                self._arrived(request, action)
             except Error as error:
-                self._settle(want, error, str(error))
+                self._settle(request, error, str(error))
         elif problems:
-            self._give_up(want, "; ".join(problems), now)
-        elif want.promises and now - self._since > _GRACE and name + ACTION_PARTS[0] not in users:
-            self._fulfil(want, name, "")
+            self._give_up(request, "; ".join(problems), now)
+        elif (
+            request.promises and now - self._since > _GRACE and name + ACTION_PARTS[0] not in users
+        ):
+            self._fulfil(request, name, "")
 
     # -- asking ----------------------------------------------------------------------------------
 
-    def _ask_next(self, want: Want, name: str, users: Users, now: float) -> None:
-        """Ask the next node, or say why none is left."""
-        if any(now - ask.started < _HEDGE for ask in want.asks.values()):
+    def _query_next(self, request: TypeRequest, name: str, users: _Users, now: float) -> None:
+        """PendingQuery the next node, or say why none is left."""
+        if any(now - query.started < _HEDGE for query in request.queries.values()):
             return
-        same = [user for user in users.get(name, ()) if user.type_hash == want.hash]
+        same = [user for user in users.get(name, ()) if user.type_hash == request.hash]
         own = self._core.name
-        nodes = dict.fromkeys(u.node for u in (*want.endpoints, *same) if u.node != own)
+        nodes = dict.fromkeys(u.node for u in (*request.endpoints, *same) if u.node != own)
         servers: dict[bytes | str, EndpointInfo] = {}
         mute: list[str] = []
         for node in nodes:
@@ -340,42 +373,44 @@ class TypeFetcher(Member):
             if not found:
                 mute.append(node.full)
         # One that was restarted is asked again.
-        want.tried = {key: trial for key, trial in want.tried.items() if key in servers}
+        request.tried = {key: trial for key, trial in request.tried.items() if key in servers}
         for key, server in servers.items():
-            trial = want.tried.get(key)
-            if key not in want.asks and (trial is None or now >= trial.again):
+            trial = request.tried.get(key)
+            if key not in request.queries and (trial is None or now >= trial.again):
                 if self._asked < _MAX_ASKED:
-                    self._ask(want, key, server, name)
+                    self._query(request, key, server, name)
                 return
-        if want.asks:
+        if request.queries:
             return
-        if not want.stored:
-            want.stored = True
-            stored = self._cache.get(name, want.hash)
+        if not request.stored:
+            request.stored = True
+            stored = self._cache.get(name, request.hash)
             if stored is not None:
                 self._core.types.library.add_version(stored)
-                self._arrived(want, stored)
+                self._arrived(request, stored)
                 return
-        if not self._looked_up(want, name, users):
-            self._give_up(want, self._reasons(want, mute), now)
+        if not self._looked_up(request, name, users):
+            self._give_up(request, self._reasons(request, mute), now)
 
-    def _looked_up(self, want: Want, name: str, users: Users) -> bool:
-        """Ask the middleware itself; returns whether it has answered well, or may still do so."""
-        if want.lookup is None or want.lookup.age > _RARELY:
-            endpoints = (*want.endpoints, *users.get(name, ()))
-            want.lookup = Lookup(self._core.middleware, name, endpoints, self._kick)
-        found = want.lookup.found
-        if want.lookup.done and found is not None:
-            if found.name == name and want.hash in ("", *announced_hashes(found)):
+    def _looked_up(self, request: TypeRequest, name: str, users: _Users) -> bool:
+        """Ask the middleware; returns whether it has answered well, or may still do so."""
+        if request.lookup is None or request.lookup.age > _RARELY:
+            endpoints = (*request.endpoints, *users.get(name, ()))
+            request.lookup = Lookup(self._core.middleware, name, endpoints, self._kick)
+        found = request.lookup.found
+        if request.lookup.done and found is not None:
+            if found.name == name and request.hash in ("", *announced_hashes(found)):
                 self._core.types.library.add_version(found)
-                self._arrived(want, found)
+                self._arrived(request, found)
                 return True
-            want.lookup.found = None
-            want.lookup.problem = f"TypeLookup tells of {found.name} with the hash {rihs01(found)}"
-        return not want.lookup.done
+            request.lookup.found = None
+            request.lookup.problem = (
+                f"TypeLookup tells of {found.name} with the hash {rihs01(found)}"
+            )
+        return not request.lookup.done
 
-    def _reasons(self, want: Want, mute: Sequence[str]) -> str:
-        reasons = [f"{trial.node}: {trial.reason}" for trial in want.tried.values()]
+    def _reasons(self, request: TypeRequest, mute: Sequence[str]) -> str:
+        reasons = [f"{trial.node}: {trial.reason}" for trial in request.tried.values()]
         if mute:
             reasons.append(
                 f"{', '.join(mute)} has no {SERVICE} service (ROS 2 Humble or older, a node "
@@ -384,124 +419,322 @@ class TypeFetcher(Member):
             )
         if not reasons:
             return "no other node in the graph uses this version of it"
-        told = f"asked for its definition: {'; '.join(reasons)}{_told(want)}"
-        if self._core.middleware.announces_requests and "/msg/" not in want.name:
+        told = f"asked for its definition: {'; '.join(reasons)}{_told(request)}"
+        if self._core.middleware.announces_requests and "/msg/" not in request.name:
             told += (
                 ". Over DDS, ROS 2 nodes announce a service by the hash of its request, and do not "
                 "find its type by that when asked"
             )
-        return f"{told}; {adding_definitions(want.name, 2)}"
+        return f"{told}; {adding_definitions(request.name, 2)}"
 
-    def _ask(self, want: Want, key: bytes | str, server: EndpointInfo, name: str) -> None:
-        ask = Ask(server, name)
+    def _query(
+        self, request: TypeRequest, key: bytes | str, server: EndpointInfo, name: str
+    ) -> None:
+        query = PendingQuery(server, name)
         if self._fetched >= _MAX_FETCHED:
-            self._failed(want, key, ask, f"not asked: {_MAX_FETCHED} types were fetched already")
+            self._failed(
+                request, key, query, f"not asked: {_MAX_FETCHED} types were fetched already"
+            )
             return
-        request = {"type_name": name, "type_hash": want.hash, "include_type_sources": True}
+        fields = {"type_name": name, "type_hash": request.hash, "include_type_sources": True}
         try:
-            call = self._clients.get(server.name).call_async(request, timeout=_TIMEOUT)
+            call = self._clients.get(server.name).call_async(fields, timeout=_TIMEOUT)
         except NodeClosedError:
             raise
         except Error as error:
-            self._failed(want, key, ask, str(error))
+            self._failed(request, key, query, str(error))
             return
-        want.asks[key] = ask
+        request.queries[key] = query
         self._asked += 1
         self._core.timers.after(_HEDGE, self._kick)
-        call.add_done_callback(lambda done: self._on_answer(want, key, done))
+        call.add_done_callback(lambda done: self._on_answer(request, key, done))
 
-    def _on_answer(self, want: Want, key: bytes | str, call: Future[Any]) -> None:
+    def _on_answer(self, request: TypeRequest, key: bytes | str, call: Future[Any]) -> None:
         """Take an answer in the thread that brings it, to look at it in the next round."""
-        self._answers.append((want, key, call))
+        self._answers.append((request, key, call))
         self._kick()
 
-    def _take(self, want: Want, key: bytes | str, call: Future[Any]) -> None:
+    def _take(self, request: TypeRequest, key: bytes | str, call: Future[Any]) -> None:
         self._asked -= 1
-        ask = want.asks.pop(key, None)
-        if ask is None or call.cancelled() or self._wants.get(want.key) is not want:
+        query = request.queries.pop(key, None)
+        if query is None or call.cancelled() or self._requests.get(request.key) is not request:
             return
-        node = ask.server.node.full
+        node = query.server.node.full
         try:
-            found = read_answer(call.result(), ask.name, want.hash, node)
+            found = read_answer(call.result(), query.name, request.hash, node)
             self._core.types.library.add_version(found)
         except WrongHashError as error:
-            self._failed(want, key, ask, str(error), believable=False)
-            if (node, want.name) not in self._told:
-                self._told.add((node, want.name))
+            self._failed(request, key, query, str(error), believable=False)
+            if (node, request.name) not in self._told:
+                self._told.add((node, request.name))
                 _log.warning("%s is not believed: %s; it is not used", node, error)
         except Error as error:
-            self._failed(want, key, ask, str(error))
+            self._failed(request, key, query, str(error))
         else:
             self._fetched += 1
-            self._arrived(want, found)
-            self._cache.put(found, want.hash)
+            self._arrived(request, found)
+            self._cache.put(found, request.hash)
 
     def _failed(
         self,
-        want: Want,
+        request: TypeRequest,
         key: bytes | str,
-        ask: Ask,
+        query: PendingQuery,
         reason: str,
         *,
         believable: bool = True,
     ) -> None:
         """Remember why a node did not help, and ask it again later, or never."""
-        before = want.tried.get(key)
+        before = request.tried.get(key)
         count = 1 if before is None else before.count + 1
         pause = min(_AGAIN * 2.0 ** (count - 1), _RARELY) if believable else float("inf")
         again = time.monotonic() + pause
-        want.tried[key] = Trial(ask.server.node.full, reason, count, again)
+        request.tried[key] = QueryResult(query.server.node.full, reason, count, again)
         self._kick()
 
     # -- endings ---------------------------------------------------------------------------------
 
-    def _arrived(self, want: Want, found: InterfaceDefinition) -> None:
+    def _arrived(self, request: TypeRequest, found: InterfaceDefinition) -> None:
         """Tell everybody that the library has a definition now."""
-        self._drop(want)
-        self._fulfil(want, found.name, rihs01(found))
-        for listener in list(want.listeners):
+        self._drop(request)
+        self._fulfil(request, found.name, rihs01(found))
+        for listener in list(request.listeners):
             listener()
 
-    def _fulfil(self, want: Want, name: str, type_hash: str) -> bool:
+    def _fulfil(self, request: TypeRequest, name: str, type_hash: str) -> bool:
         """Keep the promises, if the library has a type; returns whether it has."""
         try:
             found = self._load(name, type_hash)
         except Error as error:
             if type_hash:
-                self._fail(want, error)
+                self._fail(request, error)
             return False
-        for promise in want.promises:
+        for promise in request.promises:
             promise.fulfil(found)
         return True
 
-    def _give_up(self, want: Want, reason: str, now: float) -> None:
+    def _give_up(self, request: TypeRequest, reason: str, now: float) -> None:
         """Say why nothing will come, unless the graph may not be complete yet."""
         limit = _INTRODUCTION_S if self._core.middleware.unnamed() else _GRACE
-        left = max(want.since, self._since) + limit - now
+        left = max(request.since, self._since) + limit - now
         if left > 0:
             self._core.timers.after(min(left, _GRACE) + 0.01, self._kick)
         else:
-            self._settle(want, TypeNotFoundError(f"no definition of {want.name}: {reason}"), reason)
+            self._settle(
+                request, TypeNotFoundError(f"no definition of {request.name}: {reason}"), reason
+            )
 
-    def _settle(self, want: Want, error: Error, reason: str) -> None:
-        self._fail(want, error)
-        changed, want.problem = want.problem != reason, reason
+    def _settle(self, request: TypeRequest, error: Error, reason: str) -> None:
+        self._fail(request, error)
+        changed, request.problem = request.problem != reason, reason
         if changed:
-            for listener in list(want.listeners):
+            for listener in list(request.listeners):
                 listener()
-        if not want.listeners:
-            self._drop(want)
+        if not request.listeners:
+            self._drop(request)
 
-    def _fail(self, want: Want, error: Error) -> None:
-        for promise in want.promises:
+    def _fail(self, request: TypeRequest, error: Error) -> None:
+        for promise in request.promises:
             promise.fail(error)
 
-    def _drop(self, want: Want) -> None:
-        with self._lock:
-            if self._wants.get(want.key) is want:
-                del self._wants[want.key]
+    def _drop(self, request: TypeRequest) -> None:
+        if self._requests.get(request.key) is request:
+            del self._requests[request.key]
 
 
-def _told(want: Want) -> str:
-    problem = "" if want.lookup is None else want.lookup.problem
+def _told(request: TypeRequest) -> str:
+    problem = "" if request.lookup is None else request.lookup.problem
     return f"; {problem}" if problem else ""
+
+
+class PendingQuery:
+    """A question on its way to a node."""
+
+    def __init__(self, server: EndpointInfo, name: str) -> None:
+        self.server, self.name = server, name
+        self.started = time.monotonic()
+
+
+class QueryResult:
+    """What came of asking a node, and when to ask it again."""
+
+    def __init__(self, node: str, reason: str, count: int, again: float) -> None:
+        self.node, self.reason, self.count, self.again = node, reason, count, again
+
+
+class TypeRequest:
+    """A definition that is wanted, and how far getting it has come.
+
+    Args:
+        name: Its type's name.
+        type_hash: The hash that was announced for it; empty takes the one that is in the graph.
+        node: Full name of the node whose version is meant; empty for any.
+
+    Attributes:
+        endpoints: Who uses it.
+        listeners: Told when it has come, or cannot be had.
+        promises: Fulfilled when it has come.
+        since: When it was wanted first, and `used` last; monotonic seconds.
+        queries: Questions on their way, by the server's identity.
+        tried: What came of earlier ones, by the same.
+        problem: Why it cannot be had; empty while there is hope.
+        looked: Whether the library was asked for the version that the graph has.
+        stored: Whether the cache on disk was.
+        lookup: What the middleware itself was asked.
+    """
+
+    def __init__(self, name: str, type_hash: str, node: str) -> None:
+        self.name, self.hash, self.node = name, type_hash, node
+        self.endpoints: Sequence[EndpointInfo] = ()
+        self.listeners: list[Callable[[], None]] = []
+        self.promises: list[Promise[AnyType]] = []
+        self.since = self.used = time.monotonic()
+        self.queries: dict[bytes | str, PendingQuery] = {}
+        self.tried: dict[bytes | str, QueryResult] = {}
+        self.problem = ""
+        self.looked = self.stored = False
+        self.lookup: Lookup | None = None
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """What tells it from other ones."""
+        return self.name, self.hash, self.node
+
+
+def spelled(name: str, known: Container[str]) -> list[str]:
+    """Return the full names that a type's name may stand for, of those that are known.
+
+    Args:
+        name: Full, or ``pkg/Type``.
+        known: Full names. An action's is implied by those of its parts.
+    """
+    package, kind, base = split_name(name)
+    full = [f"{package}/{folder}/{base}" for folder in ((kind,) if kind else KINDS)]
+    return [
+        each
+        for each in full
+        if each in known
+        or (each.split("/")[1] == "action" and any(each + part in known for part in ACTION_PARTS))
+    ]
+
+
+#: Seconds for which an unused connection to a node is kept.
+_LINGER = 5.0
+
+
+class TypeClients:
+    """One client of each ``get_type_description`` in use.
+
+    Args:
+        core: The node that queries.
+    """
+
+    def __init__(self, core: Core) -> None:
+        self._core = core
+        self._lock = threading.Lock()
+        self._closed = False
+        self._known: dict[str, tuple[ServiceClient, float]] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self._known)
+
+    def get(self, service: str) -> ServiceClient:
+        """Return the client of a service; raises NodeClosedError, or what creating one raises."""
+        from rosglass.ros2.service_client import create_service_client  # noqa: PLC0415 - when needed
+
+        known = self._known.get(service)
+        if known is None:
+            client = create_service_client(self._core, service, service_type())
+        else:
+            client = known[0]
+        with self._lock:
+            closed = self._closed
+            if not closed:
+                self._known[service] = (client, time.monotonic())
+        if closed:
+            client.close()
+        return client
+
+    def close_idle(self, now: float) -> None:
+        """Close those that were not used for a while."""
+        with self._lock:
+            idle = [
+                service
+                for service, (client, used) in self._known.items()
+                if not client.pending and now - used > _LINGER
+            ]
+            clients = [self._known.pop(service)[0] for service in idle]
+        for client in clients:
+            client.close()
+
+    def close(self) -> None:
+        """Close all of them."""
+        with self._lock:
+            self._closed = True
+            clients, self._known = list(self._known.values()), {}
+        for client, _ in clients:
+            client.close()
+
+
+_TOPICS = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
+#: Seconds that each endpoint has to answer, and how many are asked.
+_LOOKUP_TIMEOUT_S, _MAX_LOOKED_UP = 2.0, 3
+
+
+class Lookup:
+    """Asks the middleware for a message's definition, on a thread that ends with the answer.
+
+    Args:
+        middleware: What to ask.
+        name: The message's name.
+        endpoints: Who uses it.
+        on_done: Called in that thread when there is an answer.
+
+    Attributes:
+        done: Whether there is.
+        found: The definition, if there was one.
+        problem: Why there is none although an endpoint announced one.
+    """
+
+    def __init__(
+        self,
+        middleware: Middleware,
+        name: str,
+        endpoints: Iterable[EndpointInfo],
+        on_done: Callable[[], None],
+    ) -> None:
+        self._middleware, self._on_done = middleware, on_done
+        self.found: Definition | None = None
+        self.problem = ""
+        self._begun = time.monotonic()
+        asked = [e for e in endpoints if e.kind in _TOPICS and e.type == name]
+        self.done = not (asked and middleware.describes_types)
+        self._thread = threading.Thread(
+            target=self._work, args=(asked[:_MAX_LOOKED_UP],), name=f"{name} lookup", daemon=True
+        )
+        if not self.done:
+            self._thread.start()
+
+    @property
+    def age(self) -> float:
+        """Seconds since it was begun."""
+        return time.monotonic() - self._begun
+
+    def join(self) -> None:
+        """Wait for the thread, which takes a few seconds at most."""
+        if self._thread.ident is not None and self._thread is not threading.current_thread():
+            self._thread.join(_LOOKUP_TIMEOUT_S)
+
+    def _work(self, endpoints: list[EndpointInfo]) -> None:
+        for endpoint in endpoints:
+            try:
+                self.found = self._middleware.describe_type(endpoint, _LOOKUP_TIMEOUT_S)
+            except Error as error:
+                self.problem = f"{endpoint.node}: {error}"
+            except Exception as error:
+                _log.exception("looking up the type of %s failed", endpoint.name)
+                self.problem = f"{endpoint.node}: {error}"
+            if self.found is not None:
+                break
+        self.done = True
+        self._on_done()

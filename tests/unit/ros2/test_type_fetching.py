@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import re
+import sys
 import threading
 import time
 from typing import TYPE_CHECKING, Any
@@ -313,7 +314,7 @@ def test_why_dds_nodes_do_not_know_their_services(join: Callable[..., Ros2Node])
         user.fetch_type(ASK)
     assert "Over DDS" not in str(caught.value)
     user.fake.announces_requests = True
-    user._fetcher._wants.clear()
+    user._fetcher._requests.clear()
     with pytest.raises(TypeNotFoundError, match="Over DDS, ROS 2 nodes announce a service by"):
         user.fetch_type(ASK)
 
@@ -512,7 +513,7 @@ def test_many_types_at_once(join: Callable[..., Ros2Node]) -> None:
 def test_nothing_is_left_behind(
     join: Callable[..., Ros2Node], eventually: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rosglass.ros2.type_clients._LINGER", 0.2)
+    monkeypatch.setattr("rosglass.ros2.type_fetching._LINGER", 0.2)
     join("robot", robot_library())
     user = join("cockpit", serves=False)
     use(user, STATE, hash_of(STATE), "robot")
@@ -539,3 +540,26 @@ def test_a_message_that_is_a_service_is_not_asked_for_for_ever(
     user._fetcher._round = lambda: rounds.append(monkey())
     nothing_happens(0.5)
     assert len(rounds) < 20
+
+
+def test_whoever_asks_at_any_time_gets_an_answer(join: Callable[..., Ros2Node]) -> None:
+    """Promises come from any thread, while others of the same type are kept and handed over."""
+    robot = join("robot", robot_library())
+    robot.create_publisher("/state", STATE)
+    user = join("user")
+    promises: list[Any] = []
+
+    def ask() -> None:
+        promises.extend(user.fetch_type_async(STATE, timeout=None) for _ in range(300))
+
+    threads = [threading.Thread(target=ask) for _ in range(4)]
+    usual = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    finally:
+        sys.setswitchinterval(usual)
+    assert {promise.result(30).rihs01 for promise in promises} == {hash_of(STATE)}
