@@ -7,9 +7,10 @@ import threading
 from concurrent.futures import Future
 
 import pytest
+from executors import Failing
 
 import rosglass
-from rosglass.comm import CancelAnswer, Dispatcher, Executor, GoalStatus, Time
+from rosglass.comm import CancelAnswer, Dispatcher, GoalStatus, Time
 from rosglass.comm.executor import LoopExecutor
 
 ENDLESS = {"order": 1_000_000}
@@ -341,17 +342,6 @@ def test_closing_a_goal_ends_the_watching(offer, client):
 
 
 # -- the server ------------------------------------------------------------------------------------
-
-
-class Failing(Executor):
-    """Runs each job on a thread of its own, unless it fails."""
-
-    failing = False
-
-    def post(self, job):
-        if self.failing:
-            raise RuntimeError("cannot schedule new futures after shutdown")
-        threading.Thread(target=job, daemon=True).start()
 
 
 def test_several_goals_run_at_once(offer, client):

@@ -10,10 +10,11 @@ import time
 import weakref
 
 import pytest
+from executors import Manual
 
 import rosglass
 from rosglass import QoS
-from rosglass.comm import IMMEDIATE, ConnectionState, Executor, GoalStatus
+from rosglass.comm import IMMEDIATE, ConnectionState, GoalStatus
 
 TEXT = "std_msgs/msg/String"
 
@@ -93,24 +94,20 @@ def test_changes_of_the_graph_are_reported(robot, console, topic):
 def test_changes_of_the_graph_are_merged_while_a_callback_waits_for_its_turn(
     robot, console, topic, eventually
 ):
-    class Later(Executor):
-        def post(self, job):
-            jobs.append(job)
-
-    jobs, calls, looks = [], [], []
-    listener = console.on_graph_change(lambda: calls.append(1), Later())
+    later, calls, looks = Manual(), [], []
+    listener = console.on_graph_change(lambda: calls.append(1), later)
     console.on_graph_change(lambda: looks.append(1), IMMEDIATE)
     for number in range(3):
         count = len(looks)
         robot.create_publisher(f"{topic}_{number}", TEXT)
         eventually(lambda count=count: len(looks) > count)
-    assert len(jobs) == 1
-    jobs.pop()()
+    assert len(later.jobs) == 1
+    later.run()
     assert calls == [1]
     robot.create_publisher(f"{topic}_more", TEXT)
-    eventually(lambda: jobs)
+    eventually(lambda: later.jobs)
     listener.close()
-    jobs.pop()()
+    later.run()
     assert calls == [1]
 
 

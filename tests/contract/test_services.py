@@ -9,9 +9,10 @@ from concurrent.futures import Future
 from contextlib import contextmanager
 
 import pytest
+from executors import Failing, Manual
 
 import rosglass
-from rosglass.comm import IMMEDIATE, Dispatcher, Executor
+from rosglass.comm import IMMEDIATE, Dispatcher
 
 TRIGGER = "std_srvs/srv/Trigger"
 
@@ -405,28 +406,21 @@ def test_a_plain_function_that_returns_a_coroutine_is_an_error(offer, client, wi
 
 
 def test_a_server_whose_executor_raises_fails_the_request(offer, client, wire, caplog):
-    class Broken(Executor):
-        def post(self, job):
-            raise RuntimeError("the pool was shut down")
-
-    offer(executor=Broken())
-    with refused(wire, "the pool was shut down"):
+    broken = Failing()
+    broken.failing = True
+    offer(executor=broken)
+    with refused(wire, "cannot schedule new futures"):
         client.call(timeout=patience(wire))
-    assert "the pool was shut down" in caplog.text
+    assert "cannot schedule new futures" in caplog.text
 
 
 def test_executors_of_servers(offer, client, eventually):
-    jobs = []
-
-    class Manual(Executor):
-        def post(self, job):
-            jobs.append(job)
-
-    offer(executor=Manual())
+    executor = Manual()
+    offer(executor=executor)
     call = client.call_async({"a": 1})
-    eventually(lambda: jobs)
+    eventually(lambda: executor.jobs)
     assert not call.done()
-    jobs.pop()()
+    executor.run()
     assert call.result(30).sum == 1
 
 

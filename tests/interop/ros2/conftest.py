@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 from ports import free_port
+from waiting import eventually
 
 import rosglass
 from rosglass.interfaces import (
@@ -50,6 +51,20 @@ def peer_values() -> Any:
 def router() -> Iterator[Router]:
     with Router(f"tcp/127.0.0.1:{free_port()}") as running:
         yield running
+
+
+@pytest.fixture
+def start_router(start: Callable[..., Any], free_port: int) -> Callable[[], Any]:
+    """Start the command `rosglass router`, always on the same port; ``start_router.url``."""
+
+    def start_router() -> Any:
+        address = f"tcp/127.0.0.1:{free_port}"
+        process = start("-m", "rosglass", "router", "--listen", address)
+        eventually(lambda: address in "".join(process.output))
+        return process
+
+    start_router.url = f"zenoh://127.0.0.1:{free_port}"  # type: ignore[attr-defined]
+    return start_router
 
 
 @pytest.fixture

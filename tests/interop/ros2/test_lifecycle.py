@@ -28,20 +28,6 @@ TWIST = "geometry_msgs/msg/Twist"
 RECOVERY = 20.0
 
 
-@pytest.fixture
-def start_router(start, free_port):
-    """Start the command `rosglass router`; always on the same port."""
-
-    def start_router():
-        address = f"tcp/127.0.0.1:{free_port}"
-        process = start("-m", "rosglass", "router", "--listen", address)
-        eventually(lambda: address in "".join(process.output))
-        return process
-
-    start_router.url = f"zenoh://127.0.0.1:{free_port}"
-    return start_router
-
-
 class Receiver:
     """Notes each message's number and when it came."""
 

@@ -27,19 +27,6 @@ IMAGE, STRING = "sensor_msgs/msg/Image", "std_msgs/msg/String"
 RECOVERY = 20.0
 
 
-@pytest.fixture
-def start_router(start, free_port):
-    """Start the command `rosglass router`; always on the same port."""
-
-    def start_router():
-        process = start("-m", "rosglass", "router", "--listen", f"tcp/127.0.0.1:{free_port}")
-        eventually(lambda: "Zenoh router at" in "".join(process.output))
-        return process
-
-    start_router.url = f"zenoh://127.0.0.1:{free_port}"
-    return start_router
-
-
 def test_a_cable_that_is_unplugged_for_ten_seconds(on_two_machines):
     seen = on_two_machines(HERE / "peers" / "two_machines_zenoh.py", "10")
     assert seen["lost"] < 8, "the operator is told soon"

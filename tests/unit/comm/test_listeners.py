@@ -6,22 +6,11 @@ import sys
 import threading
 
 import pytest
+from executors import Manual
 
 import rosglass
-from rosglass.comm import IMMEDIATE, Executor, Listeners
+from rosglass.comm import IMMEDIATE, Listeners
 from rosglass.comm.listeners import ChangeListeners
-
-
-class Manual(Executor):
-    def __init__(self):
-        self.jobs = []
-
-    def post(self, job):
-        self.jobs.append(job)
-
-    def run(self):
-        while self.jobs:
-            self.jobs.pop(0)()
 
 
 @pytest.mark.parametrize(

@@ -1,25 +1,11 @@
 from __future__ import annotations
 
 import pytest
+from executors import Manual
 from receiving import deliver
 
 from rosglass import QoS
-from rosglass.comm import IMMEDIATE, Executor, History, Sample, Subscription
-
-
-class Manual(Executor):
-    """Runs jobs when told to."""
-
-    def __init__(self):
-        self.jobs = []
-
-    def post(self, job):
-        self.jobs.append(job)
-
-    def run(self):
-        jobs, self.jobs = self.jobs, []
-        for job in jobs:
-            job()
+from rosglass.comm import IMMEDIATE, History, Sample, Subscription
 
 
 class FakeType:

@@ -6,8 +6,9 @@ import itertools
 import threading
 
 import pytest
+from executors import Failing
 
-from rosglass.comm import IMMEDIATE, Dispatcher, Executor, GoalStatus, QoS, Time
+from rosglass.comm import IMMEDIATE, Dispatcher, GoalStatus, QoS, Time
 from rosglass.errors import (
     ConnectionLostError,
     ConversionError,
@@ -535,17 +536,6 @@ def test_a_goal_cancelled_while_it_is_decided_on_is_recalled(offer, eventually):
     eventually(lambda: hand.results)
     assert hand.results["a"][0][0] == "RECALLED"
     assert executed == []
-
-
-class Failing(Executor):
-    """Runs each job on a thread of its own, until it fails."""
-
-    failing = False
-
-    def post(self, job):
-        if self.failing:
-            raise RuntimeError("cannot schedule new futures after shutdown")
-        threading.Thread(target=job, daemon=True).start()
 
 
 def test_goals_that_the_executor_does_not_take_end_at_once(offer, eventually):
