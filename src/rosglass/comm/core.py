@@ -9,10 +9,10 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from rosglass.comm.clock import Clock
-from rosglass.comm.executor import Dispatcher, check_plain
-from rosglass.comm.graph import ConnectionState, Status
+from rosglass.comm.executor import Dispatcher
+from rosglass.comm.graph import ConnectionState, GraphView, Status
 from rosglass.comm.listeners import Listeners
-from rosglass.comm.node import Handle, Node
+from rosglass.comm.node import Handle
 from rosglass.comm.timers import Timers, Worker
 from rosglass.errors import NodeClosedError
 
@@ -21,13 +21,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.comm.graph import EndpointInfo, NodeName
-    from rosglass.comm.node import Executor
-    from rosglass.comm.time import Time
     from rosglass.messages import MessageType
     from rosglass.wires.base import Middleware, Writer
 
 __all__ = [
-    "CoreNode",
     "NodeCore",
     "NodeMember",
 ]
@@ -80,7 +77,7 @@ class NodeCore(ABC, Generic[_Member]):
     #: Wire format of the node's messages, ``cdr`` or ``ros1``.
     wire: str
     #: What is seen of the ROS graph.
-    graph: Any
+    graph: GraphView
     #: Finds types.
     types: Any
     #: What moves the bytes; a ROS 1 node has none yet, and no endpoint of its asks for it.
@@ -165,6 +162,26 @@ class NodeCore(ABC, Generic[_Member]):
         return self._state()
 
     @abstractmethod
+    def resolve(self, name: str, kind: str = "topic") -> str:
+        """Return the absolute name of a topic or service, which the user may have remapped.
+
+        Args:
+            name: Absolute, relative or private name.
+            kind: ``topic`` or ``service``: some of ROS 2's rules are for one of them only.
+
+        Raises:
+            InvalidNameError: The name breaks ROS's rules.
+        """
+
+    @abstractmethod
+    def expand(self, name: str) -> str:
+        """Return the absolute name of anything, not remapped; raises InvalidNameError."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Close every member, leave the graph and end the threads; safe to call twice."""
+
+    @abstractmethod
     def runs_here(self) -> bool:
         """Return whether the calling thread is one of the node's own."""
 
@@ -194,39 +211,3 @@ class NodeCore(ABC, Generic[_Member]):
 
 def _ignore(moved: bool, idle: bool) -> None:
     """Follow nothing."""
-
-
-class CoreNode(Node):
-    """A node with a core, which keeps its clock, its status and the changes of the graph."""
-
-    _core: NodeCore[Any]
-
-    @property
-    def clock(self) -> Clock:
-        """The node's clock, which follows ``/clock`` where ROS's parameter says so."""
-        return self._core.clock
-
-    def now(self) -> Time:
-        """Return the time of the node's clock."""
-        return self._core.clock.now()
-
-    def on_graph_change(
-        self, callback: Callable[[], None], executor: Executor | None = None
-    ) -> Handle:
-        """Call `callback` after nodes or endpoints appeared or went; changes may be merged."""
-        self._core.check_open()
-        check_plain(callback, "on_graph_change()")
-        return self._core.graph_listeners.add(
-            lambda _: callback(), executor or self._core.dispatcher
-        )
-
-    def status(self) -> Status:
-        """Return the state of the connection and what is being done about it."""
-        return self._core.status()
-
-    def on_status_change(
-        self, callback: Callable[[Status], None], executor: Executor | None = None
-    ) -> Handle:
-        """Call `callback` with the new status whenever it changes."""
-        self._core.check_open()
-        return self._core.status_listeners.add(callback, executor or self._core.dispatcher)

@@ -6,7 +6,7 @@ import threading
 from collections import Counter
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from rosglass.comm.names import action_of, hidden, is_valid_node, is_valid_topic
 from rosglass.comm.qos import QoS
@@ -104,6 +104,25 @@ class Status:
 
 _TOPICS = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
 _SERVICES = (EndpointKind.SERVICE_SERVER, EndpointKind.SERVICE_CLIENT)
+
+
+class GraphView(Protocol):
+    """What a node shows of the ROS graph, whoever keeps it."""
+
+    def topics(self) -> dict[str, list[str]]:
+        """Return every topic with the types announced for it."""
+
+    def nodes(self) -> list[NodeName]:
+        """Return every node, sorted."""
+
+    def invalid_names(self) -> list[str]:
+        """Return what is left out; see :meth:`rosglass.comm.Node.invalid_names`."""
+
+    def endpoints(self, kind: EndpointKind, name: str) -> list[EndpointInfo]:
+        """Return the endpoints of a kind at a topic or service."""
+
+    def endpoints_of(self, node: NodeName) -> list[EndpointInfo]:
+        """Return the endpoints of a node."""
 
 
 class Graph:

@@ -17,7 +17,7 @@ from rosglass.comm.events import (
     conflicts,
     words,
 )
-from rosglass.comm.graph import EndpointInfo, EndpointKind
+from rosglass.comm.graph import EndpointInfo, EndpointKind, Graph
 from rosglass.comm.names import similar
 from rosglass.comm.node import Handle
 from rosglass.comm.qos import Liveliness
@@ -88,8 +88,10 @@ class Publisher(Handle):
             core.local_gids.add(self._writer.gid)
         core.add(self, self._follow)
         core.wake()
-        if self._writer.subscribers() is None:
-            core.graph.watch(topic, self._on_endpoint_removed)
+        # A wire that does not know its subscribers has a graph that tells who leaves.
+        graph = core.graph if self._writer.subscribers() is None else None
+        if isinstance(graph, Graph):
+            graph.watch(topic, self._on_endpoint_removed)
             self._writer.match(self._matching(self._subscriptions()))
 
     def __repr__(self) -> str:
@@ -248,8 +250,9 @@ class Publisher(Handle):
         self._events.clear()
         if self._process != os.getpid():
             return
-        if self._writer.subscribers() is None:
-            self._core.graph.unwatch(self.topic, self._on_endpoint_removed)
+        graph = self._core.graph if self._writer.subscribers() is None else None
+        if isinstance(graph, Graph):
+            graph.unwatch(self.topic, self._on_endpoint_removed)
         self._writer.close()
         self._core.local_gids.discard(self._writer.gid)
         self._core.remove(self)

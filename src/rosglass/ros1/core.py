@@ -37,7 +37,7 @@ class Core(TcprosCore):
         super().__init__(name, url, options, AnnouncedTypes(library, url))
         self._new_names = options.arguments.remappings(name.name, name.namespace)
 
-    def resolve(self, name: str) -> str:
+    def resolve(self, name: str, kind: str = "topic") -> str:  # noqa: ARG002 - one rule for all
         """Return the absolute name of a topic, service or parameter, which may be remapped.
 
         Raises:

@@ -6,24 +6,20 @@ import logging
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import (
-    EndpointKind,
     History,
     NodeName,
-    Publisher,
     QoS,
     Subscription,
 )
 from rosglass.comm.builtin_services import BuiltinServices
-from rosglass.comm.core import CoreNode
+from rosglass.comm.graph_node import GraphNode
 from rosglass.comm.node import check_flag, check_may_wait
 from rosglass.comm.promise import check_timeout
-from rosglass.comm.qos import check_profile
 from rosglass.comm.rclpy_names import check_order
-from rosglass.comm.subscription_feed import find_subscribed_type
 from rosglass.errors import InvalidNameError
 from rosglass.ros1.actionlib_types import actions
 from rosglass.ros1.core import Core
-from rosglass.ros1.names import absolute_namespace, split, validate_node_name
+from rosglass.ros1.names import absolute_namespace, validate_node_name
 from rosglass.ros1.parameter_server import ParameterServer
 from rosglass.ros1.roscpp_services import RoscppServices
 from rosglass.ros1.services import Services
@@ -38,12 +34,10 @@ if TYPE_CHECKING:
         Executor,
         ParameterClient,
         Promise,
-        Sample,
         ServerGoal,
         ServiceClient,
         ServiceServer,
     )
-    from rosglass.comm.log import NodeLogger
     from rosglass.comm.node import Result
     from rosglass.interfaces import Library
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
@@ -56,7 +50,7 @@ __all__ = ["Ros1Node"]
 _log = logging.getLogger("rosglass.ros1")
 
 
-class Ros1Node(CoreNode):
+class Ros1Node(GraphNode):
     """A node of a ROS 1 graph.
 
     Args:
@@ -76,6 +70,7 @@ class Ros1Node(CoreNode):
 
     wire = "ros1"
     _core: Core
+    _builtin_services: BuiltinServices[Ros1Parameters]
 
     def __init__(
         self,
@@ -104,43 +99,17 @@ class Ros1Node(CoreNode):
 
     # -- topics ----------------------------------------------------------------------------------
 
-    def create_publisher(
-        self, topic: str, type: str | MessageType, qos: QoS | int = 10
-    ) -> Publisher:
-        """Announce `topic`; see :meth:`rosglass.comm.Node.create_publisher`."""
-        self._core.check_open()
-        check_order("create_publisher", topic, type)
-        full = self.resolve(topic)
-        return Publisher(self._core, full, self._core.types.message(type), _profile(qos, full))
-
-    def create_subscription(
-        self,
-        topic: str,
-        type: str | MessageType | None = None,
-        callback: Callable[[Message], None] | None = None,
-        qos: QoS | int = 10,
-        *,
-        raw_callback: Callable[[Sample], None] | None = None,
-        executor: Executor | None = None,
-        ignore_local: bool = False,
-    ) -> Subscription:
-        """Subscribe to `topic`; see :meth:`rosglass.comm.Node.create_subscription`."""
-        self._core.check_open()
-        check_order("create_subscription", topic, type)
-        full = self.resolve(topic)
-        check_flag(ignore_local, "ignore_local", full)
-        kind = find_subscribed_type(self._core, full, type)
-        subscription = Subscription(
-            full,
-            kind,
-            _profile(qos, full),
-            executor or self._core.dispatcher,
-            callback,
-            raw_callback,
-        )
-        asked = type if kind is None and isinstance(type, str) else ""
+    def _receive(
+        self, subscription: Subscription, type: str | MessageType | None, ignore_local: bool
+    ) -> None:
+        """Let a new subscription find its publishers."""
+        asked = type if subscription.type is None and isinstance(type, str) else ""
         self._topics.subscribe(subscription, ignore_local, asked)
-        return subscription
+
+    def _profile(self, qos: QoS | int, place: str) -> QoS:
+        if type(qos) is int and qos == 0:
+            return QoS(history=History.KEEP_ALL)  # as roscpp and rospy have it
+        return super()._profile(qos, place)
 
     # -- services --------------------------------------------------------------------------------
 
@@ -234,7 +203,7 @@ class Ros1Node(CoreNode):
         """Return every action in the graph with its type."""
         return actions(self._core.graph)
 
-    # -- parameters and the log ------------------------------------------------------------------
+    # -- parameters ------------------------------------------------------------------
 
     @property
     def parameters(self) -> Ros1Parameters:
@@ -262,11 +231,6 @@ class Ros1Node(CoreNode):
         full = self._node_name(node)
         return ParameterClient(RemoteNamespace(self._core, self._parameter_server, full))
 
-    @property
-    def logger(self) -> NodeLogger:
-        """The node's logger, whose messages go to ``/rosout``, too."""
-        return self._builtin_services.log.logger
-
     # -- the node's names ------------------------------------------------------------------------
 
     @property
@@ -281,24 +245,16 @@ class Ros1Node(CoreNode):
 
     def resolve(self, name: str) -> str:
         """Return the absolute name of a topic or service; raises InvalidNameError."""
-        full = self._core.resolve(name)
+        full = super().resolve(name)
         if full == "/":
             raise InvalidNameError(f"{name!r} is a namespace; write a topic's or service's name")
         return full
 
     # -- the graph -------------------------------------------------------------------------------
 
-    def topics(self) -> dict[str, list[str]]:
-        """Return every topic in the graph with its type."""
-        return self._core.graph.topics()
-
     def nodes(self) -> list[NodeName]:
         """Return every node in the graph, this one included, sorted."""
-        return sorted({*self._core.graph.nodes(), self._core.name})
-
-    def invalid_names(self) -> list[str]:
-        """Return what is left out of the graph; see :meth:`rosglass.comm.Node.invalid_names`."""
-        return self._core.graph.invalid_names()
+        return sorted({*super().nodes(), self._core.name})
 
     def services(self) -> dict[str, list[str]]:
         """Return every service in the graph with its type.
@@ -347,40 +303,13 @@ class Ros1Node(CoreNode):
         owner = "" if node is None else self._node_name(node)
         return fetch(self._core, self._topics, self._services, name, hash, owner, timeout)
 
-    def subscriptions(self, topic: str) -> list[EndpointInfo]:
-        """Return the subscribers of a topic."""
-        return self._core.graph.endpoints(EndpointKind.SUBSCRIPTION, self.resolve(topic))
-
     def service_servers(self, name: str) -> list[EndpointInfo]:
         """Return the server of a service, with its type once it has told it."""
-        found = self._core.graph.endpoints(EndpointKind.SERVICE_SERVER, self.resolve(name))
-        return self._services.described(found)
-
-    def service_clients(self, name: str) -> list[EndpointInfo]:
-        """Return nobody: ROS 1 does not register clients."""
-        return self._core.graph.endpoints(EndpointKind.SERVICE_CLIENT, self.resolve(name))
+        return self._services.described(super().service_servers(name))
 
     def endpoints(self, node: str | NodeName) -> list[EndpointInfo]:
         """Return what a node publishes, subscribes and serves; none when it is unknown."""
-        name = NodeName(*split(self._node_name(node)))
-        return self._services.described(self._core.graph.endpoints_of(name))
-
-    def close(self) -> None:
-        """Leave the graph, close everything created from the node and end its threads.
-
-        Safe to call twice, from any thread and from callbacks.
-        """
-        self._core.close()
-
-    def _node_name(self, node: str | NodeName) -> str:
-        """Return a node's full name; raises InvalidNameError."""
-        return node.full if isinstance(node, NodeName) else self._core.expand(node)
+        return self._services.described(super().endpoints(node))
 
     def _topic_names(self) -> list[str]:
         return sorted({*self._topics.published(), *self._topics.subscribed()})
-
-
-def _profile(qos: QoS | int, place: str) -> QoS:
-    if type(qos) is int and qos == 0:
-        return QoS(history=History.KEEP_ALL)  # as roscpp and rospy have it
-    return check_profile(qos, place)

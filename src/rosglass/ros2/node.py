@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rosglass.comm import EndpointKind, NodeName, Publisher, QoS, Subscription
+from rosglass.comm import NodeName, QoS, Subscription
 from rosglass.comm.builtin_services import BuiltinServices
-from rosglass.comm.core import CoreNode
+from rosglass.comm.graph_node import GraphNode
 from rosglass.comm.names import validate_namespace, validate_node_name
-from rosglass.comm.node import check_flag
 from rosglass.comm.qos import check_profile
 from rosglass.comm.rclpy_names import check_order
-from rosglass.comm.subscription_feed import SubscriptionFeed, find_subscribed_type
+from rosglass.comm.subscription_feed import SubscriptionFeed
 from rosglass.ros2.core import Core
 from rosglass.ros2.graph_matching import GraphMatching
 from rosglass.ros2.rcl_services import RclServices
@@ -27,17 +26,14 @@ if TYPE_CHECKING:
         ActionClient,
         ActionServer,
         Answer,
-        EndpointInfo,
         Executor,
         LifecycleClient,
         ParameterClient,
         Promise,
-        Sample,
         ServerGoal,
         ServiceClient,
         ServiceServer,
     )
-    from rosglass.comm.log import NodeLogger
     from rosglass.comm.node import Result
     from rosglass.interfaces import Library
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
@@ -48,7 +44,7 @@ if TYPE_CHECKING:
 __all__ = ["Ros2Node"]
 
 
-class Ros2Node(CoreNode):
+class Ros2Node(GraphNode):
     """A ROS 2 node; made by :func:`rosglass.connect`.
 
     Args:
@@ -69,6 +65,7 @@ class Ros2Node(CoreNode):
     """
 
     _core: Core
+    _builtin_services: BuiltinServices[Ros2Parameters]
 
     def __init__(
         self,
@@ -90,44 +87,13 @@ class Ros2Node(CoreNode):
         self._builtin_services = BuiltinServices(self._core, RclServices(self, self._core))
         self._builtin_services.open(own_services)
 
-    def create_publisher(
-        self, topic: str, type: str | MessageType, qos: QoS | int = 10
-    ) -> Publisher:
-        """Announce `topic`; see :meth:`rosglass.comm.Node.create_publisher`."""
-        self._core.check_open()
-        check_order("create_publisher", topic, type)
-        self._core.types.ensure(type)
-        full = self.resolve(topic)
-        return Publisher(self._core, full, self._core.types.message(type), check_profile(qos, full))
-
-    def create_subscription(
-        self,
-        topic: str,
-        type: str | MessageType | None = None,
-        callback: Callable[[Message], None] | None = None,
-        qos: QoS | int = 10,
-        *,
-        raw_callback: Callable[[Sample], None] | None = None,
-        executor: Executor | None = None,
-        ignore_local: bool = False,
-    ) -> Subscription:
-        """Subscribe to `topic`; see :meth:`rosglass.comm.Node.create_subscription`."""
-        self._core.check_open()
-        check_order("create_subscription", topic, type)
-        full = self.resolve(topic)
-        check_flag(ignore_local, "ignore_local", full)
-        subscription = Subscription(
-            full,
-            find_subscribed_type(self._core, full, type),
-            check_profile(qos, full),
-            executor or self._core.dispatcher,
-            callback,
-            raw_callback,
-        )
+    def _receive(
+        self, subscription: Subscription, type: str | MessageType | None, ignore_local: bool
+    ) -> None:
+        """Let a new subscription find its publishers."""
         ignored = self._core.local_gids if ignore_local else frozenset[bytes]()
         matching = GraphMatching(self._core, type, ignored)
         self._core.add(SubscriptionFeed(self._core, subscription, matching, ignored))
-        return subscription
 
     def create_service_client(
         self, name: str, type: str | ServiceType | None = None, qos: QoS | None = None
@@ -208,11 +174,6 @@ class Ros2Node(CoreNode):
         self._core.check_open()
         return Ros2LifecycleClient(self, self._node_name(node))
 
-    @property
-    def logger(self) -> NodeLogger:
-        """The node's logger, whose messages go to ``/rosout``, too."""
-        return self._builtin_services.log.logger
-
     def fetch_type_async(
         self,
         name: str,
@@ -226,33 +187,13 @@ class Ros2Node(CoreNode):
         owner = "" if node is None else self._node_name(node)
         return self._fetcher.fetch(name, hash=hash, node=owner, timeout=timeout)
 
-    def topics(self) -> dict[str, list[str]]:
-        """Return every topic in the graph with the types announced for it."""
-        return self._core.graph.topics()
-
-    def nodes(self) -> list[NodeName]:
-        """Return every node in the graph, this one included, sorted."""
-        return self._core.graph.nodes()
-
     def duplicate_nodes(self) -> dict[str, int]:
         """Return the full names that several nodes bear, and how many do."""
         return self._core.graph.duplicate_nodes()
 
-    def publishers(self, topic: str) -> list[EndpointInfo]:
-        """Return the publishers of a topic."""
-        return self._core.graph.endpoints(EndpointKind.PUBLISHER, self.resolve(topic))
-
-    def subscriptions(self, topic: str) -> list[EndpointInfo]:
-        """Return the subscriptions of a topic."""
-        return self._core.graph.endpoints(EndpointKind.SUBSCRIPTION, self.resolve(topic))
-
     def unnamed_programs(self) -> int:
         """Return how many; see :meth:`rosglass.comm.Node.unnamed_programs`."""
         return self._core.middleware.unnamed()
-
-    def invalid_names(self) -> list[str]:
-        """Return what is left out of the graph; see :meth:`rosglass.comm.Node.invalid_names`."""
-        return self._core.graph.invalid_names()
 
     def services(self) -> dict[str, list[str]]:
         """Return every service that is offered or called, with the types announced for it."""
@@ -261,35 +202,6 @@ class Ros2Node(CoreNode):
     def actions(self) -> dict[str, list[str]]:
         """Return every action in the graph with the types announced for it."""
         return self._core.graph.actions()
-
-    def service_servers(self, name: str) -> list[EndpointInfo]:
-        """Return the servers of a service."""
-        full = self._core.resolve(name, "service")
-        return self._core.graph.endpoints(EndpointKind.SERVICE_SERVER, full)
-
-    def service_clients(self, name: str) -> list[EndpointInfo]:
-        """Return the clients of a service."""
-        full = self._core.resolve(name, "service")
-        return self._core.graph.endpoints(EndpointKind.SERVICE_CLIENT, full)
-
-    def endpoints(self, node: str | NodeName) -> list[EndpointInfo]:
-        """Return what a node publishes, subscribes, serves and calls; none when it is unknown."""
-        namespace, _, name = self._node_name(node).rpartition("/")
-        return self._core.graph.endpoints_of(NodeName(namespace or "/", name))
-
-    def resolve(self, name: str) -> str:
-        """Return the absolute name of a topic or service; raises InvalidNameError."""
-        return self._core.resolve(name)
-
-    def close(self) -> None:
-        """Leave the graph, close everything created from the node and end its threads.
-
-        Safe to call twice, from any thread and from callbacks.
-        """
-        self._core.close()
-
-    def _node_name(self, node: str | NodeName) -> str:
-        return node.full if isinstance(node, NodeName) else self._core.expand(node)
 
 
 def _service_profile(qos: QoS | None, place: str) -> QoS:
