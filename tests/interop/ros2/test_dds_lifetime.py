@@ -35,7 +35,7 @@ def program(text: str, domain: int) -> subprocess.Popen[str]:
 
 
 def grown(once: str, times: int, domain: int) -> tuple[int, int, int]:
-    """How many threads, files and kilobytes a program gains in five rounds of `once`, after one.
+    """How many threads, files and kilobytes a program gains in five rounds of `once`, after two: they warm up.
 
     In a process of its own: Zenoh's threads, which earlier tests leave in this one, come and go.
     """
@@ -46,7 +46,7 @@ from pathlib import Path
 def once():
 {textwrap.indent(textwrap.dedent(once), "    ")}
 
-for _ in range(6):
+for _ in range(7):
     for _ in range({times}):
         once()
     gc.collect()
@@ -58,7 +58,7 @@ for _ in range(6):
     told, _ = process.communicate(timeout=240)
     assert process.returncode == 0, told
     counts = [line.split() for line in told.splitlines() if line[0].isdecimal()]
-    first, *_, last = [[int(number) for number in count] for count in counts]
+    _, first, *_, last = [[int(number) for number in count] for count in counts]
     threads, files, memory = (after - before for before, after in zip(first, last, strict=True))
     return threads, files, memory
 
