@@ -20,9 +20,9 @@ from rosglass.comm import (
     Range,
     SetResult,
 )
+from rosglass.comm.other_node import OtherNode
 from rosglass.comm.parameters import RemoteParameters
 from rosglass.errors import NodeClosedError, ParameterError
-from rosglass.ros2.other_node import OtherNode
 from rosglass.ros2.parameters import NOT_SET, TypedValue, check_name, typed
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rosglass.comm.silence import Silence
+from rosglass.wires.tcpros.topic_subscription import Silence
 
 
 def look(silence: Silence, counts: list[int], start: float = 0.0) -> list[str]:

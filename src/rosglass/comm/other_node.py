@@ -5,14 +5,17 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import Handle
+from rosglass.comm.node import Handle
 from rosglass.errors import NodeClosedError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from rosglass.comm import Executor, Node, QoS, ServiceClient, Subscription
+    from rosglass.comm.node import Executor, Node
     from rosglass.comm.promise import Deadline
+    from rosglass.comm.qos import QoS
+    from rosglass.comm.service_client import ServiceClient
+    from rosglass.comm.subscription import Subscription
     from rosglass.messages import Message
 
 __all__ = ["OtherNode"]
