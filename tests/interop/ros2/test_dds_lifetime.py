@@ -35,7 +35,7 @@ def program(text: str, domain: int) -> subprocess.Popen[str]:
 
 
 def grown(once: str, times: int, domain: int) -> tuple[int, int, int]:
-    """How many threads, files and kilobytes a program gains in five rounds of `once`, after two: they warm up.
+    """How much a program gains in five rounds of `once`, after two: threads, files and kilobytes.
 
     In a process of its own: Zenoh's threads, which earlier tests leave in this one, come and go.
     """
