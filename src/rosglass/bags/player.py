@@ -11,7 +11,6 @@ from enum import Enum
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from rosglass.bags.played_time import PlayedTime
 from rosglass.comm import Durability, Handle, QoS
 from rosglass.errors import BagError, Error, NodeClosedError
 
@@ -22,6 +21,45 @@ if TYPE_CHECKING:
     from rosglass.comm import Node, Publisher
 
 __all__ = ["Player", "PlayerState", "PlayerStatus"]
+
+
+class PlayedTime:
+    """Seconds by which ages are told; none pass while a recording stands still.
+
+    They never run back, so that nothing old becomes new: to go to another place of the recording
+    makes what is shown older by the distance. Methods may be called in any thread.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._value, self._since, self._speed = 0.0, time.monotonic(), 0.0
+
+    def run(self, rate: float) -> None:
+        """Pass at a recording's rate from now on, 0 for not at all.
+
+        Never faster than for the operator: at ten times the speed, what is shown once per second
+        would look ten seconds old.
+        """
+        with self._lock:
+            self._settle()
+            self._speed = min(rate, 1.0)
+
+    def jump(self, seconds: float) -> None:
+        """Pass by the distance to another place, in either direction."""
+        with self._lock:
+            self._value += abs(seconds)
+
+    def now(self) -> float:
+        """Return the seconds since the beginning."""
+        with self._lock:
+            self._settle()
+            return self._value
+
+    def _settle(self) -> None:
+        now = time.monotonic()
+        self._value += (now - self._since) * self._speed
+        self._since = now
+
 
 _log = logging.getLogger("rosglass.bags")
 _NS = 1_000_000_000

@@ -13,34 +13,261 @@ from time import monotonic
 from typing import TYPE_CHECKING
 
 from rosglass.comm.complaints import Complaints
-from rosglass.comm.executor import IMMEDIATE
+from rosglass.comm.executor import IMMEDIATE, check_plain
+from rosglass.comm.listeners import Listeners
 from rosglass.comm.names import similar
-from rosglass.comm.node import Handle
-from rosglass.comm.promise import check_timeout
+from rosglass.comm.node import Executor, Handle, check_may_wait
+from rosglass.comm.promise import Promise, check_timeout
 from rosglass.comm.time import Duration, Time
+from rosglass.comm.timers import Timers
 from rosglass.errors import (
     ArgumentError,
     InvalidArgumentException,
     LookupException,
+    NodeClosedError,
     TimeoutException,
     TransformException,
 )
-from rosglass.tf.arguments import check_name, nanoseconds_of
-from rosglass.tf.changes import Changes
 from rosglass.tf.frames import FrameInfo, FrameTree
 from rosglass.tf.store import FrameStore
 from rosglass.tf.transform import Transform
-from rosglass.tf.waiting import Waiting, check_may_wait_for
 from rosglass.tf.walk import common_time, links_between, look_up
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
+    from collections.abc import Set as AbstractSet
 
-    from rosglass.comm.node import Executor
-    from rosglass.comm.promise import Promise
     from rosglass.tf.cache import Entry
 
 __all__ = ["TransformBuffer", "Transformable"]
+
+
+def check_name(name: object, what: str) -> None:
+    """Raise InvalidArgumentException unless `name` can be that of a frame."""
+    if not isinstance(name, str) or not name:
+        raise InvalidArgumentException(f"{what}: expected the name of a frame, got {name!r}")
+    if name[0] == "/":
+        raise InvalidArgumentException(
+            f"\"{name}\" passed as {what} is not valid: in tf2 frame_ids cannot start with a '/'; "
+            f"use '{name.lstrip('/')}'"
+        )
+
+
+def nanoseconds_of(time: Time | None, what: str) -> int:
+    """Return a time, 0 for the newest; raises InvalidArgumentException."""
+    if time is None:
+        return 0
+    if not isinstance(time, Time):
+        raise InvalidArgumentException(
+            f"{what}: expected a rosglass.Time, or None for the newest, got {time!r}"
+        )
+    return time.nanoseconds
+
+
+class Changes:
+    """Who wants to know of a buffer's changes.
+
+    Args:
+        links: Returns the frames whose transforms connect a target and a source; None when
+            nothing does.
+    """
+
+    def __init__(self, links: Callable[[str, str], frozenset[str] | None]) -> None:
+        self._links = links
+        self._lock = threading.Lock()
+        self._pairs: list[_Pair] = []
+        self._any: Listeners[None] = Listeners(merge=True, where="transforms")
+        self._tree: Listeners[None] = Listeners(merge=True, where="the tree of frames")
+
+    def on_any(self, callback: Callable[[], None], executor: Executor) -> Handle:
+        """Call back after any transform came."""
+        return self._any.add(_ignoring(callback), executor)
+
+    def on_tree(self, callback: Callable[[], None], executor: Executor) -> Handle:
+        """Call back after the tree changed."""
+        return self._tree.add(_ignoring(callback), executor)
+
+    def on_pair(
+        self, target: str, source: str, callback: Callable[[], None], executor: Executor
+    ) -> Handle:
+        """Call back after a transform came that lies between two frames."""
+        pair = _Pair(self, target, source)
+        pair.listeners.add(_ignoring(callback), executor)
+        pair.links = self._links(target, source)
+        with self._lock:
+            self._pairs.append(pair)
+        # What connected them meanwhile was not told.
+        pair.links = self._links(target, source)
+        return pair
+
+    def tell(self, changed: AbstractSet[str], tree: bool) -> None:
+        """Tell everybody; from any thread, without a lock held.
+
+        Args:
+            changed: The frames that a transform came for.
+            tree: Whether frames came, went, or have another parent.
+        """
+        self._any.notify(None)
+        if tree:
+            self._tree.notify(None)
+        if not self._pairs:
+            return
+        with self._lock:
+            pairs = list(self._pairs)
+        for pair in pairs:
+            before = pair.links
+            if tree:
+                pair.links = self._links(pair.target, pair.source)
+            if before != pair.links or (before is not None and not changed.isdisjoint(before)):
+                pair.listeners.notify(None)
+
+    def forget(self, pair: _Pair) -> None:
+        """Let go of who wants to know no more."""
+        with self._lock:
+            if pair in self._pairs:
+                self._pairs.remove(pair)
+
+
+class _Pair(Handle):
+    def __init__(self, owner: Changes, target: str, source: str) -> None:
+        self._owner = owner
+        self.target, self.source = target, source
+        self.listeners: Listeners[None] = Listeners(merge=True, where=f"{target} <- {source}")
+        self.links: frozenset[str] | None = None
+
+    def close(self) -> None:
+        self._owner.forget(self)
+        self.listeners.clear()
+
+
+def _ignoring(callback: Callable[[], None]) -> Callable[[None], None]:
+    check_plain(callback, "transforms")
+    return lambda _: callback()
+
+
+class Waiting:
+    """The lookups of a buffer that wait."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._requests: list[_Request] = []
+        self._timers: Timers | None = None
+        self._closed = False
+
+    def __bool__(self) -> bool:
+        return bool(self._requests)
+
+    def add(
+        self, what: str, query: Callable[[], Transform], timeout: float | None
+    ) -> Promise[Transform]:
+        """Return the promise of what `query` returns, as soon as it does not fail any more.
+
+        Args:
+            what: What is looked up.
+            query: Looks it up.
+            timeout: Seconds; None for ever.
+
+        Raises:
+            ConversionError: The timeout is no number of seconds.
+            InvalidArgumentException: Waiting cannot help.
+            NodeClosedError: The buffer is closed.
+        """
+        timeout = check_timeout(timeout, what)
+        request = _Request(what, query)
+        with self._lock:
+            if self._closed:
+                raise NodeClosedError(f"{what}: the transform buffer is closed")
+            self._requests.append(request)
+        if request.attempt():
+            self._forget(request)
+            error = request.promise.exception(0)
+            if error is not None:
+                raise error
+            return request.promise
+        request.promise.add_done_callback(lambda _: self._forget(request))
+        if timeout is not None:
+            with self._lock:
+                if self._timers is None:
+                    self._timers = Timers("rosglass tf timeouts")
+                timers = self._timers
+            request.timer = timers.after(timeout, lambda: request.expire(timeout))
+            if request.promise.done():
+                request.timer.close()
+        return request.promise
+
+    def test(self) -> None:
+        """Try all again: something came. Without a lock held."""
+        with self._lock:
+            requests = list(self._requests)
+        for request in requests:
+            request.attempt()
+
+    def close(self) -> None:
+        """Fail all that wait; safe to call twice."""
+        with self._lock:
+            self._closed = True
+            requests, self._requests = self._requests, []
+            timers, self._timers = self._timers, None
+        if timers is not None:
+            timers.close()
+        for request in requests:
+            request.promise.fail(
+                NodeClosedError(f"{request.what}: the transform buffer was closed meanwhile")
+            )
+
+    def _forget(self, request: _Request) -> None:
+        with self._lock:
+            if request in self._requests:
+                self._requests.remove(request)
+        if request.timer is not None:
+            request.timer.close()
+
+
+class _Request:
+    def __init__(self, what: str, query: Callable[[], Transform]) -> None:
+        self.what, self._query = what, query
+        self.promise: Promise[Transform] = Promise(f"{what} is not available", cancellable=True)
+        self.timer: Handle | None = None
+        self._reason: TransformException | None = None
+
+    def attempt(self) -> bool:
+        """Look it up; returns whether it was there, or never will be."""
+        try:
+            found = self._query()
+        except InvalidArgumentException as error:
+            self.promise.fail(error)
+            return True
+        except TransformException as error:
+            self._reason = error
+            return False
+        self.promise.fulfil(found)
+        return True
+
+    def expire(self, timeout: float) -> None:
+        """Give up."""
+        error = TimeoutException(
+            f"{self.what} is not available within {timeout:g} s: {self._reason}"
+        )
+        error.__cause__ = self._reason
+        self.promise.fail(error)
+
+
+def check_may_wait_for(promise: Promise[Transform], what: str) -> None:
+    """Cancel a promise that the calling thread must not wait for.
+
+    Args:
+        promise: Of a transform.
+        what: What is looked up.
+
+    Raises:
+        UnsupportedError: This is a thread that receives transforms.
+    """
+    try:
+        check_may_wait(what)
+    except Exception:
+        promise.cancel()
+        raise
+
 
 _log = logging.getLogger("rosglass.tf")
 
