@@ -130,6 +130,7 @@ def test_a_closed_node_does_nothing_more(connect, topic):
     node.on_status_change(lambda status: states.append(status.state), IMMEDIATE)
     node.close()
     node.close()
+    assert node.nodes() == []
     assert node.status().state is ConnectionState.CLOSED
     assert states[-1:] == [ConnectionState.CLOSED]
     assert subscription.closed

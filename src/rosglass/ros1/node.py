@@ -254,7 +254,8 @@ class Ros1Node(GraphNode):
 
     def nodes(self) -> list[NodeName]:
         """Return every node in the graph, this one included, sorted."""
-        return sorted({*super().nodes(), self._core.name})
+        own = () if self._core.closed else (self._core.name,)
+        return sorted({*super().nodes(), *own})
 
     def services(self) -> dict[str, list[str]]:
         """Return every service in the graph with its type.
