@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -59,6 +60,22 @@ def test_a_declared_parameter_is_read_set_described_and_forgotten(own):
     assert speed not in parameters
     with pytest.raises(ParameterError):
         parameters.get(speed)
+
+
+def test_of_several_threads_that_declare_a_parameter_one_succeeds(own):
+    described = ParameterDescriptor(description="In m/s.")
+
+    def declare(name):
+        try:
+            return own.all.declare(name, 1.5, described)
+        except ParameterError as error:
+            return str(error)
+
+    with ThreadPoolExecutor(4) as pool:
+        for number in range(5):
+            results = list(pool.map(declare, [own.name(f"speed{number}")] * 4))
+            assert results.count(1.5) == 1
+            assert sum("is declared already" in str(result) for result in results) == 3
 
 
 @pytest.mark.parametrize(

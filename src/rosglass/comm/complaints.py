@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import threading
 import time
 from typing import TYPE_CHECKING
 
@@ -26,16 +25,15 @@ class Complaints:
 
     def __init__(self, most: int = 100) -> None:
         self._most = most
-        self._lock = threading.Lock()
-        self._made: set[Hashable] = set()
+        #: Each with the call that made it: of two threads that complain, one is the first.
+        self._made: dict[Hashable, object] = {}
 
     def fresh(self, about: Hashable) -> bool:
         """Return whether to complain about something, and remember it."""
-        with self._lock:
-            if about in self._made or len(self._made) >= self._most:
-                return False
-            self._made.add(about)
-            return True
+        if about in self._made or len(self._made) >= self._most:
+            return False
+        mine = object()
+        return self._made.setdefault(about, mine) is mine
 
 
 class FailureLog:

@@ -6,7 +6,6 @@ The kinds of events are rmw's (``rmw/events_statuses``), and DDS's behind them (
 
 from __future__ import annotations
 
-import threading
 from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Generic, TypeVar
@@ -144,8 +143,8 @@ class Appearances(Generic[_E]):
     """
 
     def __init__(self, where: str = "") -> None:
-        self._lock = threading.Lock()
         self._listeners: Listeners[_E] = Listeners(where=where)
+        #: Any thread adds; every use is atomic.
         self._known: dict[Listener[_E], _Known] = {}
 
     def __bool__(self) -> bool:
@@ -154,8 +153,7 @@ class Appearances(Generic[_E]):
     def add(self, callback: Callable[[_E], None], executor: Executor) -> Handle:
         """Tell `callback` from the next :meth:`update` on, until the handle is closed."""
         listener = self._listeners.add(callback, executor)
-        with self._lock:
-            self._known[listener] = _Known()
+        self._known[listener] = _Known()
         return listener
 
     def update(
@@ -187,15 +185,15 @@ class Appearances(Generic[_E]):
         endpoints: Iterable[EndpointInfo],
         event: Callable[[EndpointInfo, int, int, int], _E | None],
     ) -> None:
-        with self._lock:
-            for listener in [one for one in self._known if one.closed]:
-                del self._known[listener]
-            listeners = list(self._known.items())
+        listeners = self._known.copy()
+        for listener in [one for one in listeners if one.closed]:
+            del listeners[listener]
+            self._known.pop(listener, None)
         if not listeners:
             return
         found = [(endpoint.gid or endpoint, endpoint) for endpoint in endpoints]
         now: Counter[Hashable] = Counter(key for key, _ in found)
-        for listener, known in listeners:
+        for listener, known in listeners.items():
             known.endpoints.update(found)
             for change, key in (
                 *((-1, gone) for gone in (known.there - now).elements()),
@@ -212,8 +210,7 @@ class Appearances(Generic[_E]):
     def clear(self) -> None:
         """Forget everyone."""
         self._listeners.clear()
-        with self._lock:
-            self._known.clear()
+        self._known.clear()
 
 
 class SubscriptionEvents:

@@ -83,8 +83,9 @@ class Subscription(Handle):
         self._qos, self._type, self._executor = qos, message_type, executor
         self._called = callback is not None or raw_callback is not None
         self._decodes = callback is not None and raw_callback is None
-        self._watchers = threading.Lock()
-        self._waiting, self._watched_at = 0, -math.inf
+        #: An item for each thread or task that waits for a sample.
+        self._waiting: list[None] = []
+        self._watched_at = -math.inf
         self._patient = False
         self._problem = self._logged = ""
         call = raw_callback
@@ -161,7 +162,7 @@ class Subscription(Handle):
         """
         left = check_timeout(timeout, f"{self.topic}: wait()")
         deadline = math.inf if left is None else time.monotonic() + left
-        self._watch(1)
+        self._watch()
         try:
             while True:
                 sample = self.take()
@@ -175,7 +176,7 @@ class Subscription(Handle):
                     ready.acquire(timeout=min(remaining, _SLICE))
                     self._inbox.dismiss(ready.release)
         finally:
-            self._watch(-1)
+            self._unwatch()
 
     def __iter__(self) -> Iterator[Sample]:
         while (sample := self.wait()) is not None:
@@ -191,7 +192,7 @@ class Subscription(Handle):
             with suppress(RuntimeError):  # the loop has ended
                 loop.call_soon_threadsafe(arrived.set)
 
-        self._watch(1)
+        self._watch()
         try:
             while True:
                 sample = self.take()
@@ -204,7 +205,7 @@ class Subscription(Handle):
                     arrived.clear()
         finally:
             self._inbox.dismiss(wake)
-            self._watch(-1)
+            self._unwatch()
 
     @property
     def patient(self) -> bool:
@@ -336,7 +337,7 @@ class Subscription(Handle):
     def _watched(self) -> bool:
         """Whether samples are waited for, to be taken or called back with, or were just now."""
         recent = time.monotonic() - self._watched_at < _MEMORY
-        return (self._called and not self._patient) or self._waiting > 0 or recent
+        return (self._called and not self._patient) or bool(self._waiting) or recent
 
     def _set_problem(
         self, problem: str, level: int = logging.WARNING, logged: str | None = None
@@ -361,12 +362,14 @@ class Subscription(Handle):
         self._source.inform()
         return handle
 
-    def _watch(self, change: int) -> None:
-        with self._watchers:
-            self._waiting += change
-            self._watched_at = time.monotonic()
-        if change > 0:
-            self._source.attend()
+    def _watch(self) -> None:
+        self._waiting.append(None)
+        self._watched_at = time.monotonic()
+        self._source.attend()
+
+    def _unwatch(self) -> None:
+        self._watched_at = time.monotonic()
+        self._waiting.pop()
 
 
 def _decoding(callback: Callable[[Message], None]) -> Callable[[Sample], None]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
@@ -28,7 +27,7 @@ class AnnouncedTypes(Types):
 
     def __init__(self, library: Library | None, url: str) -> None:
         super().__init__(library, url, ros=1)
-        self._lock = threading.Lock()
+        #: By name and sum; any thread's, as every use is atomic.
         self._learned: dict[tuple[str, str], MessageType] = {}
         self._texts: dict[MessageType | ServiceType, str] = {}
 
@@ -63,12 +62,10 @@ class AnnouncedTypes(Types):
             InvalidNameError: `name` is no type's name.
         """
         full = join_name(name)
-        with self._lock:
-            found = self._learned.get((full, md5))
+        found = self._learned.get((full, md5))
         if found is None:
             found = self._known(full, md5) or self._from_text(full, md5, text)
-            with self._lock:
-                found = self._learned.setdefault((full, md5), found)
+            found = self._learned.setdefault((full, md5), found)
         return found
 
     def announced_service(self, name: str, md5: str) -> ServiceType:

@@ -5,7 +5,6 @@ Our own node's and other nodes' alike: every node may set each of them, to value
 
 from __future__ import annotations
 
-import threading
 from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -158,7 +157,7 @@ class Ros1Parameters(Parameters):
         self.node = core.name.full
         self._core, self._server = core, server
         self._namespace = ParameterNamespace(server, core.name.full)
-        self._lock = threading.Lock()
+        #: Any thread declares and undeclares; every use is atomic.
         self._declared: dict[str, ParameterDescriptor] = {}
 
     def __repr__(self) -> str:
@@ -194,17 +193,15 @@ class Ros1Parameters(Parameters):
             )
         if default is not None:
             to_wire(full, default)
-        with self._lock:
-            if name in self._declared:
-                raise ParameterError(f"{self.node}: parameter {name!r} is declared already")
-            self._declared[name] = descriptor
+        mine = replace(descriptor)  # the same one may be given twice
+        if self._declared.setdefault(name, mine) is not mine:
+            raise ParameterError(f"{self.node}: parameter {name!r} is declared already")
         try:
             value: ParameterValue = self._server.get(full, None)
             if value is None and default is not None:
                 self._server.set(full, default)
         except BaseException:
-            with self._lock:
-                del self._declared[name]
+            self._declared.pop(name, None)
             raise
         return default if value is None else value
 
@@ -214,8 +211,7 @@ class Ros1Parameters(Parameters):
         It may be gone from the server already: others can delete it, too.
         """
         self._core.check_open()
-        with self._lock:
-            declared = self._declared.pop(name, None)
+        declared = self._declared.pop(name, None)
         full = self._namespace.full(name)
         if declared is None or self._server.has(full):
             self._server.delete(full)

@@ -4,12 +4,22 @@ from __future__ import annotations
 
 import sys
 import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from executors import Manual
 
 import rosglass
-from rosglass.comm import IMMEDIATE, Listeners
+from rosglass.comm import (
+    IMMEDIATE,
+    EndpointInfo,
+    EndpointKind,
+    Listeners,
+    Matched,
+    NodeName,
+)
+from rosglass.comm.complaints import Complaints
+from rosglass.comm.events import Appearances
 from rosglass.comm.listeners import ChangeListeners
 
 
@@ -93,6 +103,49 @@ def test_listeners_come_and_go_in_several_threads_while_values_are_told():
     assert sorted(seen) == [-1] * 4 * rounds + list(range(rounds))
     listeners.clear()
     assert not listeners
+
+
+def in_threads(job, count=4):
+    """Run `job` in several threads, each with its number; return what each returned."""
+    with ThreadPoolExecutor(count) as pool:
+        return [future.result() for future in [pool.submit(job, n) for n in range(count)]]
+
+
+@pytest.mark.usefixtures("hasty_threads")
+def test_who_appears_is_told_to_listeners_that_come_and_go_in_several_threads():
+    appearances, rounds = Appearances(), 200
+    there = EndpointInfo(EndpointKind.PUBLISHER, "/t", "p/msg/T", NodeName("/", "a"), gid=b"there")
+    stayed, over = [], threading.Event()
+
+    def come_and_go(_):
+        for _ in range(rounds):
+            appearances.add(str, IMMEDIATE).close()
+        appearances.add(lambda event: stayed.append((event.count, event.total)), IMMEDIATE)
+
+    def look():
+        while not over.is_set():
+            appearances.update([there], Matched)
+
+    looking = threading.Thread(target=look)
+    looking.start()
+    try:
+        in_threads(come_and_go)
+    finally:
+        over.set()
+        looking.join()
+    appearances.update([there], Matched)
+    assert stayed == [(1, 1)] * 4
+    appearances.clear()
+    assert not appearances
+
+
+@pytest.mark.usefixtures("hasty_threads")
+def test_of_several_threads_one_complains():
+    complaints, rounds = Complaints(1000), 300
+    fresh = in_threads(lambda _: [complaints.fresh(about) for about in range(rounds)])
+    assert [sum(made) for made in zip(*fresh, strict=True)] == [1] * rounds
+    few = Complaints(2)
+    assert [few.fresh(about) for about in "aabca"] == [True, False, True, False, False]
 
 
 def test_who_read_a_value_is_told_that_it_changed_back_before_anyone_looked():
