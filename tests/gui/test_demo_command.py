@@ -211,7 +211,7 @@ def test_a_robot_alone_waits_for_its_router_and_ends_with_its_leash(
 def test_the_virtual_screen_ends_when_its_owner_forgets_it() -> None:
     script = (
         "import os; from rosglass.demo.processes import VirtualScreen;"
-        "s = VirtualScreen(); print(s._process.pid, flush=True); s.close(); s.close()"
+        "s = VirtualScreen(); print(s.process.pid, flush=True); s.close(); s.close()"
     )
     result = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, timeout=30, check=True

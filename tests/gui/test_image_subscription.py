@@ -346,3 +346,23 @@ def test_a_camera_that_nobody_publishes_is_told(
     # It would have been told of the other one before.
     wait(lambda: "/camera: nobody publishes this topic" in caplog.text)
     assert caplog.text.count("nobody publishes") == 1
+
+
+def test_a_picture_that_comes_while_its_stream_is_made(
+    running: Any, camera: Any, wait: Any, monkeypatch: Any
+) -> None:
+    from rosglass.qml import image_stream
+
+    answers = []
+
+    class Eager(image_stream.ImageStream):
+        def __init__(self, node: Any, topic: str, show: Any, preferred: str, *others: Any) -> None:
+            super().__init__(node, topic, show, preferred, *others)
+            answers.append(others[-1]())  # the first picture is there already
+
+    monkeypatch.setattr(image_stream, "ImageStream", Eager)
+    root = load(running)
+    wait(lambda: root.property("sub").property("subscribed"))
+    camera.publish(picture(RED))
+    wait(lambda: colour(root) == RED)
+    assert answers == [False]

@@ -235,9 +235,11 @@ class SharedStream(QtCore.QObject):
 
     def _rest_if_possible(self) -> None:
         """Receive nothing until the next turn, when pictures can be fetched one by one."""
+        if not self._interval:  # so it is, too, for a picture that comes while the stream is made
+            return
         stream = self.stream
         self._period = stream.period or self._period
-        if not (self._interval and self._period and self._session.balancer.enabled):
+        if not (self._period and self._session.balancer.enabled):
             return
         # Between the key frames of a video, a picture that is fetched alone cannot be decoded.
         if stream.video or self._interval <= _HYSTERESIS * max(self._period, self._price):
