@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 _CLIENT_LAYER = ("comm", "ros1", "ros2", "node", "wires")
 _LOCKS = {"Lock", "RLock", "Event", "Condition", "Semaphore", "BoundedSemaphore", "Barrier"}
 #: What a class that stands for a whole ROS graph derives from, and the real ones among them.
-_WORLDS = {"Node", "CoreNode", "Middleware", "Wire"}
-_REAL_WORLDS = {"CoreNode", "Ros1Node", "Ros2Node", "DdsMiddleware", "ZenohMiddleware", "Bare"}
+_WORLDS = {"Node", "GraphNode", "Middleware", "Wire"}
+_REAL_WORLDS = {"GraphNode", "Ros1Node", "Ros2Node", "DdsMiddleware", "ZenohMiddleware", "Bare"}
 #: Names of the glossary's left column (house.md, section 3) that stand for nothing else.
 _GLOSSARY = re.compile(
     r"\b(told|nobody|somebody|whoever|farewells?|furniture|errands?|see_off|let_up|meanwhile)\b"
