@@ -20,7 +20,7 @@ os.environ.setdefault("QSG_RENDER_LOOP", "basic")
 if find_spec("PySide6") is None:
     os.environ.setdefault("ROSGLASS_QT", "pyside2")
 
-from memory_world import MemoryWorld
+from local_world import LocalWorld
 from waiting import eventually
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def bench(app: QCoreApplication, tmp_path: Path, wait: Callable[..., None]) -> I
     from rosglass.qml import Session, install
     from rosglass.qt import QtQml, send_deferred_deletes
 
-    world = MemoryWorld()
+    world = LocalWorld()
     session = Session(connect=world.connect)
     engine = QtQml.QQmlEngine()
     install(engine, session)

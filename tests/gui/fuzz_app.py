@@ -18,7 +18,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from memory_world import MemoryWorld
+from local_world import LocalWorld
 
 from rosglass.qml import Session, install, ros1, ros2, tf_queries
 from rosglass.qml.log import LocationFormatter, install_message_handler
@@ -122,7 +122,7 @@ class Fuzz:
     def __init__(self, host: Host, url: str) -> None:
         self.host = host
         if url == "memory":
-            self.session = Session(connect=MemoryWorld().connect)
+            self.session = Session(connect=LocalWorld().connect)
         else:
             self.session = Session(url)
         self.engine = QtQml.QQmlEngine()

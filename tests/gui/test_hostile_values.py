@@ -120,7 +120,7 @@ def test_text_from_the_network_stays_text(running: Any, wait: Any, text: str) ->
                 && got.header.frame_id === text && Object.keys(got).length === 2 }
     }""")
     publisher = running.robot.create_publisher("/evil", "diagnostic_msgs/msg/DiagnosticArray")
-    wait(lambda: running.world.subscriptions)
+    wait(publisher.subscription_count)
     pair = {"key": text, "value": text}
     publisher.publish(header={"frame_id": text}, status=[{"name": text, "values": [pair]}])
     wait(lambda: root.property("bound"))

@@ -139,7 +139,11 @@ def test_viewers_of_one_camera_look_at_it_differently(
     root.property("sub1").setProperty("rotation", 90)
     root.property("sub3").setProperty("mirrored", True)
     for i in range(4):
-        wait(lambda i=i: root.property(f"sub{i}").property("subscribed"))
+        wait(
+            lambda i=i: (
+                root.property(f"sub{i}").property("subscribed") and camera.subscription_count()
+            )
+        )
     camera.publish(quarters())
     wait(lambda: all(seen(root, i) is not None for i in range(4)))
     np.testing.assert_array_equal(seen(root, 0), QUARTERS)
@@ -159,7 +163,7 @@ def test_a_region_outside_the_picture_concerns_only_its_viewer(
     root = load(running, count=2)
     wrong = root.property("sub1")
     wrong.setProperty("regionOfInterest", _rect(10, 10, 100, 100))
-    wait(lambda: wrong.property("subscribed"))
+    wait(lambda: wrong.property("subscribed") and camera.subscription_count())
     show(running, camera, wait, root, quarters())
     wait(lambda: "not within the picture of 16x16" in wrong.property("problem"))
     assert seen(root, 1) is None
@@ -224,7 +228,7 @@ class TestDepth:
         self, running: Any, camera: Any, wait: Any
     ) -> None:
         root = load(running, 'colorMap: "gray"; minimumDepth: 0; maximumDepth: 5')
-        wait(lambda: root.property("sub0").property("subscribed"))
+        wait(lambda: root.property("sub0").property("subscribed") and camera.subscription_count())
         for millimetres in (500, 2500, 4800):
             shown = []
             for encoding, unit, kind in (("16UC1", 1, np.uint16), ("32FC1", 0.001, np.float32)):
@@ -347,7 +351,7 @@ class TestThrottle:
         """Latched ROS 1 publishers send their last picture to whoever subscribes."""
         root = load(running, "throttleRate: 50; timeout: 500")
         sub = root.property("sub0")
-        wait(lambda: sub.property("subscribed"))
+        wait(lambda: sub.property("subscribed") and camera.subscription_count())
         old = quarters()
         camera.publish(old)
         wait(lambda: seen(root) is not None)
@@ -388,7 +392,7 @@ class TestPlayback:
         wait(lambda: not running.world.subscriptions)
         np.testing.assert_array_equal(seen(root), QUARTERS)
         sub.play()
-        wait(lambda: sub.property("subscribed"))
+        wait(lambda: sub.property("subscribed") and camera.subscription_count())
         camera.publish(message(np.zeros((16, 16, 3), np.uint8)))
         wait(lambda: np.array_equal(seen(root), np.zeros((2, 2, 3))))
         assert not sub.property("stale")

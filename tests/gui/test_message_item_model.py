@@ -233,7 +233,7 @@ def test_it_shows_what_a_subscription_receives(running: Any, wait: Any) -> None:
     from rosglass.comm import QoS
 
     publisher = running.robot.create_publisher("/point", "geometry_msgs/msg/Point", QoS())
-    wait(root.subscribed)
+    wait(lambda: root.subscribed() and publisher.subscription_count())
     publisher.publish({"x": 4.5})
     wait(lambda: root.shown() == 4.5)
 

@@ -307,9 +307,9 @@ def test_what_keep_all_could_not_send_is_told(running: Any, wait: Any, caplog: A
         }"""
     )
     wait(root.ready)
-    running.world.publishers[0].closed = True
+    running.world.publishers[0].close()
     root.send()
-    wait(lambda: "nothing was published on /x: closed" in caplog.text)
+    wait(lambda: "nothing was published on /x: the publisher of /x is closed" in caplog.text)
 
 
 def test_a_topic_without_subscribers_is_named_with_the_near_name(

@@ -28,13 +28,24 @@ def test_a_publisher_offers_every_policy(running: Any, wait: Any) -> None:
     )
 
 
-def test_a_subscription_asks_for_what_is_available(running: Any, wait: Any) -> None:
+def test_a_subscription_asks_for_what_is_available(
+    running: Any, wait: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked_for: list[QoS] = []
+    node = running.session.node
+    create = node.create_subscription
+
+    def subscribe(*given: Any, **options: Any) -> Any:
+        asked_for.append(options["qos"])
+        return create(*given, **options)
+
+    monkeypatch.setattr(node, "create_subscription", subscribe)
     running.load(
         "Subscription { topic: '/a'; messageType: 'std_msgs/msg/Bool'; "
         "qos: Ros2.QoS().best_available() }"
     )
-    wait(lambda: running.world.subscriptions)
-    asked = running.world.subscriptions[0].qos
+    wait(lambda: asked_for)
+    asked = asked_for[0]
     assert asked.reliability is Reliability.BEST_AVAILABLE
     assert asked.durability is Durability.BEST_AVAILABLE
     assert asked.liveliness is Liveliness.BEST_AVAILABLE
@@ -97,21 +108,23 @@ def test_limits_that_are_none_are_refused(running: Any, wrong: str) -> None:
     assert "milliseconds" in running.run(script)
 
 
-def test_a_profile_that_clashes_is_a_problem_on_both_sides(
-    running: Any, wait: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_profile_that_clashes_is_a_problem_on_both_sides(running: Any, wait: Any) -> None:
     root: Any = running.load("""QtObject {
-        property var publisher: Ros2.createPublisher("/a", "std_msgs/msg/Bool", 1)
-        property Subscription subscription: Subscription { topic: "/b" }
+        property var publisher: Ros2.createPublisher(
+            "/a", "std_msgs/msg/Bool", Ros2.QoS().best_effort())
+        property Subscription subscription: Subscription {
+            topic: "/b"; messageType: "std_msgs/msg/Bool"; qos: Ros2.QoS().reliable()
+        }
         property int told: 0
         Component.onCompleted: publisher.problemChanged.connect(() => told += 1)
         function offered() { return publisher.problem }
         function asked() { return subscription.problem }
     }""")
     wait(lambda: running.world.publishers and running.world.subscriptions)
-    assert root.offered() == ""
-    clash = "incompatible: reliable requested, best effort offered"
-    monkeypatch.setattr(type(running.world.publishers[0]), "problem", clash)
-    running.world.subscriptions[0]._set_problem(clash)
-    wait(lambda: root.offered() == root.asked() == clash)
+    assert root.offered() == root.asked() == ""
+    running.robot.create_subscription("/a", "std_msgs/msg/Bool", print, QoS(depth=1))
+    best_effort = QoS(depth=1, reliability=Reliability.BEST_EFFORT)
+    running.robot.create_publisher("/b", "std_msgs/msg/Bool", best_effort)
+    clash = "reliability: reliable requested, best effort offered"
+    wait(lambda: clash in root.offered() and clash in root.asked())
     assert root.property("told") == 1

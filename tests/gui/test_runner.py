@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from memory_world import MemoryNode, MemoryWorld
+from local_world import LocalNode, LocalWorld
 
 from rosglass.errors import QmlError
 from rosglass.qml import Session
@@ -32,8 +32,8 @@ Rectangle {
 
 
 @pytest.fixture
-def world() -> MemoryWorld:
-    return MemoryWorld()
+def world() -> LocalWorld:
+    return LocalWorld()
 
 
 @pytest.fixture
@@ -44,7 +44,7 @@ def file(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def runner(app: Any, file: Path, world: MemoryWorld, wait: Any) -> Iterator[Runner]:
+def runner(app: Any, file: Path, world: LocalWorld, wait: Any) -> Iterator[Runner]:
     made = Runner(file, Session(connect=world.connect))
     made.load()
     wait(lambda: world.publishers and world.subscriptions)
@@ -58,7 +58,7 @@ def colour(runner: Runner) -> str:
 
 
 def test_reload_keeps_the_node_and_collects_the_old_interface(
-    runner: Runner, file: Path, world: MemoryWorld, wait: Any
+    runner: Runner, file: Path, world: LocalWorld, wait: Any
 ) -> None:
     node, window = runner.session.node, runner.window
     assert (window.title(), window.width(), window.height()) == ("one", 300, 200)
@@ -113,7 +113,7 @@ def test_roots_may_change_between_item_and_window(runner: Runner, file: Path, wa
     assert (runner.window.title(), colour(runner)) == ("item", "#00ff00")
 
 
-def test_a_file_with_errors_leaves_nothing_open(app: Any, file: Path, world: MemoryWorld) -> None:
+def test_a_file_with_errors_leaves_nothing_open(app: Any, file: Path, world: LocalWorld) -> None:
     file.write_text("import QtQuick 2.15\nItem { x: }")
     session = Session(connect=world.connect)
     with pytest.raises(QmlError, match=r"Main\.qml:2:11: "):
@@ -230,7 +230,7 @@ def test_a_root_without_windows_may_get_one_later(
 
 
 def test_errors_at_run_time_do_not_stop_a_reload(
-    runner: Runner, file: Path, world: MemoryWorld, wait: Any
+    runner: Runner, file: Path, world: LocalWorld, wait: Any
 ) -> None:
     broken = (UI % ("broken", "red")).replace(
         'Ros2.init("ui")', '{ Ros2.init("ui"); nothing.here() }'
@@ -273,7 +273,7 @@ def test_a_reload_is_put_off_while_a_call_waits(runner: Runner, file: Path, wait
 
 
 def test_import_paths_and_packages(
-    app: Any, tmp_path: Path, world: MemoryWorld, monkeypatch: Any
+    app: Any, tmp_path: Path, world: LocalWorld, monkeypatch: Any
 ) -> None:
     package = tmp_path / "ws" / "my_robot"
     module = package / "qml" / "Parts"
@@ -311,7 +311,7 @@ def test_import_paths_and_packages(
         ("{0}/data.bin", "not a QML file"),
     ],
 )
-def test_files_that_are_none(file: Path, world: MemoryWorld, place: str, message: str) -> None:
+def test_files_that_are_none(file: Path, world: LocalWorld, place: str, message: str) -> None:
     (file.parent / "empty").mkdir()
     (file.parent / "data.bin").write_bytes(b"\0\1")
     session = Session(connect=world.connect)
@@ -340,7 +340,7 @@ def test_files_that_are_none(file: Path, world: MemoryWorld, place: str, message
     ],
 )
 def test_errors_say_what_to_do(
-    app: Any, file: Path, world: MemoryWorld, text: str, advice: str
+    app: Any, file: Path, world: LocalWorld, text: str, advice: str
 ) -> None:
     file.write_text(text)
     session = Session(connect=world.connect)
@@ -371,7 +371,7 @@ def test_errors_name_the_package_that_is_missing(file: Path, module: str) -> Non
 
 
 def test_a_kiosk_stays_open_and_hides_the_pointer(
-    app: Any, file: Path, world: MemoryWorld, wait: Any, monkeypatch: Any
+    app: Any, file: Path, world: LocalWorld, wait: Any, monkeypatch: Any
 ) -> None:
     from rosglass.qml import kiosk
     from rosglass.qt import QtCore, optional
@@ -403,12 +403,12 @@ def test_a_kiosk_stays_open_and_hides_the_pointer(
 
 
 def test_connecting_waits_for_the_first_frame(
-    app: Any, file: Path, world: MemoryWorld, wait: Any, monkeypatch: pytest.MonkeyPatch
+    app: Any, file: Path, world: LocalWorld, wait: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     order: list[str] = []
     monkeypatch.setattr("rosglass.qml.session._LONGEST_PUT_OFF", 60_000)
 
-    def connect(*arguments: Any) -> MemoryNode:
+    def connect(*arguments: Any) -> LocalNode:
         order.append("connected")
         return world.connect(*arguments)
 
@@ -426,7 +426,7 @@ def test_connecting_waits_for_the_first_frame(
 
 
 def test_connecting_does_not_wait_for_a_window_that_nobody_sees(
-    app: Any, file: Path, world: MemoryWorld, wait: Any, monkeypatch: pytest.MonkeyPatch
+    app: Any, file: Path, world: LocalWorld, wait: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("rosglass.qml.session._LONGEST_PUT_OFF", 60_000)
     file.write_text(
@@ -444,7 +444,7 @@ def test_connecting_does_not_wait_for_a_window_that_nobody_sees(
 
 
 def test_connecting_waits_for_a_frame_that_never_comes_only_so_long(
-    app: Any, world: MemoryWorld, wait: Any, monkeypatch: pytest.MonkeyPatch
+    app: Any, world: LocalWorld, wait: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("rosglass.qml.session._LONGEST_PUT_OFF", 50)
     session = Session(connect=world.connect)
@@ -456,7 +456,7 @@ def test_connecting_waits_for_a_frame_that_never_comes_only_so_long(
 
 
 def test_connecting_does_not_wait_while_a_call_of_qml_does(
-    app: Any, world: MemoryWorld, monkeypatch: pytest.MonkeyPatch
+    app: Any, world: LocalWorld, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("rosglass.qml.session._LONGEST_PUT_OFF", 60_000)
     session = Session(connect=world.connect)
@@ -485,7 +485,7 @@ def texts(runner: Runner) -> str:
 def test_an_interface_that_asks_for_no_node_is_shown_the_line_to_add(
     app: Any,
     file: Path,
-    world: MemoryWorld,
+    world: LocalWorld,
     wait: Any,
     monkeypatch: pytest.MonkeyPatch,
     module: str,

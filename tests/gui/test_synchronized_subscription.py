@@ -49,11 +49,6 @@ class Robot:
     def linked(self) -> None:
         self._wait(lambda: all(s.subscription_count() for s in self._senders), 30)
 
-    def hold_back(self, seconds: int) -> None:
-        """Let what is sent from now on have been on its way for so long; in memory only."""
-        for sender in self._senders:
-            sender.held_back = seconds * 1_000_000_000
-
     def send(self, topic: int, milliseconds: int, name: str) -> None:
         sec, rest = divmod(milliseconds, 1000)
         part = "nsecs" if self._ros1 else "nanosec"
@@ -171,7 +166,7 @@ def test_a_set_that_a_silent_link_kept_back_is_stale(running: Bench, wait: Any) 
     robot.send(0, 0, "left")
     robot.send(1, 0, "right")
     wait(lambda: root.state().startswith("false"))
-    robot.hold_back(10)
+    running.world.held_back_s = 10
     robot.send(0, 500, "LEFT")
     robot.send(1, 500, "RIGHT")
     wait(lambda: root.latest() == "LEFT+RIGHT")

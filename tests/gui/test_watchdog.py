@@ -6,7 +6,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from memory_world import MemoryWorld
+from local_world import LocalWorld
 
 from rosglass.errors import Error
 from rosglass.qml import Session
@@ -78,7 +78,7 @@ def run(
     def run(code: str, limit: float) -> Runner:
         file = tmp_path / "Main.qml"
         file.write_text(UI % code)
-        session = Session(connect=MemoryWorld().connect)
+        session = Session(connect=LocalWorld().connect)
         session.longest_script = limit
         runner = Runner(file, session)
         made.append(runner)
@@ -238,7 +238,7 @@ def test_whatever_a_function_throws_is_an_error(run: Callable[..., Runner]) -> N
 
 @pytest.mark.parametrize("limit", [-1, float("nan"), float("inf"), True, "5", None])
 def test_limits_that_are_no_seconds_are_refused(app: Any, limit: Any) -> None:
-    session = Session(connect=MemoryWorld().connect)
+    session = Session(connect=LocalWorld().connect)
     with pytest.raises(Error, match=r"Session\.longest_script: .* 0 for no limit"):
         session.longest_script = limit
     assert session.longest_script == 5.0

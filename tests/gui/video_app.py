@@ -19,7 +19,7 @@ os.environ["QT_LOGGING_RULES"] = "qt.multimedia.*=false"
 
 import cv2
 import numpy as np
-from memory_world import MemoryWorld
+from local_world import LocalWorld
 
 from rosglass.comm import Time
 from rosglass.qml import Session, install
@@ -74,7 +74,7 @@ def message(encoding: str) -> dict[str, Any]:
 def main() -> None:
     file, encodings = Path(sys.argv[1]), sys.argv[2:]
     app = QtGui.QGuiApplication([])
-    world = MemoryWorld()
+    world = LocalWorld()
     camera = world.connect(None, "robot").create_publisher("/cam", "sensor_msgs/msg/Image")
     session = Session(connect=world.connect)
     # PySide2 forgets an engine that a view has made itself.
