@@ -4,23 +4,29 @@ from __future__ import annotations
 
 import threading
 from asyncio import CancelledError
-from collections import OrderedDict
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 import rosglass
-from rosglass.comm import EndpointInfo, EndpointKind, QoS
+from rosglass.comm import EndpointInfo, EndpointKind, NodeName, QoS
+from rosglass.comm.graph import Graph
 from rosglass.errors import NodeClosedError
+from rosglass.ros2 import Ros2Node
 
 pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
 
-from rosglass.wires.dds import cyclone
+from rosglass.wires.dds import cyclone, endpoints, service_ends, services
+from rosglass.wires.dds import middleware as dds_middleware
+from rosglass.wires.dds.cyclone_builtin import Discovered
 from rosglass.wires.dds.cyclone_events import Event
 from rosglass.wires.dds.cyclone_identity import Identity, Origin, Origins
 from rosglass.wires.dds.cyclone_qos import qos_of
-from rosglass.wires.dds.service_ends import Matched, Outbox
+from rosglass.wires.dds.middleware import DdsMiddleware
+from rosglass.wires.dds.options import DdsOptions, DiscoveryRange
+from rosglass.wires.dds.participant import Participant
+from rosglass.wires.dds.service_ends import Ends, Matched, Outbox
 from rosglass.wires.dds.services import DdsReplier
 
 ADD = "example_interfaces/srv/AddTwoInts"
@@ -30,23 +36,68 @@ ELSEWHERE = Origin(b"\x00\x00\x12\x03", 1, None, bytes(12), taken=True)
 
 
 @pytest.fixture
-def node():
-    made = rosglass.connect("dds://?domain=58&range=off", "here", own_services=False)
+def ends(monkeypatch):
+    """The ends of services, newest last, each with what takes what its reader receives.
+
+    Their samples have the origin `stale`, if that is set, as if it had been left in the memory.
+    """
+    made = []
+
+    class Haunted(Origins):
+        stale: Origin | None = None
+
+        def of(self, serdata: int) -> Origin | None:
+            return super().of(serdata) if self.stale is None else self.stale
+
+    class Kept(Ends):
+        def __init__(self, participant, graph, endpoint, on_taken, on_matched) -> None:
+            super().__init__(participant, graph, endpoint, on_taken, on_matched)
+            self.on_taken = on_taken
+            made.append(self)
+
+    monkeypatch.setattr(service_ends, "Origins", Haunted)
+    monkeypatch.setattr(services, "Ends", Kept)
+    return made
+
+
+@pytest.fixture
+def participants(monkeypatch):
+    """The participants of the nodes."""
+    made = []
+
+    def make(options: DdsOptions) -> Participant:
+        made.append(Participant(options))
+        return made[-1]
+
+    monkeypatch.setattr(dds_middleware, "Participant", make)
+    return made
+
+
+@pytest.fixture
+def middleware():
+    return DdsMiddleware(DdsOptions(domain=58, discovery=DiscoveryRange.OFF))
+
+
+@pytest.fixture
+def node(participants, ends, middleware):
+    made = Ros2Node(middleware, "dds://?domain=58&range=off", "here", own_services=False)
     yield made
     made.close()
 
 
 @pytest.fixture
-def participant(node):
-    return node._core.middleware._participant
+def participant(node, participants):
+    (made,) = participants
+    return made
 
 
 @pytest.fixture
-def server(node, eventually):
+def server(node, ends, eventually):
     """A server with its writer, whose requests are in ``got``."""
     made = node.create_service_server(SERVICE, ADD, lambda r: made.got.append(r.a) or {"sum": r.b})
     made.got = []
-    eventually(lambda: made._replier._replier._ends.writer is not None)
+    (made.ends,) = ends
+    eventually(lambda: made.ends.writer is not None)
     return made
 
 
@@ -73,10 +124,20 @@ def ready(client):
     return client
 
 
-def test_a_reply_is_ready_before_its_client_was_noticed(node, participant, server):
-    ends = server._replier._replier._ends
-    ends.reader._on_matched = None
-    participant.pump._acts[ends.writer.entity] = lambda: None
+def test_a_reply_is_ready_before_its_client_was_noticed(node, server, monkeypatch):
+    unnoticed = {server.ends.reader.entity, server.ends.writer.entity}
+
+    def hide(module: Any, name: str) -> None:
+        status = getattr(module, name)
+
+        def matched(entity: int) -> Any:
+            now = status(entity)
+            return SimpleNamespace(change=0, current_change=0) if entity in unnoticed else now
+
+        monkeypatch.setattr(module, name, matched)
+
+    hide(endpoints, "subscription_matched")
+    hide(service_ends, "publication_matched")
     client = ready(node.create_service_client(SERVICE, ADD))
     assert client.call({"a": 1, "b": 2}, timeout=30).sum == 2
 
@@ -96,22 +157,14 @@ def test_a_request_is_carried_out_although_its_client_left_at_once(
 
 
 def test_a_request_in_the_memory_of_another_is_not_taken_for_that(node, server):
-    class Haunted(dict[int, Origin]):
-        def pop(self, *_: Any) -> Origin:
-            return ELSEWHERE
-
-    server._replier._replier._ends.origins._noted = Haunted()
+    server.ends.origins.stale = ELSEWHERE
     client = ready(node.create_service_client(SERVICE, ADD))
     assert client.call({"a": 1, "b": 2}, timeout=30).sum == 2
 
 
-def test_a_reply_in_the_memory_of_another_is_not_taken_for_that(node, server):
-    class Haunted(dict[int, Origin]):
-        def pop(self, *_: Any) -> Origin:
-            return ELSEWHERE
-
+def test_a_reply_in_the_memory_of_another_is_not_taken_for_that(node, server, ends):
     client = ready(node.create_service_client(SERVICE, ADD))
-    client._requester._requester._ends.origins._noted = Haunted()
+    ends[-1].origins.stale = ELSEWHERE
     assert client.call({"a": 1, "b": 2}, timeout=30).sum == 2
 
 
@@ -120,7 +173,7 @@ def test_a_request_that_comes_again_is_carried_out_once(server, eventually):
 
     def receive(client: bytes, number: int, value: int) -> None:
         origin = Origin(b"\x00\x00\x12\x03", number, None, client)
-        server._replier._replier._on_requests([(request.encode({"a": value}), 0, 0, origin)])
+        server.ends.on_taken([(request.encode({"a": value}), 0, 0, origin)])
 
     one, other = (b"\x01\x0f" + bytes(9) + last for last in (b"1", b"2"))  # Fast DDS's
     for number, value in ((1, 10), (2, 20), (1, 10), (2, 20)):
@@ -156,20 +209,49 @@ def test_a_senders_guid_decides_whose_sample_it_is():
 
 
 @pytest.mark.parametrize(("depth", "told"), [(2, 1), (100, 0)])
-def test_requests_are_waited_for_no_longer_than_they_can_come(caplog, depth, told):
+def test_requests_are_waited_for_no_longer_than_they_can_come(monkeypatch, caplog, depth, told):
     """The oldest are lost when too many wait; without that, several threads may receive some."""
-    origins = [Origin(b"", number, None) for number in range(4)]
-    replier: Any = object.__new__(DdsReplier)
-    replier._service, replier._leaving = SERVICE, threading.Lock()
-    replier._ends = SimpleNamespace(depth=depth)
-    replier._left = OrderedDict((id(origin), origin) for origin in origins)
-    replier._has_come(Origin(b"", 2, None))
-    assert len(replier._left) == 4
-    replier._has_come(origins[2])
-    assert list(replier._left.values()) == origins[3:]
-    assert caplog.text.count("/add: 2 requests are lost, as more than 2 waited") == told
-    replier._has_come(origins[3])
-    assert not replier._left
+    client = Discovered(False, b"\x01\x0f" + bytes(10) + b"\x00\x00\x12\x03", 0)  # Fast DDS's
+    origins = [Origin(client.guid[12:], number, None, client.guid[:12]) for number in range(1, 7)]
+    callbacks, got = [], []
+    ends = SimpleNamespace(
+        depth=depth,
+        origins=SimpleNamespace(hasten=callbacks.append),
+        reader=SimpleNamespace(guid=b""),
+        writers=SimpleNamespace(by_guid={client.guid: client}),
+        sender=lambda _, origin: (client, origin),
+        start=lambda: None,
+    )
+
+    def make_ends(*arguments: Any) -> Any:
+        callbacks.append(arguments[3])
+        return ends
+
+    monkeypatch.setattr(services, "Ends", make_ends)
+    endpoint = EndpointInfo(EndpointKind.SERVICE_SERVER, SERVICE, ADD, NodeName("/", "here"))
+    participant: Any = SimpleNamespace(pump=None)
+    replier = DdsReplier(
+        participant, Graph(lambda: None), endpoint, lambda request, _: got.append(request.sequence)
+    )
+    receive, hasten = callbacks
+    for origin in origins[:4]:
+        assert not hasten(origin, b"")
+    replier.quick = True
+    receive([(b"", 0, 0, Origin(client.guid[12:], 2, None, client.guid[:12]))])
+    assert not hasten(origins[4], b"")  # it would overtake the four
+    assert lost_requests(caplog) == []
+    receive([(b"", 0, 0, origins[2])])
+    lost = [f"/add: 2 requests are lost, as more than {depth} waited"] * told
+    assert lost_requests(caplog) == lost
+    receive([(b"", 0, 0, origins[3])])
+    receive([(b"", 0, 0, origins[4])])
+    assert hasten(origins[5], b"")
+    assert got == [2, 3, 4, 5, 6]
+    assert lost_requests(caplog) == lost
+
+
+def lost_requests(caplog):
+    return [record.getMessage() for record in caplog.records if "are lost" in record.getMessage()]
 
 
 def test_who_looked_first_for_counterparts_has_not_the_last_word():
@@ -213,10 +295,11 @@ def test_some_who_left_are_remembered(monkeypatch):
     assert [matched.get(handle) is not None for handle in (1, 2, 3, 4)] == [False] * 3 + [True]
 
 
-def test_writing_after_the_end_is_told(node):
+def test_writing_after_the_end_is_told(node, middleware):
     """The memory that this takes went with the node."""
-    middleware, name = node._core.middleware, node._core.name
-    endpoint = EndpointInfo(EndpointKind.PUBLISHER, "/t", "std_msgs/msg/String", name)
+    endpoint = EndpointInfo(
+        EndpointKind.PUBLISHER, "/t", "std_msgs/msg/String", NodeName("/", "here")
+    )
     writer = middleware.create_writer(endpoint)
     payload = b"\0\1\0\0\1\0\0\0\0"
     writer.write(payload)
