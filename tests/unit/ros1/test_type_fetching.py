@@ -106,8 +106,8 @@ def test_what_comes_later_is_waited_for(join: Callable[..., Any]) -> None:
 
 
 def test_local_types_serve_where_nobody_tells_another(join: Callable[..., Any]) -> None:
-    user = join("cockpit")
-    library = user._core.types.library
+    library = Library()
+    user = join("cockpit", library)
     assert user.fetch_type("std_msgs/Bool", timeout=30) is rosglass.load(
         "std_msgs/Bool", ros=1, library=library
     )

@@ -313,8 +313,9 @@ def test_why_dds_nodes_do_not_know_their_services(join: Callable[..., Ros2Node])
     with pytest.raises(TypeNotFoundError, match="it answered") as caught:
         user.fetch_type(ASK)
     assert "Over DDS" not in str(caught.value)
+    user = join("dds_cockpit", serves=False)
     user.fake.announces_requests = True
-    user._fetcher._requests.clear()
+    use(user, ASK, hash_of(ASK + "_Request"), "robot", EndpointKind.SERVICE_SERVER)
     with pytest.raises(TypeNotFoundError, match="Over DDS, ROS 2 nodes announce a service by"):
         user.fetch_type(ASK)
 
