@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import threading
+import xmlrpc.client
 
 import pytest
-from tcpros import publisher_links
+from tcpros import node_uri, publisher_links
 
 from rosglass.comm import IMMEDIATE, History, QoS
 from rosglass.wires.tcpros import topic_subscription
@@ -73,3 +74,50 @@ def test_what_was_left_in_the_socket_comes_when_callbacks_have_caught_up(flood, 
     gate.set()
     eventually(lambda: len(got) == 500)
     assert got == list(range(500))
+
+
+def tell_publishers(node, topic, uris):
+    """Tell a node a topic's publishers, as a master does, and wait until it has taken that in."""
+    with xmlrpc.client.ServerProxy(node_uri(node)) as api:
+        assert api.publisherUpdate("/master", topic, uris)[0] == 1
+    taken = threading.Event()
+    node._core.loop.call(taken.set)
+    assert taken.wait(30)
+
+
+@pytest.fixture
+def stop(connect, eventually):
+    """Return the nodes, and the publisher and the subscription of a topic between them."""
+    robot, cockpit = connect("robot"), connect("cockpit")
+    publisher = robot.create_publisher("/stop", "std_msgs/Int32", ALL)
+    subscription = cockpit.create_subscription("/stop", "std_msgs/Int32", qos=ALL)
+    eventually(lambda: subscription.publisher_count() and publisher.subscription_count())
+    return robot, cockpit, publisher, subscription
+
+
+def test_a_publisher_that_the_master_names_again_at_once_stays_connected(stop):
+    robot, cockpit, publisher, subscription = stop
+    links = publisher_links(cockpit, "/stop")
+    tell_publishers(cockpit, "/stop", [])
+    publisher.publish({"data": 1})
+    tell_publishers(cockpit, "/stop", [node_uri(robot)])
+    assert subscription.wait(30).message().data == 1
+    assert publisher_links(cockpit, "/stop") == links
+
+
+def test_the_last_message_of_a_publisher_that_leaves_is_received(stop, eventually, monkeypatch):
+    monkeypatch.setattr(topic_subscription, "_LAST_MESSAGES_S", 3600.0)
+    _, cockpit, publisher, subscription = stop
+    tell_publishers(cockpit, "/stop", [])
+    publisher.publish({"data": 1})
+    publisher.close()
+    assert subscription.wait(30).message().data == 1
+    eventually(lambda: not publisher_links(cockpit, "/stop"))
+
+
+def test_a_connection_ends_whose_publisher_the_master_names_no_more(stop, eventually, monkeypatch):
+    monkeypatch.setattr(topic_subscription, "_LAST_MESSAGES_S", 0.01)
+    _, cockpit, publisher, subscription = stop
+    tell_publishers(cockpit, "/stop", [])
+    eventually(lambda: not subscription.publisher_count() and not publisher.subscription_count())
+    assert not publisher_links(cockpit, "/stop")

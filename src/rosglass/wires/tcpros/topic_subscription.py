@@ -66,6 +66,8 @@ if TYPE_CHECKING:
 
 
 _log = logging.getLogger("rosglass.ros1")
+#: How long a connection lasts that does not end although the master names its publisher no more.
+_LAST_MESSAGES_S = 1.0
 
 
 class TopicSubscription(Member):
@@ -191,9 +193,11 @@ class TopicSubscription(Member):
             return
         for uri in self._links.keys() - set(uris):
             link = self._links[uri]
-            # A master that was restarted knows but those who told it: others go on publishing.
-            if link.epoch == self._epoch or not link.connected:
+            if not link.connected:
                 self._forget(link)
+            elif link.epoch == self._epoch:
+                self._await_end(link)
+            # A master that was restarted knows but those who told it: others go on publishing.
         for uri in uris:
             known = self._links.get(uri)
             if known is None:
@@ -201,6 +205,16 @@ class TopicSubscription(Member):
             else:
                 known.epoch = self._epoch
         self.inform()
+
+    def _await_end(self, link: PublisherLink) -> None:
+        """Let a publisher's last messages come, and the master's newer word of it."""
+        link.epoch = left = -2 - self._updates  # until the master names it again
+
+        def forget() -> None:
+            if link.epoch == left and not link.ended:
+                self._forget(link)
+
+        self.core.loop.after(_LAST_MESSAGES_S, forget)
 
     def _forget(self, link: PublisherLink) -> None:
         self._links.pop(link.uri, None)
