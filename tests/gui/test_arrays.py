@@ -180,6 +180,6 @@ def test_qml_files_see_the_length(running: Any, wait: Any, count: int) -> None:
             }
         }"""
     )
-    wait(root.ready)
+    wait(lambda: root.ready() and joints.subscription_count())
     joints.publish(name=["a"] * count, position=[1.0] * count, velocity=[0.0] * count)
     wait(lambda: root.lengths() == f"{count},{count},{count},2")

@@ -79,7 +79,7 @@ def seen(root: Any, view: int = 0) -> np.ndarray | None:
 
 
 def show(running: Any, camera: Any, wait: Any, root: Any, picture: dict) -> np.ndarray:
-    wait(lambda: root.property("sub0").property("subscribed"))
+    wait(lambda: root.property("sub0").property("subscribed") and camera.subscription_count())
     camera.publish(picture)
     wait(lambda: seen(root) is not None)
     found = seen(root)

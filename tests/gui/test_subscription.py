@@ -109,7 +109,7 @@ def test_elements_made_before_init_work_after_it(bench: Any, wait: Any) -> None:
     wait.settled(bench.session)
     assert not root.property("sub").property("subscribed")
     bench.session.init("node", "/ui")
-    wait(lambda: root.property("sub").property("subscribed"))
+    wait(lambda: root.property("sub").property("subscribed") and publisher.subscription_count())
     assert root.property("sub").property("topic") == "/ui/chat"
     publisher.publish(data="x")
     wait(lambda: root.property("shown") == "x")
