@@ -43,9 +43,8 @@ if TYPE_CHECKING:
     from rosglass.comm.sample import Sample
     from rosglass.comm.service_client import Call, ServiceClient
     from rosglass.comm.service_server import ServiceServer
-    from rosglass.comm.source import Source
     from rosglass.comm.statistics import Statistics
-    from rosglass.comm.subscription import Subscription
+    from rosglass.comm.subscription import Source, Subscription
     from rosglass.comm.time import Duration, Time
     from rosglass.comm.timers import Timers, Worker
 
@@ -202,9 +201,11 @@ _HOMES = {
         "ServiceClient",
     ),
     "service_server": ("ServiceServer",),
-    "source": ("Source",),
     "statistics": ("Statistics",),
-    "subscription": ("Subscription",),
+    "subscription": (
+        "Source",
+        "Subscription",
+    ),
     "time": (
         "Duration",
         "Time",

@@ -17,7 +17,6 @@ from rosglass.comm.node import Executor, Handle, check_flag, check_may_wait
 from rosglass.comm.promise import check_timeout
 from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.comm.sample import Sample
-from rosglass.comm.source import Source
 from rosglass.errors import ConversionError
 
 if TYPE_CHECKING:
@@ -35,13 +34,38 @@ if TYPE_CHECKING:
     from rosglass.comm.time import Duration
     from rosglass.messages import Message, MessageType
 
-__all__ = ["Subscription"]
+__all__ = ["Source", "Subscription"]
 
 _log = logging.getLogger("rosglass.comm")
 #: Seconds that a subscription counts as watched after somebody waited for it.
 _MEMORY = 1.0
 #: Longest uninterrupted wait in seconds: on Windows a lock that is waited for holds up Ctrl-C.
 _SLICE = 0.2
+
+
+class Source:
+    """What a subscription asks of its world; a world overrides what it can do."""
+
+    def publisher_count(self) -> int:
+        """Return how many publishers match now."""
+        return 0
+
+    def hint(self) -> str:
+        """Return what a person could do about a topic without publishers, empty if nothing."""
+        return ""
+
+    def attend(self) -> None:
+        """Hand on samples as they come from now on, if :attr:`Subscription.watched`."""
+
+    def refresh(self) -> None:
+        """Deliver, in the calling thread, what waits to be delivered."""
+
+    def inform(self) -> None:
+        """Look at the subscription soon, without waiting: listeners or patience are new."""
+
+    def lost(self) -> int:
+        """Return how many samples were sent and have not arrived."""
+        return 0
 
 
 @hint_at_members

@@ -19,7 +19,7 @@ from rosglass.comm.events import (
 )
 from rosglass.comm.graph import ConnectionState, EndpointKind
 from rosglass.comm.names import similar
-from rosglass.comm.source import Source
+from rosglass.comm.subscription import Source
 from rosglass.comm.timers import Watchdog
 from rosglass.errors import Error, NodeClosedError, TypeNotFoundError
 from rosglass.interfaces.names import join_name
