@@ -32,6 +32,7 @@ from rosglass.comm.action_client import (
     ClientGoal,
 )
 from rosglass.comm.complaints import Complaints
+from rosglass.comm.core import NodeMember
 from rosglass.comm.executor import InOrder
 from rosglass.errors import (
     ConnectionLostError,
@@ -56,7 +57,6 @@ from rosglass.ros2.action_types import (
     part,
     stamp_of,
 )
-from rosglass.ros2.core import Member
 from rosglass.ros2.graph_matching import Repeats
 from rosglass.ros2.service_client import Ros2ServiceClient
 
@@ -389,7 +389,7 @@ class Ros2ClientGoal(ClientGoal):
         self._client._core.timers.after(delay, job)
 
 
-class Ros2ActionClient(ActionClient, Member):
+class Ros2ActionClient(ActionClient, NodeMember):
     """An action client, in the version of the type that its server announces.
 
     Args:

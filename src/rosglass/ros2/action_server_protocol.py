@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import Dispatcher, EndpointKind, Publisher, Time
 from rosglass.comm.action_server import ActionServerProtocol, ServerGoal
+from rosglass.comm.core import NodeMember
 from rosglass.comm.executor import InOrder
 from rosglass.errors import NodeClosedError
 from rosglass.ros2.action_types import (
@@ -32,7 +33,6 @@ from rosglass.ros2.action_types import (
     part,
     stamp_of,
 )
-from rosglass.ros2.core import Member
 from rosglass.ros2.service_replier import create_service_server
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ class _KeptGoal:
         self.waiting: list[Future[Any]] = []
 
 
-class Ros2ActionServerProtocol(ActionServerProtocol[ServerGoal], Member):
+class Ros2ActionServerProtocol(ActionServerProtocol[ServerGoal], NodeMember):
     """The three service servers and two publishers of an action server.
 
     Args:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from weakref import WeakValueDictionary
 
 from rosglass.comm import ConnectionState, Handle, Status
-from rosglass.comm.core import NodeCore, NodeMember
+from rosglass.comm.core import NodeCore
 from rosglass.comm.graph import Graph
 from rosglass.comm.listeners import ChangeListeners
 from rosglass.comm.names import expand
@@ -22,13 +22,9 @@ if TYPE_CHECKING:
     from rosglass.ros2.ros_arguments import Arguments
     from rosglass.wires.base import Middleware
 
-__all__ = ["Core", "Member"]
+__all__ = ["Core"]
 
 _log = logging.getLogger("rosglass.ros2")
-
-
-#: What the members of a ROS 2 node are.
-Member = NodeMember
 
 
 class Core(NodeCore[Handle]):

@@ -15,6 +15,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rosglass.comm import EndpointKind, Promise
+from rosglass.comm.core import NodeMember
 from rosglass.comm.promise import check_timeout
 from rosglass.errors import (
     DefinitionConflictError,
@@ -32,7 +33,6 @@ from rosglass.interfaces import (
 )
 from rosglass.interfaces.names import KINDS, split_name
 from rosglass.ros2.announced import nodes_of
-from rosglass.ros2.core import Member
 from rosglass.ros2.type_descriptions import (
     ACTION_PARTS,
     SERVICE,
@@ -83,7 +83,7 @@ _INTEREST = 30.0
 _MAX_ASKED, _MAX_FETCHED = 16, 2000
 
 
-class TypeFetcher(Member):
+class TypeFetcher(NodeMember):
     """Fetches definitions for one node.
 
     All decisions are made in rounds on the node's own dispatcher; what the graph, timers and
