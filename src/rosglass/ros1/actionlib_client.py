@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     from rosglass.comm import Executor, Handle, Sample
     from rosglass.messages import ActionType, Message
     from rosglass.ros1.action_state import Step, TerminalState
-    from rosglass.ros1.core import Core
+    from rosglass.wires.tcpros.core import TcprosCore
     from rosglass.wires.tcpros.topics import Topics
 
 __all__ = ["ActionlibClient", "ActionlibClientGoal"]
@@ -519,10 +519,12 @@ class ActionlibClient(ActionClient, Member):
         wanted: The type; None for the one that the server's topics tell.
     """
 
-    _core: Core
+    _core: TcprosCore
     _goals: dict[bytes, ActionlibClientGoal]
 
-    def __init__(self, core: Core, topics: Topics, name: str, wanted: ActionType | None) -> None:
+    def __init__(
+        self, core: TcprosCore, topics: Topics, name: str, wanted: ActionType | None
+    ) -> None:
         super().__init__(core, name, _END_OF_TIME)
         #: Runs all that happens to the client and its goals, one after the other.
         self._jobs = InOrder()
@@ -856,7 +858,7 @@ class _ClientTopics:
 
     def __init__(
         self,
-        core: Core,
+        core: TcprosCore,
         topics: Topics,
         name: str,
         types: ActionTypes,

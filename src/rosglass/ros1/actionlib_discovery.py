@@ -25,8 +25,8 @@ from rosglass.wires.tcpros.registrations import Member
 
 if TYPE_CHECKING:
     from rosglass.messages import MessageType
-    from rosglass.ros1.core import Core
     from rosglass.wires.tcpros.connection import Connection
+    from rosglass.wires.tcpros.core import TcprosCore
     from rosglass.wires.tcpros.master import Master
     from rosglass.wires.tcpros.topics import Topics
 
@@ -49,7 +49,7 @@ class ActionDiscovery:
         problem: What a person has to mend, in words; empty while something may come yet.
     """
 
-    def __init__(self, core: Core, topics: Topics, name: str) -> None:
+    def __init__(self, core: TcprosCore, topics: Topics, name: str) -> None:
         self._core, self._name = core, name
         self.problem = ""
         self._topics = topics
@@ -125,7 +125,7 @@ class GoalProbe(Member):
         name: Full name of their type.
     """
 
-    def __init__(self, core: Core, topics: Topics, topic: str, name: str) -> None:
+    def __init__(self, core: TcprosCore, topics: Topics, topic: str, name: str) -> None:
         self._core, self._topics, self._topic, self._name = core, topics, topic, name
         #: Replaced, never changed, and in the loop's thread only.
         self._waiting: list[tuple[Connection, dict[str, str]]] = []

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from rosglass.comm import Sample
     from rosglass.comm.action_server import ActionServer
     from rosglass.messages import ActionType, Message
-    from rosglass.ros1.core import Core
+    from rosglass.wires.tcpros.core import TcprosCore
     from rosglass.wires.tcpros.master import Master
     from rosglass.wires.tcpros.topics import Topics
 
@@ -256,7 +256,7 @@ class ActionlibServer(ActionServerProtocol[ActionlibServerGoal], Member):
     _server: ActionServer
 
     def __init__(
-        self, core: Core, topics: Topics, name: str, type: ActionType, simple: bool
+        self, core: TcprosCore, topics: Topics, name: str, type: ActionType, simple: bool
     ) -> None:
         super().__init__(core, name, type, "ros1", _log)
         self._simple = check_flag(simple, "simple", name)

@@ -18,7 +18,7 @@ from rosglass.ros1.action_state import ServerState
 
 if TYPE_CHECKING:
     from rosglass.messages import ActionType, Message, MessageType
-    from rosglass.ros1.announced_types import AnnouncedTypes
+    from rosglass.wires.tcpros.announced_types import AnnouncedTypes
     from rosglass.wires.tcpros.graph import Graph
 
 __all__ = [

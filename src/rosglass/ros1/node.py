@@ -18,11 +18,12 @@ from rosglass.comm.promise import check_timeout
 from rosglass.comm.rclpy_names import check_order
 from rosglass.errors import InvalidNameError
 from rosglass.ros1.actionlib_types import actions
-from rosglass.ros1.core import Core
-from rosglass.ros1.names import absolute_namespace, validate_node_name
+from rosglass.ros1.names import absolute_namespace, expand, validate_node_name
 from rosglass.ros1.parameter_server import ParameterServer
 from rosglass.ros1.roscpp_services import RoscppServices
 from rosglass.ros1.services import Services
+from rosglass.wires.tcpros.announced_types import AnnouncedTypes
+from rosglass.wires.tcpros.core import TcprosCore
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Mapping
@@ -48,6 +49,39 @@ if TYPE_CHECKING:
 __all__ = ["Ros1Node"]
 
 _log = logging.getLogger("rosglass.ros1")
+
+
+class Core(TcprosCore):
+    """Holds what a node consists of, and resolves its names.
+
+    Args:
+        name: The node's name.
+        url: What it was connected with, for people to read.
+        options: Master, own address, remappings.
+        library: Where definitions come from; None for the shared library.
+
+    Raises:
+        ConnectionLostError: This machine cannot listen for connections.
+    """
+
+    def __init__(
+        self, name: NodeName, url: str, options: Ros1Options, library: Library | None
+    ) -> None:
+        super().__init__(name, url, options, AnnouncedTypes(library, url))
+        self._new_names = options.arguments.remappings(name.name, name.namespace)
+
+    def resolve(self, name: str, kind: str = "topic") -> str:  # noqa: ARG002 - one rule for all
+        """Return the absolute name of a topic, service or parameter, which may be remapped.
+
+        Raises:
+            InvalidNameError: The name breaks ROS's rules.
+        """
+        full = self.expand(name)
+        return self._new_names.get(full, full)
+
+    def expand(self, name: str) -> str:
+        """Return the absolute name of anything, not remapped; raises InvalidNameError."""
+        return expand(name, self.name.name, self.name.namespace)
 
 
 class Ros1Node(GraphNode):

@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 
     from rosglass.comm import Executor, ParameterValue
     from rosglass.comm.promise import Deadline
-    from rosglass.ros1.core import Core
     from rosglass.ros1.parameter_server import ParameterServer
+    from rosglass.wires.tcpros.core import TcprosCore
 
 __all__ = ["RemoteNamespace", "Ros1Parameters"]
 
@@ -153,7 +153,7 @@ class Ros1Parameters(Parameters):
         InvalidNameError: A name breaks ROS's rules; from every method that takes one.
     """
 
-    def __init__(self, core: Core, server: ParameterServer) -> None:
+    def __init__(self, core: TcprosCore, server: ParameterServer) -> None:
         self.node = core.name.full
         self._core, self._server = core, server
         self._namespace = ParameterNamespace(server, core.name.full)
@@ -309,7 +309,7 @@ class RemoteNamespace(RemoteParameters):
         node: Full name of the other node, or any absolute namespace.
     """
 
-    def __init__(self, core: Core, server: ParameterServer, node: str) -> None:
+    def __init__(self, core: TcprosCore, server: ParameterServer, node: str) -> None:
         self.node = node
         self._core, self._server = core, server
         self._namespace = ParameterNamespace(server, node)

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from os import PathLike
 
-    from rosglass.ros1.core import Core
+    from rosglass.wires.tcpros.core import TcprosCore
     from rosglass.wires.tcpros.master import Master
 
 __all__ = [
@@ -92,7 +92,7 @@ class ParameterServer(Handle):
         start: Private parameters that the program was started with, by their names.
     """
 
-    def __init__(self, core: Core, start: Mapping[str, Any]) -> None:
+    def __init__(self, core: TcprosCore, start: Mapping[str, Any]) -> None:
         self._core, self._start = core, start
         self._beginning = threading.Lock()
         self._begun = not start
@@ -406,7 +406,7 @@ class MasterCallQueue:
         core: The node.
     """
 
-    def __init__(self, core: Core) -> None:
+    def __init__(self, core: TcprosCore) -> None:
         self._core = core
         self._lock = threading.Lock()
         self._waiting: deque[tuple[Promise[Any], Callable[[], Any]]] = deque()
@@ -578,7 +578,7 @@ class ParameterWatches:
         core: The node.
     """
 
-    def __init__(self, core: Core) -> None:
+    def __init__(self, core: TcprosCore) -> None:
         self._core = core
         self._lock = threading.Lock()
         self._watches: dict[str, ParameterWatch] = {}
@@ -628,7 +628,7 @@ class ParameterWatches:
 class ParameterWatch(Member):
     """A name that the node follows: registered with the master like a subscription."""
 
-    def __init__(self, core: Core, watches: ParameterWatches, name: str) -> None:
+    def __init__(self, core: TcprosCore, watches: ParameterWatches, name: str) -> None:
         self.name = name
         self._core, self._watches = core, watches
         self._turn = InOrder()

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from rosglass.comm.builtin_services import BuiltinServices
     from rosglass.comm.log import NodeLog, NodeLogger
     from rosglass.messages import Message
-    from rosglass.ros1.core import Core
     from rosglass.ros1.parameter_namespace import Ros1Parameters
     from rosglass.ros1.parameter_server import ParameterServer
+    from rosglass.wires.tcpros.core import TcprosCore
 
 __all__ = ["LoggerServices", "RoscppServices"]
 
@@ -65,7 +65,7 @@ class RoscppServices(BuiltinProtocol["Ros1Parameters"]):
     """
 
     def __init__(
-        self, node: Node, core: Core, server: ParameterServer, topics: Callable[[], list[str]]
+        self, node: Node, core: TcprosCore, server: ParameterServer, topics: Callable[[], list[str]]
     ) -> None:
         self._node, self._core, self._server, self._topics = node, core, server, topics
 

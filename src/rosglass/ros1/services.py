@@ -22,9 +22,8 @@ if TYPE_CHECKING:
     from rosglass.comm import Answer, EndpointInfo, Executor
     from rosglass.comm.service_client import PendingCall
     from rosglass.messages import Message, ServiceType
-    from rosglass.ros1.core import Core
     from rosglass.wires.base import OnReply, OnRequest
-    from rosglass.wires.tcpros.core import BlockingPool
+    from rosglass.wires.tcpros.core import BlockingPool, TcprosCore
     from rosglass.wires.tcpros.service_replier import TcprosReplier
     from rosglass.wires.tcpros.service_requester import Peer, Place
 
@@ -41,7 +40,7 @@ class Services:
         types: What others' servers say of themselves.
     """
 
-    def __init__(self, core: Core) -> None:
+    def __init__(self, core: TcprosCore) -> None:
         self._core = core
         self.types = ServiceTypes(core, core.lookups)
 
@@ -137,7 +136,7 @@ class ServiceTypes(Member):
         pool: Runs lookups.
     """
 
-    def __init__(self, core: Core, pool: BlockingPool) -> None:
+    def __init__(self, core: TcprosCore, pool: BlockingPool) -> None:
         self._core, self._pool = core, pool
         self._lock = threading.Lock()
         #: What is known, by service: whose it was according to the master, and what it says.

@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from typing import TypeAlias
 
     from rosglass.messages import ActionType, MessageType, ServiceType
-    from rosglass.ros1.core import Core
     from rosglass.ros1.services import Services
+    from rosglass.wires.tcpros.core import TcprosCore
     from rosglass.wires.tcpros.topics import Topics
 
     AnyType: TypeAlias = MessageType | ServiceType | ActionType
@@ -52,7 +52,7 @@ _SETTLED = 2.0
 
 
 def fetch(
-    core: Core,
+    core: TcprosCore,
     topics: Topics,
     services: Services,
     name: str,
@@ -108,7 +108,7 @@ class _Fetch(Member):
 
     def __init__(
         self,
-        core: Core,
+        core: TcprosCore,
         topics: Topics,
         services: Services,
         name: str,

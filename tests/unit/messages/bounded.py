@@ -31,8 +31,8 @@ from rosglass.interfaces import (
 )
 from rosglass.interfaces.type_sources import add_type_sources, type_sources
 from rosglass.messages import Message, MessageType, Translation, load
-from rosglass.ros1.announced_types import AnnouncedTypes
 from rosglass.wires.dds.types import describe_struct
+from rosglass.wires.tcpros.announced_types import AnnouncedTypes
 
 CPU_S, MEMORY = 4, 200 << 20
 _IDL = {

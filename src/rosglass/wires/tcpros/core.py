@@ -8,7 +8,7 @@ import threading
 from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rosglass.comm import ConnectionState, Handle, Status
 from rosglass.comm.complaints import Complaints
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from rosglass.comm import NodeName
     from rosglass.messages import ServiceType
     from rosglass.wires.base import OnRequest
+    from rosglass.wires.tcpros.announced_types import AnnouncedTypes
 
 __all__ = ["BlockingPool", "TcprosCore", "TcprosOptions", "max_connections"]
 
@@ -74,7 +75,7 @@ class TcprosCore(NodeCore[Handle]):
         name: The node's name.
         url: What it was connected with, for people to read.
         options: Master, own address, remappings.
-        types: Finds types; see :class:`rosglass.ros1.announced_types.AnnouncedTypes`.
+        types: Finds types.
 
     Attributes:
         master: Called from threads that may wait.
@@ -96,8 +97,11 @@ class TcprosCore(NodeCore[Handle]):
 
     wire = "ros1"
     graph: Graph
+    types: AnnouncedTypes
 
-    def __init__(self, name: NodeName, url: str, options: TcprosOptions, types: Any) -> None:
+    def __init__(
+        self, name: NodeName, url: str, options: TcprosOptions, types: AnnouncedTypes
+    ) -> None:
         super().__init__(name, url, _log)
         self.options = options
         self.master = Master(options.master, name.full)
