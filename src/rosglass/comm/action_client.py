@@ -310,7 +310,7 @@ class ActionClient(Client):
 
     type: ActionType | None
 
-    def __init__(self, core: NodeCore[Any], name: str, end_of_time: tuple[int, int]) -> None:
+    def __init__(self, core: NodeCore, name: str, end_of_time: tuple[int, int]) -> None:
         super().__init__(core, name)
         self.type = None
         self._end_of_time = end_of_time

@@ -53,7 +53,7 @@ class ActionServerProtocol(ABC, Generic[_Goal]):
     """
 
     def __init__(
-        self, core: NodeCore[Any], name: str, type: ActionType, wire: str, log: logging.Logger
+        self, core: NodeCore, name: str, type: ActionType, wire: str, log: logging.Logger
     ) -> None:
         self.name, self.type, self.wire, self.log = name, type, wire, log
         self.dispatcher = core.dispatcher
@@ -332,7 +332,7 @@ class ActionServer(Handle):
 
     def __init__(
         self,
-        core: NodeCore[Any],
+        core: NodeCore,
         protocol: ActionServerProtocol[Any],
         execute: Callable[[ServerGoal], Result | Awaitable[Result]],
         accept: Callable[[Message], bool] | None,

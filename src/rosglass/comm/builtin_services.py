@@ -10,7 +10,7 @@ from __future__ import annotations
 import logging
 import threading
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from rosglass.comm.core import NodeMember
 from rosglass.errors import Error, NodeClosedError, UnsupportedError
@@ -64,7 +64,7 @@ class BuiltinServices(NodeMember, Generic[_Parameters]):
         protocol: What these are in ROS 1 or in ROS 2.
     """
 
-    def __init__(self, core: NodeCore[Any], protocol: BuiltinProtocol[_Parameters]) -> None:
+    def __init__(self, core: NodeCore, protocol: BuiltinProtocol[_Parameters]) -> None:
         self._core, self._protocol = core, protocol
         self._lock = threading.RLock()
         self._parameters: _Parameters | None = None

@@ -39,9 +39,9 @@ class Client(Handle):
     """
 
     name: str
-    _core: NodeCore[Any]
+    _core: NodeCore
 
-    def __init__(self, core: NodeCore[Any], name: str) -> None:
+    def __init__(self, core: NodeCore, name: str) -> None:
         self._core, self.name = core, name
         self._closed = False
         self._warned = ""

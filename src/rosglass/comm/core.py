@@ -6,7 +6,7 @@ import os
 import threading
 from abc import ABC, abstractmethod
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.clock import Clock
 from rosglass.comm.executor import Dispatcher
@@ -49,10 +49,7 @@ class NodeMember(Handle):
         """End it; safe to call twice."""
 
 
-_Member = TypeVar("_Member", bound=Handle)
-
-
-class NodeCore(ABC, Generic[_Member]):
+class NodeCore(ABC):
     """Holds a node's threads and listeners, and keeps its members informed.
 
     Args:
@@ -98,7 +95,7 @@ class NodeCore(ABC, Generic[_Member]):
         self._lock = threading.Lock()
         self._closed = self._moved = False
         self._process = os.getpid()
-        self._members: dict[_Member, Callable[[bool, bool], None]] = {}
+        self._members: dict[Handle, Callable[[bool, bool], None]] = {}
         self.local_gids: set[bytes] = set()
         self.servers: set[Handle] = set()
 
@@ -125,7 +122,7 @@ class NodeCore(ABC, Generic[_Member]):
         if self._closed:
             raise NodeClosedError(f"node {self.name} is closed; connect again")
 
-    def add(self, member: _Member, follow: Callable[[bool, bool], None] | None = None) -> None:
+    def add(self, member: Handle, follow: Callable[[bool, bool], None] | None = None) -> None:
         """Let a member follow the graph from now on; raises NodeClosedError after closing it.
 
         Args:
@@ -140,12 +137,12 @@ class NodeCore(ABC, Generic[_Member]):
             member.close()
         self.check_open()
 
-    def remove(self, member: _Member) -> None:
+    def remove(self, member: Handle) -> None:
         """Forget a member that was closed."""
         with self._lock:
             self._members.pop(member, None)
 
-    def members(self) -> list[_Member]:
+    def members(self) -> list[Handle]:
         """Return all members."""
         with self._lock:
             return list(self._members)

@@ -34,7 +34,7 @@ __all__ = ["GraphNode"]
 class GraphNode(Node):
     """A node of a graph: its topics, what it sees of the graph, its log, clock and status."""
 
-    _core: NodeCore[Any]
+    _core: NodeCore
     _builtin_services: BuiltinServices[Any]
 
     # -- topics ----------------------------------------------------------------------------------

@@ -85,7 +85,7 @@ class NodeLog:
     def __init__(
         self,
         node: Node,
-        core: NodeCore[Any],
+        core: NodeCore,
         name: str,
         rosout: RosoutTopic | None,
         *,
@@ -179,7 +179,7 @@ class RosoutHandler(logging.Handler):
         topic: What a message looks like.
     """
 
-    def __init__(self, node: Node, core: NodeCore[Any], name: str, topic: RosoutTopic) -> None:
+    def __init__(self, node: Node, core: NodeCore, name: str, topic: RosoutTopic) -> None:
         super().__init__()
         self._node, self._core, self._label, self._topic = node, core, name, topic
         self._first_wait_s = topic.first_wait_s
@@ -278,7 +278,7 @@ class RosoutHandler(logging.Handler):
 class _Flush(NodeMember):
     """Closes a handler as its node closes."""
 
-    def __init__(self, handler: RosoutHandler, core: NodeCore[Any]) -> None:
+    def __init__(self, handler: RosoutHandler, core: NodeCore) -> None:
         self._handler, self._core = handler, core
 
     def close(self) -> None:

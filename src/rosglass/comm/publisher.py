@@ -62,7 +62,7 @@ class Publisher(Handle):
         qos: The quality of service offered; what was left open is decided.
     """
 
-    def __init__(self, core: NodeCore[Any], topic: str, type: MessageType, qos: QoS) -> None:
+    def __init__(self, core: NodeCore, topic: str, type: MessageType, qos: QoS) -> None:
         self.topic, self.type = topic, type
         self._core, self._wire = core, core.wire
         self._hash = type.type_hash

@@ -189,7 +189,7 @@ class ServiceClient(Client):
 
     def __init__(
         self,
-        core: NodeCore[Any],
+        core: NodeCore,
         name: str,
         qos: QoS,
         create_requester: Callable[

@@ -54,7 +54,7 @@ class ServiceServer(Handle):
 
     def __init__(
         self,
-        core: NodeCore[Any],
+        core: NodeCore,
         name: str,
         type: ServiceType,
         callback: Callable[[Message], Answer | Awaitable[Answer]],
@@ -243,7 +243,7 @@ def decode_checked(kind: MessageType, data: bytes | memoryview) -> Message:
     return kind.decode(data)
 
 
-def served_by_this_thread(core: NodeCore[Any], name: str) -> bool:
+def served_by_this_thread(core: NodeCore, name: str) -> bool:
     """Return whether only the calling thread can answer a service of its own node."""
     for server in list(core.servers):
         if not isinstance(server, ServiceServer) or server.name != name:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import threading
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rosglass.comm.executor import IMMEDIATE
 from rosglass.comm.node import Handle
@@ -39,7 +39,7 @@ class SimTime(Handle):
         core: What the node consists of, its clock and timers among it.
     """
 
-    def __init__(self, node: Node, core: NodeCore[Any]) -> None:
+    def __init__(self, node: Node, core: NodeCore) -> None:
         self._node, self._clock, self._timers = node, core.clock, core.timers
         self._lock = threading.Lock()
         self._subscription: Subscription | None = None

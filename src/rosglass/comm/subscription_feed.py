@@ -7,7 +7,7 @@ import threading
 import time
 from abc import ABC, abstractmethod
 from collections import deque
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.comm.core import NodeMember
 from rosglass.comm.events import (
@@ -43,7 +43,7 @@ _MAX_LEFT = 1000
 
 
 def find_subscribed_type(
-    core: NodeCore[Any], topic: str, wanted: MessageType | str | None
+    core: NodeCore, topic: str, wanted: MessageType | str | None
 ) -> MessageType | None:
     """Return the type that a subscription was asked for; None when publishers have to say it.
 
@@ -153,7 +153,7 @@ class SubscriptionFeed(NodeMember, Source):
 
     def __init__(
         self,
-        core: NodeCore[Any],
+        core: NodeCore,
         subscription: Subscription,
         matching: TopicMatching,
         ignored: AbstractSet[bytes] = frozenset(),

@@ -7,7 +7,7 @@ import logging
 from typing import TYPE_CHECKING
 from weakref import WeakValueDictionary
 
-from rosglass.comm import ConnectionState, Handle, Status
+from rosglass.comm import ConnectionState, Status
 from rosglass.comm.core import NodeCore
 from rosglass.comm.graph import Graph
 from rosglass.comm.listeners import ChangeListeners
@@ -27,7 +27,7 @@ __all__ = ["Core"]
 _log = logging.getLogger("rosglass.ros2")
 
 
-class Core(NodeCore[Handle]):
+class Core(NodeCore):
     """Holds what a node consists of, and keeps its members informed.
 
     Args:

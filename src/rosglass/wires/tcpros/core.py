@@ -68,7 +68,7 @@ class TcprosOptions:
     slave_port: int = 0
 
 
-class TcprosCore(NodeCore[Handle]):
+class TcprosCore(NodeCore):
     """Holds what a node consists of, and keeps its members registered and informed.
 
     Args:
