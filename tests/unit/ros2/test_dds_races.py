@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from asyncio import CancelledError
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -154,6 +155,22 @@ def test_a_request_is_carried_out_although_its_client_left_at_once(
         client.call_async({"a": 7})
         client.close()
     eventually(lambda: server.got == [7])
+
+
+def test_nothing_is_sent_that_a_server_just_announced_may_take_for_arguments(
+    node, server, middleware
+):
+    """Fast DDS's servers take the header that Cyclone DDS's ask for as their arguments."""
+    client = ready(node.create_service_client(SERVICE, ADD))
+    assert client.call({"a": 1, "b": 2}, timeout=30).sum == 2
+    (here,) = node.service_servers(SERVICE)
+    middleware._graph.put_endpoint("fast", replace(here, gid=b"\x01\x0f" + bytes(14)))
+    with pytest.raises(rosglass.Error, match="/add"):
+        client.call({"a": 2}, timeout=0.2)
+    assert server.got == [1]
+    # It is never matched: it only listens, or its profile does not fit.
+    assert client.call({"a": 3, "b": 4}, timeout=30).sum == 4
+    assert server.got == [1, 3]
 
 
 def test_a_request_in_the_memory_of_another_is_not_taken_for_that(node, server):

@@ -201,8 +201,12 @@ class DdsRequester(Requester):
         """Send a request; return whether nothing more is to be done for it."""
         # Whoever has just come must not be sent what it takes for something else.
         self._ends.catch_up()
+        if self._scheme is Scheme.HEADER and self._ends.strangers():
+            self._ends.look()
         scheme = self._scheme
         if scheme is None:
+            if self._schemes().get(Scheme.IDENTITY) is False and number in self._calls:
+                return False  # a server is about to be ready
             self._fail(number, SERVER_LEFT)
             return True
         parts: Parts = (data,)
@@ -329,9 +333,13 @@ class DdsRequester(Requester):
                 settled = None if now - since >= _LISTENER else False
             if settled is not None:
                 schemes[scheme] = settled or schemes.get(scheme, False)
+        if Scheme.IDENTITY not in schemes:
+            # A server that was announced may take requests before it is matched at this end.
+            for peer in ends.strangers():
+                unlinked[peer.gid] = since = self._unlinked.get(peer.gid, now)
+                if now - since < _LISTENER:
+                    schemes[Scheme.IDENTITY] = False
         self._unlinked = unlinked
-        young = [since + _LISTENER for since in unlinked.values() if since + _LISTENER > now]
-        self._recheck = min(young, default=math.inf)
         return schemes
 
     def _readers(self) -> dict[Scheme, frozenset[int]]:
@@ -349,7 +357,10 @@ class DdsRequester(Requester):
             self._linked = linked = self._readers()
             everybody = frozenset().union(*linked.values())
             self._asked = {number: asked & everybody for number, asked in self._asked.items()}
+        now = time.monotonic()
         self._scheme = self._route()
+        until = [since + _LISTENER for since in self._unlinked.values()]
+        self._recheck = min((each for each in until if each > now), default=math.inf)
         if self.changed is not None:
             self.changed()
 
