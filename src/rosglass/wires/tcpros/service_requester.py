@@ -392,9 +392,13 @@ class TcprosRequester(ServiceRequester):
     def server_found(self, moved: bool) -> None:
         """Send what waits to where the server is, and nothing more to where it was."""
         if moved:
-            for link in list(self._links):
-                if link.request is None:
-                    link.end("")
+            # Marked first: a call in another thread takes a link that is idle at any time.
+            with self._lock:
+                idle = [link for link in self._links if link.request is None]
+                for link in idle:
+                    link.ended = True
+            for link in idle:
+                link.end("")
         self._advance()
 
     def server_changed(self) -> None:
