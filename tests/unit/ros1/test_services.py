@@ -16,7 +16,7 @@ from waiting import nothing_happens
 import rosglass
 from rosglass.interfaces import Library
 from rosglass.wires.tcpros.connection import encode_header, parse_header
-from rosglass.wires.tcpros.service_requester import ServiceLink
+from rosglass.wires.tcpros.service_requester import ServiceLink, TcprosRequester
 
 ADD, TRIGGER, BOOL = "rospy_tutorials/AddTwoInts", "std_srvs/Trigger", "std_srvs/SetBool"
 MD5 = "6a2e34150c00229791cc89ff309fff21"
@@ -395,20 +395,30 @@ def test_a_service_that_moved_to_another_node_is_called_there(connect, client, e
 def test_a_call_takes_no_connection_that_is_being_ended(connect, eventually, monkeypatch):
     old, new = connect("old"), connect("new")
     client = connect("caller").create_service_client("/add", ADD, persistent=True)
-    calls, end = [], ServiceLink.end
+    calls, looked, ending = [], threading.Event(), threading.Event()
+    caller = threading.Thread(target=lambda: calls.append(client.call_async()))
+    fits, end = TcprosRequester._fits, ServiceLink.end
 
-    def call_first(link, reason=""):
-        if not calls:
-            caller = threading.Thread(target=lambda: calls.append(client.call_async()))
-            caller.start()
-            caller.join(30)
+    def fits_and_wait(*given):
+        found = fits(*given)
+        if threading.current_thread() is caller:
+            looked.set()
+            assert ending.wait(30)
+        return found
+
+    def end_after_the_call(link, reason=""):
+        ending.set()
+        caller.join(30)
         end(link, reason)
 
     old.create_service_server("/add", ADD, lambda _: {"sum": 1})
     assert client.call().sum == 1
-    monkeypatch.setattr(ServiceLink, "end", call_first)
+    monkeypatch.setattr(TcprosRequester, "_fits", fits_and_wait)
+    monkeypatch.setattr(ServiceLink, "end", end_after_the_call)
+    caller.start()
+    assert looked.wait(30)
     new.create_service_server("/add", ADD, lambda _: {"sum": 2})
-    eventually(lambda: client.call().sum == 2 and calls)
+    eventually(lambda: calls)
     assert calls[0].result(30).sum == 2
 
 
