@@ -167,3 +167,17 @@ def test_the_largest_types_go_to_javascript_and_back(bench: Any, shape: str) -> 
     assert kind.encode(there) == kind.encode(message)
     # A second is the aim, on a machine that has nothing else to do.
     assert time.process_time() - begun < 10
+
+
+def test_what_would_block_the_interface_is_refused(
+    bench: Any, tmp_path: Any, monkeypatch: Any
+) -> None:
+    monkeypatch.setattr("rosglass.qml.plain._READ_TIMEOUT_S", -1.0)
+    path = tmp_path / "slow.yaml"
+    text = bench.run(
+        f"try {{ Ros2.io.writeYaml('{path}', Array(300).fill(1)) }} catch (e) {{ return '' + e }}"
+    )
+    assert text is None or "blocks the interface" in text
+    assert not path.exists()
+    assert bench.run(f"return Ros2.io.writeYaml('{path}', Array(200).fill(1))") is True
+    assert path.exists()

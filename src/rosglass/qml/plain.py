@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 from rosglass.errors import ConversionError
@@ -15,6 +16,8 @@ __all__ = ["plain_from_js"]
 _DEEPEST = 100
 #: Values in all that are read one by one: what shares its parts can have more than atoms there are.
 _MOST = 1 << 18
+#: How long reading a value may block the interface.
+_READ_TIMEOUT_S = 5.0
 
 
 def plain_from_js(value: QJSValue) -> Any:
@@ -24,8 +27,9 @@ def plain_from_js(value: QJSValue) -> Any:
     rows, as dicts by role.
 
     Raises:
-        ConversionError: It is a function, refers to itself, is nested too deeply, or has more than
-            2^18 values; received arrays and typed arrays of numbers count as one.
+        ConversionError: It is a function, refers to itself, is nested too deeply, has more than
+            2^18 values, or takes more than 5 s to read; received arrays and typed arrays of
+            numbers count as one.
     """
     return _Reader().read(value, "", 0)
 
@@ -40,6 +44,7 @@ class _Reader:
 
     def __init__(self) -> None:
         self._left = _MOST
+        self._deadline = time.monotonic() + _READ_TIMEOUT_S
 
     def read(self, value: QJSValue, path: str, depth: int) -> Any:
         """Return a value; `path` is where it is."""
@@ -84,6 +89,14 @@ class _Reader:
                 "typed array count as one"
             )
             raise ConversionError(path[:60], Shown("more"), wanted)
+        if not self._left % 256 and time.monotonic() > self._deadline:
+            wanted = (
+                f"a value that is read within {_READ_TIMEOUT_S:g} s, for which it blocks the "
+                "interface; numbers in a typed array are read at once"
+            )
+            raise ConversionError(
+                path[:60], Shown(f"more than {_MOST - self._left} values"), wanted
+            )
 
     def _inner(self, value: QJSValue, name: str, path: str, depth: int) -> Any:
         here = f"{path}.{name}" if path else name
