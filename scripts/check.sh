@@ -10,6 +10,7 @@ trap 'kill $(jobs -p) 2>/dev/null || true; rm -f "$types"' EXIT
 checked=$!
 .venv/bin/ruff check .
 .venv/bin/ruff format --check .
+.venv/bin/python scripts/words.py
 # Without the files that take longest: `make test` runs them. They wait for real seconds, start other
 # programs, or try out a great many inputs.
 slow=(test_setup test_terminal bags/test_decompression_bombs bags/test_replay comm/test_yaml_bombs

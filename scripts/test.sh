@@ -15,6 +15,8 @@ checked=$!
 say "lint and format (ruff)"
 .venv/bin/ruff check .
 .venv/bin/ruff format --check .
+say "words (the glossary of CONTRIBUTING.md)"
+.venv/bin/python scripts/words.py
 say "documentation (mkdocs --strict)"
 NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict --quiet
 say "wheel"
