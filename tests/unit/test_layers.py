@@ -1,9 +1,10 @@
-"""The house's one rule: imports point downwards only (docs/architecture.md, section 1)."""
+"""Imports point downwards only, and the map in docs/architecture.md shows the folders there are."""
 
 from __future__ import annotations
 
 import ast
 import importlib
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -68,7 +69,7 @@ def test_imports_point_downwards(path: Path) -> None:
     room = room_of(path.relative_to(ROOT).with_suffix("").parts)
     if room in {"__init__", "__main__"}:
         return
-    assert room in RANK, f"{room} has no place in docs/architecture.md"
+    assert room in RANK, f"{room} is not in RANK, nor on the map in docs/architecture.md"
     for name in imports(path):
         parts = name.split(".")
         if parts[0] in QT:
@@ -77,6 +78,19 @@ def test_imports_point_downwards(path: Path) -> None:
             continue
         other = room_of(parts[1:])
         assert other == room or RANK[other] < RANK[room], f"{path} imports {name}"
+
+
+def test_the_map_shows_the_folders_of_the_source_tree() -> None:
+    page = Path(__file__).parents[2] / "docs" / "architecture.md"
+    shown = page.read_text(encoding="utf-8").split("src/rosglass/\n")[1].split("tests/\n")[0]
+    folders = {folder for folder in RANK if (ROOT / folder).is_dir()}
+    folders |= {f"wires/{file.parent.name}" for file in ROOT.glob("wires/*/__init__.py")}
+    drawn = re.findall(r"^  (  )?([\w.]+?)(/?)  ", shown, re.MULTILINE)
+    assert {f"wires/{name}" if deep else name for deep, name, slash in drawn if slash} == folders
+    packages = {file.parent.name for file in ROOT.glob("*/__init__.py")}
+    assert packages == {folder for folder in folders if "/" not in folder}
+    files = {f"{folder}.py" for folder in RANK if (ROOT / f"{folder}.py").is_file()}
+    assert {name for _, name, slash in drawn if not slash} == files
 
 
 def run(code: str) -> str:
