@@ -254,18 +254,18 @@ class ClientGoal(Handle):
         self._client._forget(self)
         cancels, self._cancels = self._cancels, []
         for answer, _ in cancels:
-            answer.fulfil(self._too_late())
+            answer.set_result(self._too_late())
         if self._waiting is not None:
             self._waiting.close()
         if isinstance(end, ActionResult):
-            self._acceptance.fulfil(False)  # unless it was accepted
-            self._done.fulfil(end)
+            self._acceptance.set_result(False)  # unless it was accepted
+            self._done.set_result(end)
             return
         if self._status in (GoalStatus.REJECTED, GoalStatus.CANCELED):
-            self._acceptance.fulfil(False)
+            self._acceptance.set_result(False)
         else:
-            self._acceptance.fail(end)
-        self._done.fail(end)
+            self._acceptance.set_exception(end)
+        self._done.set_exception(end)
 
     def _add_cancel(
         self, answer: Promise[CancelAnswer], timeout: float | None, failure: str
@@ -276,7 +276,7 @@ class ClientGoal(Handle):
         if timeout is not None:
 
             def give_up() -> None:
-                answer.fail(TimeoutError(failure))
+                answer.set_exception(TimeoutError(failure))
 
             self._client._core.timers.after(timeout, give_up)
 

@@ -252,7 +252,7 @@ class ServerGoal(Handle):
     def _wake(self) -> None:
         """Let what executes it see that it should end; the lock is not held."""
         self._stop.set()
-        self._cancel_request.fulfil(None)
+        self._cancel_request.set_result(None)
 
     def _conclude(self, result: Any) -> None:
         """End it with what executing it returned: cancelled if that was asked for, or done.

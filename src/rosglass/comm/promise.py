@@ -6,6 +6,7 @@ import math
 import time
 from concurrent.futures import CancelledError, Future, InvalidStateError
 from concurrent.futures import TimeoutError as _NotYet
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rosglass.comm.executor import RetryingExecutor, run_job
@@ -107,21 +108,15 @@ class Promise(Future[_T]):
             poster = RetryingExecutor(chosen, f"on_done() of {self._what}", _GIVE_UP_S)
             self.add_done_callback(lambda _: poster.post(lambda: run_job(lambda: callback(self))))
 
-    def fulfil(self, value: _T) -> bool:
-        """Let it come, unless it is done already; returns whether. For worlds."""
-        try:
-            self.set_result(value)
-        except InvalidStateError:
-            return False
-        return True
+    def set_result(self, value: _T) -> None:
+        """Complete it with `value`, unless it is done already."""
+        with suppress(InvalidStateError):
+            super().set_result(value)
 
-    def fail(self, error: BaseException) -> bool:
-        """Let an error come instead, unless it is done already; returns whether. For worlds."""
-        try:
-            self.set_exception(error)
-        except InvalidStateError:
-            return False
-        return True
+    def set_exception(self, error: BaseException | None) -> None:
+        """Complete it with an error, unless it is done already."""
+        with suppress(InvalidStateError):
+            super().set_exception(error)
 
     def _wait(self, timeout: float | None) -> None:
         timeout = check_timeout(timeout, "result()")

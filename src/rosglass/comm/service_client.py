@@ -383,7 +383,7 @@ class ServiceClient(Client):
                 f"{self._requester.server_name()} was sent the request {since:.1f} s ago, and may "
                 "still carry it out"
             )
-        pending.call.fail(error)
+        pending.call.set_exception(error)
 
     def _on_reply(self, number: int, data: bytes | memoryview | None, error: str | Error) -> None:
         """End a call with the response that came, or with the error; in a thread that receives."""
@@ -395,12 +395,14 @@ class ServiceClient(Client):
             if data is not None:
                 self._fulfil(pending, data)
             elif isinstance(error, Error):
-                pending.call.fail(error)
+                pending.call.set_exception(error)
             elif error in (SERVER_LEFT, CALL_DROPPED):
-                pending.call.fail(self._loss(pending))
+                pending.call.set_exception(self._loss(pending))
             else:
                 reason = error or "there is no response"
-                pending.call.fail(ServiceError(f"the call of {self.name} failed: {reason}"))
+                pending.call.set_exception(
+                    ServiceError(f"the call of {self.name} failed: {reason}")
+                )
         except Exception:
             _log.exception("%s: taking a response failed", self.name)
 
@@ -416,9 +418,9 @@ class ServiceClient(Client):
                 "the type: add that to the library"
             )
             rubbish.__cause__ = problem
-            pending.call.fail(rubbish)
+            pending.call.set_exception(rubbish)
         else:
-            pending.call.fulfil(message)
+            pending.call.set_result(message)
 
     def _loss(self, pending: PendingCall) -> ConnectionLostError:
         since = time.monotonic() - (pending.sent or time.monotonic())
@@ -438,7 +440,9 @@ class ServiceClient(Client):
         if self._core.forked:
             return
         for each in pending:
-            each.call.fail(NodeClosedError(f"the client of {self.name} was closed during a call"))
+            each.call.set_exception(
+                NodeClosedError(f"the client of {self.name} was closed during a call")
+            )
         self._requester.close()
         self._readiness.close()
         self._core.remove(self)

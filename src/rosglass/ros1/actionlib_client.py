@@ -138,7 +138,7 @@ class BulkCancel:
         if not self._canceled and time.monotonic() - self._begun < _RECEIVED_S:
             return False  # it may have been on its way already
         accepted = tuple(key.encode() for key in self._canceled)
-        self.answer.fulfil(
+        self.answer.set_result(
             CancelAnswer(accepted, "" if accepted else "there was no goal to cancel")
         )
         return True
@@ -185,8 +185,8 @@ class BulkCancels:
             unsent: Its error if no server could be asked.
         """
         if any(each is answer for _, each in self._waiting):
-            answer.fail(unsent)
-        answer.fail(
+            answer.set_exception(unsent)
+        answer.set_exception(
             TimeoutError(
                 f"{self._name} did not tell within {timeout:g} s that all goals are cancelled. It "
                 "may cancel them all the same: watch their status"
@@ -200,7 +200,7 @@ class BulkCancels:
         answers = [each.answer for each in self._asked] + [each for _, each in self._waiting]
         self._asked, self._waiting = [], []
         for answer in answers:
-            answer.fail(error)
+            answer.set_exception(error)
 
 
 class ActionlibClientGoal(ClientGoal):
@@ -447,10 +447,10 @@ class ActionlibClientGoal(ClientGoal):
 
     def _cancel(self, answer: Promise[CancelAnswer], timeout: float | None) -> None:
         if self._done.done():
-            answer.fulfil(self._too_late())
+            answer.set_result(self._too_late())
         elif self._sent is None:
             self._withdraw()
-            answer.fulfil(CancelAnswer((self.id,)))
+            answer.set_result(CancelAnswer((self.id,)))
         else:
             failure = (
                 f"{self._client.name} did not tell within {timeout or 0.0:g} s that it cancels "
@@ -501,12 +501,14 @@ class ActionlibClientGoal(ClientGoal):
             if status is not self._status:
                 self._set_status(status)
         if self._machine.executed:
-            self._acceptance.fulfil(True)
+            self._acceptance.set_result(True)
         said = self._machine.heard
         if self._cancels and (said in _CANCELED or (said is not None and said.is_terminal)):
             cancels, self._cancels = self._cancels, []
             for answer, _ in cancels:
-                answer.fulfil(CancelAnswer((self.id,)) if said in _CANCELED else self._too_late())
+                answer.set_result(
+                    CancelAnswer((self.id,)) if said in _CANCELED else self._too_late()
+                )
 
 
 class ActionlibClient(ActionClient, Member):
@@ -641,7 +643,7 @@ class ActionlibClient(ActionClient, Member):
 
     def _begin_bulk_cancel(self, until: Time | None, answer: Promise[CancelAnswer]) -> None:
         if self.closed:
-            answer.fail(NodeClosedError(f"the client of {self.name} was closed"))
+            answer.set_exception(NodeClosedError(f"the client of {self.name} was closed"))
             return
         for goal in self._live():
             if goal._is_unsent and (until is None or goal.stamp <= until):

@@ -431,7 +431,7 @@ class MasterCallQueue:
                 self._busy = True
                 self._waiting.append((made, job))
         if closed:
-            made.fail(self._end())
+            made.set_exception(self._end())
         elif start:
             self._core.pool.run(self._work)
         return made
@@ -444,7 +444,7 @@ class MasterCallQueue:
             self._waiting.clear()
             asked, self._asked = self._asked, None
         for promise in waiting if asked is None else [asked, *waiting]:
-            promise.fail(self._end())
+            promise.set_exception(self._end())
 
     def _work(self) -> None:
         while True:
@@ -457,19 +457,19 @@ class MasterCallQueue:
             if promise.done():
                 continue  # it was given up
             try:
-                promise.fulfil(job())
+                promise.set_result(job())
             except ConnectionLostError as error:
-                promise.fail(error)
+                promise.set_exception(error)
                 self._lose(error)
             except Exception as error:
-                promise.fail(error)
+                promise.set_exception(error)
 
     def _lose(self, error: ConnectionLostError) -> None:
         with self._lock:
             waiting = [promise for promise, _ in self._waiting]
             self._waiting.clear()
         for promise in waiting:
-            promise.fail(error)
+            promise.set_exception(error)
 
     def _end(self) -> NodeClosedError:
         return NodeClosedError(f"node {self._core.name} was closed meanwhile")

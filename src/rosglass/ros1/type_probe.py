@@ -82,7 +82,7 @@ def fetch(
         from rosglass.messages import load  # noqa: PLC0415 - numpy
 
         with suppress(Error):
-            promise.fulfil(load(name, ros=1, library=core.types.library, hash=hash))
+            promise.set_result(load(name, ros=1, library=core.types.library, hash=hash))
             return promise
     made = _Fetch(core, topics, services, name, hash, node, promise)
     if timeout is not None:
@@ -136,17 +136,17 @@ class _Fetch(Member):
         try:
             found = self._look()
         except Error as error:
-            self._promise.fail(error)
+            self._promise.set_exception(error)
             return
         if found is not None:
-            self._promise.fulfil(found)
+            self._promise.set_result(found)
 
     def expire(self, timeout: float) -> None:
         """Give up: the time is over."""
         who = f"{self._node} does not use it" if self._node else "nobody in the graph uses it"
         if self._core.status().state is not ConnectionState.CONNECTED:
             who = str(self._core.status())
-        self._promise.fail(
+        self._promise.set_exception(
             TypeNotFoundError(
                 f"no definition of {self._name} within {timeout:g} s: {self._problem or who}"
             )
@@ -162,7 +162,7 @@ class _Fetch(Member):
 
     def close(self) -> None:
         """Give up: the node is closed."""
-        self._promise.fail(NodeClosedError(f"node {self._core.name} was closed"))
+        self._promise.set_exception(NodeClosedError(f"node {self._core.name} was closed"))
 
     # -- on the node's own thread ----------------------------------------------------------------
 

@@ -218,7 +218,7 @@ class Ros2ClientGoal(ClientGoal):
         self._accepted = stamp
         self._servers = self._client._servers()
         self._advance(GoalStatus.ACCEPTED)
-        self._acceptance.fulfil(True)
+        self._acceptance.set_result(True)
         early, self._early_status = self._early_status, None
         if early is not None:
             self._on_status(*early)
@@ -265,14 +265,14 @@ class Ros2ClientGoal(ClientGoal):
     def _cancel(self, answer: Promise[CancelAnswer], timeout: float | None) -> None:
         call = self._sending
         if not self._status.is_active:
-            answer.fulfil(self._too_late())
+            answer.set_result(self._too_late())
         elif self.goal is None:
             self._end(GoalStatus.CANCELED, self._without_result())
-            answer.fulfil(CancelAnswer((self.id,)))
+            answer.set_result(CancelAnswer((self.id,)))
         elif self._status is not GoalStatus.PENDING:
             self._client._ask_cancel(self.id, Time(), answer, timeout)
         elif call is not None and self._client._take_back(call):
-            answer.fulfil(CancelAnswer((self.id,)))
+            answer.set_result(CancelAnswer((self.id,)))
         else:
             # Only a goal that was accepted can be cancelled: the server's answer comes first.
             failure = (
@@ -462,7 +462,7 @@ class Ros2ActionClient(ActionClient, NodeMember):
             request = {"goal_info": goal_info(goal_id, stamp)}
             call = self._open_ends().cancel_goal.call_async(request, timeout=timeout)
         except Error as error:
-            answer.fail(error)
+            answer.set_exception(error)
             return
         call.add_done_callback(lambda _: self._on_cancel_answer(goal_id, call, answer, timeout))
 
@@ -478,7 +478,7 @@ class Ros2ActionClient(ActionClient, NodeMember):
 
         def give_up() -> None:
             if self._ends is None:
-                answer.fail(self._not_cancelled(timeout))
+                answer.set_exception(self._not_cancelled(timeout))
 
         if timeout is not None:
             self._core.timers.after(timeout, give_up)
@@ -526,7 +526,7 @@ class Ros2ActionClient(ActionClient, NodeMember):
         elif isinstance(error, ServiceUnavailableError):
             error = self._not_cancelled(timeout)
         if error is not None:
-            answer.fail(error)
+            answer.set_exception(error)
             return
         response = call.result(0)
         accepted = tuple(bytes(info.goal_id.uuid) for info in response.goals_canceling)
@@ -537,7 +537,7 @@ class Ros2ActionClient(ActionClient, NodeMember):
         code = int(response.return_code)
         reason = CANCEL_REASONS.get(code, f"the server answers with the unknown code {code}")
         got = goal_id in accepted if goal_id != NO_ID else bool(accepted)
-        answer.fulfil(CancelAnswer(accepted, "" if got else reason))
+        answer.set_result(CancelAnswer(accepted, "" if got else reason))
 
     # -- following the graph ---------------------------------------------------------------------
 

@@ -351,7 +351,7 @@ class Ros2Requester(ServiceRequester):
             if pending.call.done() and not pending.answered:
                 requester.forget(pending.number)  # it was given up while it was sent
             return
-        pending.call.fail(error)
+        pending.call.set_exception(error)
 
     def _take(self, number: int, data: bytes | memoryview | None, error: str | Error) -> None:
         """Take a reply; called by the middleware."""

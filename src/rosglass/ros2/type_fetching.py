@@ -148,7 +148,7 @@ class TypeFetcher(NodeMember):
         )
         if hash:
             with suppress(Error):
-                promise.fulfil(self._load(name, hash))
+                promise.set_result(self._load(name, hash))
                 return promise
         if timeout is not None:
             timer = self._core.timers.after(timeout, lambda: self._expire(name, promise, timeout))
@@ -180,7 +180,9 @@ class TypeFetcher(NodeMember):
                 request.lookup.join()
         for promise in promises:
             if promise is not None:
-                promise.fail(NodeClosedError(f"node {self._core.name} is closed; connect again"))
+                promise.set_exception(
+                    NodeClosedError(f"node {self._core.name} is closed; connect again")
+                )
 
     def _put(self, asked: _Asked) -> None:
         """PendingQuery for a type in the next round; from any thread."""
@@ -211,7 +213,8 @@ class TypeFetcher(NodeMember):
                 reason = f"{nodes_of(servers)} did not answer yet"
             elif request.hash:
                 reason = "nobody in the graph uses this version of it"
-        promise.fail(TypeNotFoundError(f"no definition of {name} within {timeout:g} s: {reason}"))
+        text = f"no definition of {name} within {timeout:g} s: {reason}"
+        promise.set_exception(TypeNotFoundError(text))
 
     # -- rounds ----------------------------------------------------------------------------------
 
@@ -510,7 +513,7 @@ class TypeFetcher(NodeMember):
                 self._fail(request, error)
             return False
         for promise in request.promises:
-            promise.fulfil(found)
+            promise.set_result(found)
         return True
 
     def _give_up(self, request: TypeRequest, reason: str, now: float) -> None:
@@ -535,7 +538,7 @@ class TypeFetcher(NodeMember):
 
     def _fail(self, request: TypeRequest, error: Error) -> None:
         for promise in request.promises:
-            promise.fail(error)
+            promise.set_exception(error)
 
     def _drop(self, request: TypeRequest) -> None:
         if self._requests.get(request.key) is request:

@@ -211,7 +211,7 @@ class Waiting:
         if timers is not None:
             timers.close()
         for request in requests:
-            request.promise.fail(
+            request.promise.set_exception(
                 NodeClosedError(f"{request.what}: the transform buffer was closed meanwhile")
             )
 
@@ -235,12 +235,12 @@ class _Request:
         try:
             found = self._query()
         except InvalidArgumentException as error:
-            self.promise.fail(error)
+            self.promise.set_exception(error)
             return True
         except TransformException as error:
             self._reason = error
             return False
-        self.promise.fulfil(found)
+        self.promise.set_result(found)
         return True
 
     def expire(self, timeout: float) -> None:
@@ -249,7 +249,7 @@ class _Request:
             f"{self.what} is not available within {timeout:g} s: {self._reason}"
         )
         error.__cause__ = self._reason
-        self.promise.fail(error)
+        self.promise.set_exception(error)
 
 
 def check_may_wait_for(promise: Promise[Transform], what: str) -> None:

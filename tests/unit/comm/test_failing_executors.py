@@ -206,7 +206,7 @@ def test_a_listener_whose_callback_fails_is_called_once(caplog):
 def test_a_promise_calls_back_although_its_executor_raised_at_first():
     promise, came = Promise(cancellable=True), threading.Event()
     promise.on_done(lambda _: came.set(), Refusing(2))
-    promise.fulfil(1)
+    promise.set_result(1)
     assert came.wait(LIMIT)
 
 

@@ -21,16 +21,16 @@ def promise(request):
 
 
 def test_it_comes_once(promise):
-    assert promise.fulfil(1)
-    assert not promise.fulfil(2)
-    assert not promise.fail(ValueError())
+    promise.set_result(1)
+    promise.set_result(2)
+    promise.set_exception(ValueError())
     assert promise.result() == promise.result(0) == 1
     assert promise.exception() is None
     assert not promise.cancel()
 
 
 def test_an_error_comes_instead(promise):
-    assert promise.fail(rosglass.TimeoutError("its own"))
+    promise.set_exception(rosglass.TimeoutError("its own"))
     with pytest.raises(rosglass.TimeoutError, match="its own"):
         promise.result(1)
     assert str(promise.exception(1)) == "its own"
@@ -55,7 +55,7 @@ def test_giving_up():
     promise.on_done(told.append)
     assert promise.cancel()
     assert promise.cancel()
-    assert not promise.fulfil(1)
+    promise.set_result(1)
     assert told == [promise]
     assert concurrent.futures.wait([promise], 0).done == {promise}
     with pytest.raises(concurrent.futures.CancelledError):
@@ -81,7 +81,7 @@ def test_callbacks_run_where_they_should():
     promise.on_done(lambda _: told[0].set_result(threading.current_thread().name))
     promise.on_done(lambda _: told[1].set_result(threading.current_thread().name), elsewhere)
     promise.on_done(told[2].append, IMMEDIATE)
-    promise.fulfil(None)
+    promise.set_result(None)
     assert told[2] == [promise]
     assert [future.result(30) for future in told[:2]] == ["home", "elsewhere"]
     late = concurrent.futures.Future()
@@ -112,7 +112,7 @@ def test_a_thread_that_receives_may_look_but_not_wait(monkeypatch):
         with pytest.raises(TimeoutError):
             promise.result(0)
         assert subscription.wait(0) is None
-        promise.fulfil(3)
+        promise.set_result(3)
         told.append(promise.result())
 
     thread = threading.Thread(target=receive, daemon=True)
