@@ -14,8 +14,8 @@ from contextlib import suppress
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm.complaints import FailureLog
 from rosglass.comm.executor import IMMEDIATE, RetryingExecutor, let_exit
+from rosglass.comm.log_limits import FailureLog
 from rosglass.comm.qos import History
 from rosglass.comm.statistics import MARK_PERIOD, Meter
 from rosglass.errors import ConversionError

@@ -8,9 +8,9 @@ import threading
 from concurrent.futures import CancelledError, Future
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm.complaints import Complaints
 from rosglass.comm.executor import Dispatcher, LoopExecutor, executor_for
 from rosglass.comm.graph import EndpointKind
+from rosglass.comm.log_limits import LogOnce
 from rosglass.comm.node import Handle
 from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.errors import DecodeError, Error, NodeClosedError, ServiceError
@@ -69,7 +69,7 @@ class ServiceServer(Handle):
         self._closed = False
         self._waiting = 0
         self._running: set[Future[Any]] = set()
-        self._complaints = Complaints()
+        self._log_once = LogOnce()
         #: Requests that come before the replier that answers them is here; None from then on.
         self._early: list[tuple[RequestId, bytes]] | None = []
         # Executors other than our own may do anything.
@@ -229,7 +229,7 @@ class ServiceServer(Handle):
 
     def _refuse(self, request: RequestId, reason: str) -> None:
         """Turn a client's fault down, and name it in the log once."""
-        if self._complaints.fresh(request.client):
+        if self._log_once.is_first(request.client):
             client = self._replier.client_name(request)
             _log.warning("%s: refusing requests of %s: %s", self.name, client, reason)
         self._replier.fail(request, reason)

@@ -31,9 +31,9 @@ from rosglass.comm.action_client import (
     ActionClient,
     ClientGoal,
 )
-from rosglass.comm.complaints import Complaints
 from rosglass.comm.core import NodeMember
 from rosglass.comm.executor import InOrder
+from rosglass.comm.log_limits import LogOnce
 from rosglass.errors import (
     ConnectionLostError,
     DecodeError,
@@ -635,7 +635,7 @@ class _ClientEndpoints(Handle):
         self, core: Core, name: str, types: ActionTypes, goals: dict[bytes, Ros2ClientGoal]
     ) -> None:
         self._core, self._name, self._goals = core, name, goals
-        self._complaints = Complaints()
+        self._log_once = LogOnce()
         self.types = types
         self.send_goal = Ros2ServiceClient(core, part(name, SEND_GOAL), types.send_goal, quiet=True)
         self.cancel_goal = Ros2ServiceClient(
@@ -715,7 +715,7 @@ class _ClientEndpoints(Handle):
 
     def _complain(self, topic: str, gid: bytes, reason: str) -> None:
         """Log what cannot be understood, once for each publisher."""
-        if not self._complaints.fresh((topic, gid)):
+        if not self._log_once.is_first((topic, gid)):
             return
         publishers = self._core.graph.endpoints(EndpointKind.PUBLISHER, part(self._name, topic))
         who = [found.node.full for found in publishers if found.gid == gid] or [f"gid {gid.hex()}"]

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from time import monotonic
 from typing import TYPE_CHECKING
 
-from rosglass.comm.complaints import Complaints
 from rosglass.comm.executor import IMMEDIATE, check_plain
 from rosglass.comm.listeners import Listeners
+from rosglass.comm.log_limits import LogOnce
 from rosglass.comm.names import similar
 from rosglass.comm.node import Executor, Handle, check_may_wait
 from rosglass.comm.promise import Promise, check_timeout
@@ -320,7 +320,7 @@ class TransformBuffer(Handle):
         self.ignored: Counter[str] = Counter()
         self._lock = threading.Lock()
         self._store = FrameStore(kept.nanoseconds)
-        self._complaints = Complaints(1000)
+        self._log_once = LogOnce(1000)
         self._changes = Changes(self._links)
         self._waiting = Waiting()
 
@@ -392,7 +392,7 @@ class TransformBuffer(Handle):
             jumps, store.jumps = store.jumps, []
         # What is logged may go round the world, and may ask the graph who it was.
         for frame, first, second in disagreements:
-            if self._complaints.fresh(("kind", frame)):
+            if self._log_once.is_first(("kind", frame)):
                 _log.warning(
                     "frame '%s' is published as static and as moving, by %s and %s: what comes "
                     "last counts; let one of them publish it",
@@ -409,7 +409,7 @@ class TransformBuffer(Handle):
                 str(jumps[-1][2]) or "an unnamed authority",
             )
         for kind, child, told in refused:
-            if self._complaints.fresh((kind, child, authority)):
+            if self._log_once.is_first((kind, child, authority)):
                 level = logging.DEBUG if kind == "repeated" else logging.WARNING
                 _log.log(level, "%s (from %s)", told, str(authority) or "an unnamed authority")
         if changed:

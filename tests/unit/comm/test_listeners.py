@@ -18,9 +18,9 @@ from rosglass.comm import (
     Matched,
     NodeName,
 )
-from rosglass.comm.complaints import Complaints
 from rosglass.comm.events import Appearances
 from rosglass.comm.listeners import ChangeListeners
+from rosglass.comm.log_limits import LogOnce
 
 
 @pytest.mark.parametrize(
@@ -140,12 +140,12 @@ def test_who_appears_is_told_to_listeners_that_come_and_go_in_several_threads():
 
 
 @pytest.mark.usefixtures("hasty_threads")
-def test_of_several_threads_one_complains():
-    complaints, rounds = Complaints(1000), 300
-    fresh = in_threads(lambda _: [complaints.fresh(about) for about in range(rounds)])
-    assert [sum(made) for made in zip(*fresh, strict=True)] == [1] * rounds
-    few = Complaints(2)
-    assert [few.fresh(about) for about in "aabca"] == [True, False, True, False, False]
+def test_of_several_threads_one_logs():
+    log_once, rounds = LogOnce(1000), 300
+    firsts = in_threads(lambda _: [log_once.is_first(about) for about in range(rounds)])
+    assert [sum(made) for made in zip(*firsts, strict=True)] == [1] * rounds
+    few = LogOnce(2)
+    assert [few.is_first(about) for about in "aabca"] == [True, False, True, False, False]
 
 
 def test_who_read_a_value_is_told_that_it_changed_back_before_anyone_looked():

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rosglass.comm import ConnectionState, Handle, Status
-from rosglass.comm.complaints import Complaints
 from rosglass.comm.core import NodeCore
+from rosglass.comm.log_limits import LogOnce
 from rosglass.errors import Error, ServiceError
 from rosglass.wires.tcpros.address import bracketed, own_address
 from rosglass.wires.tcpros.connection import Connection, outlast
@@ -130,7 +130,7 @@ class TcprosCore(NodeCore):
         #: Connections that others have made; those without a header, the oldest first.
         self._connections: set[Connection] = set()
         self._silent: dict[Connection, None] = {}
-        self._max_connections, self._complaints = max_connections(), Complaints()
+        self._max_connections, self._log_once = max_connections(), LogOnce()
         self.topics, self.repliers = Topics(self), dict[str, TcprosReplier]()
         self._registrations = Registrations(self)
         self._worker = self._start_following()
@@ -302,7 +302,7 @@ class TcprosCore(NodeCore):
         """Take a connection in; its header says what it is for."""
         link: Connection
         if len(self._connections) >= self._max_connections:
-            if self._complaints.fresh("crowded"):
+            if self._log_once.is_first("crowded"):
                 text = "%s: refused, for this node has %d connections; others are not named"
                 _log.warning(text, address, len(self._connections))
             sock.close()

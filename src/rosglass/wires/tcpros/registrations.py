@@ -15,8 +15,8 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rosglass.comm import ConnectionState, EndpointKind, Status
-from rosglass.comm.complaints import Complaints
 from rosglass.comm.core import NodeMember
+from rosglass.comm.log_limits import LogOnce
 from rosglass.errors import ConnectionLostError, Error, MasterError
 from rosglass.wires.tcpros.address import doubt, own_address, parse_uri
 from rosglass.wires.tcpros.master import Master
@@ -88,7 +88,7 @@ class Registrations:
         self._registered: set[Member] = set()
         self._tried: set[Member] = set()
         self._leaving: deque[Member] = deque()
-        self._complaints = Complaints()
+        self._log_once = LogOnce()
         self._answered = False
         #: The master's process, as it last said.
         self._process: object = None
@@ -243,7 +243,7 @@ class Registrations:
                 raise
             except Error as error:
                 refused.append(str(error))
-                if self._complaints.fresh((member, str(error))):
+                if self._log_once.is_first((member, str(error))):
                     _log.warning("%s: %s", member, error)
         return refused
 

@@ -14,7 +14,7 @@ from collections import deque
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import EndpointKind
-from rosglass.comm.complaints import Complaints
+from rosglass.comm.log_limits import LogOnce
 from rosglass.errors import ServiceError
 from rosglass.interfaces import ros1_name
 from rosglass.wires.base import Replier, RequestId
@@ -77,7 +77,7 @@ class TcprosReplier(Replier, Member):
         self._sessions: dict[Connection, _Session] = {}
         #: Why clients were refused lately, and when, by their names.
         self._refused: dict[str, tuple[str, float]] = {}
-        self._complaints = Complaints()
+        self._log_once = LogOnce()
         #: Whether the master has shown the service as this node's.
         self._seen = False
         self._warned = ""
@@ -171,7 +171,7 @@ class TcprosReplier(Replier, Member):
         self._refused[client] = (problem, time.monotonic())
         if len(self._refused) > _MAX_REFUSED:
             del self._refused[next(iter(self._refused))]
-        if self._complaints.fresh((client, md5)):
+        if self._log_once.is_first((client, md5)):
             ours = self._core.types.text(self.type).strip()
             _log.warning("%s: it is not served. Ours:\n%s", problem, ours)
         return problem

@@ -18,7 +18,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Protocol
 from urllib.parse import urlsplit
 
-from rosglass.comm.complaints import Complaints
+from rosglass.comm.log_limits import LogOnce
 from rosglass.interfaces import ros1_name
 from rosglass.wires.tcpros.address import is_loopback
 from rosglass.wires.tcpros.master import parse_xml
@@ -111,7 +111,7 @@ class Slave(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCDispatcher):
         super().__init__(allow_none=True)
         self._api = api
         self._lock = threading.Lock()
-        self._complaints = Complaints()
+        self._log_once = LogOnce()
         #: The oldest first.
         self._connections: dict[socket.socket, None] = {}
         #: Of the connection that a thread serves: the other end's address, and this one's.
@@ -143,7 +143,7 @@ class Slave(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCDispatcher):
                 with suppress(OSError):
                     oldest.shutdown(socket.SHUT_RDWR)  # its thread ends
             self._connections[sock] = None
-        if crowded and self._complaints.fresh("crowded"):
+        if crowded and self._log_once.is_first("crowded"):
             text = "%s: the node's API has more than %d connections, the oldest are cut"
             _log.warning(text, address, _MAX_CONNECTIONS)
         try:
@@ -196,7 +196,7 @@ class Slave(socketserver.ThreadingMixIn, xmlrpc.server.SimpleXMLRPCDispatcher):
         # Debian names a machine 127.0.1.1, to which others connect from 127.0.0.1.
         here = peer == own or is_loopback(peer)
         if not here and peer not in _addresses(self._api.master_uri()):
-            if self._complaints.fresh(("shutdown", peer)):
+            if self._log_once.is_first(("shutdown", peer)):
                 text = "%s at %s wanted to end this node: only its own and the master's host may"
                 _log.warning(text, caller, peer)
             raise ValueError(f"taken from this node's own and the master's host, not from {peer}")
