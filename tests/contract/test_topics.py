@@ -307,6 +307,21 @@ def test_ignore_local_leaves_out_what_this_node_publishes(robot, console, topic,
     assert received == ["other"]
 
 
+def test_ignore_local_leaves_out_what_a_closed_publisher_sent_last(
+    robot, console, topic, eventually
+):
+    # Without a callback, samples wait in the wire for the subscription to look.
+    subscription = robot.create_subscription(topic, TEXT, ignore_local=True)
+    hearing = console.create_subscription(topic, TEXT)
+    own = robot.create_publisher(topic, TEXT)
+    eventually(own.subscription_count)
+    eventually(hearing.publisher_count)
+    own.publish(data="own")
+    own.close()
+    eventually(lambda: hearing.statistics().received)
+    assert subscription.statistics().received == 0
+
+
 def test_publishers_that_come_and_go_are_reported(connect, robot, console, topic, eventually):
     events = []
     subscription = console.create_subscription(topic, TEXT)

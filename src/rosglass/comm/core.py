@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import threading
 from abc import ABC, abstractmethod
+from collections import deque
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -31,6 +32,8 @@ __all__ = [
 
 #: Seconds between the members' regular looks at what has no event.
 _POLL = 1.0
+#: Closed publishers whose GIDs are kept.
+_MAX_CLOSED_GIDS = 1000
 
 
 class NodeMember(Handle):
@@ -67,7 +70,7 @@ class NodeCore(ABC):
             posts the callbacks of the clock's timers.
         graph_listeners: Told after each change of the graph.
         status_listeners: Told each new status.
-        local_gids: Identities of the node's own publishers.
+        local_gids: GIDs of the node's own publishers, and of those closed last.
         servers: The services that the node offers.
     """
 
@@ -97,6 +100,7 @@ class NodeCore(ABC):
         self._process = os.getpid()
         self._members: dict[Handle, Callable[[bool, bool], None]] = {}
         self.local_gids: set[bytes] = set()
+        self._closed_gids: deque[bytes] = deque()
         self.servers: set[Handle] = set()
 
     def _start_following(self) -> Worker:
@@ -146,6 +150,12 @@ class NodeCore(ABC):
         """Return all members."""
         with self._lock:
             return list(self._members)
+
+    def retire_gid(self, gid: bytes) -> None:
+        """Keep a closed publisher in :attr:`local_gids` while its samples may still arrive."""
+        self._closed_gids.append(gid)
+        if len(self._closed_gids) > _MAX_CLOSED_GIDS:
+            self.local_gids.discard(self._closed_gids.popleft())
 
     def wake(self) -> None:
         """Let the members follow soon, as if the graph had changed; from any thread."""

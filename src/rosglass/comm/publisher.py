@@ -254,7 +254,7 @@ class Publisher(Handle):
         if isinstance(graph, Graph):
             graph.unwatch(self.topic, self._on_endpoint_removed)
         self._writer.close()
-        self._core.local_gids.discard(self._writer.gid)
+        self._core.retire_gid(self._writer.gid)
         self._core.remove(self)
 
     # -- subscriptions ---------------------------------------------------------------------------

@@ -124,11 +124,9 @@ class GraphMatching(TopicMatching):
         self._core.graph.unwatch(self._topic, self._on_endpoint_removed)
 
     def _on_endpoint_removed(self, endpoint: EndpointInfo) -> None:
-        if endpoint.kind is not _PUBLISHER or not self.find_matching([endpoint]):
+        if endpoint.kind is not _PUBLISHER or endpoint.gid in self._ignored:
             return
-        # The node's own publishers that are closed are no longer among its identities.
-        ignores_own = self._ignored is self._core.local_gids
-        if not (ignores_own and endpoint.node == self._core.name):
+        if self.find_matching([endpoint]):
             self._feed.on_publisher_left(endpoint)
 
     # -- quality of service ----------------------------------------------------------------------

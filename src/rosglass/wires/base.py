@@ -121,8 +121,8 @@ class Reader(Handle):
     def set_eager(self, eager: bool) -> None:
         """Say whether samples are handed on as they come, which is how a reader starts.
 
-        Nobody waits for the samples of a reader that is not eager: it may hand them on in
-        batches, some ten times a second, so that a topic nobody looks at costs next to nothing.
+        A reader that is not eager may hand samples on in batches, several times a second, so that
+        a topic that no consumer waits for costs next to nothing.
         """
 
     def flush(self) -> None:

@@ -520,4 +520,11 @@ def test_what_the_node_publishes_itself_can_be_left_out(node, middleware):
     assert everything.statistics().received == 2
     publisher.close()
     middleware.readers[0].receive(HELLO, gid=own)
-    assert subscription.statistics().received == 2, "that identity is somebody else's now"
+    assert subscription.statistics().received == 1, "samples of a closed publisher come back"
+
+
+def test_gids_of_closed_publishers_are_not_kept_for_ever(node):
+    kept = node._core.local_gids
+    for _ in range(1005):
+        node.create_publisher("/t", STRING).close()
+    assert len(kept) == 1000

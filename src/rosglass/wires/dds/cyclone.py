@@ -50,6 +50,7 @@ __all__ = [
     "create_writer",
     "delete",
     "guid",
+    "handle",
     "keeping",
     "library",
     "matched_publications",
@@ -76,6 +77,7 @@ _PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
     "dds_delete": (c_int32, [_entity]),
     "dds_wait_for_acks": (c_int32, [_entity, c_int64]),
     "dds_get_guid": (c_int32, [_entity, pointer]),
+    "dds_get_instance_handle": (c_int32, [_entity, POINTER(c_uint64)]),
     "dds_get_entity_sertype": (c_int32, [_entity, POINTER(pointer)]),
     "dds_get_matched_publications": (c_int32, [_entity, pointer, c_size_t]),
     "dds_get_matched_subscriptions": (c_int32, [_entity, pointer, c_size_t]),
@@ -278,6 +280,14 @@ def guid(entity: int) -> bytes:
     buffer = ctypes.create_string_buffer(16)
     check_alive(library().dds_get_guid(entity, buffer), "dds_get_guid", f"entity {entity}")
     return buffer.raw
+
+
+def handle(entity: int) -> int:
+    """Return the number by which samples and matches name a reader or writer."""
+    value = c_uint64()
+    result = library().dds_get_instance_handle(entity, ctypes.byref(value))
+    check_alive(result, "dds_get_instance_handle", f"entity {entity}")
+    return value.value
 
 
 def sertype(entity: int) -> int:

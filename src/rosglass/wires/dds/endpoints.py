@@ -322,6 +322,7 @@ class DdsWriter(Writer):
         )
         self.gid = self._writer.guid
         participant.add_endpoint(endpoint.node, self.gid, writer=True)
+        participant.add_writer(cyclone.handle(self._writer.entity), self.gid, endpoint.type_hash)
 
     def write(self, data: bytes | bytearray) -> None:
         """Send a payload; a reliable writer that keeps all waits for slow readers."""
@@ -394,12 +395,15 @@ class DdsReader(Reader):
 
     def _identify(self, handle: int) -> tuple[bytes, str]:
         """Return a writer's identity and type hash; both empty when it is gone already."""
-        # What is latched comes before the constructor has returned.
-        self._made.wait(_PATIENCE)
-        found = cyclone_builtin.matched_publication(self._reader.entity, handle)
-        if found is None:
-            return b"", ""
+        writer = self._participant.writers.get(handle)
+        if writer is None:
+            # What is latched comes before the constructor has returned.
+            self._made.wait(_PATIENCE)
+            found = cyclone_builtin.matched_publication(self._reader.entity, handle)
+            if found is None:
+                return b"", ""
+            writer = found.guid, hash_of(found.user_data)
         if len(self._writers) >= _MAX_WRITERS:
             self._writers.clear()
-        writer = self._writers[handle] = found.guid, hash_of(found.user_data)
+        self._writers[handle] = writer
         return writer

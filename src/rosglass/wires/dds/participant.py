@@ -36,6 +36,8 @@ _BACKOFF_S = 0.1
 _ACKNOWLEDGE_TIMEOUT_S = 1.0
 #: Time between two looks at lingering writers while a participant is closed.
 _LINGER_POLL_S = 0.002
+#: Writers that are remembered; older ones are known as long as they are matched.
+_MAX_WRITERS = 1000
 #: What the pump knows the lingering writers by; no entity has that number.
 _LINGERING = 0
 
@@ -54,6 +56,7 @@ class Participant:
         lingering: Where closed writers wait until what they sent has arrived.
         on_nodes: Called with all nodes whenever they or their endpoints change, never twice at a
             time; what announces them sets it.
+        writers: GUIDs and type hashes of the last writers of topics, by their handles.
         seen: What is seen of the others; what follows them sets it.
 
     Raises:
@@ -67,6 +70,7 @@ class Participant:
         self.seen: DdsGraph | None = None
         self._nodes: dict[NodeName, int] = {}
         self._endpoints: dict[bytes, tuple[NodeName, bool]] = {}
+        self.writers: dict[int, tuple[bytes, str]] = {}
         self._lock = threading.Lock()
         self._use = threading.Condition()
         self._users = 0
@@ -109,6 +113,13 @@ class Participant:
         with self._lock:
             self._endpoints[guid] = (node, writer)
             self._tell()
+
+    def add_writer(self, handle: int, guid: bytes, type_hash: str) -> None:
+        """Remember a topic's writer, whose samples may be read after it was deleted."""
+        with self._lock:
+            if len(self.writers) >= _MAX_WRITERS:
+                del self.writers[next(iter(self.writers))]
+            self.writers[handle] = guid, type_hash
 
     def remove_endpoint(self, guid: bytes) -> None:
         """Remove a reader or writer."""
