@@ -66,14 +66,17 @@ def members(kind: Any) -> list[str]:
     base = meta
     while base.className()[0] != "Q" or base.className().startswith("QPy"):
         base = base.superClass()
-    names = [meta.property(i).name() for i in range(base.propertyCount(), meta.propertyCount())]
+    properties = range(base.propertyCount(), meta.propertyCount())
+    names = sorted(meta.property(index).name() for index in properties)
     notifiers = {f"{name}Changed" for name in names}
+    methods = []
     for index in range(base.methodCount(), meta.methodCount()):
         method = meta.method(index)
         name = bytes(method.name()).decode()
         public = method.access() == QtCore.QMetaMethod.Access.Public
         if public and not name.startswith("_") and name not in notifiers:
-            names.append(name)
+            methods.append(name)
+    names += sorted(methods)
     for index in range(base.enumeratorCount(), meta.enumeratorCount()):
         enum = meta.enumerator(index)
         names += [str(enum.key(place)) for place in range(enum.keyCount())]

@@ -65,8 +65,8 @@ def _component(uri: str, kind: type[QtCore.QObject], exports: list[str]) -> str:
         "exportMetaObjectRevisions: [256]",
     ]
     lines += _enums(meta, base)
-    lines += _properties(meta, base)
-    lines += _methods(kind, base)
+    lines += sorted(_properties(meta, base))
+    lines += sorted(_methods(kind, base), key=_name_of)
     body = "".join(f"        {line}\n" for line in lines)
     return f"    Component {{\n{body}    }}\n"
 
@@ -118,6 +118,11 @@ def _methods(kind: type[QtCore.QObject], base: QtCore.QMetaObject) -> Iterator[s
             )
         )
         yield f"{'Signal' if is_signal else 'Method'} {{ {'; '.join(filter(None, parts))} }}"
+
+
+def _name_of(line: str) -> tuple[bool, str]:
+    """Return the sorting key of a method's line: signals first, then by name."""
+    return line.startswith("Method"), line.split('"', 2)[1]
 
 
 def _parameter_names(kind: type[QtCore.QObject], method: str, count: int) -> list[str]:
