@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import logging
 import threading
+from collections import deque
 from concurrent.futures import CancelledError, Future
 from typing import TYPE_CHECKING, Any
 
@@ -70,17 +71,14 @@ class ServiceServer(Handle):
         self._waiting = 0
         self._running: set[Future[Any]] = set()
         self._log_once = LogOnce()
-        #: Requests that come before the replier that answers them is here; None from then on.
-        self._early: list[tuple[RequestId, bytes]] | None = []
+        #: Requests received before the replier that answers them is here; None from then on.
+        self._early: deque[tuple[RequestId, bytes]] | None = deque()
         # Executors other than our own may do anything.
         quick = isinstance(self._executor, (Dispatcher, LoopExecutor))
         self._replier = create_replier(self._on_request, quick)
         core.servers.add(self)
         core.add(self)
-        with self._lock:
-            early, self._early = self._early or [], None
-        for request, data in early:
-            self._on_request(request, data)
+        self._post_early()
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.name} [{self.type.name}]>"
@@ -116,6 +114,20 @@ class ServiceServer(Handle):
                 # The buffer is the wire's, and ends with this call.
                 self._early.append((request, bytes(data)))
                 return
+        self._post(request, data)
+
+    def _post_early(self) -> None:
+        """Hand on the early requests; those received until then wait behind them."""
+        while True:
+            with self._lock:
+                if not self._early:
+                    self._early = None
+                    return
+                request, data = self._early.popleft()
+            self._post(request, data)
+
+    def _post(self, request: RequestId, data: bytes | memoryview) -> None:
+        with self._lock:
             full = self._waiting >= _MAX_WAITING
             if not full:
                 self._waiting += 1
@@ -154,7 +166,10 @@ class ServiceServer(Handle):
                 return
             answer = self._executor.run(answer)
             with self._lock:
+                closed = self._closed
                 self._running.add(answer)
+            if closed:  # by another thread, after this one looked
+                answer.cancel()
         if isinstance(answer, Future):
             answer.add_done_callback(lambda future: self._finish(request, future))
         else:
