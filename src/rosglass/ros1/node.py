@@ -67,8 +67,8 @@ class Core(TcprosCore):
     def __init__(
         self, name: NodeName, url: str, options: Ros1Options, library: Library | None
     ) -> None:
-        super().__init__(name, url, options, AnnouncedTypes(library, url))
         self._new_names = options.arguments.remappings(name.name, name.namespace)
+        super().__init__(name, url, options, AnnouncedTypes(library, url))
 
     def resolve(self, name: str, kind: str = "topic") -> str:  # noqa: ARG002 - one rule for all
         """Return the absolute name of a topic, service or parameter, which may be remapped.
@@ -121,15 +121,19 @@ class Ros1Node(GraphNode):
         namespace = absolute_namespace(namespace, "namespace", relative=False)
         self.url, self.name, self.namespace = url, name, namespace
         self._core = Core(NodeName(namespace, name), url, options, library)
-        self._topics = self._core.topics
-        self._services = Services(self._core)
-        self._parameter_server = ParameterServer(self._core, parameters or {})
-        self._builtin_services = BuiltinServices(
-            self._core,
-            RoscppServices(self, self._core, self._parameter_server, self._topic_names),
-        )
-        self._core.start(self._parameter_server.changed)
-        self._builtin_services.open(own_services)
+        try:
+            self._topics = self._core.topics
+            self._services = Services(self._core)
+            self._parameter_server = ParameterServer(self._core, parameters or {})
+            self._builtin_services = BuiltinServices(
+                self._core,
+                RoscppServices(self, self._core, self._parameter_server, self._topic_names),
+            )
+            self._core.start(self._parameter_server.changed)
+            self._builtin_services.open(own_services)
+        except BaseException:
+            self._core.close()
+            raise
 
     # -- topics ----------------------------------------------------------------------------------
 

@@ -281,6 +281,8 @@ class TcprosCore(NodeCore):
         for acceptor in self._acceptors:
             self.loop.call(acceptor.end)
         self.loop.close()
+        for sock in (self._tcpros, self._slave):
+            sock.close()  # those of a node that was never started have no acceptor
         if self._api is not None:
             self._api.close()
         self.graph.clear()
