@@ -121,3 +121,28 @@ def test_a_connection_ends_whose_publisher_the_master_names_no_more(stop, eventu
     tell_publishers(cockpit, "/stop", [])
     eventually(lambda: not subscription.publisher_count() and not publisher.subscription_count())
     assert not publisher_links(cockpit, "/stop")
+
+
+@pytest.mark.parametrize("type", ["std_msgs/Int32", None])
+def test_a_subscription_made_as_the_publisher_connects_gets_the_latched_message_once(
+    connect, eventually, monkeypatch, type
+):
+    robot, cockpit = connect("robot"), connect("cockpit")
+    robot.create_publisher("/state", "std_msgs/Int32", QoS.latched()).publish({"data": 1})
+    got = []
+    on_header = topic_subscription.PublisherLink._on_header
+
+    def subscribe_first(self, header):
+        if self.topic == "/state":
+            cockpit.create_subscription("/state", type, got.append, executor=IMMEDIATE)
+        on_header(self, header)
+
+    monkeypatch.setattr(topic_subscription.PublisherLink, "_on_header", subscribe_first)
+    cockpit.create_subscription("/state", type)
+    eventually(lambda: got)
+    # Two rounds of the loop: what the subscription is still to be handed has come by then.
+    for _ in range(2):
+        done = threading.Event()
+        cockpit._core.pool.run(lambda done=done: cockpit._core.loop.call(done.set))
+        assert done.wait(30)
+    assert [message.data for message in got] == [1]

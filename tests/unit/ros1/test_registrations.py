@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from inside import core_of
 from ports import free_port
-from tcpros import node_uri
+from tcpros import node_uri, publisher_links
 from waiting import eventually
 
 import rosglass
 from rosglass.comm import ConnectionState, EndpointKind, NodeName
+from rosglass.comm.builtin_services import BuiltinServices
 from rosglass.wires.tcpros import address, registrations
 from rosglass.wires.tcpros.publication import Publication
 from rosglass.wires.tcpros.topic_subscription import TopicSubscription
@@ -220,6 +221,34 @@ def test_a_new_network_address_is_announced_and_the_node_lives_on(
         eventually(lambda: node.status().state is ConnectionState.CLOSED)
 
 
+def test_own_messages_are_ignored_also_after_the_address_has_changed(
+    master: FakeMaster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(address, "_route_elsewhere", lambda: "127.0.0.1")
+    url = master.url.partition("?")[0]
+    with rosglass.connect(url, "panel", own_services=False) as node:
+        others: list[Any] = []
+        node.create_subscription("/a", "std_msgs/Int32", others.append, ignore_local=True)
+        every = node.create_subscription("/a", "std_msgs/Int32")
+        publisher = node.create_publisher("/a", "std_msgs/Int32")
+        eventually(lambda: publisher.subscription_count() and every.publisher_count())
+        monkeypatch.setattr(address, "_route_elsewhere", lambda: "127.0.0.2")
+        eventually(lambda: "127.0.0.2" in master.publishers["/a"]["/panel"])
+        # The old connection ends a second after the new one was made: only the latter counts.
+        eventually(
+            lambda: (
+                [link.uri for link in publisher_links(node, "/a") if link.connected]
+                == [node_uri(node)]
+            )
+        )
+        publisher.publish({"data": 1})
+        assert every.wait(30).message().data == 1
+        last = node.create_publisher("/b", "std_msgs/Int32")
+        node.create_subscription("/b", "std_msgs/Int32", others.append)
+        eventually(lambda: last.publish({"data": 2}) or others)
+        assert others[0].data == 2
+
+
 def test_a_node_that_somebody_else_closes_looks_nothing_up_any_more(
     master: FakeMaster, node: Any
 ) -> None:
@@ -401,3 +430,17 @@ def test_a_publisher_out_of_reach_is_told_once_for_all_its_topics_and_when_it_is
     assert {r.levelno for r in caplog.records if "/robot" in r.getMessage()} == {logging.WARNING}
     eventually(lambda: not any(one.problem for one in heard), lambda: [h.problem for h in heard])
     robot.close()
+
+
+def test_a_node_that_cannot_be_made_leaves_nothing_behind(
+    master: FakeMaster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: Any) -> None:
+        raise OSError("no more threads")
+
+    monkeypatch.setattr(BuiltinServices, "open", fail)
+    with pytest.raises(OSError, match="no more threads"):
+        rosglass.connect(master.url, "panel")
+    monkeypatch.undo()
+    eventually(lambda: not [t for t in threading.enumerate() if t.name.startswith("panel")])
+    connected(master).close()

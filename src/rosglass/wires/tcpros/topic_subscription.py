@@ -110,13 +110,15 @@ class TopicSubscription(Member):
 
     def _join(self, reader: TypeNegotiation) -> None:
         for link in self.links():
-            if link.connected:
+            # One that connected since the reader joined negotiates with it already.
+            if link.connected and reader not in link.readers:
+                link.readers = (*link.readers, reader)
                 reader.negotiate_type(link, lambda link=link: self._catch_up(reader, link))  # type: ignore[misc]
         self.attend()
 
     def _catch_up(self, reader: TypeNegotiation, link: PublisherLink) -> None:
         """Hand on what a connection of the subscription's own would have brought."""
-        if link.uri == self.core.uri:
+        if link.is_local:
             for data in self._topics.latched(self.topic):
                 reader.take(link, [data], time.time_ns())
         elif link.latched is not None:
@@ -153,7 +155,7 @@ class TopicSubscription(Member):
 
     def on_publisher_connected(self, link: PublisherLink) -> None:
         """Negotiate the type with every subscription, then resume reading."""
-        readers = list(self.readers)
+        link.readers = readers = self.readers
         left = len(readers) + 1
 
         def decided() -> None:
@@ -314,7 +316,7 @@ class TypeNegotiation(TopicMatching, Reader):
     ) -> None:
         self.topic, self.eager = topic, True
         self._core, self._on_close = core, on_close
-        self._ignored = core.uri if ignore_local else ""
+        self._ignore_local = ignore_local
         #: The type of each publisher that is understood, and what is wrong with the others.
         self._accepted: dict[PublisherLink, tuple[MessageType, bytes]] = {}
         self._refused: dict[PublisherLink, str] = {}
@@ -327,7 +329,7 @@ class TypeNegotiation(TopicMatching, Reader):
 
     def negotiate_type(self, link: PublisherLink, decided: Callable[[], None]) -> None:
         """Find out whether a publisher's messages are understood, then call `decided`."""
-        if self._ignored and link.uri == self._ignored:
+        if self._ignore_local and link.is_local:
             decided()
             return
         header = link.header
@@ -570,6 +572,7 @@ class PublisherLink:
         latched: The last message of a publisher that latches.
         epoch: Which master, of those that were started one after the other, named it last.
         ended: Whether it is forgotten.
+        readers: The readers with which the type is negotiated on this connection.
     """
 
     def __init__(self, subscription: TopicSubscription, uri: str, epoch: int) -> None:
@@ -579,6 +582,7 @@ class PublisherLink:
         self.problem, self.lost = "", False
         self.latched: Received | None = None
         self.ended = False
+        self.readers: tuple[TypeNegotiation, ...] = ()
         self._core = subscription.core
         self._connection: Connection | None = None
         self._addresses: list[tuple[str, int]] = []
@@ -594,6 +598,11 @@ class PublisherLink:
         return bool(self.header)
 
     @property
+    def is_local(self) -> bool:
+        """Whether the publisher is the node itself, at its address or one that it had before."""
+        return self.uri in self._core.uris
+
+    @property
     def silence(self) -> str:
         """What is strange about nothing coming from it; empty when nothing is."""
         return self._silence.problem
@@ -601,7 +610,7 @@ class PublisherLink:
     def listen(self) -> None:
         """Look whether it has fallen silent; on the node's own thread."""
         # Latched messages come once; and what this node sends is missed by nobody.
-        if self.connected and not self._latches and self.uri not in self._core.uris:
+        if self.connected and not self._latches and not self.is_local:
             self._silence.follow(self.name, self._count, time.monotonic())
 
     @property
