@@ -12,9 +12,11 @@ import re
 import threading
 import time
 import uuid
+from abc import abstractmethod
 from collections import deque
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from functools import partial
+from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
 
 from rosglass.comm import ConnectionState, Durability, EndpointKind, Handle, History, Status
 from rosglass.errors import ArgumentError, NodeClosedError
@@ -37,6 +39,8 @@ if TYPE_CHECKING:
     from rosglass.comm import EndpointInfo, NodeName
     from rosglass.comm.graph import Graph
 
+    _Call = Callable[[], None]
+
 __all__ = ["LocalMiddleware"]
 
 _NAME = re.compile(r"[A-Za-z0-9_.-]*")
@@ -47,123 +51,104 @@ _COUNTERPART = {
     EndpointKind.SERVICE_CLIENT: EndpointKind.SERVICE_SERVER,
 }
 _Other = TypeVar("_Other", bound="_Endpoint[Any]")
+#: The arguments of :class:`OnSample`.
+_Sample: TypeAlias = tuple[bytes, int, int | None, bytes, int, str]
 
 
 class _Network:
-    """What the nodes of one name share: their graphs, and their endpoints."""
+    """The graph of the nodes that share a name.
+
+    Attributes:
+        lock: Guards the graph and the state of its endpoints; held while the nodes' graphs are
+            updated, so that they see changes in order, but never while a sample, request or reply
+            is handed on.
+    """
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._graphs: tuple[Graph, ...] = ()
-        self._nodes: dict[Hashable, NodeName] = {}
+        self.lock = threading.Lock()
+        self._graphs: list[Graph] = []
+        self._members: dict[Hashable, _Member] = {}
         self._endpoints: dict[tuple[EndpointKind, str, str], tuple[Any, ...]] = {}
 
     def join(self, graph: Graph) -> None:
-        """Show a graph what is there, and what comes."""
-        with self._lock:
-            self._graphs += (graph,)
-            nodes = dict(self._nodes)
-            endpoints = [one for there in self._endpoints.values() for one in there]
-        for key, node in nodes.items():
-            graph.put_node(key, node)
-        for endpoint in endpoints:
-            graph.put_endpoint(endpoint.info.gid, endpoint.info)
+        """Keep a node's graph up to date from now on."""
+        with self.lock:
+            self._graphs.append(graph)
+            for member in self._members.values():
+                member.put_into(graph)
 
     def leave(self, graph: Graph) -> None:
-        """Show a graph nothing more."""
-        with self._lock:
-            self._graphs = tuple(other for other in self._graphs if other is not graph)
+        """Update a node's graph no more."""
+        with self.lock:
+            self._graphs = [other for other in self._graphs if other is not graph]
 
-    def add_node(self, key: Hashable, node: NodeName) -> None:
-        """Put a node into all graphs."""
-        with self._lock:
-            self._nodes[key] = node
-            graphs = self._graphs
-        for graph in graphs:
-            graph.put_node(key, node)
+    def add(self, member: _Member) -> None:
+        """Put a node or endpoint into all graphs; the lock is held."""
+        self._members[member.key] = member
+        for graph in self._graphs:
+            member.put_into(graph)
 
-    def remove_node(self, key: Hashable) -> None:
-        """Remove a node from all graphs."""
-        with self._lock:
-            self._nodes.pop(key, None)
-            graphs = self._graphs
-        for graph in graphs:
-            graph.remove(key)
+    def remove(self, member: _Member) -> None:
+        """Remove a node or endpoint from all graphs; the lock is held."""
+        if self._members.pop(member.key, None) is not None:
+            for graph in self._graphs:
+                graph.remove(member.key)
 
-    def add(self, endpoint: _Endpoint[Any]) -> tuple[Any, ...]:
-        """Put an endpoint into all graphs; return its counterparts, which have not seen it."""
-        info = endpoint.info
-        with self._lock:
-            there = self._endpoints.get((info.kind, info.name, info.type), ())
-            if endpoint not in there:
-                self._endpoints[info.kind, info.name, info.type] = (*there, endpoint)
-            graphs = self._graphs
-            others = self.counterparts(info)
-        for graph in graphs:
-            graph.put_endpoint(info.gid, info)
-        return others
-
-    def remove(self, endpoint: _Endpoint[Any]) -> tuple[Any, ...]:
-        """Remove an endpoint from all graphs; return its counterparts."""
+    def add_endpoint(self, endpoint: _Endpoint[Any]) -> tuple[Any, ...]:
+        """Add an endpoint that can be sent to; return its counterparts. The lock is held."""
         info = endpoint.info
         place = info.kind, info.name, info.type
-        with self._lock:
-            there = self._endpoints.pop(place, ())
-            left = tuple(one for one in there if one is not endpoint)
-            if left:
-                self._endpoints[place] = left
-            graphs = self._graphs
-            others = self.counterparts(info)
-        for graph in graphs:
-            graph.remove(info.gid)
-        return others
+        known = self._endpoints.get(place, ())
+        if endpoint not in known:
+            self._endpoints[place] = (*known, endpoint)
+        return self.counterparts(info)
+
+    def remove_endpoint(self, endpoint: _Endpoint[Any]) -> tuple[Any, ...]:
+        """Remove an endpoint; return its counterparts. The lock is held."""
+        info = endpoint.info
+        place = info.kind, info.name, info.type
+        left = tuple(one for one in self._endpoints.pop(place, ()) if one is not endpoint)
+        if left:
+            self._endpoints[place] = left
+        return self.counterparts(info)
 
     def counterparts(self, info: EndpointInfo) -> tuple[Any, ...]:
         """Return the endpoints that an endpoint of this topic or service talks to."""
         return self._endpoints.get((_COUNTERPART[info.kind], info.name, info.type), ())
 
 
-class _Endpoint(Handle, Generic[_Other]):
-    """What every endpoint has: its place in all graphs, until it is closed.
-
-    Args:
-        owner: What it is made by.
-        info: What it is, without identity.
+class _Member(Handle):
+    """A node or endpoint that is in the graph until it is closed.
 
     Attributes:
-        info: The same with identity.
-        closed: Whether it is closed.
+        key: Its key in the nodes' graphs.
+        closed: Whether it is closed; guarded by the network's lock.
     """
 
-    def __init__(self, owner: LocalMiddleware, info: EndpointInfo) -> None:
-        self.info = replace(info, gid=uuid.uuid4().bytes)
+    key: Hashable
+
+    def __init__(self, owner: LocalMiddleware) -> None:
         self.closed = False
         self._owner, self._network = owner, owner.network
-        self._lock = threading.Lock()
+        self._lock = owner.network.lock
 
-    def _open(self) -> None:
-        self._owner.add(self)
-        self.show()
+    @abstractmethod
+    def put_into(self, graph: Graph) -> None:
+        """Add this to a node's graph."""
 
     def show(self) -> None:
-        """Join all graphs, and exchange data with the counterparts there; safe to call twice."""
-        for other in self._network.add(self):
-            self.link(other)
-            other.link(self)
+        """Join the graph, unless this is closed; safe to call twice."""
+        with self._lock:
+            if not self.closed:
+                self._network.add(self)
 
     def hide(self) -> None:
-        """Leave all graphs until :meth:`show`; safe to call twice."""
-        for other in self._network.remove(self):
-            other.unlink(self)
-
-    def link(self, other: _Other) -> None:
-        """Take note of a counterpart that has come, or was there first."""
-
-    def unlink(self, other: _Other) -> None:
-        """Take note of a counterpart that has gone."""
+        """Leave the graph until :meth:`show`; safe to call twice."""
+        with self._lock:
+            self._network.remove(self)
 
     def close(self) -> None:
-        """Leave all graphs; safe to call twice."""
+        """Leave the graph; safe to call twice."""
         with self._lock:
             if self.closed:
                 return
@@ -171,8 +156,75 @@ class _Endpoint(Handle, Generic[_Other]):
         self.hide()
         self._owner.remove(self)
 
-    def _counterparts(self) -> tuple[_Other, ...]:
-        return self._network.counterparts(self.info)
+
+class _Announcement(_Member):
+    """A node in the graph."""
+
+    def __init__(self, owner: LocalMiddleware, node: NodeName) -> None:
+        super().__init__(owner)
+        self.key, self._node = object(), node
+
+    def put_into(self, graph: Graph) -> None:
+        graph.put_node(self.key, self._node)
+
+
+class _Endpoint(_Member, Generic[_Other]):
+    """An endpoint in the graph, linked with its counterparts.
+
+    Args:
+        owner: The middleware that creates it.
+        info: Its description without identity.
+
+    Attributes:
+        info: Its description with identity.
+    """
+
+    def __init__(self, owner: LocalMiddleware, info: EndpointInfo) -> None:
+        super().__init__(owner)
+        self.key = gid = uuid.uuid4().bytes
+        self.info = replace(info, gid=gid)
+
+    def _open(self) -> None:
+        self._owner.add(self)
+        self.show()
+
+    def put_into(self, graph: Graph) -> None:
+        graph.put_endpoint(self.key, self.info)
+
+    def show(self) -> None:
+        """Join the graph, and link with the counterparts; safe to call twice."""
+        calls: list[_Call] = []
+        with self._lock:
+            if self.closed:
+                return
+            self._network.add(self)
+            for other in self._network.add_endpoint(self):
+                self.link(other, calls)
+                other.link(self, calls)
+        for call in calls:
+            call()
+
+    def hide(self) -> None:
+        """Leave the graph until :meth:`show`; safe to call twice."""
+        calls: list[_Call] = []
+        with self._lock:
+            self._network.remove(self)
+            for other in self._network.remove_endpoint(self):
+                self.unlink(other, calls)
+                other.unlink(self, calls)
+        for call in calls:
+            call()
+
+    def link(self, other: _Other, calls: list[_Call]) -> None:
+        """Link with a counterpart; the lock is held.
+
+        Args:
+            other: The counterpart.
+            calls: Takes what is to be called once the lock is released.
+        """
+
+    def unlink(self, other: _Other, calls: list[_Call]) -> None:
+        """Unlink a counterpart; the lock is held. Arguments as for :meth:`link`."""
 
     def _check_open(self) -> None:
         if self.closed:
@@ -180,7 +232,7 @@ class _Endpoint(Handle, Generic[_Other]):
 
 
 class LocalWriter(_Endpoint["LocalReader"], Writer):
-    """Hands the samples of a publisher to all readers of the topic."""
+    """Sends the samples of a publisher to all readers of the topic."""
 
     def __init__(self, owner: LocalMiddleware, info: EndpointInfo) -> None:
         super().__init__(owner, info)
@@ -190,8 +242,8 @@ class LocalWriter(_Endpoint["LocalReader"], Writer):
         self._numbers = itertools.count(1)
         self._keeps = qos.durability is Durability.TRANSIENT_LOCAL
         depth = None if qos.history is History.KEEP_ALL else qos.depth
-        #: The last samples, for readers that come later, each with the time it expires at.
-        self._kept: deque[tuple[float, tuple[Any, ...]]] = deque(maxlen=depth)
+        #: The last samples, for late readers, each with the monotonic time at which it expires.
+        self._kept: deque[tuple[float, _Sample]] = deque(maxlen=depth)
         lifespan = qos.lifespan
         self._lifespan_s = float("inf") if lifespan is None else lifespan.seconds
         self._open()
@@ -207,35 +259,24 @@ class LocalWriter(_Endpoint["LocalReader"], Writer):
                 self._kept.append((time.monotonic() + self._lifespan_s, sample))
             readers = self._readers
         for reader in readers:
-            reader.take(sample)
+            reader.deliver(sample)
 
-    def link(self, other: LocalReader) -> None:
-        """Send to a reader from now on, what was kept first."""
-        # Under the lock, so that the reader gets every sample exactly once.
-        with self._lock:
-            if other in self._readers:
-                return
-            if self._owner.matches_qos and other.info.qos.conflicts(self.info.qos):
-                return
-            self._readers += (other,)
-            late = other.info.qos.durability is Durability.TRANSIENT_LOCAL
+    def link(self, other: LocalReader, calls: list[_Call]) -> None:
+        """Send to a reader from now on: the kept samples first, and each exactly once."""
+        if other in self._readers:
+            return
+        if self._owner.matches_qos and other.info.qos.conflicts(self.info.qos):
+            return
+        self._readers += (other,)
+        if other.info.qos.durability is Durability.TRANSIENT_LOCAL:
             now = time.monotonic()
-            kept = [sample for end, sample in self._kept if now < end] if late else []
-            if kept:
-                other.hold()
-        if kept:
-            other.catch_up(kept)
+            kept = [sample for expiry, sample in self._kept if now < expiry]
+            if kept and other.hold(self.gid, kept):
+                calls.append(partial(other.catch_up, self.gid))
 
-    def hide(self) -> None:
-        """Leave all graphs, and send to no reader, until :meth:`show`."""
-        super().hide()
-        with self._lock:
-            self._readers = ()
-
-    def unlink(self, other: LocalReader) -> None:
+    def unlink(self, other: LocalReader, calls: list[_Call]) -> None:  # noqa: ARG002
         """Send to a reader no more."""
-        with self._lock:
-            self._readers = tuple(one for one in self._readers if one is not other)
+        self._readers = tuple(one for one in self._readers if one is not other)
 
 
 class LocalReader(_Endpoint[LocalWriter], Reader):
@@ -244,36 +285,38 @@ class LocalReader(_Endpoint[LocalWriter], Reader):
     def __init__(self, owner: LocalMiddleware, info: EndpointInfo, on_sample: OnSample) -> None:
         super().__init__(owner, info)
         self._on_sample = on_sample
-        #: Samples that came while older ones are handed on, and how many writers' ones are.
-        self._held: list[tuple[Any, ...]] = []
-        self._holding = 0
+        #: The samples that wait for older ones of their writer to be handed on, by its identity.
+        self._held: dict[bytes, list[_Sample]] = {}
         self._open()
 
-    def take(self, sample: tuple[Any, ...]) -> None:
-        """Hand on a sample, or let it wait for older ones."""
-        if self._holding:
+    def deliver(self, sample: _Sample) -> None:
+        """Hand on a sample, after those that its writer has kept."""
+        if self._held:
             with self._lock:
-                if self._holding:
-                    self._held.append(sample)
+                held = self._held.get(sample[3])
+                if held is not None:
+                    held.append(sample)
                     return
         if not self.closed:
             self._on_sample(*sample)
 
-    def hold(self) -> None:
-        """Let what comes wait until :meth:`catch_up` has handed on what was kept."""
-        with self._lock:
-            self._holding += 1
+    def hold(self, gid: bytes, kept: list[_Sample]) -> bool:
+        """Hold samples of a writer; return whether :meth:`catch_up` is needed. The lock is held."""
+        is_new = gid not in self._held
+        self._held.setdefault(gid, []).extend(kept)
+        return is_new
 
-    def catch_up(self, kept: list[tuple[Any, ...]]) -> None:
-        """Hand on what a writer has kept, then what came since."""
-        while kept:
-            for sample in kept:
+    def catch_up(self, gid: bytes) -> None:
+        """Hand on the samples of a writer that are held, and those that follow until then."""
+        while True:
+            with self._lock:
+                held, self._held[gid] = self._held[gid], []
+                if not held:
+                    del self._held[gid]
+                    return
+            for sample in held:
                 if not self.closed:
                     self._on_sample(*sample)
-            with self._lock:
-                kept, self._held = self._held, []
-                if not kept:
-                    self._holding -= 1
 
 
 class LocalRequester(_Endpoint["LocalReplier"], Requester):
@@ -288,17 +331,17 @@ class LocalRequester(_Endpoint["LocalReplier"], Requester):
 
     def ready(self) -> bool:
         """Return whether there is a server."""
-        return bool(self._counterparts())
+        return bool(self._network.counterparts(self.info))
 
     def send(self, number: int, data: bytes | bytearray, timeout: float | None) -> None:  # noqa: ARG002 - the caller keeps it
         """Send a request to all servers; the first reply counts."""
-        servers = self._counterparts()
         with self._lock:
             self._check_open()
+            servers = self._network.counterparts(self.info)
             self._pending[number] = set(servers)
         request = RequestId(self.info.gid, number, self)
         for server in servers:
-            server.take(request, bytes(data))
+            server.handle_request(request, bytes(data))
         if not servers:
             self._fail(number, SERVER_LEFT)
 
@@ -307,15 +350,13 @@ class LocalRequester(_Endpoint["LocalReplier"], Requester):
         with self._lock:
             self._pending.pop(number, None)
 
-    def take(self, number: int, data: bytes) -> None:
-        """Hand on a reply, if it is the first one."""
-        with self._lock:
-            wanted = self._pending.pop(number, None) is not None and not self.closed
-        if wanted:
+    def handle_reply(self, number: int, data: bytes) -> None:
+        """Hand on the first reply to a request."""
+        if self._complete(number):
             self._on_reply(number, data, "")
 
-    def refuse(self, number: int, server: LocalReplier, reason: str) -> None:
-        """Take note that a server will not answer a request."""
+    def handle_refusal(self, number: int, server: LocalReplier, reason: str) -> None:
+        """Fail a request once its last server has refused it."""
         with self._lock:
             servers = self._pending.get(number)
             if servers is None:
@@ -324,25 +365,29 @@ class LocalRequester(_Endpoint["LocalReplier"], Requester):
         if not servers:
             self._fail(number, reason)
 
+    def link(self, other: LocalReplier, calls: list[_Call]) -> None:  # noqa: ARG002 - any will do
+        """Notify the client that a server is there."""
+        if self.changed is not None:
+            calls.append(self.changed)
+
+    def unlink(self, other: LocalReplier, calls: list[_Call]) -> None:
+        """Fail the requests that only this server had."""
+        calls += [
+            partial(self.handle_refusal, number, other, SERVER_LEFT)
+            for number, servers in self._pending.items()
+            if other in servers
+        ]
+        if self.changed is not None:
+            calls.append(self.changed)
+
     def _fail(self, number: int, reason: str) -> None:
-        with self._lock:
-            wanted = self._pending.pop(number, None) is not None and not self.closed
-        if wanted:
+        if self._complete(number):
             self._on_reply(number, None, reason)
 
-    def link(self, other: LocalReplier) -> None:  # noqa: ARG002 - any will do
-        """Say that a server is there."""
-        if self.changed is not None:
-            self.changed()
-
-    def unlink(self, other: LocalReplier) -> None:
-        """Give up the requests that only this server had."""
+    def _complete(self, number: int) -> bool:
+        """Forget a request; return whether its client still waits for the reply."""
         with self._lock:
-            numbers = [number for number, servers in self._pending.items() if other in servers]
-        for number in numbers:
-            self.refuse(number, other, SERVER_LEFT)
-        if self.changed is not None:
-            self.changed()
+            return self._pending.pop(number, None) is not None and not self.closed
 
 
 class LocalReplier(_Endpoint[LocalRequester], Replier):
@@ -355,7 +400,7 @@ class LocalReplier(_Endpoint[LocalRequester], Replier):
         self._on_request = on_request
         self._open()
 
-    def take(self, request: RequestId, data: bytes) -> None:
+    def handle_request(self, request: RequestId, data: bytes) -> None:
         """Hand on a request."""
         if self.closed:
             self.fail(request, SERVER_LEFT)
@@ -366,35 +411,23 @@ class LocalReplier(_Endpoint[LocalRequester], Replier):
         """Answer a request."""
         self._check_open()
         if isinstance(request.handle, LocalRequester):
-            request.handle.take(request.sequence, bytes(data))
+            request.handle.handle_reply(request.sequence, bytes(data))
 
     def fail(self, request: RequestId, reason: str) -> None:
-        """Tell the client that no response will come."""
+        """Fail a request: no response will be sent."""
         if isinstance(request.handle, LocalRequester):
-            request.handle.refuse(request.sequence, self, reason)
-
-
-class _Announcement(Handle):
-    """A node's place in all graphs."""
-
-    def __init__(self, network: _Network, node: NodeName) -> None:
-        self._network, self._key = network, object()
-        network.add_node(self._key, node)
-
-    def close(self) -> None:
-        """Leave all graphs; safe to call twice."""
-        self._network.remove_node(self._key)
+            request.handle.handle_refusal(request.sequence, self, reason)
 
 
 class LocalMiddleware(Middleware):
-    """A node's place in a graph inside this process.
+    """A node's connection to a graph inside this process.
 
     Args:
         url: ``local://NAME``; the name may be empty.
         wire: Format of the payloads, ``cdr`` or ``ros1``.
 
     Attributes:
-        network: What it shares with the other nodes of that name.
+        network: The graph that it shares with the other nodes of that name.
 
     Raises:
         ArgumentError: The URL has more than a name.
@@ -408,8 +441,8 @@ class LocalMiddleware(Middleware):
             expected = "local://NAME with a name of letters, digits, '_', '-' and '.', no options"
             raise ArgumentError("url", url, expected)
         self._name, self.wire = name, wire
-        self._lock = threading.Lock()
-        self._ends: dict[Handle, None] = {}
+        #: What is open, and whether this is closed; both guarded by the network's lock.
+        self._open_members: dict[_Member, None] = {}
         self._graph: Graph | None = None
         self._closed = False
 
@@ -423,24 +456,25 @@ class LocalMiddleware(Middleware):
         self.network.join(graph)
 
     def status(self) -> Status:
-        """Return that it is connected, until it is closed."""
+        """Return the state of the connection: connected until it is closed."""
         if self._closed:
             return Status(ConnectionState.CLOSED, "closed")
         return Status(ConnectionState.CONNECTED, "in this process")
 
     def stamp(self) -> tuple[int, int | None]:
-        """Return when a sample that is sent now arrives, and when it was sent, if that is known.
+        """Return the times of reception and sending for a sample that is sent now.
 
-        Both in nanoseconds since the Unix epoch.
+        Both in nanoseconds since the Unix epoch; the latter is None where it is unknown.
         """
         now = time.time_ns()
         return now, now
 
     def announce(self, node: NodeName) -> Handle:
         """Show a node in the graph until the handle is closed."""
-        made = _Announcement(self.network, node)
-        self.add(made)
-        return made
+        announcement = _Announcement(self, node)
+        self.add(announcement)
+        announcement.show()
+        return announcement
 
     def create_writer(self, endpoint: EndpointInfo) -> LocalWriter:
         """Announce a publisher and return its sending end."""
@@ -455,35 +489,36 @@ class LocalMiddleware(Middleware):
         return LocalRequester(self, endpoint, on_reply)
 
     def create_replier(self, endpoint: EndpointInfo, on_request: OnRequest) -> LocalReplier:
-        """Announce a service server, whose requests `on_request` takes."""
+        """Announce a service server and hand its requests to `on_request`."""
         return LocalReplier(self, endpoint, on_request)
 
     def poll(self) -> None:
-        """Do nothing: all is done as it happens."""
+        """Do nothing: every change takes effect at once."""
 
-    def add(self, end: Handle) -> None:
-        """Let something end with this; raises NodeClosedError after closing."""
-        with self._lock:
+    def add(self, member: _Member) -> None:
+        """Close `member` together with this; raises NodeClosedError after closing."""
+        with self.network.lock:
             if self._closed:
                 raise NodeClosedError(f"local://{self._name} is closed; connect again")
-            self._ends[end] = None
+            self._open_members[member] = None
 
-    def remove(self, end: Handle) -> None:
-        """Forget something that was closed."""
-        with self._lock:
-            self._ends.pop(end, None)
+    def remove(self, member: _Member) -> None:
+        """Remove something that was closed."""
+        with self.network.lock:
+            self._open_members.pop(member, None)
 
     def close(self) -> None:
         """Leave the graph; safe to call twice."""
-        with self._lock:
+        if self._graph is None:
+            self._closed = True
+            return
+        with self.network.lock:
             if self._closed:
                 return
             self._closed = True
-            ends = list(self._ends)
-        for end in ends:
-            end.close()
-        if self._graph is None:
-            return
+            members = list(self._open_members)
+        for member in members:
+            member.close()
         self.network.leave(self._graph)
         with _networks_lock:
             _members[self._name] -= 1
@@ -491,7 +526,7 @@ class LocalMiddleware(Middleware):
                 del _members[self._name], networks[self._name]
 
 
-#: The graphs of this process by name, and how many nodes each has.
+#: The graphs of this process by name, and how many nodes each has; guarded by the lock.
 networks: dict[str, _Network] = {}
 _members: dict[str, int] = {}
 _networks_lock = threading.Lock()

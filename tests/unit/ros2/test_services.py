@@ -172,8 +172,8 @@ def test_replies_to_one_client_come_in_bursts_that_it_can_keep(node, middleware,
     (replier,) = middleware.repliers
     data = rosglass.load(ADD).request.encode({})
     for number in range(30):
-        replier.take(RequestId(b"w" * 16, number), data)
-    replier.take(RequestId(b"x" * 16, 99), data)
+        replier.handle_request(RequestId(b"w" * 16, number), data)
+    replier.handle_request(RequestId(b"x" * 16, 99), data)
     eventually(lambda: len(promises) == 31)
     for promise in promises:
         promise.set_result({})
@@ -527,9 +527,9 @@ def test_rubbish_is_named_once_per_client_and_disturbs_nobody(robot, client, cap
     replier = robot.fake.repliers[0]
     for _ in range(3):
         for who in (b"a" * 16, b"b" * 16):
-            replier.take(RequestId(who, 1), b"\0\1\0\0rubbish")
+            replier.handle_request(RequestId(who, 1), b"\0\1\0\0rubbish")
     for number in range(200):
-        replier.take(RequestId(number.to_bytes(16, "big"), 1), b"")
+        replier.handle_request(RequestId(number.to_bytes(16, "big"), 1), b"")
     assert client.call({"a": 1}, timeout=30).sum == 1
     told = [r.getMessage() for r in caplog.records if "refusing requests" in r.getMessage()]
     assert len(told) == 100
@@ -544,7 +544,7 @@ def test_a_request_may_come_while_the_server_is_made(robot, monkeypatch):
 
     def hasty(endpoint, on_request):
         replier = create(endpoint, on_request)
-        replier.take(RequestId(b"w" * 16, 1), memoryview(data))
+        replier.handle_request(RequestId(b"w" * 16, 1), memoryview(data))
         return replier
 
     monkeypatch.setattr(robot.fake, "create_replier", hasty)
@@ -558,7 +558,7 @@ def test_a_client_gone_wild_cannot_fill_the_memory(robot, middleware, client, ca
     replier = robot.fake.repliers[0]
     data = rosglass.load(ADD).request.encode()
     for number in range(1500):
-        replier.take(RequestId(b"w" * 16, number), data)
+        replier.handle_request(RequestId(b"w" * 16, number), data)
     release.set()
     assert 499 <= len(replier.failures) <= 500
     assert caplog.text.count("1000 requests wait for the callback already") == 1
