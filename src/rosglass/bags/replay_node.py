@@ -87,6 +87,7 @@ class ReplayNode(Ros2Node):
         # Messages of both ROS in one recording are translated to ROS 2's.
         ros1 = bool(bag.channels) and all(channel.wire == "ros1" for channel in bag.channels)
         wire = "ros1" if ros1 else "cdr"
+        self._unprofiled = {channel.topic for channel in bag.channels if not channel.offered}
         local = f"local://replay-{uuid.uuid4().hex}"
         try:
             super().__init__(_ReplayWire(local, wire), url, name, namespace)
@@ -169,8 +170,8 @@ class ReplayNode(Ros2Node):
             if callback is None:
                 known = self._recorded_types.find_opaque(known) or known
         profile = qos if isinstance(qos, QoS) else QoS(depth=qos)
-        if self.wire == "ros1":
-            # ROS 1 sends what is latched to every subscriber.
+        # ROS 1 sends what is latched to every subscriber, and what was not recorded is no conflict.
+        if self.wire == "ros1" or self.resolve(topic) in self._unprofiled:
             profile = replace(profile, durability=Durability.BEST_AVAILABLE)
         qos = profile.for_subscription([info.qos for info in recorded])
         return super().create_subscription(

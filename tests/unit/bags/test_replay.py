@@ -363,3 +363,16 @@ def test_commands_look_at_recordings(drive, capsys, command, told):
 
     main([*command, "--url", f"replay:{drive}"])
     assert told in capsys.readouterr().out
+
+
+def test_a_durability_that_was_not_recorded_is_no_problem(drive, play):
+    node = play(drive, "?rate=20")
+    found: list[str] = []
+    subscription = node.create_subscription(
+        "/chatter", callback=lambda m: found.append(m.data), qos=QoS.latched()
+    )
+    eventually(lambda: found and subscription.publisher_count() == 1)
+    assert subscription.problem == ""
+    # What was recorded is compared.
+    plan = node.create_subscription("/plan", qos=QoS(deadline=Duration(SECOND)))
+    eventually(lambda: "deadline" in plan.problem)
