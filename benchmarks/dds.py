@@ -279,8 +279,7 @@ def dora_interfaces(folder: str) -> bool:
 
 def run(quick: bool, only: str) -> tuple[dict[str, Any], list[str]]:
     """Run the cases; returns the figures and the targets missed."""
-    from rosglass.wires.dds.domain import domain_config
-    from rosglass.wires.dds.options import DdsOptions
+    from rosglass.wires.dds.domain import DdsOptions, domain_config
 
     results: dict[str, Any] = {}
     missed: list[str] = []

@@ -239,7 +239,7 @@ def _dds(url: str) -> Middleware:
             'install it with: pip install "rosglass[dds]"; '
             "without it, there are zenoh:// (ROS 2 with rmw_zenoh) and ros1://host:11311 (ROS 1)"
         )
-    from rosglass.wires.dds.options import DdsOptions  # noqa: PLC0415
+    from rosglass.wires.dds.domain import DdsOptions  # noqa: PLC0415
 
     options = DdsOptions.parse(url, os.environ)
     from rosglass.wires.dds.middleware import DdsMiddleware  # noqa: PLC0415

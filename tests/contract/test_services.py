@@ -210,7 +210,7 @@ def test_requests_come_in_the_order_of_the_calls(robot, ordered_client, topic, w
 def test_a_server_that_ends_takes_its_calls_along_and_the_next_one_is_called(
     robot, client, ordered_client, topic, wire, kept, eventually, monkeypatch
 ):
-    monkeypatch.setattr("rosglass.ros2.service_client._GRACE_S", 0.1)  # 3 s, for a router's restart
+    monkeypatch.setattr("rosglass.ros2.rmw_services._GRACE_S", 0.1)  # 3 s, for a router's restart
     used, begun = ordered_client if kept else client, threading.Event()
     server = robot.create_service_server(topic, wire.add, lambda _: begun.set() or Future())
     call = used.call_async(timeout=30)

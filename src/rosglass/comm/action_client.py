@@ -1,7 +1,7 @@
 """Sending goals to an action: the client, and its goals from their sending to their end.
 
 What becomes of a goal depends on the protocol: ``ros1/actionlib_client.py`` and
-``ros2/action_client_protocol.py`` follow it, and put here what users see of it.
+``ros2/action_client.py`` follow it, and put here what users see of it.
 """
 
 from __future__ import annotations

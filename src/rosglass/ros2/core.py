@@ -18,7 +18,7 @@ from rosglass.ros2.ros_arguments import NO_ARGUMENTS
 if TYPE_CHECKING:
     from rosglass.comm import NodeName
     from rosglass.interfaces import Library
-    from rosglass.ros2.pacing import RequestWindow
+    from rosglass.ros2.rmw_services import RequestWindow
     from rosglass.ros2.ros_arguments import Arguments
     from rosglass.wires.base import Middleware
 

@@ -14,11 +14,10 @@ from rosglass.comm.rclpy_names import check_order
 from rosglass.comm.sim_time import USE_SIM_TIME, SimTime
 from rosglass.comm.subscription_feed import SubscriptionFeed
 from rosglass.ros2.core import Core
-from rosglass.ros2.graph_matching import GraphMatching
+from rosglass.ros2.rmw_services import create_service_client, create_service_server
 from rosglass.ros2.ros_arguments import NO_ARGUMENTS
-from rosglass.ros2.service_client import create_service_client
-from rosglass.ros2.service_replier import create_service_server
-from rosglass.ros2.type_fetching import TypeFetcher
+from rosglass.ros2.topic_matching import GraphMatching
+from rosglass.ros2.type_descriptions import TypeDescriptionServer, TypeFetcher
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterator
@@ -131,7 +130,7 @@ class Ros2Node(GraphNode):
         self._core.check_open()
         check_order("create_action_client", name, type)
         self._core.types.ensure(type)
-        from rosglass.ros2.action_client_protocol import Ros2ActionClient  # noqa: PLC0415 - few need it
+        from rosglass.ros2.action_client import Ros2ActionClient  # noqa: PLC0415 - few need it
 
         return Ros2ActionClient(self._core, self.resolve(name), type)
 
@@ -150,7 +149,7 @@ class Ros2Node(GraphNode):
         check_order("create_action_server", name, type)
         self._core.types.ensure(type)
         from rosglass.comm.action_server import ActionServer  # noqa: PLC0415 - few need it
-        from rosglass.ros2.action_server_protocol import Ros2ActionServerProtocol  # noqa: PLC0415
+        from rosglass.ros2.action_server import Ros2ActionServerProtocol  # noqa: PLC0415
 
         kind = self._core.types.action(type)
         protocol = Ros2ActionServerProtocol(self._core, self.resolve(name), kind)
@@ -165,7 +164,7 @@ class Ros2Node(GraphNode):
     def create_parameter_client(self, node: str | NodeName) -> ParameterClient:
         """Return a client of another node's parameters; `node` is its full name."""
         from rosglass.comm.parameters import ParameterClient  # noqa: PLC0415 - few need it
-        from rosglass.ros2.parameter_services import RemoteParameterServices  # noqa: PLC0415
+        from rosglass.ros2.parameters import RemoteParameterServices  # noqa: PLC0415
 
         self._core.check_open()
         return ParameterClient(RemoteParameterServices(self, self._node_name(node)))
@@ -273,9 +272,7 @@ class RclServices(BuiltinProtocol["Ros2Parameters"]):
 
     def offer(self, services: BuiltinServices[Ros2Parameters]) -> Iterator[None]:
         """Announce ``/rosout``, and offer descriptions of types and the parameter services."""
-        from rosglass.ros2.parameter_services import ParameterServices  # noqa: PLC0415
-        from rosglass.ros2.parameters import DESCRIBE_TYPES  # noqa: PLC0415
-        from rosglass.ros2.type_descriptions import TypeDescriptionServer  # noqa: PLC0415
+        from rosglass.ros2.parameters import DESCRIBE_TYPES, ParameterServices  # noqa: PLC0415
 
         core, parameters = self._core, services.parameters
         services.log.open()

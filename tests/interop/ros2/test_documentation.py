@@ -20,7 +20,7 @@ from waiting import eventually
 import rosglass
 from rosglass.comm import ParameterDescriptor, Range
 from rosglass.interfaces import Library, type_description
-from rosglass.wires.dds.options import DdsOptions
+from rosglass.wires.dds.domain import DdsOptions
 from rosglass.wires.zenoh.options import ZenohOptions
 
 if TYPE_CHECKING:

@@ -91,9 +91,8 @@ def test_left_out_names_are_kept_apart_and_go_with_their_nodes(hostile, connect)
 def test_a_hostile_dds_topic_and_type_are_left_out_of_the_graph():
     from rosglass.comm import NodeName
     from rosglass.comm.graph import Graph
-    from rosglass.wires.dds.cyclone_builtin import Discovered
-    from rosglass.wires.dds.discovery_info import NodeEntities, ParticipantEntities
-    from rosglass.wires.dds.graph import DdsGraph
+    from rosglass.wires.dds.cyclone import Discovered
+    from rosglass.wires.dds.graph import DdsGraph, NodeEntities, ParticipantEntities
 
     graph = Graph(lambda: None)
     seen = DdsGraph(graph, b"own".ljust(12, b"\0"))

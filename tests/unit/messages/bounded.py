@@ -31,7 +31,7 @@ from rosglass.interfaces import (
 )
 from rosglass.interfaces.type_sources import add_type_sources, type_sources
 from rosglass.messages import Message, MessageType, Translation, load
-from rosglass.wires.dds.types import describe_struct
+from rosglass.wires.dds.type_lookup import describe_struct
 from rosglass.wires.tcpros.announced_types import AnnouncedTypes
 
 CPU_S, MEMORY = 4, 200 << 20

@@ -18,7 +18,7 @@ from rosglass.comm import (
 )
 from rosglass.interfaces import Library
 from rosglass.ros2 import Ros2Node
-from rosglass.ros2.action_server_protocol import _cancelable
+from rosglass.ros2.action_server import _cancelable
 from rosglass.wires.base import SERVER_LEFT
 
 pytestmark = pytest.mark.usefixtures("quick")
@@ -132,7 +132,7 @@ def impatient(monkeypatch):
         ("_RETRY_S", 0.01),
         ("_OVERDUE_S", 0.05),
     ):
-        monkeypatch.setattr(f"rosglass.ros2.action_client_protocol.{name}", value)
+        monkeypatch.setattr(f"rosglass.ros2.action_client.{name}", value)
 
 
 # -- both ends -----------------------------------------------------------------------------------
@@ -662,9 +662,9 @@ def test_results_are_kept_for_a_while(client, server, node, monkeypatch, eventua
         return sum(ask.call({"goal_id": {"uuid": goal.id}}).status != 0 for goal in goals)
 
     assert kept() == 4
-    monkeypatch.setattr("rosglass.ros2.action_server_protocol._MAX_ENDED", 3)
+    monkeypatch.setattr("rosglass.ros2.action_server._MAX_ENDED", 3)
     eventually(lambda: kept() == 3)
-    monkeypatch.setattr("rosglass.ros2.action_server_protocol._RESULT_TIMEOUT_S", 0.0)
+    monkeypatch.setattr("rosglass.ros2.action_server._RESULT_TIMEOUT_S", 0.0)
     eventually(lambda: kept() == 0)
 
 
@@ -709,7 +709,7 @@ def test_a_goal_accepted_just_before_closing_is_told_its_end(robot, node, close,
 
 
 def test_closing_does_not_wait_for_clients_that_never_ask(robot, node, monkeypatch):
-    monkeypatch.setattr("rosglass.ros2.action_server_protocol._ASK_TIMEOUT_S", 0.1)
+    monkeypatch.setattr("rosglass.ros2.action_server._ASK_TIMEOUT_S", 0.1)
     server = robot.create_action_server("/fib", FIB, fibonacci)
     ask = node.create_service_client("/fib/_action/send_goal")
     never = node.create_service_client("/fib/_action/get_result")

@@ -16,7 +16,7 @@ from rosglass.errors import (
 )
 
 pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
-from rosglass.wires.dds import cyclone, cyclone_qos
+from rosglass.wires.dds import cyclone
 
 PROFILES = [
     QoS(),
@@ -46,7 +46,7 @@ def fresh():
 @pytest.mark.parametrize("writer", [True, False])
 @pytest.mark.parametrize("profile", PROFILES, ids=str)
 def test_profiles_are_kept(profile, writer):
-    kept = cyclone_qos.qos_of(profile, writer=writer).profile()
+    kept = cyclone.qos_of(profile, writer=writer).profile()
     if profile.history is History.KEEP_ALL:
         profile = profile.with_depth(kept.depth)
     assert kept == profile
@@ -54,12 +54,12 @@ def test_profiles_are_kept(profile, writer):
 
 def test_only_writers_have_a_lifespan():
     brief = QoS(lifespan=Duration.from_seconds(0.5))
-    assert cyclone_qos.qos_of(brief, writer=True).profile() == brief
-    assert cyclone_qos.qos_of(brief, writer=False).profile() == QoS()
+    assert cyclone.qos_of(brief, writer=True).profile() == brief
+    assert cyclone.qos_of(brief, writer=False).profile() == QoS()
 
 
 def test_an_empty_profile_is_ddss_default():
-    profile = cyclone_qos.Qos().profile()
+    profile = cyclone.Qos().profile()
     assert profile.reliability is Reliability.BEST_EFFORT
     assert profile.durability is Durability.VOLATILE
     assert (profile.deadline, profile.lifespan, profile.lease_duration) == (None, None, None)
@@ -70,17 +70,17 @@ def test_a_profile_interrupted_at_its_making_frees_nothing(monkeypatch):
     def interrupt():
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(cyclone_qos, "library", interrupt)
+    monkeypatch.setattr(cyclone, "library", interrupt)
     with pytest.raises(KeyboardInterrupt):
-        cyclone_qos.Qos()
+        cyclone.Qos()
     gc.collect()
 
 
 def test_user_data_is_any_bytes():
-    qos = cyclone_qos.qos_of(QoS(), writer=True, user_data=b"typehash=x;\0\xff")
+    qos = cyclone.qos_of(QoS(), writer=True, user_data=b"typehash=x;\0\xff")
     assert qos.user_data() == b"typehash=x;\0\xff"
-    assert cyclone_qos.Qos().user_data() == b""
-    assert cyclone_qos.Qos().property("__Hostname") == ""
+    assert cyclone.Qos().user_data() == b""
+    assert cyclone.Qos().property("__Hostname") == ""
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,7 @@ import pytest
 
 import rosglass
 from rosglass.wires.dds import domain as dds_domain
-from rosglass.wires.dds.domain import domain_config, users_part
-from rosglass.wires.dds.options import DdsOptions
+from rosglass.wires.dds.domain import DdsOptions, domain_config, users_part
 
 
 def config(url="dds://", **env):

@@ -6,7 +6,7 @@ import pytest
 
 from rosglass.comm import NodeName
 from rosglass.errors import DecodeError
-from rosglass.wires.dds.discovery_info import (
+from rosglass.wires.dds.graph import (
     NodeEntities,
     ParticipantEntities,
     format_user_data,

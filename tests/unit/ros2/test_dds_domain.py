@@ -16,8 +16,7 @@ pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
 
 from rosglass.wires.dds import cyclone, cyclone_identity
 from rosglass.wires.dds import domain as dds_domain
-from rosglass.wires.dds.domain import Domain
-from rosglass.wires.dds.options import DdsOptions
+from rosglass.wires.dds.domain import DdsOptions, Domain
 
 URL = "dds://?domain=57&range=off"
 

@@ -6,13 +6,13 @@ import pytest
 
 from rosglass.comm import EndpointInfo, EndpointKind, NodeName, QoS
 from rosglass.ros2 import Graph
-from rosglass.wires.dds.cyclone_builtin import Discovered
-from rosglass.wires.dds.discovery_info import (
+from rosglass.wires.dds.cyclone import Discovered
+from rosglass.wires.dds.graph import (
     PARTICIPANT_USER_DATA,
+    DdsGraph,
     NodeEntities,
     ParticipantEntities,
 )
-from rosglass.wires.dds.graph import DdsGraph
 
 PUBLISHER, SUBSCRIPTION = EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION
 SERVER, CLIENT = EndpointKind.SERVICE_SERVER, EndpointKind.SERVICE_CLIENT

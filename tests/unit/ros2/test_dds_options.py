@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 import rosglass
-from rosglass.wires.dds.options import DdsOptions, DiscoveryRange
+from rosglass.wires.dds.domain import DdsOptions, DiscoveryRange
 
 SUBNET, LOCALHOST = DiscoveryRange.SUBNET, DiscoveryRange.LOCALHOST
 OFF, SYSTEM_DEFAULT = DiscoveryRange.OFF, DiscoveryRange.SYSTEM_DEFAULT

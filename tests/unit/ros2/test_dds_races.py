@@ -18,16 +18,14 @@ from rosglass.ros2 import Ros2Node
 
 pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
 
-from rosglass.wires.dds import cyclone, endpoints, service_ends, services
+from rosglass.wires.dds import cyclone, endpoints, service_endpoints, services
 from rosglass.wires.dds import middleware as dds_middleware
-from rosglass.wires.dds.cyclone_builtin import Discovered
-from rosglass.wires.dds.cyclone_events import Event
+from rosglass.wires.dds.cyclone import Discovered, Event, qos_of
 from rosglass.wires.dds.cyclone_identity import Identity, Origin, Origins
-from rosglass.wires.dds.cyclone_qos import qos_of
+from rosglass.wires.dds.domain import DdsOptions, DiscoveryRange
 from rosglass.wires.dds.middleware import DdsMiddleware
-from rosglass.wires.dds.options import DdsOptions, DiscoveryRange
 from rosglass.wires.dds.participant import Participant
-from rosglass.wires.dds.service_ends import Ends, Matched, Outbox
+from rosglass.wires.dds.service_endpoints import Ends, Matched, Outbox
 from rosglass.wires.dds.services import DdsReplier
 
 ADD = "example_interfaces/srv/AddTwoInts"
@@ -56,7 +54,7 @@ def ends(monkeypatch):
             self.on_taken = on_taken
             made.append(self)
 
-    monkeypatch.setattr(service_ends, "Origins", Haunted)
+    monkeypatch.setattr(service_endpoints, "Origins", Haunted)
     monkeypatch.setattr(services, "Ends", Kept)
     return made
 
@@ -138,7 +136,7 @@ def test_a_reply_is_ready_before_its_client_was_noticed(node, server, monkeypatc
         monkeypatch.setattr(module, name, matched)
 
     hide(endpoints, "subscription_matched")
-    hide(service_ends, "publication_matched")
+    hide(service_endpoints, "publication_matched")
     client = ready(node.create_service_client(SERVICE, ADD))
     assert client.call({"a": 1, "b": 2}, timeout=30).sum == 2
 
@@ -296,7 +294,7 @@ def test_who_looked_first_for_counterparts_has_not_the_last_word():
 
 
 def test_some_who_left_are_remembered(monkeypatch):
-    monkeypatch.setattr("rosglass.wires.dds.service_ends._MAX_DEPARTED", 2)
+    monkeypatch.setattr("rosglass.wires.dds.service_endpoints._MAX_DEPARTED", 2)
     here = [1]
     matched = Matched(
         1, lambda _: here, lambda _, h: SimpleNamespace(guid=h) if h in here else None

@@ -9,7 +9,7 @@ import pytest
 
 from rosglass.errors import DefinitionError
 from rosglass.interfaces import parse_type_description
-from rosglass.wires.dds.types import describe_struct
+from rosglass.wires.dds.type_lookup import describe_struct
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -11,15 +11,18 @@ import pytest
 from rosglass import Time, load
 from rosglass.comm import ParameterDescriptor, ParameterType, Range
 from rosglass.errors import ParameterError
-from rosglass.ros2.parameter_services import (
+from rosglass.ros2.parameters import (
+    TypedValue,
+    check_name,
     descriptor_from_message,
     descriptor_to_message,
     event_from_message,
     event_to_message,
+    in_range,
+    typed,
     value_from_message,
     value_to_message,
 )
-from rosglass.ros2.parameters import TypedValue, check_name, in_range, typed
 
 T = ParameterType
 

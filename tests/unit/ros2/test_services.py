@@ -23,8 +23,7 @@ from rosglass.comm import (
 )
 from rosglass.interfaces import Library
 from rosglass.ros2 import Ros2Node
-from rosglass.ros2.pacing import ReplyPacer, RequestWindow
-from rosglass.ros2.service_client import Ros2ServiceClient
+from rosglass.ros2.rmw_services import ReplyPacer, RequestWindow, Ros2ServiceClient
 from rosglass.wires.base import CALL_DROPPED, SERVER_LEFT, RequestId
 
 pytestmark = pytest.mark.usefixtures("quick")
@@ -193,7 +192,7 @@ def test_no_reply_overtakes_one_that_waited(monkeypatch):
 
     later, sent = LaterByHand(), []
     pacer = ReplyPacer(later)
-    monkeypatch.setattr("rosglass.ros2.pacing._BURST_S", 3600)
+    monkeypatch.setattr("rosglass.ros2.rmw_services._BURST_S", 3600)
     for _ in range(10):
         pacer.on_request(b"w")
     for number in range(8):
@@ -207,7 +206,7 @@ def test_no_reply_overtakes_one_that_waited(monkeypatch):
 
     pacer.send_later(b"w", send_ninth)
     assert sent == list(range(8))
-    monkeypatch.setattr("rosglass.ros2.pacing._BURST_S", 0)
+    monkeypatch.setattr("rosglass.ros2.rmw_services._BURST_S", 0)
     later.job()
     assert sent == list(range(10))
     pacer.on_request(b"w")
@@ -282,7 +281,7 @@ def test_an_empty_response_is_taken_in_every_shape(node, middleware):
 
 
 def test_calls_end_soon_when_their_server_is_gone(client, requester, middleware, monkeypatch):
-    monkeypatch.setattr("rosglass.ros2.service_client._GRACE_S", 0.05)
+    monkeypatch.setattr("rosglass.ros2.rmw_services._GRACE_S", 0.05)
     requester.linked = True
     key = middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01, gid=b"1" * 16)
     call = client.call_async(timeout=60)
@@ -313,7 +312,7 @@ def test_a_server_that_comes_back_soon_keeps_its_calls(client, requester, middle
 def test_calls_end_when_their_server_was_away_and_is_back(
     client, requester, middleware, monkeypatch
 ):
-    monkeypatch.setattr("rosglass.ros2.service_client._GRACE_S", 0.05)
+    monkeypatch.setattr("rosglass.ros2.rmw_services._GRACE_S", 0.05)
     requester.linked = True
     middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01, gid=b"1" * 16)
     calls = [client.call_async(timeout=None) for _ in range(2)]
@@ -325,7 +324,7 @@ def test_calls_end_when_their_server_was_away_and_is_back(
 
 
 def test_patient_calls_wait_for_their_server_to_be_back(node, middleware, monkeypatch):
-    monkeypatch.setattr("rosglass.ros2.service_client._GRACE_S", 0.05)
+    monkeypatch.setattr("rosglass.ros2.rmw_services._GRACE_S", 0.05)
     client = Ros2ServiceClient(core_of(node), "/add", ADD, patient=True)
     (requester,) = middleware.requesters
     key = middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01, gid=b"1" * 16)

@@ -50,7 +50,7 @@ def robot_library(state: str = STATE_TEXT) -> Library:
 @pytest.fixture(autouse=True)
 def hurry(monkeypatch: pytest.MonkeyPatch) -> None:
     """The local graph is complete at once."""
-    monkeypatch.setattr("rosglass.ros2.type_fetching._GRACE", 0.1)
+    monkeypatch.setattr("rosglass.ros2.type_descriptions._GRACE", 0.1)
 
 
 @pytest.fixture
@@ -515,7 +515,7 @@ def test_many_types_at_once(join: Callable[..., Ros2Node]) -> None:
 def test_nothing_is_left_behind(
     join: Callable[..., Ros2Node], eventually: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rosglass.ros2.type_fetching._LINGER", 0.2)
+    monkeypatch.setattr("rosglass.ros2.type_descriptions._LINGER", 0.2)
     join("robot", robot_library())
     user = join("cockpit", serves=False)
     use(user, STATE, hash_of(STATE), "robot")

@@ -5,8 +5,8 @@ while it copies samples, announces a type description that keeps plain ROS 2 end
 matching, and takes 0.2 s to import. Entities are the numbers that the library gives them. What is
 declared here follows the headers of Eclipse Cyclone DDS 11 (``dds/dds.h``, ``dds/ddsc/*.h``).
 
-Beside it, samples are in ``cyclone_samples``, profiles in ``cyclone_qos``, events in
-``cyclone_events``, the discovered participants and endpoints in ``cyclone_builtin``.
+In this order: the library and its entities, quality of service, events, discovered participants
+and endpoints. Samples are in ``cyclone_samples``.
 """
 
 from __future__ import annotations
@@ -18,12 +18,28 @@ import os
 import struct
 import sys
 from contextlib import suppress
-from ctypes import POINTER, c_bool, c_char_p, c_int32, c_int64, c_size_t, c_uint32, c_uint64
+from ctypes import (
+    POINTER,
+    byref,
+    c_bool,
+    c_char_p,
+    c_int16,
+    c_int32,
+    c_int64,
+    c_size_t,
+    c_ubyte,
+    c_uint32,
+    c_uint64,
+    c_void_p,
+)
 from ctypes import c_void_p as pointer
+from dataclasses import dataclass, field
+from enum import IntEnum, IntFlag
 from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeVar
 
+from rosglass.comm import Durability, Duration, History, Liveliness, QoS, Reliability
 from rosglass.errors import (
     ConnectionLostError,
     Error,
@@ -32,14 +48,20 @@ from rosglass.errors import (
     UnsupportedError,
 )
 
-if TYPE_CHECKING:
-    from rosglass.wires.dds.cyclone_qos import Qos
-
 __all__ = [
     "GONE",
     "INFINITY",
     "TIMEOUT",
     "VERSION",
+    "XCDR1",
+    "BuiltinTopic",
+    "Discovered",
+    "Event",
+    "LivelinessChanged",
+    "Matched",
+    "Qos",
+    "Status",
+    "Waitset",
     "assert_liveliness",
     "check",
     "check_alive",
@@ -53,10 +75,19 @@ __all__ = [
     "handle",
     "keeping",
     "library",
+    "liveliness_changed",
+    "matched_publication",
     "matched_publications",
+    "matched_subscription",
     "matched_subscriptions",
+    "publication_matched",
+    "qos_of",
+    "sample_lost",
     "sertype",
+    "set_events",
     "start_at_first_sample",
+    "subscription_matched",
+    "take",
 ]
 
 _log = logging.getLogger("rosglass.ros2")
@@ -481,3 +512,456 @@ def _declare(loaded: Any) -> Any:
         function = getattr(loaded, name)
         function.restype, function.argtypes = result, arguments
     return loaded
+
+
+#: The encoding of ROS 2's messages, as data representations are numbered (DDS-XTypes 1.3, 7.6.3.1).
+XCDR1 = 0
+
+_AUTOMATIC, _MANUAL_BY_TOPIC = 0, 2
+_UNLIMITED = -1
+
+
+class Qos:
+    """A set of policies.
+
+    Args:
+        borrowed: Address of policies that someone else frees; None for a new, empty set.
+
+    Attributes:
+        address: Where the library keeps it.
+    """
+
+    def __init__(self, borrowed: int | None = None) -> None:
+        # Last, as Ctrl-C may come in between: what was not created is not freed.
+        self._owned = False
+        self.address: int = library().dds_create_qos() if borrowed is None else borrowed
+        self._owned = borrowed is None
+
+    def __del__(self) -> None:
+        if self._owned:
+            library().dds_delete_qos(self.address)
+
+    def set_user_data(self, data: bytes) -> None:
+        """Attach bytes that everyone sees who discovers the entity."""
+        library().dds_qset_userdata(self.address, data, len(data))
+
+    def set_history(self, depth: int | None) -> None:
+        """Keep the newest `depth` samples, or all with None."""
+        library().dds_qset_history(self.address, int(depth is None), depth or 0)
+
+    def wait_at_most(self, seconds: float) -> None:
+        """Let a reliable writer wait no longer than so for readers that take nothing."""
+        library().dds_qset_reliability(self.address, 1, round(seconds * 1e9))
+
+    def user_data(self) -> bytes:
+        """Return the bytes attached to the entity, empty when there are none."""
+        value, size = c_void_p(), c_size_t()
+        if not library().dds_qget_userdata(self.address, byref(value), byref(size)):
+            return b""
+        if not value.value:
+            return b""
+        data = ctypes.string_at(value.value, size.value)
+        library().dds_free(value)
+        return data
+
+    def property(self, name: str) -> str:
+        """Return a named property, empty when there is none."""
+        value = c_void_p()
+        if not library().dds_qget_prop(self.address, name.encode(), byref(value)):
+            return ""
+        text = ctypes.cast(value, c_char_p).value or b""
+        library().dds_free(value)
+        return text.decode(errors="replace")
+
+    def representations(self) -> list[int]:
+        """Return the numbers of the encodings that are announced, empty when none are."""
+        values, size = c_void_p(), c_uint32()
+        if not library().dds_qget_data_representation(self.address, byref(size), byref(values)):
+            return []
+        if not values.value:
+            return []
+        found = (c_int16 * size.value).from_address(values.value)[:]
+        library().dds_free(values)
+        return found
+
+    def profile(self) -> QoS:
+        """Return the policies that ROS 2 has; what was not announced has DDS's default.
+
+        Depth is never announced by discovery, so it says nothing about remote endpoints.
+        """
+        lib, kind, kind2, depth, span = library(), c_int32(), c_int32(), c_int32(), c_int64()
+        reliability, durability, history = (
+            Reliability.BEST_EFFORT,
+            Durability.VOLATILE,
+            History.KEEP_LAST,
+        )
+        if lib.dds_qget_reliability(self.address, byref(kind), byref(span)) and kind.value:
+            reliability = Reliability.RELIABLE
+        # Transient and persistent are more than transient local.
+        if lib.dds_qget_durability(self.address, byref(kind)) and kind.value:
+            durability = Durability.TRANSIENT_LOCAL
+        if lib.dds_qget_history(self.address, byref(kind), byref(depth)) and kind.value:
+            history = History.KEEP_ALL
+        liveliness, lease = Liveliness.AUTOMATIC, None
+        if lib.dds_qget_liveliness(self.address, byref(kind2), byref(span)):
+            lease = _duration(span.value)
+            if kind2.value == _MANUAL_BY_TOPIC:
+                liveliness = Liveliness.MANUAL_BY_TOPIC
+        deadline = lifespan = None
+        if lib.dds_qget_deadline(self.address, byref(span)):
+            deadline = _duration(span.value)
+        if lib.dds_qget_lifespan(self.address, byref(span)):
+            lifespan = _duration(span.value)
+        return QoS(
+            depth=max(depth.value, 1),
+            reliability=reliability,
+            durability=durability,
+            history=history,
+            deadline=deadline,
+            lifespan=lifespan,
+            liveliness=liveliness,
+            lease_duration=lease,
+        )
+
+
+def qos_of(profile: QoS, *, writer: bool, user_data: bytes = b"") -> Qos:
+    """Return the policies of a writer or reader with ROS 2's `profile`."""
+    qos, lib = Qos(), library()
+    address = qos.address
+    reliable = profile.reliability is Reliability.RELIABLE
+    lib.dds_qset_reliability(address, int(reliable), INFINITY if reliable else 0)
+    keep_all = profile.history is History.KEEP_ALL
+    depth = _UNLIMITED if keep_all else profile.depth
+    qos.set_history(None if keep_all else profile.depth)
+    latched = profile.durability is Durability.TRANSIENT_LOCAL
+    lib.dds_qset_durability(address, int(latched))
+    if writer and latched:
+        lib.dds_qset_durability_service(
+            address, 0, int(keep_all), depth, _UNLIMITED, _UNLIMITED, _UNLIMITED
+        )
+    if profile.deadline is not None:
+        lib.dds_qset_deadline(address, profile.deadline.nanoseconds)
+    if writer and profile.lifespan is not None:
+        lib.dds_qset_lifespan(address, profile.lifespan.nanoseconds)
+    manual = profile.liveliness is Liveliness.MANUAL_BY_TOPIC
+    lease = profile.lease_duration
+    lib.dds_qset_liveliness(
+        address,
+        _MANUAL_BY_TOPIC if manual else _AUTOMATIC,
+        INFINITY if lease is None else lease.nanoseconds,
+    )
+    if writer:
+        lib.dds_qset_writer_data_lifecycle(address, False)
+    # XCDR1 alone: ROS 2 knows no other encoding.
+    lib.dds_qset_data_representation(address, 1, byref(c_int16(XCDR1)))
+    if user_data:
+        qos.set_user_data(user_data)
+    return qos
+
+
+def _duration(nanoseconds: int) -> Duration | None:
+    return None if nanoseconds in (0, INFINITY) else Duration(nanoseconds)
+
+
+#: Conditions that are told at once at most.
+_KEYS = 64
+_S = TypeVar("_S", bound=ctypes.Structure)
+
+
+class Status(ctypes.Structure):
+    """What happened to a reader or writer (OMG DDS 1.4, section 2.2.4.1).
+
+    Attributes:
+        total: How often since its creation.
+        change: How often since the last time this was told.
+    """
+
+    _fields_ = (("total", c_uint32), ("change", c_int32))
+    total: int
+    change: int
+
+
+class Matched(ctypes.Structure):
+    """Counterparts came or went.
+
+    Attributes:
+        total: How often one came since the entity's creation.
+        change: How often since the last time this was told.
+        current: How many there are.
+        current_change: How many more than last time.
+        handle: Which one it was last.
+    """
+
+    _fields_ = (
+        ("total", c_uint32),
+        ("change", c_int32),
+        ("current", c_uint32),
+        ("current_change", c_int32),
+        ("handle", c_uint64),
+    )
+    total: int
+    change: int
+    current: int
+    current_change: int
+    handle: int
+
+
+class LivelinessChanged(ctypes.Structure):
+    """Writers went silent or spoke again.
+
+    Attributes:
+        alive: How many are alive.
+        not_alive: How many are not.
+        alive_change: How many more are alive than last time.
+        not_alive_change: How many more are not.
+        handle: Which one it was last.
+    """
+
+    _fields_ = (
+        ("alive", c_uint32),
+        ("not_alive", c_uint32),
+        ("alive_change", c_int32),
+        ("not_alive_change", c_int32),
+        ("handle", c_uint64),
+    )
+    alive: int
+    not_alive: int
+    alive_change: int
+    not_alive_change: int
+    handle: int
+
+
+class Event(IntFlag):
+    """What can happen to a reader or writer (``dds_status_id_t``)."""
+
+    NONE = 0
+    SAMPLE_LOST = 1 << 5
+    DATA_AVAILABLE = 1 << 8
+    LIVELINESS_CHANGED = 1 << 10
+    PUBLICATION_MATCHED = 1 << 11
+    SUBSCRIPTION_MATCHED = 1 << 12
+
+
+def set_events(entity: int, events: Event) -> None:
+    """Let a waitset that an entity is attached to be woken by these events, and no others."""
+    result = library().dds_set_status_mask(entity, events)
+    check_alive(result, "dds_set_status_mask", f"entity {entity}")
+
+
+def subscription_matched(reader: int) -> Matched:
+    """Return how a reader is matched; its event is over with it."""
+    return _status(reader, "subscription_matched", Matched())
+
+
+def publication_matched(writer: int) -> Matched:
+    """Return how a writer is matched; its event is over with it."""
+    return _status(writer, "publication_matched", Matched())
+
+
+def liveliness_changed(reader: int) -> LivelinessChanged:
+    """Return how many of a reader's writers are alive; its event is over with it."""
+    return _status(reader, "liveliness_changed", LivelinessChanged())
+
+
+def sample_lost(reader: int) -> Status:
+    """Return how many samples a reader knows that it did not get; its event is over with it."""
+    return _status(reader, "sample_lost", Status())
+
+
+def _status(entity: int, what: str, into: _S) -> _S:
+    call = f"dds_get_{what}_status"
+    check_alive(getattr(library(), call)(entity, ctypes.byref(into)), call, f"entity {entity}")
+    return into
+
+
+class Waitset:
+    """Waits, without the GIL, until one of several conditions holds.
+
+    Args:
+        participant: Who owns it.
+    """
+
+    def __init__(self, participant: int) -> None:
+        lib = library()
+        self._entity = check(lib.dds_create_waitset(participant), "dds_create_waitset", "waitset")
+        self._guard = check(
+            lib.dds_create_guardcondition(participant), "dds_create_guardcondition", "waitset"
+        )
+        self.attach(self._guard, 0)
+        self._keys = (c_uint64 * _KEYS)()
+        self._wait = lib.dds_waitset_wait
+
+    def attach(self, entity: int, key: int) -> None:
+        """Be woken by a condition, or by an entity with a status mask; `key` must not be 0."""
+        check(library().dds_waitset_attach(self._entity, entity, key), "dds_waitset_attach", "")
+
+    def wait(self, timeout: float | None) -> list[int]:
+        """Return the keys of what holds, empty after `timeout` seconds or :meth:`wake`."""
+        keys = self._keys
+        span = INFINITY if timeout is None else int(timeout * 1e9)
+        count = self._wait(self._entity, keys, _KEYS, span)
+        if count < 0:
+            check(count, "dds_waitset_wait", "waitset")
+        found: list[int] = keys[:count]  # no more than there are
+        if 0 in found:
+            library().dds_take_guardcondition(self._guard, ctypes.byref(c_bool()))
+            found = [key for key in found if key]
+        return found
+
+    def wake(self) -> None:
+        """Let :meth:`wait` return, in another thread."""
+        library().dds_set_guardcondition(self._guard, True)
+
+    def close(self) -> None:
+        """Delete it; nobody may be waiting."""
+        for entity in (self._guard, self._entity):
+            delete(entity)
+
+
+_ROOM = 32
+_ALIVE = 16
+
+
+class BuiltinTopic(IntEnum):
+    """The topics on which discovery tells its news; for :func:`cyclone.create_reader`."""
+
+    PARTICIPANT = 0x7FFF0001
+    PUBLICATION = 0x7FFF0003
+    SUBSCRIPTION = 0x7FFF0004
+
+
+@dataclass(frozen=True)
+class Discovered:
+    """A participant, writer or reader that appeared, changed or went.
+
+    Attributes:
+        alive: Whether it is there; when not, only `guid` is known.
+        guid: Its 16 bytes of identity.
+        handle: Its number within this process, as with samples and matches.
+        participant: The identity of the participant it belongs to, or is.
+        user_data: What it attached to itself.
+        topic: Its DDS topic, empty for a participant.
+        type: Its DDS type, empty for a participant.
+        qos: Its profile.
+        representations: The encodings that a writer offers or a reader takes, by their numbers;
+            empty when it does not say, which stands for XCDR1 alone.
+        properties: Those of `__NetworkAddresses`, `__Hostname`, `__Pid` and `__ProcessName` that a
+            participant announces.
+    """
+
+    alive: bool
+    guid: bytes
+    handle: int
+    participant: bytes = b""
+    user_data: bytes = b""
+    topic: str = ""
+    type: str = ""
+    qos: QoS = field(default_factory=QoS)
+    representations: tuple[int, ...] = ()
+    properties: tuple[tuple[str, str], ...] = ()
+
+
+def take(reader: int, topic: BuiltinTopic, place: str) -> list[Discovered]:
+    """Take the news that a reader of a built-in topic holds, the oldest first.
+
+    Call it until it returns nothing.
+    """
+    samples = (c_void_p * _ROOM)()
+    infos = (_Info * _ROOM)()
+    lib = library()
+    count = check(lib.dds_take(reader, samples, infos, _ROOM, _ROOM), "dds_take", place)
+    found = []
+    for sample, info in zip(samples[:count], infos, strict=False):
+        alive = info.instance_state == _ALIVE and info.valid
+        if topic is BuiltinTopic.PARTICIPANT:
+            found.append(_participant(sample, info.instance_handle, alive))
+        else:
+            found.append(_endpoint(sample, info.instance_handle, alive))
+    if count:
+        lib.dds_return_loan(reader, samples, count)
+    return found
+
+
+def matched_publication(reader: int, handle: int) -> Discovered | None:
+    """Return the writer with a handle that a reader is matched with, None when it is gone."""
+    return _matched_endpoint(library().dds_get_matched_publication_data(reader, handle), handle)
+
+
+def matched_subscription(writer: int, handle: int) -> Discovered | None:
+    """Return the reader with a handle that a writer is matched with, None when it is gone."""
+    return _matched_endpoint(library().dds_get_matched_subscription_data(writer, handle), handle)
+
+
+class _Info(ctypes.Structure):
+    """``dds_sample_info_t``."""
+
+    _fields_ = (
+        ("sample_state", ctypes.c_int32),
+        ("view_state", ctypes.c_int32),
+        ("instance_state", ctypes.c_int32),
+        ("valid", ctypes.c_bool),
+        ("source_timestamp", ctypes.c_int64),
+        ("instance_handle", c_uint64),
+        ("publication_handle", c_uint64),
+        ("ranks", ctypes.c_uint32 * 5),
+    )
+
+
+class _Participant(ctypes.Structure):
+    """``dds_builtintopic_participant_t``."""
+
+    _fields_ = (("key", c_ubyte * 16), ("qos", c_void_p))
+
+
+class _Endpoint(ctypes.Structure):
+    """``dds_builtintopic_endpoint_t``."""
+
+    _fields_ = (
+        ("key", c_ubyte * 16),
+        ("participant", c_ubyte * 16),
+        ("participant_handle", c_uint64),
+        ("topic", c_char_p),
+        ("type", c_char_p),
+        ("qos", c_void_p),
+    )
+
+
+_PROPERTIES = ("__NetworkAddresses", "__Hostname", "__Pid", "__ProcessName")
+
+
+def _participant(address: Any, handle: int, alive: bool) -> Discovered:
+    data = _Participant.from_address(address)
+    guid = bytes(data.key)
+    if not (alive and data.qos):
+        return Discovered(alive, guid, handle, guid)
+    qos = Qos(data.qos)
+    told = ((name, qos.property(name)) for name in _PROPERTIES)
+    properties = tuple((name, text) for name, text in told if text)
+    return Discovered(True, guid, handle, guid, qos.user_data(), properties=properties)
+
+
+def _endpoint(address: Any, handle: int, alive: bool) -> Discovered:
+    data = _Endpoint.from_address(address)
+    guid = bytes(data.key)
+    if not (alive and data.qos):
+        return Discovered(False, guid, handle)
+    qos = Qos(data.qos)
+    return Discovered(
+        True,
+        guid,
+        handle,
+        bytes(data.participant),
+        qos.user_data(),
+        data.topic.decode(errors="replace"),
+        data.type.decode(errors="replace"),
+        qos.profile(),
+        tuple(qos.representations()),
+    )
+
+
+def _matched_endpoint(address: int | None, handle: int) -> Discovered | None:
+    if not address:
+        return None
+    found = _endpoint(address, handle, alive=True)
+    library().dds_builtintopic_free_endpoint(address)
+    return found

@@ -12,17 +12,17 @@ from rosglass.comm import History, Reliability
 from rosglass.comm.names import mangle_type
 from rosglass.errors import NodeClosedError, TimeoutError  # noqa: A004 - the field's own word
 from rosglass.wires.base import Reader, Writer
-from rosglass.wires.dds import cyclone, cyclone_builtin
-from rosglass.wires.dds.cyclone_events import (
+from rosglass.wires.dds import cyclone
+from rosglass.wires.dds.cyclone import (
     Event,
     liveliness_changed,
+    qos_of,
     sample_lost,
     set_events,
     subscription_matched,
 )
-from rosglass.wires.dds.cyclone_qos import qos_of
 from rosglass.wires.dds.cyclone_samples import Batch, Taken, discard, sample, send
-from rosglass.wires.dds.discovery_info import format_user_data, hash_of
+from rosglass.wires.dds.graph import format_user_data, hash_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -399,7 +399,7 @@ class DdsReader(Reader):
         if writer is None:
             # What is latched comes before the constructor has returned.
             self._made.wait(_PATIENCE)
-            found = cyclone_builtin.matched_publication(self._reader.entity, handle)
+            found = cyclone.matched_publication(self._reader.entity, handle)
             if found is None:
                 return b"", ""
             writer = found.guid, hash_of(found.user_data)

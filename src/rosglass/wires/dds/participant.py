@@ -11,17 +11,16 @@ from typing import TYPE_CHECKING
 
 from rosglass.errors import NodeClosedError
 from rosglass.wires.dds import cyclone
-from rosglass.wires.dds.cyclone_events import Event, Waitset, set_events
-from rosglass.wires.dds.cyclone_qos import Qos
-from rosglass.wires.dds.discovery_info import PARTICIPANT_USER_DATA, NodeEntities
+from rosglass.wires.dds.cyclone import Event, Qos, Waitset, set_events
 from rosglass.wires.dds.domain import Domain
+from rosglass.wires.dds.graph import PARTICIPANT_USER_DATA, NodeEntities
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from rosglass.comm import NodeName
+    from rosglass.wires.dds.domain import DdsOptions
     from rosglass.wires.dds.graph import DdsGraph
-    from rosglass.wires.dds.options import DdsOptions
 
 __all__ = ["Participant"]
 

@@ -1,9 +1,9 @@
-"""The ends of a service over DDS, for peers of every DDS implementation.
+"""Service clients and servers over DDS, for peers of every DDS implementation.
 
-A service's replies go to all its clients, who pick their own. How, depends on the other end; see
-:class:`rosglass.wires.dds.service_ends.Scheme`. rmw_cyclonedds puts 16 bytes in front of requests
-and replies, behind the encapsulation header: a number of the client's, and one of the request's; a
-server returns them as they are. Being 16, they leave everything behind them aligned.
+A service's replies go to all its clients, which pick their own. How depends on the peer; see
+:class:`rosglass.wires.dds.service_endpoints.Scheme`. rmw_cyclonedds puts 16 bytes in front of
+requests and replies, behind the encapsulation header: a number of the client's, and one of the
+request's; a server returns them as they are. Being 16, they leave everything behind them aligned.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from rosglass.wires.base import SERVER_LEFT, Replier, Requester, RequestId
 from rosglass.wires.dds import cyclone_identity
 from rosglass.wires.dds.cyclone_identity import UNKNOWN_GUID, Identity, Origin
 from rosglass.wires.dds.cyclone_samples import COPIED
-from rosglass.wires.dds.discovery_info import parse_user_data
-from rosglass.wires.dds.service_ends import (
+from rosglass.wires.dds.graph import parse_user_data
+from rosglass.wires.dds.service_endpoints import (
     PREFIX,
     REMEDY,
     Ends,
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from rosglass.comm import EndpointInfo
     from rosglass.comm.graph import Graph
     from rosglass.wires.base import OnReply, OnRequest
-    from rosglass.wires.dds.cyclone_builtin import Discovered
+    from rosglass.wires.dds.cyclone import Discovered
     from rosglass.wires.dds.endpoints import Taken
     from rosglass.wires.dds.participant import Participant
 

@@ -1,4 +1,11 @@
-"""Calling services of ROS 2: versions of their type, and requests that are not lost."""
+"""Services of ROS 2 above a middleware's requesters and repliers.
+
+A client follows the version of the type that servers announce, a server reports clients of other
+versions. Neither sends faster than its peers take: a server of ROS 2 keeps the last 10 requests
+that it has not taken, of all its clients together, and a client the last 10 replies
+(``rmw_qos_profile_services_default``, in every middleware). What comes beyond that displaces the
+oldest, and neither side is informed.
+"""
 
 from __future__ import annotations
 
@@ -6,32 +13,40 @@ import logging
 import threading
 import time
 from collections import deque
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointInfo, EndpointKind, QoS
+from rosglass.comm.core import NodeMember
 from rosglass.comm.names import similar
 from rosglass.comm.service_client import Call, PendingCall, ServiceClient, ServiceRequester
-from rosglass.errors import Error, ServiceError
-from rosglass.ros2.announced import (
-    Announced,
-    choose,
-    identity,
-    mismatches,
-    nodes_of,
-    rivals,
-)
-from rosglass.ros2.pacing import HOLD_S, LIMIT, STALL_S, RequestWindow
-from rosglass.wires.base import SERVER_LEFT
+from rosglass.comm.service_server import ServiceServer
+from rosglass.errors import Error, NodeClosedError, ServiceError
+from rosglass.ros2.announced import Announced, choose, identity, mismatches, nodes_of, rivals
+from rosglass.wires.base import SERVER_LEFT, Replier, RequestId
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Awaitable, Callable, Hashable, Mapping, Sequence
 
-    from rosglass.messages import ServiceType
+    from rosglass.comm import Answer, Executor
+    from rosglass.comm.timers import Timers
+    from rosglass.messages import Message, ServiceType
     from rosglass.ros2.core import Core
-    from rosglass.wires.base import OnReply, Requester
+    from rosglass.wires.base import OnReply, OnRequest, Requester
 
-__all__ = ["Ros2Requester", "Ros2ServiceClient", "create_service_client"]
+__all__ = [
+    "HOLD_S",
+    "LIMIT",
+    "STALL_S",
+    "ReplyPacer",
+    "RequestWindow",
+    "Ros2Replier",
+    "Ros2Requester",
+    "Ros2ServiceClient",
+    "create_service_client",
+    "create_service_server",
+]
 
 _log = logging.getLogger("rosglass.ros2")
 #: Seconds that a server may be out of the graph before its calls end: a router that is restarted
@@ -455,3 +470,316 @@ class Ros2Requester(ServiceRequester):
             self._queue.clear()
         if requester is not None:
             requester.close()
+
+
+def create_service_server(
+    core: Core,
+    name: str,
+    type: ServiceType | str,
+    callback: Callable[[Message], Answer | Awaitable[Answer]],
+    qos: QoS | None = None,
+    executor: Executor | None = None,
+) -> ServiceServer:
+    """Offer a service in a ROS 2 node.
+
+    Args:
+        core: The node.
+        name: Absolute service name.
+        type: The type, or its name.
+        callback: Called with each request; see :meth:`Node.create_service_server`.
+        qos: Profile of requests and replies; None for the usual one.
+        executor: Where `callback` runs; None for the node's dispatcher, or for the running event
+            loop when `callback` is a coroutine function.
+    """
+    kind, profile = core.types.service(type), qos or QoS.services()
+
+    def create(on_request: OnRequest, quick: bool) -> Replier:
+        return Ros2Replier(core, name, kind, profile, on_request, quick)
+
+    return ServiceServer(core, name, kind, callback, profile, executor, create)
+
+
+class Ros2Replier(Replier, NodeMember):
+    """A middleware's replier, with what every ROS 2 server needs besides.
+
+    It names clients of other versions of the type, and other servers of the same service; and it
+    sends no more replies at once than a client's queue holds.
+
+    Args:
+        core: The node it belongs to.
+        name: Absolute service name.
+        type: The type.
+        qos: Profile of requests and replies.
+        on_request: Called with each request.
+        quick: Whether that only puts a request aside for another thread.
+    """
+
+    def __init__(
+        self,
+        core: Core,
+        name: str,
+        type: ServiceType,
+        qos: QoS,
+        on_request: OnRequest,
+        quick: bool,
+    ) -> None:
+        self._core, self._name, self._on_request = core, name, on_request
+        self._announced = Announced(core, core.types.service, type, fixed=True)
+        self._pacer = ReplyPacer(core.timers)
+        self._closed = False
+        self._warned = ""
+        kind, known = EndpointKind.SERVICE_SERVER, self._announced.hash
+        self._replier = core.middleware.create_replier(
+            EndpointInfo(kind, name, type.name, core.name, qos, known), self._count_request
+        )
+        self._replier.quick = quick
+        core.add(self)
+        core.wake()
+
+    @property
+    def problem(self) -> str:  # type: ignore[override]
+        """Why some clients cannot be served, in words; empty when all is well."""
+        graph = self._core.graph
+        clients = graph.endpoints(EndpointKind.SERVICE_CLIENT, self._name)
+        problems = mismatches(self._announced, clients, "calls", "it is not served")
+        if not problems and self._replier.problem:
+            problems.append(self._replier.problem)
+        servers = graph.endpoints(EndpointKind.SERVICE_SERVER, self._name)
+        others = [server for server in servers if server.node != self._core.name]
+        if others:
+            problems.append(
+                f"{nodes_of(others)} offers {self._name}, too: clients get whichever answer comes "
+                "first; end one of the two"
+            )
+        return "; ".join(problems)
+
+    @property
+    def tells_failures(self) -> bool:  # type: ignore[override]
+        """Whether :meth:`fail` tells anything."""
+        return self._replier.tells_failures
+
+    def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - the graph alone matters
+        """Follow a change of the graph: log what is wrong, once."""
+        if not moved or self._closed:
+            return
+        problem = self.problem
+        if problem and problem != self._warned:
+            _log.warning("%s: %s", self._name, problem)
+        self._warned = problem
+
+    def _count_request(self, request: RequestId, data: bytes | memoryview) -> None:
+        self._pacer.on_request(request.client)
+        self._on_request(request, data)
+
+    def reply(self, request: RequestId, data: bytes | bytearray) -> None:
+        """Answer a request, as soon as its client can take the reply."""
+        if self._pacer.on_reply(request.client):
+            self._replier.reply(request, data)
+        else:
+            self._pacer.send_later(request.client, lambda: self._reply_later(request, data))
+
+    def _reply_later(self, request: RequestId, data: bytes | bytearray) -> None:
+        try:
+            self._replier.reply(request, data)
+        except NodeClosedError:
+            pass  # another thread has closed it
+        except Error as error:
+            _log.error("%s: cannot answer %s: %s", self._name, self.client_name(request), error)
+
+    def fail(self, request: RequestId, reason: str) -> None:
+        """Tell the client that no response will come, where the middleware can say so."""
+        self._pacer.on_failure(request.client)
+        self._replier.fail(request, reason)
+
+    def client_name(self, request: RequestId) -> str:
+        """Return who sent a request, for people."""
+        clients = self._core.graph.endpoints(EndpointKind.SERVICE_CLIENT, self._name)
+        known = [client for client in clients if client.gid and client.gid == request.client]
+        if known or len(clients) == 1:
+            return nodes_of(known or clients)
+        return super().client_name(request)
+
+    def close(self) -> None:
+        """Send the replies that wait, and withdraw the service; safe to call twice."""
+        if self._closed:
+            return
+        self._closed = True
+        self._pacer.flush()
+        self._replier.close()
+        self._core.remove(self)
+
+
+#: Requests that are open at a time, or replies in a burst: two less than the peer's queue holds.
+LIMIT = 8
+#: Seconds without an answer after which an open request counts as taken: its server holds it until
+#: later, or it is lost.
+STALL_S = 30.0
+#: The same for requests that a server is known to hold, such as those for an action's result.
+HOLD_S = 0.1
+#: Seconds that a client is given to take a burst of replies.
+_BURST_S = 0.04
+#: Clients whose open requests are counted, and replies to one that wait at most: of more, sent to
+#: a client that asks faster than it listens, most will be lost.
+_MAX_CLIENTS = _MAX_WAITING = 1000
+
+
+class RequestWindow:
+    """The open requests of a node to one service, :data:`LIMIT` at most.
+
+    Args:
+        stall_s: Seconds without an answer after which an open request counts as taken.
+    """
+
+    def __init__(self, stall_s: float) -> None:
+        self._stall_s = stall_s
+        self._lock = threading.Lock()
+        #: When each that is open was sent, monotonic; the oldest first.
+        self._open: dict[Hashable, float] = {}
+        #: What to call when there is room, for those that found none.
+        self._waiting: dict[Callable[[], None], None] = {}
+
+    def enter(self, request: Hashable, retry: Callable[[], None]) -> bool:
+        """Return whether a request may be sent now.
+
+        Args:
+            request: It counts until it leaves.
+            retry: One of the calls that :meth:`leave` returns when there is room again.
+        """
+        now = time.monotonic()
+        with self._lock:
+            if len(self._open) >= LIMIT:
+                while self._open and now - next(iter(self._open.values())) >= self._stall_s:
+                    del self._open[next(iter(self._open))]
+                if len(self._open) >= LIMIT:
+                    self._waiting[retry] = None
+                    return False
+            self._open[request] = now
+        return True
+
+    def leave(self, request: Hashable) -> list[Callable[[], None]]:
+        """Take note that a request is not open any more; return what to call, without a lock."""
+        with self._lock:
+            if self._open.pop(request, None) is None or not self._waiting:
+                return []
+            waiting = list(self._waiting)
+            self._waiting.clear()
+        return waiting
+
+
+@dataclass(slots=True)
+class _Client:
+    """A client that has sent requests.
+
+    Attributes:
+        open: How many of them are open.
+        paced: Whether they were more than it can take the replies of at once.
+        burst: Replies sent since `since`, monotonic.
+        waiting: Replies to be sent, in order.
+        sending: Whether a thread sends them, or a timer will.
+    """
+
+    open: int = 0
+    paced: bool = False
+    burst: int = 0
+    since: float = 0.0
+    waiting: list[Callable[[], None]] = field(default_factory=list)
+    sending: bool = False
+
+
+class ReplyPacer:
+    """The replies of a server: to clients with many open requests in bursts of :data:`LIMIT`.
+
+    A client with fewer open requests gets each reply at once.
+
+    Args:
+        timers: Send what has to wait.
+    """
+
+    def __init__(self, timers: Timers) -> None:
+        self._timers = timers
+        self._lock = threading.Lock()
+        self._clients: dict[bytes, _Client] = {}
+
+    def on_request(self, client: bytes) -> None:
+        """Count a request."""
+        with self._lock:
+            known = self._clients.get(client)
+            if known is None:
+                if len(self._clients) >= _MAX_CLIENTS:
+                    self._drop_one()
+                known = self._clients[client] = _Client()
+            known.open += 1
+            if known.open > LIMIT:
+                known.paced = True
+
+    def on_reply(self, client: bytes) -> bool:
+        """Count a request that is answered; return False if its reply is for :meth:`send_later`."""
+        with self._lock:
+            known = self._clients.get(client)
+            if known is not None:
+                if known.paced or known.sending:
+                    return False
+                self._count_reply(known, time.monotonic())
+        return True
+
+    def send_later(self, client: bytes, send: Callable[[], None]) -> None:
+        """Send a reply as soon as its client can take it; `send` raises nothing."""
+        with self._lock:
+            known = self._clients.get(client)
+            if known is not None:
+                known.waiting.append(send)
+                if known.sending:
+                    return
+                known.sending = True
+        if known is None:
+            send()
+        else:
+            self._send_waiting(known)
+
+    def on_failure(self, client: bytes) -> None:
+        """Count a request that gets no reply."""
+        with self._lock:
+            known = self._clients.get(client)
+            if known is not None:
+                known.open -= 1
+
+    def flush(self) -> None:
+        """Send all that waits at once, before the server goes."""
+        with self._lock:
+            clients = list(self._clients.values())
+            self._clients.clear()
+        for known in clients:
+            while known.waiting:
+                with suppress(IndexError):  # another thread sent the last one
+                    known.waiting.pop(0)()
+
+    def _send_waiting(self, known: _Client) -> None:
+        """Send as much as the client can take now, and the rest later."""
+        while True:
+            with self._lock:
+                if not known.waiting:
+                    known.sending = False
+                    return
+                now = time.monotonic()
+                later = known.since + _BURST_S - now
+                if later > 0 and known.burst >= LIMIT and len(known.waiting) <= _MAX_WAITING:
+                    break
+                send = known.waiting.pop(0)
+                self._count_reply(known, now)
+            send()
+        self._timers.after(later, lambda: self._send_waiting(known))
+
+    def _count_reply(self, known: _Client, now: float) -> None:
+        """Count a reply that is about to be sent; the lock is held."""
+        if now - known.since >= _BURST_S:
+            known.burst, known.since, known.paced = 0, now, known.open > LIMIT
+        known.burst += 1
+        known.open -= 1
+
+    def _drop_one(self) -> None:
+        """Forget a client, one without open requests if there is one; the lock is held."""
+        idle = (client for client, known in self._clients.items() if known.open <= 0)
+        unanswered = (client for client, known in self._clients.items() if not known.waiting)
+        client = next(idle, None) or next(unanswered, None)
+        if client is not None:
+            del self._clients[client]

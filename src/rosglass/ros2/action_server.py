@@ -33,7 +33,7 @@ from rosglass.ros2.action_types import (
     part,
     stamp_of,
 )
-from rosglass.ros2.service_replier import create_service_server
+from rosglass.ros2.rmw_services import create_service_server
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -21,14 +21,11 @@ from typing import TYPE_CHECKING, NamedTuple
 from rosglass.comm import EndpointKind
 from rosglass.comm.names import mangle_type
 from rosglass.errors import Error, NodeClosedError
-from rosglass.wires.dds import cyclone, cyclone_builtin, cyclone_identity
-from rosglass.wires.dds.cyclone import keeping
-from rosglass.wires.dds.cyclone_builtin import Discovered
-from rosglass.wires.dds.cyclone_events import Event, publication_matched
+from rosglass.wires.dds import cyclone, cyclone_identity
+from rosglass.wires.dds.cyclone import Discovered, Event, keeping, publication_matched, qos_of
 from rosglass.wires.dds.cyclone_identity import Origins
-from rosglass.wires.dds.cyclone_qos import qos_of
-from rosglass.wires.dds.discovery_info import format_user_data
 from rosglass.wires.dds.endpoints import SampleReader, SampleWriter, Taken
+from rosglass.wires.dds.graph import format_user_data
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -231,7 +228,7 @@ class Ends:
             self.look,
         )
         self.writers = Matched(
-            self.reader.entity, cyclone.matched_publications, cyclone_builtin.matched_publication
+            self.reader.entity, cyclone.matched_publications, cyclone.matched_publication
         )
         participant.add_endpoint(self._node, self.reader.guid, writer=False)
         _here[participant.guid[:PREFIX]] += 1
@@ -358,7 +355,7 @@ class Ends:
                 self.readers = Matched(
                     writer.entity,
                     cyclone.matched_subscriptions,
-                    cyclone_builtin.matched_subscription,
+                    cyclone.matched_subscription,
                 )
                 self.writer = writer
             self._participant.pump.watch(writer.entity, Event.PUBLICATION_MATCHED, self._on_event)

@@ -57,8 +57,8 @@ from rosglass.ros2.action_types import (
     part,
     stamp_of,
 )
-from rosglass.ros2.graph_matching import Repeats
-from rosglass.ros2.service_client import Ros2ServiceClient
+from rosglass.ros2.rmw_services import Ros2ServiceClient
+from rosglass.ros2.topic_matching import Repeats
 
 if TYPE_CHECKING:
     from collections.abc import Callable
