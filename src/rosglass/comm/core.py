@@ -1,7 +1,8 @@
-"""What everything created from one node shares in every world, and the node's end."""
+"""The core of a node: its threads, listeners and members, and how they end."""
 
 from __future__ import annotations
 
+import atexit
 import os
 import threading
 from abc import ABC, abstractmethod
@@ -30,46 +31,48 @@ __all__ = [
     "NodeMember",
 ]
 
-#: Seconds between the members' regular looks at what has no event.
-_POLL = 1.0
 #: Closed publishers whose GIDs are kept.
 _MAX_CLOSED_GIDS = 1000
+#: Between two regular calls of each member's :meth:`NodeMember.follow`.
+_POLL_S = 1.0
+#: How long closing waits until listeners were notified that another node closed this one.
+_NOTIFY_TIMEOUT_S = 1.0
 
 
 class NodeMember(Handle):
-    """Something created from a node: it follows the graph, and ends with the node."""
+    """An object created from a node: it follows the graph, and is closed with the node."""
 
     def follow(self, moved: bool, idle: bool) -> None:
-        """Follow the graph; called on the node's own thread, and may take its time.
+        """Follow the graph; called on the node's own thread, where it may take its time.
 
         Args:
-            moved: Whether nodes or endpoints appeared or went since the last call.
-            idle: Whether this is the regular look, about once a second.
+            moved: Whether nodes or endpoints appeared or left since the last call.
+            idle: Whether this is the regular call, once a second.
         """
 
     @abstractmethod
     def close(self) -> None:
-        """End it; safe to call twice."""
+        """Close it; safe to call twice."""
 
 
 class NodeCore(ABC):
-    """Holds a node's threads and listeners, and keeps its members informed.
+    """The threads and listeners of a node; keeps its members informed of the graph.
 
     Args:
         name: The node's name.
-        url: What it was connected with, for people to read.
-        log: Where failures are told.
+        url: The URL it was connected with, for messages.
+        log: Logger for failures.
 
     Attributes:
         log: As given.
         clock: The node's clock.
-        dispatcher: Runs callbacks that bring no executor of their own.
-        own_dispatcher: Runs what the node answers for itself, such as questions for its parameters;
-            no callback of a user can hold that up.
-        timers: Runs short jobs later, and jobs that the middleware's threads must not wait for;
-            posts the callbacks of the clock's timers.
-        graph_listeners: Told after each change of the graph.
-        status_listeners: Told each new status.
+        dispatcher: Runs callbacks that have no executor of their own.
+        own_dispatcher: Runs the node's built-in services, such as those for its parameters, so that
+            no user callback can block them.
+        timers: Runs short delayed jobs, and jobs that the wire's threads must not wait for; posts
+            the callbacks of the clock's timers.
+        graph_listeners: Notified after each change of the graph.
+        status_listeners: Notified of each new status.
         local_gids: GIDs of the node's own publishers, and of those closed last.
         servers: The services that the node offers.
     """
@@ -80,11 +83,11 @@ class NodeCore(ABC):
     graph: GraphView
     #: Finds types.
     types: Any
-    #: What moves the bytes; a ROS 1 node has none yet, and no endpoint of its asks for it.
+    #: Moves the bytes; a ROS 1 node has none, and none of its endpoints asks for it.
     middleware: Middleware
-    #: Announces a publisher, given its type, and returns its sending end.
+    #: Announces a publisher of a type and returns its writer.
     create_writer: Callable[[EndpointInfo, MessageType], Writer]
-    #: Calls :meth:`_follow`; made by the world, once all is there that this needs.
+    #: Calls :meth:`_follow`; started by subclasses once all that this needs is there.
     _worker: Worker
 
     def __init__(self, name: NodeName, url: str, log: logging.Logger) -> None:
@@ -95,6 +98,7 @@ class NodeCore(ABC):
         self.own_dispatcher = Dispatcher(f"{name.name} services")
         self.timers = Timers(f"{name.name} timers")
         self.clock = Clock(name.name, self.dispatcher, self.timers)
+        #: Guards the members, and the moment of closing.
         self._lock = threading.Lock()
         self._closed = self._moved = False
         self._process = os.getpid()
@@ -104,7 +108,7 @@ class NodeCore(ABC):
         self.servers: set[Handle] = set()
 
     def _start_following(self) -> Worker:
-        return Worker(f"{self.name.name} graph", self._follow, _POLL)
+        return Worker(f"{self.name.name} graph", self._follow, _POLL_S)
 
     @property
     def closed(self) -> bool:
@@ -113,11 +117,11 @@ class NodeCore(ABC):
 
     @property
     def forked(self) -> bool:
-        """Whether this process is a fork of the one that the node belongs to."""
+        """Whether this process is a fork of the one that created the node."""
         return self._process != os.getpid()
 
     def check_open(self) -> None:
-        """Raise NodeClosedError when the node is closed, or was left behind by a fork."""
+        """Raise NodeClosedError if the node is closed, or was inherited by a fork."""
         if self.forked:
             raise NodeClosedError(
                 f"node {self.name} belongs to the process that made it, and does not work "
@@ -127,11 +131,14 @@ class NodeCore(ABC):
             raise NodeClosedError(f"node {self.name} is closed; connect again")
 
     def add(self, member: Handle, follow: Callable[[bool, bool], None] | None = None) -> None:
-        """Let a member follow the graph from now on; raises NodeClosedError after closing it.
+        """Add a member, which follows the graph from now on, soon for the first time.
 
         Args:
             member: Closed with the node.
-            follow: What a member that is no :class:`NodeMember` has in place of its method.
+            follow: Called in place of :meth:`NodeMember.follow`, which other handles lack.
+
+        Raises:
+            NodeClosedError: The node is closed; the member is closed, too.
         """
         if follow is None:
             follow = member.follow if isinstance(member, NodeMember) else _ignore
@@ -140,9 +147,10 @@ class NodeCore(ABC):
         if self._closed:
             member.close()
         self.check_open()
+        self.wake()
 
     def remove(self, member: Handle) -> None:
-        """Forget a member that was closed."""
+        """Remove a closed member."""
         with self._lock:
             self._members.pop(member, None)
 
@@ -170,7 +178,7 @@ class NodeCore(ABC):
 
     @abstractmethod
     def resolve(self, name: str, kind: str = "topic") -> str:
-        """Return the absolute name of a topic or service, which the user may have remapped.
+        """Return the absolute name of a topic or service, after the user's remappings.
 
         Args:
             name: Absolute, relative or private name.
@@ -184,17 +192,59 @@ class NodeCore(ABC):
     def expand(self, name: str) -> str:
         """Return the absolute name of anything, not remapped; raises InvalidNameError."""
 
-    @abstractmethod
-    def close(self) -> None:
-        """Close every member, leave the graph and end the threads; safe to call twice."""
-
-    @abstractmethod
     def runs_here(self) -> bool:
         """Return whether the calling thread is one of the node's own."""
+        threads = (self._worker, self.dispatcher, self.own_dispatcher)
+        return any(thread.is_current for thread in threads)
+
+    def close(self, reason: str = "", *, killed: bool = False) -> None:
+        """Close every member, leave the graph and end the threads; safe to call twice.
+
+        Args:
+            reason: Why, for the last status, if it was not the program that asked for it.
+            killed: As of the status.
+        """
+        if self.forked:
+            self._closed = True  # threads and connections are the parent's
+            return
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+            members = list(self._members)
+        atexit.unregister(self.close)
+        self.clock.close()
+        for member in reversed(members):
+            try:
+                member.close()
+            except Exception:  # noqa: PERF203 - the others must be closed all the same
+                self.log.exception("%s cannot be closed", member)
+        self.timers.close()
+        self._disconnect()
+        self._worker.close()
+        self.graph.clear()
+        self._notify_closed(Status(ConnectionState.CLOSED, reason or "closed", killed))
+        self.graph_listeners.clear()
+        if reason:
+            notified = threading.Event()
+            self.dispatcher.post(notified.set)
+            notified.wait(_NOTIFY_TIMEOUT_S)
+        self.dispatcher.close()
+        self.own_dispatcher.close()
+        if not reason:
+            self.status_listeners.clear()
+
+    @abstractmethod
+    def _disconnect(self) -> None:
+        """Leave the graph and end the wire's threads."""
+
+    @abstractmethod
+    def _notify_closed(self, status: Status) -> None:
+        """Notify the status listeners that the node is closed."""
 
     @abstractmethod
     def _state(self) -> Status:
-        """Return the state of the connection, in the process that it belongs to."""
+        """Return the state of the connection, in the process that owns it."""
 
     def _follow(self, idle: bool) -> None:
         """Let the members follow the graph; run by the worker."""
@@ -204,7 +254,7 @@ class NodeCore(ABC):
         with self._lock:
             members = list(self._members.items())
         for member, follow in members:
-            # Another thread may close the node, or this member, meanwhile.
+            # Another thread may close the node, or this member, at any time.
             with suppress(NodeClosedError):
                 try:
                     follow(moved, idle)
@@ -217,4 +267,4 @@ class NodeCore(ABC):
 
 
 def _ignore(moved: bool, idle: bool) -> None:
-    """Follow nothing."""
+    """Do nothing when the graph changes."""

@@ -124,6 +124,9 @@ class GraphView(Protocol):
     def endpoints_of(self, node: NodeName) -> list[EndpointInfo]:
         """Return the endpoints of a node."""
 
+    def clear(self) -> None:
+        """Remove everything."""
+
 
 class Graph:
     """Nodes and endpoints, each under the key its middleware knows it by.

@@ -87,7 +87,6 @@ class Publisher(Handle):
         if self._writer.gid:
             core.local_gids.add(self._writer.gid)
         core.add(self, self._follow)
-        core.wake()
         # A wire that does not know its subscribers has a graph that tells who leaves.
         graph = core.graph if self._writer.subscribers() is None else None
         if isinstance(graph, Graph):

@@ -204,7 +204,6 @@ class ServiceClient(Client):
         self._pending: dict[int, PendingCall] = {}
         self._requester = create_requester(self._pending, self._on_reply, self._on_change)
         core.add(self, self._follow)
-        core.wake()
 
     def __repr__(self) -> str:
         kind = self.type.name if self.type is not None else "type not known yet"

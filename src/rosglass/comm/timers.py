@@ -1,4 +1,4 @@
-"""A node's scheduler: jobs that run later or again and again, and limits that are watched."""
+"""A node's scheduler: delayed jobs, a worker thread, and watchdogs for deadlines."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ __all__ = [
 ]
 
 _log = logging.getLogger("rosglass.comm")
-#: Seconds that closing waits for a job that is still running.
+#: How long closing waits for a running job.
 _CLOSE_TIMEOUT_S = 2.0
-#: Longest single wait in seconds; the system's limit is some thousand years below infinity.
+#: Longest single wait; the operating system has an upper limit.
 _LONGEST_WAIT_S = 3600.0
-#: Jobs that were called off are swept out when they are so many, and more than half.
+#: Cancelled jobs are removed from the heap once there are this many, and more than half.
 _SWEEP_COUNT = 64
 
 
 class Timers:
-    """Runs jobs after a delay, in order of time, on one daemon thread that starts with the first.
+    """Runs jobs after a delay, on one daemon thread that starts with the first job.
 
-    Jobs must return soon: the others wait meanwhile.
+    Jobs must return quickly: they hold up all others.
     """
 
     def __init__(self, name: str) -> None:
@@ -42,15 +42,12 @@ class Timers:
         self._changed = threading.Condition()
         self._jobs: list[tuple[float, int, _Job]] = []
         self._numbers = itertools.count()
-        self._called_off = 0
+        self._cancelled = 0
         self._thread: threading.Thread | None = None
         self._closed = False
 
     def after(self, delay: float, job: Callable[[], None]) -> Handle:
-        """Run `job` after `delay` seconds, unless the handle is closed before.
-
-        Jobs are forgotten when the timers are closed.
-        """
+        """Run `job` after `delay` seconds unless the handle, or these timers, are closed first."""
         made = _Job(self, job)
         with self._changed:
             if self._closed:
@@ -65,7 +62,7 @@ class Timers:
         return made
 
     def close(self) -> None:
-        """Forget all jobs and end the thread; safe to call twice, and from a job."""
+        """Drop all jobs and end the thread; safe to call twice, and from a job."""
         with self._changed:
             self._closed = True
             self._jobs.clear()
@@ -77,13 +74,13 @@ class Timers:
         if thread.is_alive():
             _log.warning("%s: a job still runs %.0f s after closing", self._name, _CLOSE_TIMEOUT_S)
 
-    def _call_off(self) -> None:
+    def _on_cancelled(self) -> None:
         with self._changed:
-            self._called_off += 1
-            if self._called_off >= _SWEEP_COUNT and 2 * self._called_off > len(self._jobs):
+            self._cancelled += 1
+            if self._cancelled >= _SWEEP_COUNT and 2 * self._cancelled > len(self._jobs):
                 self._jobs = [entry for entry in self._jobs if entry[2].job is not None]
                 heapq.heapify(self._jobs)
-                self._called_off = 0
+                self._cancelled = 0
 
     def _work(self) -> None:
         while True:
@@ -98,7 +95,7 @@ class Timers:
                         continue
                     job = heapq.heappop(self._jobs)[2].take()
                     if job is None:
-                        self._called_off = max(0, self._called_off - 1)
+                        self._cancelled = max(0, self._cancelled - 1)
             try:
                 job()
             except BaseException:  # sys.exit() in one job must not end all others
@@ -116,16 +113,18 @@ class _Job(Handle):
 
     def close(self) -> None:
         if self.take() is not None:
-            self._owner._call_off()
+            self._owner._on_cancelled()
 
 
 class Worker:
-    """Runs `job` soon after each :meth:`wake`, merging requests, and after every pause.
+    """A thread that runs `job` soon after each :meth:`wake`, and regularly.
+
+    Wake-ups that arrive during a run are merged into one more run.
 
     Args:
         name: The thread's name.
-        job: What to do; told whether it runs because the pause is over. Exceptions are logged.
-        pause: Longest time between two runs in seconds.
+        job: Called with True for a regular run, False for a wake-up. Exceptions are logged.
+        pause: Seconds between two regular runs, however often it is woken.
     """
 
     def __init__(self, name: str, job: Callable[[bool], None], pause: float) -> None:
@@ -136,7 +135,7 @@ class Worker:
         self._thread.start()
 
     def wake(self) -> None:
-        """Ask for a run soon; from any thread, without waiting."""
+        """Request a run soon; from any thread, without waiting."""
         self._wanted.set()
 
     @property
@@ -145,10 +144,10 @@ class Worker:
         return self._thread is threading.current_thread()
 
     def close(self) -> None:
-        """End the thread after the run in progress and wait for it; safe to call twice.
+        """End the thread after the current run and join it; safe to call twice.
 
-        A run that takes longer than 2 s more is left to its daemon thread, with a warning: closing
-        must not hang a program.
+        After 2 s a run that does not return is abandoned with a warning, so that closing never
+        hangs a program; its thread is a daemon.
         """
         self._closed = True
         self._wanted.set()
@@ -159,26 +158,31 @@ class Worker:
             _log.warning("%s still runs %.0f s after closing", self._thread.name, _CLOSE_TIMEOUT_S)
 
     def _work(self) -> None:
+        due = time.monotonic() + self._pause
         while True:
-            asked = self._wanted.wait(self._pause)
+            self._wanted.wait(max(0.0, due - time.monotonic()))
             self._wanted.clear()
             if self._closed:
                 return
+            now = time.monotonic()
+            regular = now >= due
+            if regular:
+                due = now + self._pause
             try:
-                self._job(not asked)
+                self._job(regular)
             except Exception:
                 _log.exception("%s failed", self._thread.name)
 
 
 class Watchdog(Handle):
-    """Counts how often nothing happened for as long as a limit; costs what happens nothing.
+    """Reports missed deadlines between events, without any cost per event.
 
     Args:
         timers: Runs the checks.
-        limit: Longest time between two events.
-        last: Returns when the last event was, by :func:`time.monotonic`; called on the timers'
+        limit: Longest allowed time between two events.
+        last: Returns the :func:`time.monotonic` time of the last event; called on the timers'
             thread.
-        missed: Called, on the same thread, with how many times the limit passed by.
+        missed: Called on the same thread with the number of deadlines missed since the last call.
 
     Attributes:
         limit: As given.
@@ -199,7 +203,7 @@ class Watchdog(Handle):
         self._timer = timers.after(self._period, self._check)
 
     def close(self) -> None:
-        """Count no more; safe to call twice."""
+        """Stop counting; safe to call twice."""
         self._closed = True
         self._timer.close()
 
@@ -213,5 +217,5 @@ class Watchdog(Handle):
             self._missed(count)
         left = self._since + self._period - time.monotonic()
         self._timer = self._timers.after(max(0.0, left), self._check)
-        if self._closed:  # another thread did so just now, and may have closed the timer before
+        if self._closed:  # by another thread just now, which may have closed the previous timer
             self._timer.close()

@@ -546,7 +546,6 @@ class ActionlibClient(ActionClient, Member):
         else:
             self._speak(ActionTypes.of(wanted, core.types))
         core.add(self)
-        core.wake()
 
     def _is_ready(self) -> bool:
         """Return whether a server is there that understands the goals.

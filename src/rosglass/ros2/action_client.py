@@ -412,7 +412,6 @@ class Ros2ActionClient(ActionClient, NodeMember):
         if self._version.types is not None:
             self._speak(self._version.types)
         core.add(self)
-        core.wake()
 
     def _is_ready(self) -> bool:
         """Return whether a server is there that understands the goals."""

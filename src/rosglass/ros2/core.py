@@ -100,42 +100,21 @@ class Core(NodeCore):
         """Return the absolute name of anything, not remapped; raises InvalidNameError."""
         return expand(name, self.name.name, self.name.namespace)
 
-    def runs_here(self) -> bool:
-        """Return whether the calling thread is one of the node's own."""
-        return self._worker.is_current or self.dispatcher.is_current
-
     def _state(self) -> Status:
         return self.status_listeners.read()
 
-    def close(self) -> None:
-        """Close every member, leave the graph and end the threads; safe to call twice."""
-        with self._lock:
-            if self._closed:
-                return
-            self._closed = True
-            atexit.unregister(self.close)
-            if self.forked:
-                return  # the connection is the parent's, and its threads did not come along
-            members = list(self._members)
-        self.clock.close()
-        for member in reversed(members):
-            member.close()
-        self.timers.close()
+    def _disconnect(self) -> None:
         self.middleware.close()
-        self._worker.close()
-        self.graph.clear()
-        self._tell_status()
-        self.graph_listeners.clear()
-        self.dispatcher.close()
-        self.own_dispatcher.close()
-        self.status_listeners.clear()
+
+    def _notify_closed(self, status: Status) -> None:  # noqa: ARG002 - the middleware's says more
+        self._update_status()
 
     def _follow(self, idle: bool) -> None:
         self.middleware.poll()
-        self._tell_status()
+        self._update_status()
         super()._follow(idle)
 
-    def _tell_status(self) -> None:
+    def _update_status(self) -> None:
         if self.status_listeners.update():
             status = self.middleware.status()
             if status.state is ConnectionState.LOST:

@@ -85,9 +85,13 @@ class Ros2Node(GraphNode):
         self.url, self.name, self.namespace = url, name, namespace
         self.wire = middleware.wire
         self._core = Core(NodeName(namespace, name), url, middleware, library, arguments)
-        self._fetcher = TypeFetcher(self._core)
         self._builtin_services = BuiltinServices(self._core, RclServices(self, self._core))
-        self._builtin_services.open(own_services)
+        try:
+            self._fetcher = TypeFetcher(self._core)
+            self._builtin_services.open(own_services)
+        except BaseException:
+            self._core.close()
+            raise
 
     def _receive(
         self, subscription: Subscription, type: str | MessageType | None, ignore_local: bool

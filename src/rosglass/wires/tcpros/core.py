@@ -40,8 +40,6 @@ _log = logging.getLogger("rosglass.ros1")
 #: Connections at a time whose other end has not sent its header. More than wait to be accepted
 #: (``_BACKLOG``): after a pause, as many honest ones come at once.
 _MAX_SILENT_CONNECTIONS = 300
-#: Seconds that closing waits until listeners were told that somebody else has closed the node.
-_TELLING = 1.0
 #: Jobs under way at once: nodes that are gone, but registered still, answer only by a time-out,
 #: and others must not wait for that.
 _MAX_THREADS = 32
@@ -188,21 +186,13 @@ class TcprosCore(NodeCore):
 
     def runs_here(self) -> bool:
         """Return whether the calling thread is one of the node's own."""
-        threads = (
-            self._worker,
-            self._registrations,
-            self.dispatcher,
-            self.own_dispatcher,
-            self.loop,
-        )
-        return any(thread.is_current for thread in threads)
+        return super().runs_here() or self._registrations.is_current or self.loop.is_current
 
     def add(self, member: Handle, follow: Callable[[bool, bool], None] | None = None) -> None:
         """Register a member and let it follow the graph; raises NodeClosedError after closing."""
         super().add(member, follow)
         if isinstance(member, Member):
             self._registrations.wake()
-        self.wake()
 
     def remove(self, member: Handle) -> None:
         """Unregister a member that was closed, soon."""
@@ -249,31 +239,8 @@ class TcprosCore(NodeCore):
         _log.warning("%s: %s", self.name, told)
         self.close(told, killed=not owner and "same name" not in reason)
 
-    def close(self, reason: str = "closed", *, killed: bool = False) -> None:
-        """Close every member, leave the graph and end the threads; safe to call twice.
-
-        Takes about two seconds when the master does not answer.
-
-        Args:
-            reason: What the status says from now on.
-            killed: As of the status.
-        """
-        if self.forked:
-            self._closed = True
-            return  # the threads did not come along
-        with self._lock:
-            if self._closed:
-                return
-            self._closed = True
-            members = list(self._members)
-        atexit.unregister(self.close)
-        self.clock.close()
-        for member in reversed(members):
-            try:
-                member.close()
-            except Exception:  # noqa: PERF203 - the others must be closed all the same
-                _log.exception("%s cannot be closed", member)
-        self.timers.close()
+    def _disconnect(self) -> None:
+        """Unregister everything, which takes about two seconds if the master does not answer."""
         self._registrations.close()
         self._worker.close()
         self.pool.close()
@@ -285,18 +252,9 @@ class TcprosCore(NodeCore):
             sock.close()  # those of a node that was never started have no acceptor
         if self._api is not None:
             self._api.close()
-        self.graph.clear()
-        self.tell(Status(ConnectionState.CLOSED, reason, killed))
-        self.graph_listeners.clear()
-        if reason != "closed":
-            # Nobody here has asked for it: who listens must know.
-            told = threading.Event()
-            self.dispatcher.post(told.set)
-            told.wait(_TELLING)
-        else:
-            self.status_listeners.clear()
-        self.dispatcher.close()
-        self.own_dispatcher.close()
+
+    def _notify_closed(self, status: Status) -> None:
+        self.tell(status)
 
     # -- connections, in the loop's thread -------------------------------------------------------
 
