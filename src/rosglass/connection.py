@@ -7,7 +7,7 @@ import os
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
-from rosglass.comm.node import check_flag
+from rosglass.comm.handle import check_flag
 from rosglass.errors import ArgumentError, UnsupportedError
 from rosglass.interfaces import Library
 

@@ -9,11 +9,12 @@ import sys
 import threading
 
 import pytest
+from inside import core_of
 from usage import native_threads
 
 import rosglass
 from rosglass import QoS
-from rosglass.comm import IMMEDIATE, History
+from rosglass.comm import IMMEDIATE, ConnectionState, Handle, History
 
 TEXT, IMAGE = "std_msgs/msg/String", "sensor_msgs/msg/Image"
 KEEP_ALL = QoS(history=History.KEEP_ALL)
@@ -66,6 +67,20 @@ def test_a_node_can_be_closed_in_its_own_callback(
     eventually(lambda: "/closing" not in [found.full for found in robot.nodes()])
     with pytest.raises(rosglass.NodeClosedError):
         node.create_publisher(topic, TEXT)
+
+
+def test_one_part_that_cannot_be_closed_holds_up_no_other(connect, topic, caplog):
+    class Broken(Handle):
+        def close(self):
+            raise RuntimeError("out of order")
+
+    node = connect("closing")
+    subscription = node.create_subscription(topic, TEXT)
+    core_of(node).add(Broken())
+    node.close()
+    assert subscription.closed
+    assert node.status().state is ConnectionState.CLOSED
+    assert "out of order" in caplog.text
 
 
 def test_nodes_close_while_samples_arrive(robot, connect, topic, eventually):

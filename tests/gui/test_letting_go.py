@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from rosglass.comm.node import Handle
+from rosglass.comm.handle import Handle
 from rosglass.qml.parameter_link import ParameterLink
 from rosglass.tf import TransformBuffer
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rosglass.comm.graph_node import GraphNode
+    from rosglass.comm import Node
 
 
-def core_of(node: GraphNode) -> Any:
+def core_of(node: Node) -> Any:
     """Return what everything that was created from a node shares."""
     return node._core

@@ -22,11 +22,12 @@ if TYPE_CHECKING:
     )
     from rosglass.comm.executor import IMMEDIATE, Dispatcher, LoopExecutor, executor_for
     from rosglass.comm.graph import ConnectionState, EndpointInfo, EndpointKind, NodeName, Status
+    from rosglass.comm.handle import Executor, Handle
     from rosglass.comm.inbox import INBOX_LIMIT
     from rosglass.comm.lifecycle import LifecycleClient, State, Transition, TransitionEvent
     from rosglass.comm.listeners import Listeners
     from rosglass.comm.names import anonymous_name
-    from rosglass.comm.node import Answer, Executor, Handle, Node
+    from rosglass.comm.node import Node
     from rosglass.comm.parameters import (
         ParameterClient,
         ParameterDescriptor,
@@ -42,7 +43,7 @@ if TYPE_CHECKING:
     from rosglass.comm.qos import BEST_AVAILABLE, Durability, History, Liveliness, QoS, Reliability
     from rosglass.comm.sample import Sample
     from rosglass.comm.service_client import Call, ServiceClient
-    from rosglass.comm.service_server import ServiceServer
+    from rosglass.comm.service_server import Answer, ServiceServer
     from rosglass.comm.statistics import Statistics
     from rosglass.comm.subscription import Source, Subscription
     from rosglass.comm.time import Duration, Time
@@ -169,12 +170,11 @@ _HOMES = {
         "TransitionEvent",
     ),
     "listeners": ("Listeners",),
-    "node": (
-        "Answer",
+    "handle": (
         "Executor",
         "Handle",
-        "Node",
     ),
+    "node": ("Node",),
     "parameters": (
         "ParameterClient",
         "ParameterDescriptor",
@@ -200,7 +200,10 @@ _HOMES = {
         "Call",
         "ServiceClient",
     ),
-    "service_server": ("ServiceServer",),
+    "service_server": (
+        "Answer",
+        "ServiceServer",
+    ),
     "statistics": ("Statistics",),
     "subscription": (
         "Source",

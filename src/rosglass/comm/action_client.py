@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from rosglass.comm.action import ActionResult, CancelAnswer, GoalStatus
 from rosglass.comm.client import Client, untyped
+from rosglass.comm.handle import Executor, Handle
 from rosglass.comm.listeners import Listeners
 from rosglass.comm.names import similar
-from rosglass.comm.node import Executor, Handle
 from rosglass.comm.promise import Promise, check_timeout
 from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.comm.time import Time

@@ -7,11 +7,11 @@ import threading
 import time
 from abc import ABC, abstractmethod
 from concurrent.futures import Future
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
 
 from rosglass.comm.action import GoalStatus
 from rosglass.comm.executor import LoopExecutor, executor_for
-from rosglass.comm.node import Handle
+from rosglass.comm.handle import Handle
 from rosglass.comm.promise import Promise
 from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.errors import ArgumentError, Error, NodeClosedError
@@ -21,13 +21,15 @@ if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Sequence
 
     from rosglass.comm.core import NodeCore
-    from rosglass.comm.node import Executor, Result
+    from rosglass.comm.handle import Executor
     from rosglass.comm.time import Time
     from rosglass.messages import ActionType, Message
 
-__all__ = ["ActionServer", "ActionServerProtocol", "ServerGoal"]
+__all__ = ["ActionServer", "ActionServerProtocol", "Result", "ServerGoal"]
 
 _Goal = TypeVar("_Goal", bound="ServerGoal")
+#: What executing a goal returns.
+Result: TypeAlias = "Message | dict[str, Any] | None"
 
 #: Time in all that closing waits for goals to end.
 _CLOSE_TIMEOUT_S = 2.0

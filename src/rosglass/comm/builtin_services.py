@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from rosglass.comm.core import NodeCore
+    from rosglass.comm.handle import Handle
     from rosglass.comm.log import NodeLog
-    from rosglass.comm.node import Handle
     from rosglass.comm.parameters import Parameters
 
 __all__ = ["BuiltinProtocol", "BuiltinServices"]

@@ -9,8 +9,8 @@ import time
 from abc import abstractmethod
 from typing import TYPE_CHECKING, Any
 
+from rosglass.comm.handle import Handle, check_may_wait
 from rosglass.comm.listeners import ChangeListeners
-from rosglass.comm.node import Handle, check_may_wait
 from rosglass.comm.promise import check_timeout
 from rosglass.errors import ArgumentError, ConversionError, NodeClosedError
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.comm.core import NodeCore
-    from rosglass.comm.node import Executor
+    from rosglass.comm.handle import Executor
 
 __all__ = [
     "Client",

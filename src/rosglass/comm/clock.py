@@ -14,9 +14,9 @@ from enum import Enum
 from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.comm.executor import RetryingExecutor, check_plain, let_exit
+from rosglass.comm.handle import Executor, Handle, Unique
 from rosglass.comm.listeners import Listeners
 from rosglass.comm.log_limits import FailureLog
-from rosglass.comm.node import Executor, Handle, Unique
 from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.comm.time import Duration, Time
 from rosglass.errors import ArgumentError, NodeClosedError

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm.clock import Clock
 from rosglass.comm.executor import Dispatcher
 from rosglass.comm.graph import ConnectionState, GraphView, Status
+from rosglass.comm.handle import Handle
 from rosglass.comm.listeners import Listeners
-from rosglass.comm.node import Handle
 from rosglass.comm.timers import Timers, Worker
 from rosglass.errors import NodeClosedError
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 
     from rosglass.comm.graph import EndpointInfo
-    from rosglass.comm.node import Executor, Handle
+    from rosglass.comm.handle import Executor, Handle
     from rosglass.comm.qos import QoS
     from rosglass.wires.base import Middleware
 

@@ -11,8 +11,8 @@ from collections import deque
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
+from rosglass.comm.handle import Executor
 from rosglass.comm.log_limits import FailureLog
-from rosglass.comm.node import Executor
 from rosglass.comm.timers import Timers
 from rosglass.errors import ArgumentError
 

@@ -23,7 +23,7 @@ from rosglass.errors import ConversionError
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from rosglass.comm.node import Executor
+    from rosglass.comm.handle import Executor
     from rosglass.comm.qos import QoS
     from rosglass.comm.sample import Sample
     from rosglass.comm.statistics import Statistics

@@ -15,7 +15,8 @@ from rosglass.errors import TransitionError
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from rosglass.comm.node import Executor, Handle, Node
+    from rosglass.comm.handle import Executor, Handle
+    from rosglass.comm.node import Node
     from rosglass.messages import Message
 
 __all__ = ["LifecycleClient", "State", "Transition", "TransitionEvent"]

@@ -6,7 +6,7 @@ import threading
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from rosglass.comm.executor import RetryingExecutor, check_plain, run_job
-from rosglass.comm.node import Executor, Handle
+from rosglass.comm.handle import Executor, Handle
 from rosglass.errors import ArgumentError
 
 if TYPE_CHECKING:

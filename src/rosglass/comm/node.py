@@ -1,21 +1,20 @@
-"""The seam between every world (ROS 1, DDS, Zenoh) and everything above it.
-
-A world implements :class:`Node`, :class:`Publisher` and :class:`Subscription`; nothing above this
-package knows which one it talks to.
-"""
+"""A node: everything that :func:`rosglass.connect` offers, for ROS 1 and ROS 2 alike."""
 
 from __future__ import annotations
 
-import sys
 import time
-from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias, TypeVar
+from abc import abstractmethod
+from typing import TYPE_CHECKING, Any
 
-from rosglass.comm.graph import ConnectionState
-from rosglass.comm.qos import QoS
-from rosglass.comm.rclpy_names import hint_at_members
+from rosglass.comm.executor import check_plain
+from rosglass.comm.graph import ConnectionState, EndpointKind, NodeName, Status
+from rosglass.comm.handle import Handle, check_flag, check_may_wait
+from rosglass.comm.publisher import Publisher
+from rosglass.comm.qos import QoS, check_profile
+from rosglass.comm.rclpy_names import check_order, hint_at_members
+from rosglass.comm.subscription import Subscription
+from rosglass.comm.subscription_feed import find_subscribed_type
 from rosglass.errors import (
-    ArgumentError,
     NodeClosedError,
     TimeoutError,  # noqa: A004 - the field's own word
     UnsupportedError,
@@ -23,92 +22,33 @@ from rosglass.errors import (
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
-    from concurrent.futures import Future
-    from logging import Logger
-    from types import FrameType, TracebackType
 
     from rosglass.comm.action_client import ActionClient
-    from rosglass.comm.action_server import ActionServer, ServerGoal
+    from rosglass.comm.action_server import ActionServer, Result, ServerGoal
+    from rosglass.comm.builtin_services import BuiltinServices
     from rosglass.comm.clock import Clock, Timer
-    from rosglass.comm.graph import EndpointInfo, NodeName, Status
+    from rosglass.comm.core import NodeCore
+    from rosglass.comm.graph import EndpointInfo
+    from rosglass.comm.handle import Executor
     from rosglass.comm.lifecycle import LifecycleClient
+    from rosglass.comm.log import NodeLogger
     from rosglass.comm.parameters import ParameterClient, Parameters
     from rosglass.comm.promise import Promise
-    from rosglass.comm.publisher import Publisher
     from rosglass.comm.sample import Sample
     from rosglass.comm.service_client import ServiceClient
-    from rosglass.comm.service_server import ServiceServer
-    from rosglass.comm.subscription import Subscription
+    from rosglass.comm.service_server import Answer, ServiceServer
     from rosglass.comm.time import Duration, Time
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
 
-__all__ = [
-    "Answer",
-    "Executor",
-    "Handle",
-    "Node",
-    "Unique",
-    "check_flag",
-    "check_may_wait",
-]
+__all__ = ["Node"]
 
-
-_H = TypeVar("_H", bound="Handle")
-#: Seconds between two looks whether a node that spins is closed.
+#: Pause between two checks whether a node that spins is closed.
 _SPIN_POLL_S = 0.2
-#: Where the threads begin that receive.
-_RECEIVING = ("rosglass.wires.dds.", "rosglass.wires.zenoh.", "rosglass.wires.tcpros.io_loop")
-#: Where those begin that follow the graph and keep time; some of their jobs may wait for a moment.
-_FOLLOWING = ("rosglass.comm.timers",)
-#: What answers a request: a response, or the promise of one.
-Answer: TypeAlias = (
-    "Message | dict[str, Any] | Future[Message] | Future[dict[str, Any] | None] | None"
-)
-#: What a goal ends with.
-Result: TypeAlias = "Message | dict[str, Any] | None"
-
-
-class Unique:
-    """Base of what cannot be copied: a copy would share threads and sockets, and close them."""
-
-    def __reduce_ex__(self, _: object) -> NoReturn:
-        # What copy.copy, copy.deepcopy and pickle ask for.
-        raise UnsupportedError(
-            f"{self!r} can neither be copied nor pickled: it lives in this process, and exists "
-            "once; hand on the object itself, or create another one"
-        )
-
-
-class Executor(ABC):
-    """Where callbacks run: a thread, an event loop, or at once in the middleware's thread."""
-
-    @abstractmethod
-    def post(self, job: Callable[[], None]) -> None:
-        """Run `job` soon; called from any thread, returns without waiting."""
-
-
-class Handle(Unique, ABC):
-    """Something started or registered that can be ended; ends by itself as a context manager."""
-
-    @abstractmethod
-    def close(self) -> None:
-        """End it; safe to call twice."""
-
-    def __enter__(self: _H) -> _H:  # noqa: PYI019 - typing.Self needs 3.11
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 @hint_at_members
 class Node(Handle):
-    """A participant of a ROS graph; made by :func:`rosglass.connect`.
+    """A participant of a ROS graph; created by :func:`rosglass.connect`.
 
     Attributes:
         url: The URL it was connected with.
@@ -121,11 +61,14 @@ class Node(Handle):
     name: str
     namespace: str
     wire: str
+    _core: NodeCore
+    _builtin_services: BuiltinServices[Any]
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.namespace.rstrip('/')}/{self.name} on {self.url}>"
 
-    @abstractmethod
+    # -- topics ----------------------------------------------------------------------------------
+
     def create_publisher(
         self, topic: str, type: str | MessageType, qos: QoS | int = 10
     ) -> Publisher:
@@ -140,8 +83,12 @@ class Node(Handle):
             InvalidNameError: The topic name breaks ROS's rules.
             TypeNotFoundError: No definition of the type is known.
         """
+        self._core.check_open()
+        check_order("create_publisher", topic, type)
+        self._core.types.ensure(type)
+        full = self.resolve(topic)
+        return Publisher(self._core, full, self._core.types.message(type), self._profile(qos, full))
 
-    @abstractmethod
     def create_subscription(
         self,
         topic: str,
@@ -163,7 +110,7 @@ class Node(Handle):
                 the subscription until they are taken.
             qos: Profile; an integer is the depth of a reliable, volatile profile.
             raw_callback: Called with each :class:`Sample` instead: bytes, stamps, origin. Samples
-                of a type that nobody can define have an :class:`rosglass.messages.OpaqueType`.
+                of a type without a definition have an :class:`rosglass.messages.OpaqueType`.
             executor: Where callbacks run; None for the node's own dispatcher thread.
             ignore_local: Whether to leave out what this node publishes itself.
 
@@ -171,6 +118,30 @@ class Node(Handle):
             InvalidNameError: The topic name breaks ROS's rules.
             TypeNotFoundError: No definition of the given type is known.
         """
+        self._core.check_open()
+        check_order("create_subscription", topic, type)
+        full = self.resolve(topic)
+        check_flag(ignore_local, "ignore_local", full)
+        subscription = Subscription(
+            full,
+            find_subscribed_type(self._core, full, type),
+            self._profile(qos, full),
+            executor or self._core.dispatcher,
+            callback,
+            raw_callback,
+        )
+        self._receive(subscription, type, ignore_local)
+        return subscription
+
+    @abstractmethod
+    def _receive(
+        self, subscription: Subscription, type: str | MessageType | None, ignore_local: bool
+    ) -> None:
+        """Connect a new subscription with its publishers."""
+
+    def _profile(self, qos: QoS | int, place: str) -> QoS:
+        """Return the profile that a user gave; errors as of :func:`check_profile`."""
+        return check_profile(qos, place)
 
     def wait_for_message(
         self,
@@ -185,12 +156,12 @@ class Node(Handle):
             topic: Absolute, relative or private topic name.
             type: Type name or type; None takes the type that publishers announce.
             timeout: Seconds to wait, None for ever.
-            qos: Profile; None for the strongest that is available, so that a latched message comes
-                at once.
+            qos: Profile; None for the strongest that is available, so that a latched message is
+                received at once.
 
         Raises:
-            TimeoutError: None came within the time; says what stood in the way.
-            NodeClosedError: The node is closed, or gets closed meanwhile.
+            TimeoutError: No message arrived in time; the error says why.
+            NodeClosedError: The node is closed, or is closed while waiting.
             InvalidNameError: The topic name breaks ROS's rules.
             TypeNotFoundError: No definition of the type is known.
         """
@@ -204,6 +175,9 @@ class Node(Handle):
             why = subscription.problem or subscription.hint or "it is published, but nothing came"
             raise TimeoutError(f"{subscription.topic}: no message within {timeout:g} s: {why}")
 
+    # -- services and actions --------------------------------------------------------------------
+
+    @abstractmethod
     def create_service_client(
         self, name: str, type: str | ServiceType | None = None, qos: QoS | None = None
     ) -> ServiceClient:
@@ -213,14 +187,14 @@ class Node(Handle):
             name: Absolute, relative or private service name.
             type: Type name or type; None takes the type that the server announces, as soon as it is
                 there.
-            qos: Profile of requests and replies; None for the usual one.
+            qos: Profile of requests and replies; None for ROS's default for services.
 
         Raises:
             InvalidNameError: The name breaks ROS's rules.
             TypeNotFoundError: No definition of the given type is known.
         """
-        raise self._unsupported("service clients")
 
+    @abstractmethod
     def create_service_server(
         self,
         name: str,
@@ -238,21 +212,21 @@ class Node(Handle):
             callback: Called with each request; returns the response as a message or a dict of
                 fields (None for an empty or all-default one), or a
                 :class:`concurrent.futures.Future` of it to answer later. An exception is logged
-                and, where the world can say so, told to the caller. A coroutine function runs in
-                the event loop in which the server is created.
-            qos: Profile of requests and replies; None for the usual one.
+                and, where the wire supports it, reported to the caller. A coroutine function runs
+                in the event loop in which the server is created.
+            qos: Profile of requests and replies; None for ROS's default for services.
             executor: Where `callback` runs; None for the node's own dispatcher thread.
 
         Raises:
             InvalidNameError: The name breaks ROS's rules.
             TypeNotFoundError: No definition of the type is known.
         """
-        raise self._unsupported("service servers")
 
+    @abstractmethod
     def create_action_client(self, name: str, type: str | ActionType | None = None) -> ActionClient:
         """Return a client of an action; arguments and errors as for a service client."""
-        raise self._unsupported("action clients")
 
+    @abstractmethod
     def create_action_server(
         self,
         name: str,
@@ -268,46 +242,64 @@ class Node(Handle):
         Args:
             name: Absolute, relative or private action name.
             type: Type name or type.
-            execute: Called with each accepted goal, on a thread of the goal's own, or on
-                `executor`. What it returns is the result of a goal that succeeded, or was
-                cancelled when a request to cancel was accepted meanwhile; an exception aborts the
-                goal. It may also return a :class:`concurrent.futures.Future` of the result, which
-                lets the goal go on, or end the goal itself. A coroutine function runs in the event
-                loop in which the server is created.
-            accept: Told the goal; returns whether it is accepted. None accepts all.
-            cancel: Told the goal; returns whether a request to cancel it is accepted. None
-                accepts all, and so does a callback that fails.
-            executor: Where `execute`, `accept` and `cancel` run; None for threads of the goals'
-                own and, for the latter two, the node's dispatcher.
+            execute: Called with each accepted goal, on a thread per goal, or on `executor`. It
+                returns the result of a goal that succeeded, or that was cancelled if a request to
+                cancel was accepted; an exception aborts the goal. It may also return a
+                :class:`concurrent.futures.Future` of the result, which keeps the goal executing,
+                or end the goal itself. A coroutine function runs in the event loop in which the
+                server is created.
+            accept: Receives the goal and returns True to accept it. None accepts all goals.
+            cancel: Receives the goal and returns True to accept the request to cancel it. None
+                accepts all requests, and so does a callback that fails.
+            executor: Where `execute`, `accept` and `cancel` run; None for a thread per goal and,
+                for the latter two, the node's dispatcher.
 
         Raises:
             InvalidNameError: The name breaks ROS's rules.
             TypeNotFoundError: No definition of the type is known.
         """
-        raise self._unsupported("action servers")
+
+    # -- parameters ------------------------------------------------------------------------------
 
     @property
+    @abstractmethod
     def parameters(self) -> Parameters:
         """This node's own parameters."""
-        raise self._unsupported("parameters")
 
+    @abstractmethod
     def create_parameter_client(self, node: str | NodeName) -> ParameterClient:
         """Return a client of another node's parameters; `node` is its full name."""
-        raise self._unsupported("parameters")
 
     def create_lifecycle_client(self, node: str | NodeName) -> LifecycleClient:
-        """Return a client that drives a lifecycle node; `node` is its full name."""
-        raise self._unsupported("lifecycle nodes")
+        """Return a client that drives a lifecycle node; `node` is its full name.
+
+        Raises:
+            UnsupportedError: ROS 1 has no lifecycle nodes.
+        """
+        raise UnsupportedError(f"{self!r} does not support lifecycle nodes: ROS 1 has none")
+
+    # -- the log and time ------------------------------------------------------------------------
 
     @property
-    def logger(self) -> Logger:
-        """The node's logger, whose messages other nodes can follow (``/rosout``), too."""
-        raise self._unsupported("a logger")
+    def logger(self) -> NodeLogger:
+        """The node's logger, which also publishes to ``/rosout``."""
+        return self._builtin_services.log.logger
 
     @property
     def clock(self) -> Clock:
-        """The node's clock: the system's time, or that of a simulation."""
-        raise self._unsupported("a clock")
+        """The node's clock, which follows ``/clock`` if ``use_sim_time`` is set."""
+        return self._core.clock
+
+    def now(self) -> Time:
+        """Return the time of the node's clock."""
+        return self._core.clock.now()
+
+    def steady(self) -> float:
+        """Return a monotonic time in seconds, by which the ages of messages are measured.
+
+        It stands still while a recording that replaces a robot is paused.
+        """
+        return time.monotonic()
 
     def create_timer(
         self,
@@ -316,56 +308,21 @@ class Node(Handle):
         *,
         executor: Executor | None = None,
     ) -> Timer:
-        """Call `callback` again and again, by the node's clock.
+        """Call `callback` periodically, by the node's clock.
 
         Args:
             period: Seconds, or a Duration, between two calls.
-            callback: What to call. One that is still running or waiting when its time comes again
-                misses that turn.
+            callback: Called without arguments. Ticks are skipped while a call is still waiting or
+                running.
             executor: Where it runs; None for the node's own dispatcher thread.
 
         Raises:
-            ConversionError: The period is not above zero.
+            ArgumentError: The period is not above zero.
             NodeClosedError: The node is closed.
         """
         return self.clock.create_timer(period, callback, executor)
 
-    def services(self) -> dict[str, list[str]]:
-        """Return every service in the graph with the types announced for it."""
-        raise self._unsupported("a list of services")
-
-    def actions(self) -> dict[str, list[str]]:
-        """Return every action in the graph with the types announced for it."""
-        raise self._unsupported("a list of actions")
-
-    def unnamed_programs(self) -> int:
-        """Return how many programs were found that have not said yet which nodes they have.
-
-        Over DDS, nodes on Fast DDS do so up to four seconds after they were found; until then the
-        graph is not complete. Over Zenoh it is 1 until the router has sent what it knows, which
-        takes seconds with thousands of topics. Always 0 elsewhere.
-        """
-        return 0
-
-    def invalid_names(self) -> list[str]:
-        """Return what other nodes have announced, but is left out of the graph, sorted.
-
-        These names break ROS's rules, so that nothing could be done with them; control characters
-        in them are as they were sent.
-        """
-        return []
-
-    def service_servers(self, name: str) -> list[EndpointInfo]:
-        """Return the servers of a service."""
-        raise self._unsupported("a list of services")
-
-    def service_clients(self, name: str) -> list[EndpointInfo]:
-        """Return the clients of a service."""
-        raise self._unsupported("a list of services")
-
-    def endpoints(self, node: str | NodeName) -> list[EndpointInfo]:
-        """Return what a node publishes, subscribes, serves and calls; `node` is its full name."""
-        raise self._unsupported("a list of endpoints")
+    # -- types -----------------------------------------------------------------------------------
 
     def fetch_type(
         self,
@@ -375,27 +332,28 @@ class Node(Handle):
         node: str | NodeName | None = None,
         timeout: float | None = 5.0,
     ) -> MessageType | ServiceType | ActionType:
-        """Return a type in the version that the robot uses, asking the robot for it if need be.
+        """Return a type in the version that the robot uses, requesting it from the robot if needed.
 
-        Subscriptions do so by themselves, without waiting. What is fetched is in the library
-        afterwards, so that its name is enough for everything else.
+        Subscriptions do so themselves, without waiting. A fetched type is in the library
+        afterwards, so that its name is enough everywhere else.
 
         Args:
             name: ``pkg/msg/Type``, ``pkg/srv/Type``, ``pkg/action/Type``, or ``pkg/Type``.
-            hash: RIHS01 hash (ROS 1: md5 sum) of the version, when the robot uses several.
-            node: Full name of the node whose version it shall be.
-            timeout: Seconds to wait in all, for somebody who uses the type to appear and for the
-                answer; None for ever.
+            hash: RIHS01 hash (ROS 1: md5 sum) of the version, if the robot uses several.
+            node: Full name of the node whose version is wanted.
+            timeout: Seconds to wait in all, for an endpoint that uses the type to appear and for
+                the answer; None for ever.
 
         Raises:
-            InvalidNameError: `name` is no type's name, or `hash` no hash.
-            TypeNotFoundError: Nobody uses or nobody sends it; says who was asked, and why not.
+            InvalidNameError: `name` is no type name, or `hash` no hash.
+            TypeNotFoundError: No endpoint uses the type, or none sends it; says which were asked,
+                and why not.
             DefinitionConflictError: Several versions are in use.
-            NodeClosedError: The node is closed, or gets closed meanwhile.
-            UnsupportedError: In this world nobody can be asked.
+            NodeClosedError: The node is closed, or is closed while waiting.
         """
         return self.fetch_type_async(name, hash=hash, node=node, timeout=timeout).result()
 
+    @abstractmethod
     def fetch_type_async(
         self,
         name: str,
@@ -404,67 +362,112 @@ class Node(Handle):
         node: str | NodeName | None = None,
         timeout: float | None = 5.0,
     ) -> Promise[MessageType | ServiceType | ActionType]:
-        """Ask for a type as :meth:`fetch_type` does, and return at once.
+        """Request a type as :meth:`fetch_type` does, and return at once.
 
-        The promise can be waited for, awaited in asyncio, or call back.
+        The promise can be waited for, awaited in asyncio, or given a callback.
         """
-        raise self._unsupported("fetching types")
 
-    def _unsupported(self, what: str) -> UnsupportedError:
-        return UnsupportedError(f"{self!r} does not support {what}")
+    # -- the graph -------------------------------------------------------------------------------
 
-    @abstractmethod
+    def resolve(self, name: str) -> str:
+        """Return the absolute name of a topic or service; raises InvalidNameError."""
+        return self._core.resolve(name)
+
     def topics(self) -> dict[str, list[str]]:
-        """Return every topic in the graph with the types announced for it."""
+        """Return every topic in the graph with its announced types."""
+        return self._core.graph.topics()
 
     @abstractmethod
+    def services(self) -> dict[str, list[str]]:
+        """Return every service in the graph with its announced types."""
+
+    @abstractmethod
+    def actions(self) -> dict[str, list[str]]:
+        """Return every action in the graph with its announced types."""
+
     def nodes(self) -> list[NodeName]:
         """Return every node in the graph, this one included, sorted."""
+        return self._core.graph.nodes()
 
     def duplicate_nodes(self) -> dict[str, int]:
-        """Return the full names that several nodes bear, and how many do.
+        """Return the full names that several nodes share, and how many.
 
-        In ROS 1 none: the master ends the first node of a name when a second one registers.
+        None in ROS 1: the master shuts a node down when a second one registers its name.
         """
         return {}
 
-    @abstractmethod
+    def unnamed_programs(self) -> int:
+        """Return how many programs were discovered that have not announced their nodes yet.
+
+        Over DDS, nodes on Fast DDS do so up to four seconds after they were discovered; until then
+        the graph is not complete. Over Zenoh it is 1 until the router has sent its graph, which
+        takes seconds with thousands of topics. Always 0 elsewhere.
+        """
+        return 0
+
+    def invalid_names(self) -> list[str]:
+        """Return the announced names that are left out of the graph, sorted.
+
+        They break ROS's rules, so that nothing could be done with them; control characters in
+        them are as they were sent.
+        """
+        return self._core.graph.invalid_names()
+
     def publishers(self, topic: str) -> list[EndpointInfo]:
         """Return the publishers of a topic."""
+        return self._core.graph.endpoints(EndpointKind.PUBLISHER, self.resolve(topic))
 
-    @abstractmethod
     def subscriptions(self, topic: str) -> list[EndpointInfo]:
         """Return the subscriptions of a topic."""
+        return self._core.graph.endpoints(EndpointKind.SUBSCRIPTION, self.resolve(topic))
 
-    @abstractmethod
+    def service_servers(self, name: str) -> list[EndpointInfo]:
+        """Return the servers of a service."""
+        full = self._core.resolve(name, "service")
+        return self._core.graph.endpoints(EndpointKind.SERVICE_SERVER, full)
+
+    def service_clients(self, name: str) -> list[EndpointInfo]:
+        """Return the clients of a service; none in ROS 1, which does not register them."""
+        full = self._core.resolve(name, "service")
+        return self._core.graph.endpoints(EndpointKind.SERVICE_CLIENT, full)
+
+    def endpoints(self, node: str | NodeName) -> list[EndpointInfo]:
+        """Return the endpoints of a node, given by its full name; none if it is unknown."""
+        namespace, _, name = self._node_name(node).rpartition("/")
+        return self._core.graph.endpoints_of(NodeName(namespace or "/", name))
+
     def on_graph_change(
         self, callback: Callable[[], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` after nodes or endpoints appeared or went; changes may be merged."""
+        """Call `callback` after nodes or endpoints appeared or left; changes may be merged."""
+        self._core.check_open()
+        check_plain(callback, "on_graph_change()")
+        return self._core.graph_listeners.add(
+            lambda _: callback(), executor or self._core.dispatcher
+        )
 
-    @abstractmethod
+    def _node_name(self, node: str | NodeName) -> str:
+        """Return a node's full name; raises InvalidNameError."""
+        return node.full if isinstance(node, NodeName) else self._core.expand(node)
+
+    # -- the connection and its end --------------------------------------------------------------
+
     def status(self) -> Status:
         """Return the state of the connection and what is being done about it."""
+        return self._core.status()
 
-    @abstractmethod
     def on_status_change(
         self, callback: Callable[[Status], None], executor: Executor | None = None
     ) -> Handle:
         """Call `callback` with the new status whenever it changes."""
-
-    @abstractmethod
-    def resolve(self, name: str) -> str:
-        """Return the absolute name of a topic or service; raises InvalidNameError."""
-
-    @abstractmethod
-    def now(self) -> Time:
-        """Return the time of the node's clock."""
+        self._core.check_open()
+        return self._core.status_listeners.add(callback, executor or self._core.dispatcher)
 
     def spin(self) -> None:
         """Wait until the node is closed, or until Ctrl-C, which closes it.
 
-        For programs that have nothing else to do: callbacks run on threads of their own, and are
-        called whether or not a program waits here.
+        For programs that have nothing else to do: callbacks run on threads of their own, whether
+        or not a program waits here.
         """
         check_may_wait(f"{self!r} is not closed")
         try:
@@ -473,41 +476,9 @@ class Node(Handle):
         except KeyboardInterrupt:
             self.close()
 
-    def steady(self) -> float:
-        """Return seconds by which the ages of messages are told; they never run back.
+    def close(self) -> None:
+        """Leave the graph, close everything created from the node and end its threads.
 
-        None pass while a recording that is shown in a robot's place is paused.
+        Safe to call twice, from any thread and from callbacks.
         """
-        return time.monotonic()
-
-
-def check_flag(value: object, name: str, where: str = "") -> bool:
-    """Return an option that is True or False; raises ArgumentError.
-
-    Python takes any text for true, "no" and "false" included.
-    """
-    if value is not True and value is not False:
-        raise ArgumentError(name, value, "True or False", where)
-    return value
-
-
-def check_may_wait(name: str, *, following: bool = False) -> None:
-    """Raise UnsupportedError in a callback that runs in a thread that receives.
-
-    Args:
-        name: The service, action or topic that is about to be waited for.
-        following: Whether threads that follow the graph and keep time may wait.
-    """
-    # Zenoh's threads are not Python's, and marking them would cost something with every sample.
-    frame: FrameType | None = sys._getframe()
-    first = ""
-    while frame is not None:
-        module = frame.f_globals.get("__name__", "")
-        first = first if module == "threading" else module
-        frame = frame.f_back
-    if first.startswith(_RECEIVING if following else (*_RECEIVING, *_FOLLOWING)):
-        raise UnsupportedError(
-            f"{name}: this callback runs in a thread that receives (executor=IMMEDIATE, or "
-            "add_done_callback()), where what it waits for could never arrive; take call_async(), "
-            "get_async() or the like here, or let it run elsewhere: on_done(), or another executor"
-        )
+        self._core.close()

@@ -5,13 +5,14 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm.node import Handle
+from rosglass.comm.handle import Handle
 from rosglass.errors import NodeClosedError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from rosglass.comm.node import Executor, Node
+    from rosglass.comm.handle import Executor
+    from rosglass.comm.node import Node
     from rosglass.comm.promise import Deadline
     from rosglass.comm.qos import QoS
     from rosglass.comm.service_client import ServiceClient

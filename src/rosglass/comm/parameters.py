@@ -9,7 +9,7 @@ from enum import IntEnum
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from rosglass.comm.executor import check_plain
-from rosglass.comm.node import Handle
+from rosglass.comm.handle import Handle
 from rosglass.comm.promise import Deadline
 from rosglass.errors import ArgumentError, NodeClosedError, ParameterError, UnsupportedError
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from os import PathLike
 
-    from rosglass.comm.node import Executor
+    from rosglass.comm.handle import Executor
 
 __all__ = [
     "ParameterClient",

@@ -10,13 +10,13 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rosglass.comm.executor import RetryingExecutor, run_job
-from rosglass.comm.node import check_may_wait
+from rosglass.comm.handle import check_may_wait
 from rosglass.errors import ArgumentError, TimeoutError  # noqa: A004 - the field's own word
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
 
-    from rosglass.comm.node import Executor
+    from rosglass.comm.handle import Executor
 
 __all__ = [
     "Deadline",

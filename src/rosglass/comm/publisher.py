@@ -18,8 +18,8 @@ from rosglass.comm.events import (
     words,
 )
 from rosglass.comm.graph import EndpointInfo, EndpointKind, Graph
+from rosglass.comm.handle import Handle
 from rosglass.comm.names import similar
-from rosglass.comm.node import Handle
 from rosglass.comm.qos import Liveliness
 from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.comm.sample import Sample
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from rosglass.comm.core import NodeCore
     from rosglass.comm.events import IncompatibleQoS
-    from rosglass.comm.node import Executor
+    from rosglass.comm.handle import Executor
     from rosglass.comm.qos import QoS
     from rosglass.messages import Message, MessageType
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.client import Client, untyped
-from rosglass.comm.node import check_may_wait
+from rosglass.comm.handle import check_may_wait
 from rosglass.comm.promise import Promise, check_timeout
 from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.comm.service_server import decode_checked, served_by_this_thread
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from rosglass.comm.core import NodeCore
-    from rosglass.comm.node import Handle
+    from rosglass.comm.handle import Handle
     from rosglass.comm.qos import QoS
     from rosglass.messages import Message, ServiceType
     from rosglass.wires.base import OnReply

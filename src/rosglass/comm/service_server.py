@@ -7,12 +7,12 @@ import logging
 import threading
 from collections import deque
 from concurrent.futures import CancelledError, Future
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rosglass.comm.executor import Dispatcher, LoopExecutor, executor_for
 from rosglass.comm.graph import EndpointKind
+from rosglass.comm.handle import Handle
 from rosglass.comm.log_limits import LogOnce
-from rosglass.comm.node import Handle
 from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.errors import DecodeError, Error, NodeClosedError, ServiceError
 
@@ -20,14 +20,18 @@ if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
 
     from rosglass.comm.core import NodeCore
-    from rosglass.comm.node import Answer, Executor
+    from rosglass.comm.handle import Executor
     from rosglass.comm.qos import QoS
     from rosglass.messages import Message, MessageType, ServiceType
     from rosglass.wires.base import OnRequest, Replier, RequestId
 
-__all__ = ["ServiceServer", "decode_checked", "served_by_this_thread"]
+__all__ = ["Answer", "ServiceServer", "decode_checked", "served_by_this_thread"]
 
 _log = logging.getLogger("rosglass.comm")
+#: What answers a request: a response, or a future of one.
+Answer: TypeAlias = (
+    "Message | dict[str, Any] | Future[Message] | Future[dict[str, Any] | None] | None"
+)
 #: Requests that wait for the callback; more come only from a client gone wild.
 _MAX_WAITING = 1000
 

@@ -11,7 +11,7 @@ import threading
 from typing import TYPE_CHECKING
 
 from rosglass.comm.executor import IMMEDIATE
-from rosglass.comm.node import Handle
+from rosglass.comm.handle import Handle
 from rosglass.comm.qos import QoS
 from rosglass.comm.time import Time
 from rosglass.errors import Error

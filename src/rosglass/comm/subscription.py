@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 from rosglass.comm.events import SubscriptionEvents
 from rosglass.comm.executor import IMMEDIATE, check_plain
+from rosglass.comm.handle import Executor, Handle, check_flag, check_may_wait
 from rosglass.comm.inbox import ImmediateInbox, Inbox
-from rosglass.comm.node import Executor, Handle, check_flag, check_may_wait
 from rosglass.comm.promise import check_timeout
 from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.comm.sample import Sample

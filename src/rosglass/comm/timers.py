@@ -9,7 +9,7 @@ import threading
 import time
 from typing import TYPE_CHECKING
 
-from rosglass.comm.node import Handle
+from rosglass.comm.handle import Handle
 
 if TYPE_CHECKING:
     from collections.abc import Callable

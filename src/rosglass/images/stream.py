@@ -11,7 +11,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rosglass.comm.executor import IMMEDIATE
-from rosglass.comm.node import Handle
+from rosglass.comm.handle import Handle
 from rosglass.comm.qos import QoS, Reliability
 from rosglass.errors import Error, NodeClosedError, NoPictureError
 from rosglass.images.transports import choose

@@ -13,7 +13,8 @@ from rosglass.qt import QtCore, is_alive
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rosglass.comm.node import Handle, Node
+    from rosglass.comm.handle import Handle
+    from rosglass.comm.node import Node
     from rosglass.messages import MessageType
     from rosglass.qml.dialect import Dialect
     from rosglass.qml.runtime import Runtime

@@ -7,7 +7,7 @@ import threading
 from collections import deque
 from typing import TYPE_CHECKING
 
-from rosglass.comm.node import Executor
+from rosglass.comm.handle import Executor
 from rosglass.qt import QtCore, Signal, Slot
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from rosglass.comm.action import CancelAnswer
     from rosglass.comm.action_client import ActionClient, ClientGoal
-    from rosglass.comm.node import Executor
+    from rosglass.comm.handle import Executor
     from rosglass.comm.promise import Promise
     from rosglass.messages import Message
     from rosglass.qml.dialect import Dialect

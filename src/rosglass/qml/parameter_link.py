@@ -14,7 +14,8 @@ from rosglass.errors import Error, ParameterError
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from rosglass.comm.node import Handle, Node
+    from rosglass.comm.handle import Handle
+    from rosglass.comm.node import Node
     from rosglass.comm.parameters import ParameterClient, ParameterEvent
     from rosglass.qml.session import Session
 

@@ -25,7 +25,8 @@ from rosglass.qt import QtCore, Signal, Slot, is_alive
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from rosglass.comm.node import Handle, Node
+    from rosglass.comm.handle import Handle
+    from rosglass.comm.node import Node
     from rosglass.ros2.ros_arguments import Arguments
 
 __all__ = ["NOT_INITIALIZED", "Session"]

@@ -8,7 +8,7 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rosglass.comm.node import Executor
+from rosglass.comm.handle import Executor
 from rosglass.comm.qos import Durability, History, QoS, Reliability
 from rosglass.errors import ConversionError, DecodeError, Error, TypeNotFoundError
 from rosglass.qml.dialect import Dialect

@@ -15,7 +15,7 @@ from rosglass.qml.tf_queries import shown_transform
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
-    from rosglass.comm.node import Handle
+    from rosglass.comm.handle import Handle
     from rosglass.qml.runtime import Runtime
     from rosglass.qml.tf_link import TfLink
     from rosglass.tf import Transform, TransformBuffer

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm import IMMEDIATE, GoalStatus, Publisher, QoS, Subscription, Time
 from rosglass.comm.action_server import ActionServerProtocol, ServerGoal
 from rosglass.comm.executor import InOrder
-from rosglass.comm.node import check_flag
+from rosglass.comm.handle import check_flag
 from rosglass.errors import ArgumentError, DecodeError, MasterError, NodeClosedError
 from rosglass.ros1.action_state import ServerState
 from rosglass.ros1.actionlib_types import (

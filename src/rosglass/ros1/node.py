@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import (
     History,
+    Node,
     NodeName,
     QoS,
     Subscription,
 )
 from rosglass.comm.builtin_services import BuiltinServices
-from rosglass.comm.graph_node import GraphNode
-from rosglass.comm.node import check_flag, check_may_wait
+from rosglass.comm.handle import check_flag, check_may_wait
 from rosglass.comm.promise import check_timeout
 from rosglass.comm.rclpy_names import check_order
 from rosglass.errors import InvalidNameError
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
         ServiceClient,
         ServiceServer,
     )
-    from rosglass.comm.node import Result
+    from rosglass.comm.action_server import Result
     from rosglass.interfaces import Library
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
     from rosglass.ros1.actionlib_client import ActionlibClient
@@ -84,7 +84,7 @@ class Core(TcprosCore):
         return expand(name, self.name.name, self.name.namespace)
 
 
-class Ros1Node(GraphNode):
+class Ros1Node(Node):
     """A node of a ROS 1 graph.
 
     Args:

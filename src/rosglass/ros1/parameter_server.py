@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from rosglass.comm import Executor, Handle, Listeners, Promise
 from rosglass.comm.executor import InOrder
+from rosglass.comm.handle import check_may_wait
 from rosglass.comm.names import similar
-from rosglass.comm.node import check_may_wait
 from rosglass.comm.promise import check_timeout
 from rosglass.errors import (
     ConnectionLostError,

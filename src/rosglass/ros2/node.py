@@ -5,9 +5,8 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import IMMEDIATE, NodeName, QoS, Subscription
+from rosglass.comm import IMMEDIATE, Node, NodeName, QoS, Subscription
 from rosglass.comm.builtin_services import BuiltinProtocol, BuiltinServices
-from rosglass.comm.graph_node import GraphNode
 from rosglass.comm.names import validate_namespace, validate_node_name
 from rosglass.comm.qos import check_profile
 from rosglass.comm.rclpy_names import check_order
@@ -28,15 +27,14 @@ if TYPE_CHECKING:
         Answer,
         Executor,
         LifecycleClient,
-        Node,
         ParameterClient,
         Promise,
         ServerGoal,
         ServiceClient,
         ServiceServer,
     )
+    from rosglass.comm.action_server import Result
     from rosglass.comm.log import NodeLog
-    from rosglass.comm.node import Result
     from rosglass.interfaces import Library
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
     from rosglass.ros2.parameters import Change, Ros2Parameters
@@ -46,7 +44,7 @@ if TYPE_CHECKING:
 __all__ = ["RclServices", "Ros2Node"]
 
 
-class Ros2Node(GraphNode):
+class Ros2Node(Node):
     """A ROS 2 node; made by :func:`rosglass.connect`.
 
     Args:

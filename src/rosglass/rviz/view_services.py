@@ -13,7 +13,8 @@ from rosglass.ros1.names import expand, split
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rosglass.comm.node import Handle, Node
+    from rosglass.comm.handle import Handle
+    from rosglass.comm.node import Node
     from rosglass.comm.publisher import Publisher
     from rosglass.messages import Message
     from rosglass.qml.session import Session

@@ -6,7 +6,7 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import ConnectionState
-from rosglass.comm.node import Handle
+from rosglass.comm.handle import Handle
 from rosglass.errors import InvalidArgumentException, NodeClosedError
 from rosglass.tf.topics import DEPTH, TYPE, is_ros1, qos_of, topic_of
 from rosglass.tf.transform import Transform

@@ -13,10 +13,10 @@ from time import monotonic
 from typing import TYPE_CHECKING
 
 from rosglass.comm.executor import IMMEDIATE, check_plain
+from rosglass.comm.handle import Executor, Handle, check_may_wait
 from rosglass.comm.listeners import Listeners
 from rosglass.comm.log_limits import LogOnce
 from rosglass.comm.names import similar
-from rosglass.comm.node import Executor, Handle, check_may_wait
 from rosglass.comm.promise import Promise, check_timeout
 from rosglass.comm.time import Duration, Time
 from rosglass.comm.timers import Timers

@@ -7,7 +7,7 @@ import threading
 from typing import TYPE_CHECKING
 
 from rosglass.comm.executor import IMMEDIATE
-from rosglass.comm.node import Handle
+from rosglass.comm.handle import Handle
 from rosglass.errors import Error
 from rosglass.tf.buffer import TransformBuffer
 from rosglass.tf.topics import DEPTH, TYPE, qos_of, topic_of

@@ -15,8 +15,8 @@ from waiting import eventually
 from rosglass import QoS
 from rosglass.comm import IMMEDIATE, Clock, Dispatcher, History, Sample, Subscription, Timers
 from rosglass.comm.executor import RetryingExecutor
+from rosglass.comm.handle import Executor
 from rosglass.comm.listeners import Listeners
-from rosglass.comm.node import Executor
 from rosglass.comm.promise import Promise
 
 LIMIT = 60

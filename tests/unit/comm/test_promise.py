@@ -99,7 +99,7 @@ def test_asyncio_is_imported_only_by_those_who_use_it():
 
 def test_a_thread_that_receives_may_look_but_not_wait(monkeypatch):
     """What it waits for could never arrive."""
-    monkeypatch.setattr("rosglass.comm.node._RECEIVING", (__name__,))
+    monkeypatch.setattr("rosglass.comm.handle._RECEIVING", (__name__,))
     told = []
 
     def receive():

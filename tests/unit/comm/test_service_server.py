@@ -8,7 +8,7 @@ from typing import Any
 
 from rosglass.comm import QoS
 from rosglass.comm.executor import IMMEDIATE, LoopExecutor
-from rosglass.comm.node import Executor
+from rosglass.comm.handle import Executor
 from rosglass.comm.service_server import ServiceServer
 from rosglass.messages import load
 from rosglass.wires.base import Replier, RequestId

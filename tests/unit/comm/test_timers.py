@@ -10,7 +10,7 @@ import weakref
 
 import pytest
 
-from rosglass.comm import Duration, Timers
+from rosglass.comm import Duration, Timers, Worker
 from rosglass.comm.timers import Watchdog
 
 
@@ -117,3 +117,22 @@ def test_a_watchdog_that_is_closed_while_it_looks_looks_no_more(timers):
     assert done.get(timeout=30) == count
     gc.collect()
     assert looks() is None
+
+
+def test_a_worker_that_is_woken_all_the_time_keeps_its_regular_run(eventually):
+    runs = []
+    worker = Worker("worker of the test", runs.append, pause=0.2)
+    stop = threading.Event()
+
+    def keep_waking():
+        while not stop.wait(0.001):
+            worker.wake()
+
+    waking = threading.Thread(target=keep_waking)
+    waking.start()
+    try:
+        eventually(lambda: True in runs)
+    finally:
+        stop.set()
+        waking.join()
+        worker.close()

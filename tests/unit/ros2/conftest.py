@@ -54,7 +54,7 @@ def robot(connect: Callable[..., Ros2Node]) -> Ros2Node:
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Look ten times a second for what has no event."""
-    monkeypatch.setattr("rosglass.comm.core._POLL", 0.1)
+    monkeypatch.setattr("rosglass.comm.core._POLL_S", 0.1)
 
 
 @pytest.fixture

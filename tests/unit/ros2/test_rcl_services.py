@@ -11,11 +11,13 @@ import pytest
 
 from rosglass import Time
 from rosglass.comm import (
+    ConnectionState,
     ParameterDescriptor,
     State,
     Transition,
 )
 from rosglass.errors import (
+    Error,
     NodeClosedError,
     ParameterError,
     RosArgumentError,
@@ -390,3 +392,12 @@ def test_a_node_without_lifecycle_is_named(node) -> None:
     client = node.create_lifecycle_client("/nobody")
     with pytest.raises(ServiceUnavailableError, match="/nobody/get_available_transitions"):
         client.activate(timeout=0.05)
+
+
+def test_a_node_that_cannot_be_finished_leaves_nothing_behind(middleware):
+    threads = set(threading.enumerate())
+    wrong = Arguments.parse(["--ros-args", "-p", "use_sim_time:=maybe"])
+    with pytest.raises(Error, match="use_sim_time"):
+        Ros2Node(middleware, "fake://", "robot", "/", None, wrong, own_services=True)
+    assert middleware.status().state is ConnectionState.CLOSED
+    assert set(threading.enumerate()) <= threads

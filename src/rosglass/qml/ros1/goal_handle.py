@@ -20,7 +20,7 @@ from rosglass.qt import Property, QJSValue, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
     from rosglass.comm.action_client import ClientGoal
-    from rosglass.comm.node import Executor
+    from rosglass.comm.handle import Executor
 
 __all__ = ["RosGoalHandle"]
 

@@ -337,7 +337,7 @@ class BlockingPool:
     """
 
     # Its threads may wait for what others receive, unlike all that begin in io_loop.py; see
-    # rosglass.comm.node.check_may_wait.
+    # rosglass.comm.handle.check_may_wait.
 
     def __init__(self, name: str) -> None:
         self._name = name

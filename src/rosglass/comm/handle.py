@@ -1,0 +1,98 @@
+"""Base classes of what users hold and pass in: handles and executors; and checks of arguments."""
+
+from __future__ import annotations
+
+import sys
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, NoReturn, TypeVar
+
+from rosglass.errors import ArgumentError, UnsupportedError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import FrameType, TracebackType
+
+__all__ = [
+    "Executor",
+    "Handle",
+    "Unique",
+    "check_flag",
+    "check_may_wait",
+]
+
+_H = TypeVar("_H", bound="Handle")
+#: Modules in which the threads that receive start.
+_RECEIVING = ("rosglass.wires.dds.", "rosglass.wires.zenoh.", "rosglass.wires.tcpros.io_loop")
+#: Modules in which the threads start that follow the graph and run timers.
+_FOLLOWING = ("rosglass.comm.timers",)
+
+
+class Unique:
+    """Base of objects that cannot be copied, as a copy would share threads and sockets."""
+
+    def __reduce_ex__(self, _: object) -> NoReturn:
+        # Called by copy.copy, copy.deepcopy and pickle.
+        raise UnsupportedError(
+            f"{self!r} can neither be copied nor pickled: it lives in this process, and exists "
+            "once; hand on the object itself, or create another one"
+        )
+
+
+class Executor(ABC):
+    """Runs callbacks: on a thread, in an event loop, or at once in the wire's thread."""
+
+    @abstractmethod
+    def post(self, job: Callable[[], None]) -> None:
+        """Run `job` soon; called from any thread, returns without waiting."""
+
+
+class Handle(Unique, ABC):
+    """Something that was started or registered; closed explicitly or as a context manager."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Close it; safe to call twice."""
+
+    def __enter__(self: _H) -> _H:  # noqa: PYI019 - typing.Self needs 3.11
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def check_flag(value: object, name: str, where: str = "") -> bool:
+    """Return a boolean option; raises ArgumentError.
+
+    Any text is true in Python, "no" and "false" included.
+    """
+    if value is not True and value is not False:
+        raise ArgumentError(name, value, "True or False", where)
+    return value
+
+
+def check_may_wait(name: str, *, following: bool = False) -> None:
+    """Raise UnsupportedError if the calling thread receives, and so must not wait.
+
+    Args:
+        name: The service, action or topic that the caller is about to wait for.
+        following: Whether threads that follow the graph and run timers may wait.
+    """
+    # The stack tells: Zenoh's threads are not Python's, and marking them would cost something
+    # with every sample.
+    frame: FrameType | None = sys._getframe()
+    first = ""
+    while frame is not None:
+        module = frame.f_globals.get("__name__", "")
+        first = first if module == "threading" else module
+        frame = frame.f_back
+    if first.startswith(_RECEIVING if following else (*_RECEIVING, *_FOLLOWING)):
+        raise UnsupportedError(
+            f"{name}: this callback runs in a thread that receives (executor=IMMEDIATE, or "
+            "add_done_callback()), where what it waits for could never arrive; take call_async(), "
+            "get_async() or the like here, or let it run elsewhere: on_done(), or another executor"
+        )
