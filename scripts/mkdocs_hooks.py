@@ -1,4 +1,4 @@
-"""Links the Sphinx roles in docstrings (``:class:`Node```), which mkdocstrings leaves as they are."""
+"""Links the Sphinx roles in docstrings (``:class:`Node```), which mkdocstrings does not know."""
 
 from __future__ import annotations
 
