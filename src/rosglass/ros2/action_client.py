@@ -57,7 +57,7 @@ from rosglass.ros2.action_types import (
     part,
     stamp_of,
 )
-from rosglass.ros2.rmw_services import Ros2ServiceClient
+from rosglass.ros2.rmw_services import ActionServiceClient
 from rosglass.ros2.topic_matching import Repeats
 
 if TYPE_CHECKING:
@@ -136,7 +136,7 @@ class Ros2ClientGoal(ClientGoal):
         self._sending = call
         call.add_done_callback(lambda _: self._jobs.add(lambda: self._on_answer(call)))
 
-    def _take_back(self, service: Ros2ServiceClient) -> bool:
+    def _take_back(self, service: ActionServiceClient) -> bool:
         """Take it back from its service if it was not sent yet; return whether that was so."""
         call, self._sending = self._sending, None  # its end is not the goal's
         if call is None or service.withdraw(call):
@@ -585,7 +585,7 @@ class Ros2ActionClient(ActionClient, NodeMember):
         problems = self._version.conflicts()
         ends = self._ends
         if not problems and ends is not None:
-            problems = [end.trouble for end in ends.services if end.trouble]
+            problems = [end.middleware_problem for end in ends.services if end.middleware_problem]
         return list(dict.fromkeys(problems))
 
     def _absence(self) -> str:
@@ -636,12 +636,10 @@ class _ClientEndpoints(Handle):
         self._core, self._name, self._goals = core, name, goals
         self._log_once = LogOnce()
         self.types = types
-        self.send_goal = Ros2ServiceClient(core, part(name, SEND_GOAL), types.send_goal, quiet=True)
-        self.cancel_goal = Ros2ServiceClient(
-            core, part(name, CANCEL_GOAL), types.cancel_goal, quiet=True
-        )
-        self.get_result = Ros2ServiceClient(
-            core, part(name, GET_RESULT), types.get_result, patient=True, quiet=True
+        self.send_goal = ActionServiceClient(core, part(name, SEND_GOAL), types.send_goal)
+        self.cancel_goal = ActionServiceClient(core, part(name, CANCEL_GOAL), types.cancel_goal)
+        self.get_result = ActionServiceClient(
+            core, part(name, GET_RESULT), types.get_result, waits_for_reconnect=True
         )
         self.services = (self.send_goal, self.cancel_goal, self.get_result)
         self._readers = [

@@ -15,6 +15,7 @@ import time
 from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointInfo, EndpointKind, QoS
@@ -39,18 +40,18 @@ __all__ = [
     "HOLD_S",
     "LIMIT",
     "STALL_S",
+    "ActionServiceClient",
     "ReplyPacer",
     "RequestWindow",
     "Ros2Replier",
     "Ros2Requester",
-    "Ros2ServiceClient",
     "create_service_client",
     "create_service_server",
 ]
 
 _log = logging.getLogger("rosglass.ros2")
-#: Seconds that a server may be out of the graph before its calls end: a router that is restarted
-#: hides everybody for one or two.
+#: Seconds that a server may be missing from the graph before its calls end: a router that is
+#: restarted hides all nodes for one or two.
 _GRACE_S = 3.0
 #: Seconds between looks at a server that is in the graph but not linked yet.
 _RETRY_S = 0.05
@@ -69,60 +70,41 @@ def create_service_client(
         qos: Profile of requests and replies; None for the usual one.
     """
     profile = qos or QoS.services()
-
-    def create(
-        pending: Mapping[int, PendingCall], on_reply: OnReply, on_change: Callable[[], None]
-    ) -> Ros2Requester:
-        return Ros2Requester(core, name, wanted, profile, pending, on_reply, on_change)
-
-    return ServiceClient(core, name, profile, create)
+    return ServiceClient(core, name, profile, partial(Ros2Requester, core, name, wanted, profile))
 
 
-class Ros2ServiceClient(ServiceClient):
-    """A client of a service that belongs to more, such as an action's, whose owner watches it.
+class ActionServiceClient(ServiceClient):
+    """A client of one of an action's services, whose problems the action client logs.
 
     Args:
         core: The node it belongs to.
         name: Absolute service name.
         type: The type.
-        patient: Whether calls go on as long as their server is away, and its servers hold them.
-        quiet: Whether its owner logs what is wrong.
+        waits_for_reconnect: Whether calls survive the loss of their server; such a server is
+            expected to hold requests for long.
     """
 
     _requester: Ros2Requester
 
     def __init__(
-        self,
-        core: Core,
-        name: str,
-        type: ServiceType | str,
-        *,
-        patient: bool = False,
-        quiet: bool = False,
+        self, core: Core, name: str, type: ServiceType, *, waits_for_reconnect: bool = False
     ) -> None:
         profile = QoS.services()
-
-        def create(
-            pending: Mapping[int, PendingCall], on_reply: OnReply, on_change: Callable[[], None]
-        ) -> Ros2Requester:
-            return Ros2Requester(
-                core,
-                name,
-                type,
-                profile,
-                pending,
-                on_reply,
-                on_change,
-                patient=patient,
-                quiet=quiet,
-            )
-
+        create = partial(
+            Ros2Requester,
+            core,
+            name,
+            type,
+            profile,
+            waits_for_reconnect=waits_for_reconnect,
+            quiet=True,
+        )
         super().__init__(core, name, profile, create)
 
     @property
-    def trouble(self) -> str:
-        """What its middleware has against servers that are there; empty when nothing."""
-        return self._requester.trouble
+    def middleware_problem(self) -> str:
+        """Why its middleware cannot call some servers in the graph; empty when it can."""
+        return self._requester.middleware_problem
 
     def server_ids(self) -> frozenset[bytes | str]:
         """Return the identities of the servers that understand the requests."""
@@ -135,21 +117,21 @@ class Ros2ServiceClient(ServiceClient):
 
 @dataclass(eq=False, slots=True)
 class _Route:
-    """How a request was sent.
+    """The route that a request was sent on.
 
     Attributes:
-        requester: Through which it was sent.
-        servers: Identities of the servers that were there then.
-        alone: Since when none of them is there, or was; None while one is that may answer.
+        requester: The requester that sent it.
+        servers: Identities of the servers that were in the graph then.
+        lost_at: Monotonic time at which the last of them left; None while one may answer.
     """
 
     requester: Requester
     servers: frozenset[bytes | str]
-    alone: float | None = None
+    lost_at: float | None = None
 
 
 class Ros2Requester(ServiceRequester):
-    """A middleware's requester for the version of the type that servers announce.
+    """The requester of a service client, for the version of the type that servers announce.
 
     It keeps no more requests open than a server's queue holds, and ends calls whose servers left.
 
@@ -159,10 +141,10 @@ class Ros2Requester(ServiceRequester):
         wanted: The type, its name, or None; see :func:`create_service_client`.
         qos: Profile of requests and replies.
         pending: The calls that have not ended, by number.
-        on_reply: Takes what comes of the requests.
-        on_change: Called when a server has come or gone, or may have.
-        patient: Whether calls go on as long as their server is away, and its servers hold them.
-        quiet: Whether the client's owner logs what is wrong.
+        on_reply: Takes the outcome of each request.
+        on_change: Called when a server may have appeared or left.
+        waits_for_reconnect: See :class:`ActionServiceClient`.
+        quiet: Whether the client's owner logs conflicts.
     """
 
     def __init__(
@@ -175,46 +157,48 @@ class Ros2Requester(ServiceRequester):
         on_reply: OnReply,
         on_change: Callable[[], None],
         *,
-        patient: bool = False,
+        waits_for_reconnect: bool = False,
         quiet: bool = False,
     ) -> None:
-        self._core, self._name, self._qos, self._patient = core, name, qos, patient
-        self._quiet = quiet
+        self._core, self._name, self._qos, self._quiet = core, name, qos, quiet
+        self._waits_for_reconnect = waits_for_reconnect
         self._pending, self._on_reply, self._on_change = pending, on_reply, on_change
         self._discovers = wanted is None
         given = None if wanted is None else core.types.service(wanted)
         fixed = wanted is not None and not isinstance(wanted, str)
         self._announced: Announced[ServiceType] = Announced(core, core.types.service, given, fixed)
         self.type = given
+        #: Guards the queue, the current requester and the flags of :meth:`_flush`.
         self._lock = threading.Lock()
-        #: Requests that wait to be sent; changed with the lock.
+        #: Requests that wait to be sent.
         self._queue: deque[PendingCall] = deque()
-        #: Speaks the type; None while that is not known, and after closing.
+        #: None while the type is unknown, and after closing.
         self._requester: Requester | None = None
-        self._window = core.windows.setdefault(name, RequestWindow(HOLD_S if patient else STALL_S))
+        stall_s = HOLD_S if waits_for_reconnect else STALL_S
+        self._window = core.windows.setdefault(name, RequestWindow(stall_s))
         self._flushing = self._again = self._retrying = self._closed = False
         self._choice = self._failure = ""
         self._adopt(retry=True)
         if self._announced.type is not None:
             self._connect(self._announced.type)
 
-    # -- who is there ------------------------------------------------------------------------------
+    # -- servers -----------------------------------------------------------------------------------
 
     @property
     def warn_level(self) -> int | None:  # type: ignore[override]
-        """At which level the client logs conflicts; None where its owner does that."""
+        """The level at which the client logs conflicts; None if its owner logs them."""
         if self._quiet:
             return None
         return logging.INFO if self._announced.pending else logging.WARNING
 
     @property
-    def trouble(self) -> str:
-        """What the middleware has against servers that are there; empty when nothing."""
+    def middleware_problem(self) -> str:
+        """Why the middleware cannot call some servers in the graph; empty when it can."""
         requester = self._requester
         return "" if requester is None else requester.problem
 
     def ready(self) -> bool:
-        """Return whether a server is there that understands the requests."""
+        """Return whether a server of this type and version is linked."""
         requester = self._requester
         if requester is None:
             return False
@@ -222,11 +206,11 @@ class Ros2Requester(ServiceRequester):
         return not (servers and not self._fitting(servers)) and requester.ready()
 
     def server_ids(self) -> frozenset[bytes | str]:
-        """Return the identities of the servers that understand the requests."""
+        """Return the identities of the servers of this type and version."""
         return frozenset(map(identity, self._fitting(self._servers())))
 
     def server_name(self) -> str:
-        """Return who has the service, for people."""
+        """Return the names of the service's nodes, for messages."""
         return nodes_of(self._fitting(self._servers())) or "its server"
 
     def _servers(self) -> list[EndpointInfo]:
@@ -236,19 +220,20 @@ class Ros2Requester(ServiceRequester):
         return [server for server in servers if self._announced.fits(server)]
 
     def conflicts(self) -> list[str]:
-        """Say what a person has to mend."""
+        """Return the conflicts with servers, one sentence each."""
         problems = [self._choice, self._announced.failure, self._failure]
         problems = [text for text in problems if text]
         if not problems:
             servers = self._servers()
             problems = mismatches(self._announced, servers, "offers", "it cannot be called")
-            # The middleware knows better what becomes of several servers.
+            # Where several servers conflict, the middleware knows more about it.
             others = rivals(self._fitting(servers), self._name)
-            problems += [self.trouble] if self.trouble and not problems else others
+            told = self.middleware_problem
+            problems += [told] if told and not problems else others
         return problems
 
     def absence(self) -> str:
-        """Say why no server is there although nothing is wrong."""
+        """Return why no server is available when there is no conflict."""
         servers = self._fitting(self._servers())
         if servers:
             return f"{nodes_of(servers)} offers it, but is not linked yet"
@@ -266,10 +251,10 @@ class Ros2Requester(ServiceRequester):
         )
 
     def look(self) -> None:
-        """Do nothing: servers announce themselves."""
+        """Do nothing: servers are discovered by the graph."""
 
-    def delay(self, pending: PendingCall) -> str:  # noqa: ARG002 - it holds for all that wait
-        """Say why a request was not sent although all is well."""
+    def delay(self, pending: PendingCall) -> str:  # noqa: ARG002 - the same for all
+        """Return why a request was not sent when there is no conflict."""
         if self.ready():
             return f"{LIMIT} requests before it still wait for {self.server_name()} to answer"
         return "its server appeared too late"
@@ -277,15 +262,15 @@ class Ros2Requester(ServiceRequester):
     # -- sending -----------------------------------------------------------------------------------
 
     def send(self, pending: PendingCall) -> None:
-        """Send a request as soon as a server is there, in the order of the calls."""
+        """Send a request as soon as a server is available, in the order of the calls."""
         with self._lock:
             self._queue.append(pending)
         if pending.call.done():
-            self.forget(pending)  # it ended before it came here
+            self.forget(pending)  # it ended before it was queued
         self._flush()
 
     def withdraw(self, pending: PendingCall) -> bool:
-        """Do not send a request any more; return False if it is on its way already."""
+        """Take a request back; return False if it was sent already."""
         with self._lock:
             if pending not in self._queue:
                 return False
@@ -293,24 +278,22 @@ class Ros2Requester(ServiceRequester):
         return True
 
     def forget(self, pending: PendingCall) -> None:
-        """Take note that a call has ended: do not send it, drop its response."""
+        """Drop an ended call: do not send its request, ignore its response."""
         if pending.sent is None:
-            with self._lock:
-                if pending in self._queue:
-                    self._queue.remove(pending)
+            self.withdraw(pending)
         if pending.route is not None and not pending.answered:
             pending.route.requester.forget(pending.number)
         for send in self._window.leave(pending):
-            if pending.private:  # this may be in the middle of receiving
+            if pending.private:  # this may run while the middleware receives
                 self._core.timers.after(0.0, send)
             else:
                 send()
 
     def _flush(self) -> None:
-        """Send what waits, in order, if a server is there."""
+        """Send the queued requests, in order, if a server is available."""
         with self._lock:
             if self._flushing:
-                self._again = True  # the thread that does it sees to what was added
+                self._again = True  # the thread that is flushing repeats
                 return
             self._flushing = True
         again = True
@@ -324,8 +307,7 @@ class Ros2Requester(ServiceRequester):
             self._flushing = False
             raise
         if self._queue and not self._retrying and self._fitting(self._servers()):
-            # In the graph, but not linked yet, or holding what it was sent: that may change without
-            # news.
+            # In the graph, but not linked yet, or holding requests: no event reports the change.
             self._retrying = True
             self._core.timers.after(_RETRY_S, self._retry)
 
@@ -364,28 +346,30 @@ class Ros2Requester(ServiceRequester):
             error = ServiceError(f"{self._name}: the request could not be sent: {problem}")
         else:
             if pending.call.done() and not pending.answered:
-                requester.forget(pending.number)  # it was given up while it was sent
+                requester.forget(pending.number)  # it was cancelled while it was sent
             return
         pending.call.set_exception(error)
 
-    def _take(self, number: int, data: bytes | memoryview | None, error: str | Error) -> None:
-        """Take a reply; called by the middleware."""
+    def _on_middleware_reply(
+        self, number: int, data: bytes | memoryview | None, error: str | Error
+    ) -> None:
+        """Pass a reply on, or the reason why there is none."""
         if data is None:
             pending = self._pending.get(number)
             route = None if pending is None else pending.route
             if route is not None and route.servers and not route.servers & self.server_ids():
-                error = SERVER_LEFT  # whatever the middleware makes of it
+                error = SERVER_LEFT  # more telling than the middleware's reason
         self._on_reply(number, data, error)
 
     def _is_quick(self, number: int) -> bool:
-        """Return whether taking a reply now runs none but our own code."""
+        """Return whether a reply may be taken on a receiving thread: it runs no user code."""
         pending = self._pending.get(number)
         return pending is not None and pending.private
 
     # -- following the graph -----------------------------------------------------------------------
 
     def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - definitions may be added
-        """Follow the graph: the type, whether a server is there, calls whose server went."""
+        """Update the type, readiness, the queue and lost calls after a change of the graph."""
         if self._adopt(retry=idle) and self._announced.type is not None:
             try:
                 self._connect(self._announced.type)
@@ -398,7 +382,7 @@ class Ros2Requester(ServiceRequester):
         self._end_lost_calls()
 
     def _adopt(self, *, retry: bool) -> bool:
-        """Take the type that servers announce; returns whether it is another one now."""
+        """Take the type that servers announce; return whether it has changed."""
         servers = self._servers()
         name = "" if self._announced.type is None else self._announced.type.name
         self._choice = ""
@@ -408,13 +392,13 @@ class Ros2Requester(ServiceRequester):
         return bool(name) and self._announced.follow(name, servers, retry)
 
     def _connect(self, kind: ServiceType) -> None:
-        """Speak `kind` from now on."""
+        """Replace the requester by one for `kind`."""
         core, known = self._core, self._announced.hash
         requester = core.middleware.create_requester(
             EndpointInfo(
                 EndpointKind.SERVICE_CLIENT, self._name, kind.name, core.name, self._qos, known
             ),
-            self._take,
+            self._on_middleware_reply,
         )
         requester.changed, requester.quick = core.wake, self._is_quick
         with self._lock:
@@ -433,7 +417,7 @@ class Ros2Requester(ServiceRequester):
                     self._on_reply(pending.number, None, SERVER_LEFT)
 
     def _end_lost_calls(self) -> None:
-        """End the calls whose servers left, and have not answered for too long since."""
+        """End the calls whose servers have been gone for :data:`_GRACE_S`."""
         if not self._pending:
             return
         here = self.server_ids()
@@ -445,25 +429,23 @@ class Ros2Requester(ServiceRequester):
             if not route.servers:
                 route.servers = here
             if not self._has_left(pending, here):
-                route.alone = None
-            elif route.alone is None:
-                route.alone = now
-            elif now - route.alone >= _GRACE_S:
+                route.lost_at = None
+            elif route.lost_at is None:
+                route.lost_at = now
+            elif now - route.lost_at >= _GRACE_S:
                 self._on_reply(pending.number, None, SERVER_LEFT)
                 route.requester.forget(pending.number)
 
     def _has_left(self, pending: PendingCall, here: frozenset[bytes | str]) -> bool:
-        """Return whether a request's servers have left, so that it may get no answer any more."""
+        """Return whether the servers that a request was sent to have left."""
         route = pending.route
         stranded = route.requester.stranded(pending.number)
-        if self._patient:
-            return bool(stranded and self.ready())  # there is a server to be asked again
+        if self._waits_for_reconnect:
+            return bool(stranded and self.ready())  # it can be sent again
         return stranded or (bool(route.servers) and not route.servers & here)
 
-    # -- the end -----------------------------------------------------------------------------------
-
     def close(self) -> None:
-        """Close what leads to the servers; safe to call twice."""
+        """Close the requester; safe to call twice."""
         with self._lock:
             self._closed = True
             requester, self._requester = self._requester, None
@@ -480,7 +462,7 @@ def create_service_server(
     qos: QoS | None = None,
     executor: Executor | None = None,
 ) -> ServiceServer:
-    """Offer a service in a ROS 2 node.
+    """Return a server of a service in a ROS 2 node.
 
     Args:
         core: The node.
@@ -492,17 +474,14 @@ def create_service_server(
             loop when `callback` is a coroutine function.
     """
     kind, profile = core.types.service(type), qos or QoS.services()
-
-    def create(on_request: OnRequest, quick: bool) -> Replier:
-        return Ros2Replier(core, name, kind, profile, on_request, quick)
-
+    create = partial(Ros2Replier, core, name, kind, profile)
     return ServiceServer(core, name, kind, callback, profile, executor, create)
 
 
 class Ros2Replier(Replier, NodeMember):
-    """A middleware's replier, with what every ROS 2 server needs besides.
+    """The replier of a service server, above a middleware's.
 
-    It names clients of other versions of the type, and other servers of the same service; and it
+    It reports clients of other versions of the type and other servers of the same service, and
     sends no more replies at once than a client's queue holds.
 
     Args:
@@ -511,7 +490,7 @@ class Ros2Replier(Replier, NodeMember):
         type: The type.
         qos: Profile of requests and replies.
         on_request: Called with each request.
-        quick: Whether that only puts a request aside for another thread.
+        quick: Whether `on_request` only queues a request for another thread.
     """
 
     def __init__(
@@ -538,7 +517,7 @@ class Ros2Replier(Replier, NodeMember):
 
     @property
     def problem(self) -> str:  # type: ignore[override]
-        """Why some clients cannot be served, in words; empty when all is well."""
+        """Why some clients cannot be served, in words; empty when all can."""
         graph = self._core.graph
         clients = graph.endpoints(EndpointKind.SERVICE_CLIENT, self._name)
         problems = mismatches(self._announced, clients, "calls", "it is not served")
@@ -548,18 +527,18 @@ class Ros2Replier(Replier, NodeMember):
         others = [server for server in servers if server.node != self._core.name]
         if others:
             problems.append(
-                f"{nodes_of(others)} offers {self._name}, too: clients get whichever answer comes "
-                "first; end one of the two"
+                f"{nodes_of(others)} offers {self._name}, too: clients get whichever reply arrives "
+                "first; stop one of the two"
             )
         return "; ".join(problems)
 
     @property
     def tells_failures(self) -> bool:  # type: ignore[override]
-        """Whether :meth:`fail` tells anything."""
+        """Whether the middleware can carry :meth:`fail`."""
         return self._replier.tells_failures
 
     def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - the graph alone matters
-        """Follow a change of the graph: log what is wrong, once."""
+        """Log a new problem after a change of the graph."""
         if not moved or self._closed:
             return
         problem = self.problem
@@ -572,7 +551,7 @@ class Ros2Replier(Replier, NodeMember):
         self._on_request(request, data)
 
     def reply(self, request: RequestId, data: bytes | bytearray) -> None:
-        """Answer a request, as soon as its client can take the reply."""
+        """Send a reply, as soon as its client can take it."""
         if self._pacer.on_reply(request.client):
             self._replier.reply(request, data)
         else:
@@ -582,17 +561,17 @@ class Ros2Replier(Replier, NodeMember):
         try:
             self._replier.reply(request, data)
         except NodeClosedError:
-            pass  # another thread has closed it
+            pass  # closed by another thread
         except Error as error:
             _log.error("%s: cannot answer %s: %s", self._name, self.client_name(request), error)
 
     def fail(self, request: RequestId, reason: str) -> None:
-        """Tell the client that no response will come, where the middleware can say so."""
+        """Report to the client that there will be no response, where the middleware can."""
         self._pacer.on_failure(request.client)
         self._replier.fail(request, reason)
 
     def client_name(self, request: RequestId) -> str:
-        """Return who sent a request, for people."""
+        """Return the name of a request's client, for messages."""
         clients = self._core.graph.endpoints(EndpointKind.SERVICE_CLIENT, self._name)
         known = [client for client in clients if client.gid and client.gid == request.client]
         if known or len(clients) == 1:
@@ -600,7 +579,7 @@ class Ros2Replier(Replier, NodeMember):
         return super().client_name(request)
 
     def close(self) -> None:
-        """Send the replies that wait, and withdraw the service; safe to call twice."""
+        """Send the delayed replies and withdraw the service; safe to call twice."""
         if self._closed:
             return
         self._closed = True
@@ -616,15 +595,15 @@ LIMIT = 8
 STALL_S = 30.0
 #: The same for requests that a server is known to hold, such as those for an action's result.
 HOLD_S = 0.1
-#: Seconds that a client is given to take a burst of replies.
+#: Seconds from one burst of replies to a client to the next.
 _BURST_S = 0.04
-#: Clients whose open requests are counted, and replies to one that wait at most: of more, sent to
-#: a client that asks faster than it listens, most will be lost.
+#: Clients whose open requests are counted, and delayed replies to one client: a client that sends
+#: requests faster than it takes replies loses most of what is beyond.
 _MAX_CLIENTS = _MAX_WAITING = 1000
 
 
 class RequestWindow:
-    """The open requests of a node to one service, :data:`LIMIT` at most.
+    """The open requests of a node to one service: at most :data:`LIMIT`.
 
     Args:
         stall_s: Seconds without an answer after which an open request counts as taken.
@@ -632,18 +611,19 @@ class RequestWindow:
 
     def __init__(self, stall_s: float) -> None:
         self._stall_s = stall_s
+        #: Guards both dicts: all clients of a service in a node share the window.
         self._lock = threading.Lock()
-        #: When each that is open was sent, monotonic; the oldest first.
+        #: Monotonic time of sending of each open request, the oldest first.
         self._open: dict[Hashable, float] = {}
-        #: What to call when there is room, for those that found none.
+        #: The callbacks of requesters that found the window full.
         self._waiting: dict[Callable[[], None], None] = {}
 
     def enter(self, request: Hashable, retry: Callable[[], None]) -> bool:
         """Return whether a request may be sent now.
 
         Args:
-            request: It counts until it leaves.
-            retry: One of the calls that :meth:`leave` returns when there is room again.
+            request: The request; it is open until :meth:`leave`.
+            retry: Returned by :meth:`leave` when there is room again.
         """
         now = time.monotonic()
         with self._lock:
@@ -657,7 +637,7 @@ class RequestWindow:
         return True
 
     def leave(self, request: Hashable) -> list[Callable[[], None]]:
-        """Take note that a request is not open any more; return what to call, without a lock."""
+        """Remove a request; return the callbacks to call now that there is room."""
         with self._lock:
             if self._open.pop(request, None) is None or not self._waiting:
                 return []
@@ -671,11 +651,11 @@ class _Client:
     """A client that has sent requests.
 
     Attributes:
-        open: How many of them are open.
-        paced: Whether they were more than it can take the replies of at once.
-        burst: Replies sent since `since`, monotonic.
-        waiting: Replies to be sent, in order.
-        sending: Whether a thread sends them, or a timer will.
+        open: Number of open requests.
+        paced: Whether more were open than replies that it can take at once.
+        burst: Replies sent since the monotonic time `since`.
+        waiting: Delayed replies, in order.
+        sending: Whether a thread or timer is sending them.
     """
 
     open: int = 0
@@ -687,16 +667,17 @@ class _Client:
 
 
 class ReplyPacer:
-    """The replies of a server: to clients with many open requests in bursts of :data:`LIMIT`.
+    """Sends replies to clients with many open requests in bursts of :data:`LIMIT`.
 
     A client with fewer open requests gets each reply at once.
 
     Args:
-        timers: Send what has to wait.
+        timers: Send the delayed replies.
     """
 
     def __init__(self, timers: Timers) -> None:
         self._timers = timers
+        #: Guards the clients: requests arrive and replies are sent on different threads.
         self._lock = threading.Lock()
         self._clients: dict[bytes, _Client] = {}
 
@@ -713,7 +694,7 @@ class ReplyPacer:
                 known.paced = True
 
     def on_reply(self, client: bytes) -> bool:
-        """Count a request that is answered; return False if its reply is for :meth:`send_later`."""
+        """Count a reply; return False if it must be sent with :meth:`send_later`."""
         with self._lock:
             known = self._clients.get(client)
             if known is not None:
@@ -723,7 +704,7 @@ class ReplyPacer:
         return True
 
     def send_later(self, client: bytes, send: Callable[[], None]) -> None:
-        """Send a reply as soon as its client can take it; `send` raises nothing."""
+        """Send a reply as soon as its client can take it; `send` must not raise."""
         with self._lock:
             known = self._clients.get(client)
             if known is not None:
@@ -737,14 +718,14 @@ class ReplyPacer:
             self._send_waiting(known)
 
     def on_failure(self, client: bytes) -> None:
-        """Count a request that gets no reply."""
+        """Count a request that will get no reply."""
         with self._lock:
             known = self._clients.get(client)
             if known is not None:
                 known.open -= 1
 
     def flush(self) -> None:
-        """Send all that waits at once, before the server goes."""
+        """Send all delayed replies now, before the server closes."""
         with self._lock:
             clients = list(self._clients.values())
             self._clients.clear()
@@ -754,7 +735,7 @@ class ReplyPacer:
                     known.waiting.pop(0)()
 
     def _send_waiting(self, known: _Client) -> None:
-        """Send as much as the client can take now, and the rest later."""
+        """Send what the client can take now, and the rest later."""
         while True:
             with self._lock:
                 if not known.waiting:
@@ -777,7 +758,7 @@ class ReplyPacer:
         known.open -= 1
 
     def _drop_one(self) -> None:
-        """Forget a client, one without open requests if there is one; the lock is held."""
+        """Remove a client, preferably one without open requests; the lock is held."""
         idle = (client for client, known in self._clients.items() if known.open <= 0)
         unanswered = (client for client, known in self._clients.items() if not known.waiting)
         client = next(idle, None) or next(unanswered, None)
