@@ -23,7 +23,7 @@ from rosglass.comm import (
 )
 from rosglass.interfaces import Library
 from rosglass.ros2 import Ros2Node
-from rosglass.ros2.rmw_services import ReplyPacer, RequestWindow, Ros2ServiceClient
+from rosglass.ros2.rmw_services import ActionServiceClient, ReplyPacer, RequestWindow
 from rosglass.wires.base import CALL_DROPPED, SERVER_LEFT, RequestId
 
 pytestmark = pytest.mark.usefixtures("quick")
@@ -325,7 +325,7 @@ def test_calls_end_when_their_server_was_away_and_is_back(
 
 def test_patient_calls_wait_for_their_server_to_be_back(node, middleware, monkeypatch):
     monkeypatch.setattr("rosglass.ros2.rmw_services._GRACE_S", 0.05)
-    client = Ros2ServiceClient(core_of(node), "/add", ADD, patient=True)
+    client = ActionServiceClient(core_of(node), "/add", ADD, waits_for_reconnect=True)
     (requester,) = middleware.requesters
     key = middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01, gid=b"1" * 16)
     requester.linked = True

@@ -37,7 +37,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
 from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution
-from typing import Any, TypeVar
+from typing import Any
 
 from rosglass.comm import Durability, Duration, History, Liveliness, QoS, Reliability
 from rosglass.errors import (
@@ -57,11 +57,9 @@ __all__ = [
     "BuiltinTopic",
     "Discovered",
     "Event",
-    "LivelinessChanged",
-    "Matched",
     "Qos",
-    "Status",
     "Waitset",
+    "alive_writers",
     "assert_liveliness",
     "check",
     "check_alive",
@@ -75,14 +73,13 @@ __all__ = [
     "handle",
     "keeping",
     "library",
-    "liveliness_changed",
+    "lost_samples",
     "matched_publication",
     "matched_publications",
     "matched_subscription",
     "matched_subscriptions",
     "publication_matched",
     "qos_of",
-    "sample_lost",
     "sertype",
     "set_events",
     "start_at_first_sample",
@@ -665,70 +662,6 @@ def _duration(nanoseconds: int) -> Duration | None:
 
 #: Conditions that are told at once at most.
 _KEYS = 64
-_S = TypeVar("_S", bound=ctypes.Structure)
-
-
-class Status(ctypes.Structure):
-    """What happened to a reader or writer (OMG DDS 1.4, section 2.2.4.1).
-
-    Attributes:
-        total: How often since its creation.
-        change: How often since the last time this was told.
-    """
-
-    _fields_ = (("total", c_uint32), ("change", c_int32))
-    total: int
-    change: int
-
-
-class Matched(ctypes.Structure):
-    """Counterparts came or went.
-
-    Attributes:
-        total: How often one came since the entity's creation.
-        change: How often since the last time this was told.
-        current: How many there are.
-        current_change: How many more than last time.
-        handle: Which one it was last.
-    """
-
-    _fields_ = (
-        ("total", c_uint32),
-        ("change", c_int32),
-        ("current", c_uint32),
-        ("current_change", c_int32),
-        ("handle", c_uint64),
-    )
-    total: int
-    change: int
-    current: int
-    current_change: int
-    handle: int
-
-
-class LivelinessChanged(ctypes.Structure):
-    """Writers went silent or spoke again.
-
-    Attributes:
-        alive: How many are alive.
-        not_alive: How many are not.
-        alive_change: How many more are alive than last time.
-        not_alive_change: How many more are not.
-        handle: Which one it was last.
-    """
-
-    _fields_ = (
-        ("alive", c_uint32),
-        ("not_alive", c_uint32),
-        ("alive_change", c_int32),
-        ("not_alive_change", c_int32),
-        ("handle", c_uint64),
-    )
-    alive: int
-    not_alive: int
-    alive_change: int
-    not_alive_change: int
-    handle: int
 
 
 class Event(IntFlag):
@@ -748,30 +681,36 @@ def set_events(entity: int, events: Event) -> None:
     check_alive(result, "dds_set_status_mask", f"entity {entity}")
 
 
-def subscription_matched(reader: int) -> Matched:
-    """Return how a reader is matched; its event is over with it."""
-    return _status(reader, "subscription_matched", Matched())
+def subscription_matched(reader: int) -> bool:
+    """Return whether matched writers appeared or left since the last call; resets the event."""
+    return _has_changed(_status(reader, "subscription_matched"))
 
 
-def publication_matched(writer: int) -> Matched:
-    """Return how a writer is matched; its event is over with it."""
-    return _status(writer, "publication_matched", Matched())
+def publication_matched(writer: int) -> bool:
+    """Return whether matched readers appeared or left since the last call; resets the event."""
+    return _has_changed(_status(writer, "publication_matched"))
 
 
-def liveliness_changed(reader: int) -> LivelinessChanged:
-    """Return how many of a reader's writers are alive; its event is over with it."""
-    return _status(reader, "liveliness_changed", LivelinessChanged())
+def _has_changed(status: list[int]) -> bool:
+    _total, change, _current, current_change, *_ = status
+    return bool(change or current_change)
 
 
-def sample_lost(reader: int) -> Status:
-    """Return how many samples a reader knows that it did not get; its event is over with it."""
-    return _status(reader, "sample_lost", Status())
+def alive_writers(reader: int) -> int:
+    """Return how many of a reader's writers assert their liveliness; resets the event."""
+    return _status(reader, "liveliness_changed")[0]
 
 
-def _status(entity: int, what: str, into: _S) -> _S:
-    call = f"dds_get_{what}_status"
-    check_alive(getattr(library(), call)(entity, ctypes.byref(into)), call, f"entity {entity}")
-    return into
+def lost_samples(reader: int) -> int:
+    """Return how many samples a reader knows to be lost, in all; resets the event."""
+    return _status(reader, "sample_lost")[0]
+
+
+def _status(entity: int, what: str) -> list[int]:
+    """Return the numbers that a status begins with (OMG DDS 1.4, section 2.2.4.1)."""
+    numbers, call = (c_int32 * 8)(), f"dds_get_{what}_status"
+    check_alive(getattr(library(), call)(entity, numbers), call, f"entity {entity}")
+    return numbers[:]
 
 
 class Waitset:

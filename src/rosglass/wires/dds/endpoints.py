@@ -15,9 +15,9 @@ from rosglass.wires.base import Reader, Writer
 from rosglass.wires.dds import cyclone
 from rosglass.wires.dds.cyclone import (
     Event,
-    liveliness_changed,
+    alive_writers,
+    lost_samples,
     qos_of,
-    sample_lost,
     set_events,
     subscription_matched,
 )
@@ -254,13 +254,13 @@ class SampleReader:
     def lost(self) -> int:
         """Return how many samples were announced but never came."""
         with suppress(NodeClosedError):
-            self._lost = sample_lost(self.entity).total
+            self._lost = lost_samples(self.entity)
         return self._lost
 
     def alive(self) -> int:
         """Return how many of the writers it is matched with are alive."""
         with suppress(NodeClosedError):
-            return liveliness_changed(self.entity).alive
+            return alive_writers(self.entity)
         return 0
 
     def close(self) -> None:
@@ -284,8 +284,7 @@ class SampleReader:
         # The status calls until it is read, and costs as much as taking a sample.
         if self._on_matched is not None and self._count == count:
             with suppress(NodeClosedError):
-                matched = subscription_matched(self.entity)
-                if matched.change or matched.current_change:
+                if subscription_matched(self.entity):
                     self._on_matched()
         return more
 

@@ -449,8 +449,7 @@ class Ends:
         if self.closed or self.writer is None:
             return
         with suppress(NodeClosedError):
-            matched = publication_matched(self.writer.entity)
-            if matched.change or matched.current_change:
+            if publication_matched(self.writer.entity):
                 self.look()
         if self.outbox.retry():
             self._wake(False)
