@@ -173,6 +173,6 @@ def test_the_clock_follows_the_simulation(robot, console, simulate, eventually):
 def test_a_simulation_that_publishes_no_time_is_warned_of(
     simulate, eventually, monkeypatch, caplog
 ):
-    monkeypatch.setattr("rosglass.comm.sim_time._FIRST_TIME_TIMEOUT_S", 0.1)
+    monkeypatch.setattr("rosglass.comm.builtin_services._FIRST_TIME_TIMEOUT_S", 0.1)
     simulate(True)
     eventually(lambda: "time stands still at zero" in caplog.text)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.comm import Publisher, Subscription
-    from rosglass.wires.base import Graph
+    from rosglass.comm.graph import Graph
 
 #: What every node has by itself.
 _OWN = {"/clock", "/parameter_events", "/rosout"}

@@ -1,8 +1,12 @@
 """What every ROS node has by itself: parameters, a log, simulated time, and services for them.
 
-Each is made at its first use; what other nodes expect to find is offered shortly after connecting,
-in small pieces, so that it costs neither the connection nor a user interface's first picture time.
-What these are in ROS 1, and what in ROS 2, says a :class:`BuiltinProtocol`.
+Each is created at its first use. The services that other nodes expect are offered shortly after
+connecting, one at a time, so that they delay neither the connection nor a user interface's first
+frame. A :class:`BuiltinProtocol` defines what they are in ROS 1 and in ROS 2.
+
+Simulated time: ROS wiki, "Clock"; design article "Clock and Time"; rclcpp's ``TimeSource``. In
+ROS 1 all nodes share one parameter ``use_sim_time``, on the parameter server; in ROS 2 each node
+has its own.
 """
 
 from __future__ import annotations
@@ -13,21 +17,31 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from rosglass.comm.core import NodeMember
+from rosglass.comm.executor import IMMEDIATE
+from rosglass.comm.handle import Handle
+from rosglass.comm.qos import QoS
+from rosglass.comm.time import Time
 from rosglass.errors import Error, NodeClosedError, UnsupportedError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from rosglass.comm.core import NodeCore
-    from rosglass.comm.handle import Handle
     from rosglass.comm.log import NodeLog
+    from rosglass.comm.node import Node
     from rosglass.comm.parameters import Parameters
+    from rosglass.comm.sample import Sample
+    from rosglass.comm.subscription import Subscription
 
-__all__ = ["BuiltinProtocol", "BuiltinServices"]
+__all__ = ["USE_SIM_TIME", "BuiltinProtocol", "BuiltinServices", "SimTime"]
 
 _log = logging.getLogger("rosglass.comm")
 #: From connecting until the services are offered, and between two of them.
 _OFFER_DELAY_S, _OFFER_PAUSE_S = 0.2, 0.01
+#: The name of the parameter.
+USE_SIM_TIME = "use_sim_time"
+#: How long a simulation may take to publish its first time before a warning is logged.
+_FIRST_TIME_TIMEOUT_S = 5.0
 _Parameters = TypeVar("_Parameters", bound="Parameters")
 
 
@@ -36,7 +50,7 @@ class BuiltinProtocol(ABC, Generic[_Parameters]):
 
     @abstractmethod
     def open(self, services: BuiltinServices[_Parameters]) -> None:
-        """Begin what does not wait for its first use."""
+        """Start what does not wait for its first use."""
 
     @abstractmethod
     def create_parameters(self, services: BuiltinServices[_Parameters]) -> _Parameters:
@@ -48,7 +62,7 @@ class BuiltinProtocol(ABC, Generic[_Parameters]):
 
     @abstractmethod
     def offer(self, services: BuiltinServices[_Parameters]) -> Iterator[None]:
-        """Offer what other nodes expect to find, in pieces of a millisecond or so.
+        """Offer the services that other nodes expect, yielding after each.
 
         Raises:
             NodeClosedError: The node was closed.
@@ -57,15 +71,16 @@ class BuiltinProtocol(ABC, Generic[_Parameters]):
 
 
 class BuiltinServices(NodeMember, Generic[_Parameters]):
-    """A node's parameters, log and simulated time, and the services by which others reach them.
+    """A node's parameters, log and simulated time, and the services that expose them.
 
     Args:
-        core: What the node consists of.
+        core: The core of the node.
         protocol: What these are in ROS 1 or in ROS 2.
     """
 
     def __init__(self, core: NodeCore, protocol: BuiltinProtocol[_Parameters]) -> None:
         self._core, self._protocol = core, protocol
+        #: Held at each first use, which may use another of them, and while closing.
         self._lock = threading.RLock()
         self._parameters: _Parameters | None = None
         self._node_log: NodeLog | None = None
@@ -74,7 +89,7 @@ class BuiltinServices(NodeMember, Generic[_Parameters]):
         self._closed = False
 
     def open(self, offered: bool) -> None:
-        """Begin; other nodes find the services only if they are `offered`."""
+        """Start; other nodes find the services only if they are `offered`."""
         self._core.add(self)
         self._protocol.open(self)
         if offered:
@@ -93,7 +108,7 @@ class BuiltinServices(NodeMember, Generic[_Parameters]):
 
     @property
     def log(self) -> NodeLog:
-        """The node's log; after closing, its logger logs for Python's handlers only."""
+        """The node's log; after closing, its logger logs only to Python's handlers."""
         with self._lock:
             if self._node_log is None:
                 self._node_log = self._protocol.create_log(self)
@@ -102,7 +117,7 @@ class BuiltinServices(NodeMember, Generic[_Parameters]):
             return self._node_log
 
     def own(self, handle: Handle) -> None:
-        """Close a handle with the node, the last one first."""
+        """Close a handle with the node, in reverse order of these calls."""
         with self._lock:
             self._handles.append(handle)
             closed = self._closed
@@ -110,7 +125,7 @@ class BuiltinServices(NodeMember, Generic[_Parameters]):
             handle.close()
 
     def close(self) -> None:
-        """Withdraw all of it; safe to call twice."""
+        """Withdraw all services; safe to call twice."""
         with self._lock:
             self._closed = True
             handles, self._handles = self._handles, []
@@ -122,7 +137,7 @@ class BuiltinServices(NodeMember, Generic[_Parameters]):
         self._core.remove(self)
 
     def _offer(self) -> None:
-        """Offer the next piece."""
+        """Offer the next service."""
         if self._closed:
             return
         try:
@@ -135,3 +150,71 @@ class BuiltinServices(NodeMember, Generic[_Parameters]):
             _log.warning("%s: its own services are not offered: %s", self._core.name, error)
         else:
             self._core.timers.after(_OFFER_PAUSE_S, self._offer)
+
+
+class SimTime(Handle):
+    """Makes a node's clock follow ``/clock``, or the system time.
+
+    Args:
+        node: The node, which subscribes to ``/clock``.
+        core: Its core.
+    """
+
+    def __init__(self, node: Node, core: NodeCore) -> None:
+        self._node, self._clock, self._timers = node, core.clock, core.timers
+        #: Makes following and closing exclude each other.
+        self._lock = threading.Lock()
+        self._subscription: Subscription | None = None
+        self._closed = False
+
+    def close(self) -> None:
+        """Stop following; the clock keeps its time. Safe to call twice."""
+        with self._lock:
+            self._closed = True
+            subscription, self._subscription = self._subscription, None
+        if subscription is not None:
+            subscription.close()
+
+    @property
+    def following(self) -> bool:
+        """Whether the clock follows ``/clock``."""
+        return self._subscription is not None
+
+    def follow(self, wanted: bool) -> None:
+        """Start or stop following ``/clock``."""
+        made = None
+        with self._lock:
+            if self._closed or wanted == self.following:
+                return
+            if wanted:
+                try:
+                    made = self._node.create_subscription(
+                        "/clock",
+                        "rosgraph_msgs/msg/Clock",
+                        qos=QoS.clock(),
+                        raw_callback=self._on_time,
+                        executor=IMMEDIATE,
+                    )
+                except Error:
+                    _log.exception("%s: cannot follow simulated time", self._node)
+                    return
+            old, self._subscription = self._subscription, made
+        if old is not None:
+            old.close()
+        # Not `wanted`: another thread may have changed it since.
+        self._clock.simulate(self.following)
+        if wanted:
+            self._timers.after(_FIRST_TIME_TIMEOUT_S, self._warn_no_time)
+
+    def _on_time(self, sample: Sample) -> None:
+        self._clock.advance(Time(sample.message().clock.nanoseconds))
+
+    def _warn_no_time(self) -> None:
+        """Log why time stands still, if it does."""
+        if self.following and not self._clock.now().nanoseconds:
+            _log.warning(
+                "%s: %s is set, but nothing was received on /clock: time stands still at zero "
+                "until a simulation publishes it, or the parameter is false",
+                self._node,
+                USE_SIM_TIME,
+            )

@@ -1,7 +1,7 @@
-"""The clock of a node: the system's time, or a simulation's.
+"""A node's clock, with system or simulated time, and its timers.
 
-Behaviour: design article "Clock and Time", and rclcpp's ``Clock`` and ``TimeSource``: a node whose
-time is simulated but was not told yet lives at time zero.
+Behaviour: design article "Clock and Time", and rclcpp's ``Clock`` and ``TimeSource``: simulated
+time is zero until ``/clock`` is received.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ if TYPE_CHECKING:
 __all__ = ["Clock", "ClockChange", "Jump", "Timer"]
 
 _log = logging.getLogger("rosglass.comm")
-#: Longest uninterrupted wait in seconds: on Windows a lock that is waited for holds up Ctrl-C.
+#: Longest uninterrupted wait: on Windows, waiting for a lock blocks Ctrl-C.
 _SLICE_S = 0.2
-#: Seconds that simulated time may stand still before those who sleep by it are warned.
+#: How long simulated time may stand still before a sleeping thread logs a warning.
 _STILL_S = 5.0
 
 
 class ClockChange(Enum):
-    """What happened to the source of a clock's time when it jumped."""
+    """How the time source of a clock changed in a jump."""
 
     NONE = "none"
     TO_SIMULATED = "to simulated"
@@ -44,11 +44,11 @@ class ClockChange(Enum):
 
 
 class Jump(NamedTuple):
-    """A clock that did not just move on.
+    """A discontinuity of a clock.
 
     Attributes:
-        delta: The new time less the old one; negative for a jump backwards.
-        change: Whether the source of the time changed, too.
+        delta: New time minus old time; negative for a jump backwards.
+        change: How the time source changed with it.
     """
 
     delta: Duration
@@ -57,25 +57,26 @@ class Jump(NamedTuple):
 
 @hint_at_members
 class Clock(Unique):
-    """What time it is for a node.
+    """The time of a node.
 
     Args:
-        name: Of the node, for threads and messages.
-        executor: Where callbacks run that bring no executor of their own.
-        timers: The node's, on whose thread callbacks are posted to their executors.
+        name: The node's name, for messages.
+        executor: Runs callbacks that have no executor of their own.
+        timers: The node's timers, whose thread posts callbacks to their executors.
     """
 
     def __init__(self, name: str, executor: Executor, timers: Timers) -> None:
         self._name, self._executor, self._timers = name, executor, timers
+        #: Guards all that follows, and wakes sleeping threads.
         self._changed = threading.Condition()
         self._simulated = False
         self._time = 0
         self._switches = 0
         self._closed = False
         self._watchers: list[_Watcher] = []
-        #: The timers in use, few at a time; changed with the lock.
+        #: The open timers.
         self._periodic: list[Timer] = []
-        #: Fires what is due; None while nothing is, or only the simulation's time can tell.
+        #: Fires the next due timers; None if there are none, or only simulated time decides when.
         self._alarm: Handle | None = None
 
     def __repr__(self) -> str:
@@ -88,19 +89,19 @@ class Clock(Unique):
         return self._simulated
 
     def now(self) -> Time:
-        """Return the time; zero while a simulated clock was not told any yet."""
+        """Return the time; zero until a simulated clock received one."""
         return Time(self._time) if self._simulated else Time(time.time_ns())
 
     def sleep(self, duration: Duration | float) -> bool:
         """Wait until `duration` (seconds, or a Duration) has passed on this clock.
 
-        A simulation that stands still is waited for; one that jumps back is waited for again.
+        Waits for as long as simulated time stands still, and again for what it jumps back.
 
         Returns:
-            True; False when the clock changed between system and simulated time meanwhile.
+            True; False if the clock changed between system and simulated time while sleeping.
 
         Raises:
-            NodeClosedError: The node is closed, or gets closed meanwhile.
+            NodeClosedError: The node is closed, or is closed while sleeping.
         """
         length = duration if isinstance(duration, Duration) else _seconds("duration", duration)
         with self._changed:
@@ -124,8 +125,8 @@ class Clock(Unique):
 
         Args:
             callback: Called with the :class:`Jump`.
-            forward: Tell jumps forward of at least this much, too; simulated time only.
-            executor: Where `callback` runs; None for the node's own dispatcher thread.
+            forward: Also report jumps forward of at least this much; simulated time only.
+            executor: Runs `callback`; None for the node's own dispatcher thread.
         """
         if not callable(callback):
             raise ArgumentError("callback", callback, "something that can be called")
@@ -143,7 +144,7 @@ class Clock(Unique):
     ) -> Timer:
         """Call `callback` every `period` (seconds, or a Duration) of this clock.
 
-        A callback that is still running or waiting when its time comes again misses that turn.
+        Ticks are skipped while a call is still waiting or running.
 
         Raises:
             ArgumentError: The period is not above zero.
@@ -165,7 +166,7 @@ class Clock(Unique):
         return timer
 
     def simulate(self, simulated: bool) -> None:
-        """Take the time from a simulation, or from the system; for worlds."""
+        """Switch between simulated and system time; called by the node."""
         with self._changed:
             if simulated == self._simulated or self._closed:
                 return
@@ -176,10 +177,10 @@ class Clock(Unique):
             delta = self.now() - before
             self._restart()
         change = ClockChange.TO_SIMULATED if simulated else ClockChange.TO_SYSTEM
-        self._tell(Jump(delta, change))
+        self._notify(Jump(delta, change))
 
     def advance(self, now: Time) -> None:
-        """Set the simulated time; for worlds. Without effect while the system's time is used."""
+        """Set the simulated time; called by the node. No effect while system time is used."""
         with self._changed:
             if not self._simulated or self._closed:
                 return
@@ -191,7 +192,7 @@ class Clock(Unique):
                 self._set_alarm()
             self._changed.notify_all()
         if self._watchers:
-            self._tell(Jump(Duration(delta), ClockChange.NONE))
+            self._notify(Jump(Duration(delta), ClockChange.NONE))
 
     def close(self) -> None:
         """End timers and sleeps; safe to call twice."""
@@ -204,17 +205,17 @@ class Clock(Unique):
             watcher.close()
 
     def forget(self, timer: Timer) -> None:
-        """Let go of a timer that was closed; for :class:`Timer`."""
+        """Remove a closed timer; called by :class:`Timer`."""
         with self._changed, suppress(ValueError):
             self._periodic.remove(timer)
             self._set_alarm()
 
-    def _tell(self, jump: Jump) -> None:
+    def _notify(self, jump: Jump) -> None:
         for watcher in list(self._watchers):
-            watcher.tell(jump)
+            watcher.notify(jump)
 
     def _tick(self) -> int:
-        """Return what intervals are measured with: a system clock that is set does not count."""
+        """Return the time that measures intervals, not affected by setting the system clock."""
         return self._time if self._simulated else time.monotonic_ns()
 
     def _sleep(self, end: int, read: Callable[[], int], switches: int) -> bool:
@@ -236,7 +237,7 @@ class Clock(Unique):
                 still = self._simulated and not warned and time.monotonic() > still_at
                 if not still:
                     self._changed.wait(_SLICE_S if self._simulated else min(rest / 1e9, _SLICE_S))
-            if still:  # handlers of the log are the user's, and may use the clock
+            if still:  # without the lock: log handlers are the user's, and may use the clock
                 warned = True
                 _log.warning(
                     "%s sleeps by simulated time, which stands at %.3f s: is /clock published?",
@@ -245,7 +246,7 @@ class Clock(Unique):
                 )
 
     def _restart(self) -> None:
-        """Count the timers' periods from now on: the old times mean nothing any more."""
+        """Restart the timers' periods, after their due times became meaningless."""
         now = self._tick()
         for timer in self._periodic:
             timer.due = now + timer.period.nanoseconds
@@ -253,23 +254,23 @@ class Clock(Unique):
         self._changed.notify_all()
 
     def _set_alarm(self) -> None:
-        """Let the timers that are due next be fired in time; the lock is held."""
+        """Schedule the next due timers; the lock is held."""
         if self._alarm is not None:
             self._alarm.close()
             self._alarm = None
         if not self._periodic:
             return
         left = (min(timer.due for timer in self._periodic) - self._tick()) / 1e9
-        if left <= 0 or not self._simulated:  # else, the simulation's time has to move first
+        if left <= 0 or not self._simulated:  # otherwise advance() fires them
             self._alarm = self._timers.after(max(0.0, left), self._fire_due)
 
     def _fire_due(self) -> None:
-        """Fire the timers that are due, in their order; run on the timers' thread."""
+        """Fire the due timers in order of their due times; run on the timers' thread."""
         with self._changed:
             now = self._tick()
             due = sorted((t for t in self._periodic if t.due <= now), key=lambda timer: timer.due)
             for timer in due:
-                # Turns that were missed are not made up for.
+                # Missed ticks are skipped.
                 timer.due += timer.period.nanoseconds * (
                     (now - timer.due) // timer.period.nanoseconds + 1
                 )
@@ -282,15 +283,15 @@ class Clock(Unique):
 
 
 class _Watcher(Handle):
-    """Passes on the jumps that one callback wants to know of."""
+    """Notifies one callback of the jumps that it asked for."""
 
     def __init__(self, watchers: list[_Watcher], forward: Duration | None) -> None:
         self.listeners: Listeners[Jump] = Listeners()
         self._watchers, self._forward = watchers, forward
 
-    def tell(self, jump: Jump) -> None:
-        wanted = jump.delta < Duration() or jump.change is not ClockChange.NONE
-        if wanted or (self._forward is not None and jump.delta >= self._forward):
+    def notify(self, jump: Jump) -> None:
+        jumped = jump.delta < Duration() or jump.change is not ClockChange.NONE
+        if jumped or (self._forward is not None and jump.delta >= self._forward):
             self.listeners.notify(jump)
 
     def close(self) -> None:
@@ -301,11 +302,11 @@ class _Watcher(Handle):
 
 @hint_at_members
 class Timer(Handle):
-    """Calls back again and again; made by :meth:`Node.create_timer`.
+    """Calls back periodically; created by :meth:`Node.create_timer`.
 
     Attributes:
         period: Time between two calls.
-        due: When to call next, in nanoseconds of what the clock measures intervals with.
+        due: When to call next, in nanoseconds of the clock's interval time.
     """
 
     due = 0
@@ -324,13 +325,13 @@ class Timer(Handle):
         return f"<Timer every {self.period.seconds} s{' closed' * self._closed}>"
 
     def fire(self) -> None:
-        """Post the callback, unless it is still waiting or running from the last time."""
+        """Post the callback, unless the previous call is still waiting or running."""
         if not self._waiting:
             self._waiting = True
             self._executor.post(self._run)
 
     def close(self) -> None:
-        """Call back no more; safe to call twice, from any thread and from the callback."""
+        """Stop calling back; safe to call twice, from any thread and from the callback."""
         if not self._closed:
             self._closed = True
             self._executor.close()

@@ -1,4 +1,4 @@
-"""What publishers and subscriptions tell besides messages: who came and went, what went wrong.
+"""Events of publishers and subscriptions: matches, incompatible QoS, deadlines, losses.
 
 The kinds of events are rmw's (``rmw/events_statuses``), and DDS's behind them (OMG DDS 1.4, section
 2.2.4.1).
@@ -40,13 +40,13 @@ _E = TypeVar("_E")
 
 @dataclass(frozen=True, slots=True)
 class Matched:
-    """A publisher and a subscription found each other, or one of them went.
+    """A publisher and a subscription matched, or no longer match.
 
     Attributes:
-        endpoint: The other side. The name of its node may become known later only.
-        change: 1 when it came, -1 when it went.
-        count: How many match now.
-        total: How many have matched since the callback was registered.
+        endpoint: The other side. The name of its node may become known only later.
+        change: 1 for a new match, -1 for a lost one.
+        count: Current number of matches.
+        total: Number of matches since the callback was registered.
     """
 
     endpoint: EndpointInfo
@@ -57,13 +57,13 @@ class Matched:
 
 @dataclass(frozen=True, slots=True)
 class IncompatibleQoS:
-    """Somebody appeared on the topic whose quality of service does not match.
+    """An endpoint with an incompatible QoS profile appeared on the topic.
 
     Attributes:
-        endpoint: Who.
-        policies: Which policies are in conflict, e.g. ``("reliability",)``.
+        endpoint: The endpoint.
+        policies: The policies in conflict, e.g. ``("reliability",)``.
         problem: The conflict in words.
-        total: How many such endpoints have appeared since the callback was registered.
+        total: Number of such endpoints since the callback was registered.
     """
 
     endpoint: EndpointInfo
@@ -87,13 +87,13 @@ class DeadlineMissed:
 
 @dataclass(frozen=True, slots=True)
 class LivelinessChanged:
-    """A publisher became alive, or is not alive any more.
+    """A publisher became alive, or is no longer alive.
 
     Attributes:
-        endpoint: Which publisher.
-        change: 1 when it is alive now, -1 when not.
-        alive: How many are alive now.
-        not_alive: How many are still there but have not shown their liveliness in time.
+        endpoint: The publisher.
+        change: 1 if it is alive now, -1 if not.
+        alive: Current number of alive publishers.
+        not_alive: Current number of publishers that did not assert their liveliness in time.
     """
 
     endpoint: EndpointInfo
@@ -104,10 +104,10 @@ class LivelinessChanged:
 
 @dataclass(frozen=True, slots=True)
 class LivelinessLost:
-    """A publisher did not show its liveliness within its own lease duration.
+    """A publisher did not assert its liveliness within its own lease duration.
 
     Attributes:
-        total: How often that has happened.
+        total: Number of such events.
     """
 
     total: int
@@ -115,11 +115,11 @@ class LivelinessLost:
 
 @dataclass(frozen=True, slots=True)
 class SamplesLost:
-    """Samples were sent and have not arrived.
+    """Samples were sent but not received.
 
     Attributes:
-        change: How many since the last event.
-        total: How many in all.
+        change: Number lost since the last event.
+        total: Number lost in all.
     """
 
     change: int
@@ -127,7 +127,7 @@ class SamplesLost:
 
 
 class _Known:
-    """What a listener was told: how often each endpoint is there, and how many ever came."""
+    """The endpoints that one listener was notified of."""
 
     def __init__(self) -> None:
         self.there: Counter[Hashable] = Counter()
@@ -136,7 +136,7 @@ class _Known:
 
 
 class Appearances(Generic[_E]):
-    """Tells each listener about who appears and who goes, those who are there already first.
+    """Notifies each listener of endpoints that appear and leave, starting with the present ones.
 
     Args:
         where: The topic, for errors.
@@ -151,7 +151,7 @@ class Appearances(Generic[_E]):
         return bool(self._listeners)
 
     def add(self, callback: Callable[[_E], None], executor: Executor) -> Handle:
-        """Tell `callback` from the next :meth:`update` on, until the handle is closed."""
+        """Notify `callback` from the next :meth:`update` on, until the handle is closed."""
         listener = self._listeners.add(callback, executor)
         self._known[listener] = _Known()
         return listener
@@ -162,15 +162,15 @@ class Appearances(Generic[_E]):
         event: Callable[[EndpointInfo, int, int, int], _E | None],
         left: Sequence[EndpointInfo] = (),
     ) -> None:
-        """Tell everyone the difference to what they were told; always from the same thread.
+        """Notify the listeners of what changed; always called by the same thread.
 
         Args:
-            endpoints: Who is there now. Who keeps an identity is the same, whatever becomes known
-                later, such as the node's name.
-            event: Called with an endpoint, the change (1 or -1), how many are there now, and how
-                many have appeared in all; returns what to tell, None for nothing.
-            left: Those that left since the last call, in that order. Listeners learn of each that
-                had come since then as well, once.
+            endpoints: The present endpoints. One with the same GID is the same, even if the name of
+                its node has become known since.
+            event: Called with an endpoint, the change (1 or -1), the current number and the total
+                number; returns the event, None for none.
+            left: Endpoints that left since the last call, in that order; those that had also
+                appeared since then are reported once, too.
         """
         there = list(endpoints)
         now = {endpoint.gid or endpoint for endpoint in there}
@@ -203,18 +203,18 @@ class Appearances(Generic[_E]):
                 known.total += change > 0
                 made = event(known.endpoints[key], change, known.there.total(), known.total)
                 if made is not None:
-                    listener.tell(made)
+                    listener.notify(made)
             known.there = now.copy()
             known.endpoints = dict(found)
 
     def clear(self) -> None:
-        """Forget everyone."""
+        """Remove all listeners."""
         self._listeners.clear()
         self._known.clear()
 
 
 class SubscriptionEvents:
-    """Who wants to know what about a subscription of a topic; worlds tell them."""
+    """The event listeners of one subscription."""
 
     def __init__(self, topic: str) -> None:
         self.matched: Appearances[Matched] = Appearances(topic)
@@ -225,7 +225,7 @@ class SubscriptionEvents:
         self.problem: Listeners[str] = Listeners(where=topic)
 
     def clear(self) -> None:
-        """Forget everyone."""
+        """Remove all listeners."""
         self.matched.clear()
         self.incompatible.clear()
         self.liveliness.clear()
@@ -235,11 +235,11 @@ class SubscriptionEvents:
 
 
 class PublisherEvents:
-    """Who wants to know what about a publisher; worlds tell them.
+    """The event listeners of one publisher.
 
     Args:
-        executor: Where callbacks run that bring no executor of their own.
-        added: Called when there is a new listener, which is to be told soon.
+        executor: Runs callbacks that have no executor of their own.
+        added: Called after a listener was added, so that it is notified soon.
         topic: The publisher's topic, for errors.
     """
 
@@ -252,12 +252,12 @@ class PublisherEvents:
         self.problem: Listeners[str] = Listeners(where=topic)
 
     def added(self, handle: Handle) -> Handle:
-        """Have a new listener told soon; returns its handle."""
+        """Return the handle of a new listener, which is notified soon."""
         self._added()
         return handle
 
     def clear(self) -> None:
-        """Forget everyone."""
+        """Remove all listeners."""
         self.matched.clear()
         self.incompatible.clear()
         self.deadline.clear()
@@ -268,11 +268,11 @@ class PublisherEvents:
 def conflicts(
     middleware: Middleware, endpoint: EndpointInfo, requested: QoS, offered: QoS
 ) -> dict[str, str]:
-    """Say, policy by policy, what keeps a publisher and a subscription apart.
+    """Return the conflicts between a publisher and a subscription, in words for each QoS policy.
 
     Args:
-        middleware: What connects them.
-        endpoint: The one of the two that is not ours.
+        middleware: The middleware that connects them.
+        endpoint: The remote one of the two.
         requested: The subscription's profile.
         offered: The publisher's profile.
     """
@@ -280,14 +280,14 @@ def conflicts(
 
 
 def words(found: Mapping[str, str]) -> str:
-    """Return the conflicts of policies as one line."""
+    """Return conflicts as one line."""
     return "; ".join(f"{policy}: {reason}" for policy, reason in found.items())
 
 
 def conflict_events(
     found: Mapping[EndpointInfo, Mapping[str, str]],
 ) -> Callable[[EndpointInfo, int, int, int], IncompatibleQoS | None]:
-    """Return what makes events of the endpoints in conflict, for :class:`comm.Appearances`."""
+    """Return the `event` argument of :meth:`Appearances.update` for endpoints in conflict."""
 
     def event(
         endpoint: EndpointInfo, change: int, _count: int, total: int

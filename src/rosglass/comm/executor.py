@@ -1,4 +1,4 @@
-"""Executors, which run callbacks: a dispatcher thread, an event loop, or the caller's at once."""
+"""Executors, which run callbacks: on a thread, in an event loop, or at once in the caller."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ __all__ = [
 ]
 
 _log = logging.getLogger("rosglass.comm")
-#: Seconds that closing waits for a callback that is still running.
+#: How long closing waits for a running callback.
 _CLOSE_TIMEOUT_S = 2.0
-#: Seconds until an executor that raised is given its jobs again: the first, and the longest.
+#: First and longest delay until jobs are posted again to an executor that raised.
 _FIRST_RETRY_S, _LONGEST_RETRY_S = 0.05, 1.0
-#: Gives executors that raised their jobs again; its thread starts with the first of them.
+#: Posts jobs again to executors that raised; its thread starts with the first one.
 _retries = Timers("rosglass executor retries")
 
 
 def run_job(job: Callable[[], None]) -> None:
-    """Run `job`, and log an exception that it raises."""
+    """Run `job` and log an exception that it raises."""
     try:
         job()
     except (Exception, SystemExit) as error:
@@ -54,7 +54,7 @@ def run_job(job: Callable[[], None]) -> None:
 
 
 def let_exit(error: BaseException) -> None:
-    """Raise `error` if it is of `sys.exit()` in the main thread; none of ours ends by that."""
+    """Raise `error` if it is a SystemExit in the main thread; other threads must not end by it."""
     if isinstance(error, SystemExit) and threading.current_thread() is threading.main_thread():
         raise error
 
@@ -62,27 +62,27 @@ def let_exit(error: BaseException) -> None:
 class ImmediateExecutor(Executor):
     """Runs each job at once, in the thread that posts it.
 
-    For jobs that take microseconds: the middleware receives nothing else meanwhile. They may
-    publish and close subscriptions, but must not wait for anything nor close the node.
+    For jobs that take microseconds: the wire receives nothing else while they run. They may
+    publish and close subscriptions, but must neither wait for anything nor close the node.
     """
 
     def post(self, job: Callable[[], None]) -> None:
-        """Run `job` now; an exception it raises is logged, and `sys.exit()` ends nothing."""
+        """Run `job` now; logs an exception that it raises, SystemExit included."""
         try:
             run_job(job)
-        except SystemExit:  # in the main thread, in the midst of what the node does
+        except SystemExit:  # in the main thread, which is in the middle of the node's own code
             _log.exception("a callback failed")
 
 
-#: The one immediate executor; it has no state.
+#: The only immediate executor; it has no state.
 IMMEDIATE = ImmediateExecutor()
 
 
 class Dispatcher(Executor):
-    """Runs jobs one after the other, in the order they were posted, on a thread of its own.
+    """Runs jobs one at a time, in the order of posting, on a thread of its own.
 
-    The thread starts with the first job. It is a daemon: a program that forgets to close its node
-    still ends.
+    The thread starts with the first job. It is a daemon, so that a program that does not close its
+    node still ends.
     """
 
     def __init__(self, name: str) -> None:
@@ -93,7 +93,7 @@ class Dispatcher(Executor):
         self._closed = False
 
     def post(self, job: Callable[[], None]) -> None:
-        """Run `job` on the thread soon; forgotten when the dispatcher is closed."""
+        """Run `job` on the thread soon; dropped if the dispatcher is closed first."""
         if self._thread is None:
             self._start()
         if not self._closed:
@@ -105,10 +105,10 @@ class Dispatcher(Executor):
         return self._thread is threading.current_thread()
 
     def close(self) -> None:
-        """End the thread after the job that runs now; waiting jobs are forgotten.
+        """Drop waiting jobs and end the thread after the current one.
 
-        Safe to call twice and from a job. A job that does not return within 2 s is left to its
-        daemon thread, with a warning: closing must not hang a program.
+        Safe to call twice and from a job. A job that does not return within 2 s is abandoned with
+        a warning, so that closing never hangs a program; its thread is a daemon.
         """
         with self._lock:
             self._closed = True
@@ -135,35 +135,36 @@ class Dispatcher(Executor):
                 return
             try:
                 run_job(job)
-            except BaseException:  # sys.exit() in one callback must not end all others
+            except BaseException:  # sys.exit() in one callback must not stop the others
                 _log.exception("%s: a callback asked to end its thread, which goes on", self._name)
 
 
 class RetryingExecutor(Executor):
-    """Posts jobs to an executor that may raise, as a full queue or a pool that was shut down does.
+    """Posts jobs to an executor that may raise, as a full queue or a closed pool does.
 
-    What it did not take is posted again, in the order of refusal, until it takes it: a job may
-    carry a stop command, and must neither be lost nor end the thread that posts it. Jobs must not
-    raise: an executor may run them at once.
+    Rejected jobs are posted again, in order, until they are accepted: a job may carry a stop
+    command, and must neither be lost nor end the thread that posts it. Jobs must not raise, since
+    the executor may run them at once.
 
     Args:
-        executor: The executor, often the user's own.
+        executor: The executor, often a user's.
         name: What posts, for the log.
-        give_up_s: Seconds after which a job that was not taken is given up, with an error in the
-            log; for jobs that have no owner who closes this.
+        give_up_s: Seconds after which rejected jobs are dropped with an error in the log; for jobs
+            without an owner that closes this.
     """
 
     def __init__(self, executor: Executor, name: str, give_up_s: float = math.inf) -> None:
         self._executor, self._name = executor, name
-        self._give_up_s, self._refused_at = give_up_s, 0.0
+        self._give_up_s, self._rejected_at = give_up_s, 0.0
+        #: Guards the rejected jobs.
         self._lock = threading.Lock()
-        self._refused: deque[Callable[[], None]] = deque()
+        self._rejected: deque[Callable[[], None]] = deque()
         self._closed = False
         self._failures = FailureLog(_log)
 
     def post(self, job: Callable[[], None]) -> None:
         """Run `job` on the executor soon; logs, and never raises."""
-        if not self._refused:
+        if not self._rejected:
             try:
                 self._executor.post(job)
             except Exception:
@@ -171,14 +172,14 @@ class RetryingExecutor(Executor):
             else:
                 return
         with self._lock:
-            self._refused.append(job)
-            first = len(self._refused) == 1
+            self._rejected.append(job)
+            first = len(self._rejected) == 1
         if first:
-            self._refused_at = time.monotonic()
+            self._rejected_at = time.monotonic()
             self._retry_after(_FIRST_RETRY_S)
 
     def close(self) -> None:
-        """Forget the jobs that were not taken; safe to call twice."""
+        """Drop the rejected jobs; safe to call twice."""
         self._closed = True
 
     def _retry_after(self, delay_s: float) -> None:
@@ -187,38 +188,38 @@ class RetryingExecutor(Executor):
     def _retry(self, delay_s: float) -> None:
         while not self._closed:
             try:
-                self._executor.post(self._refused[0])
+                self._executor.post(self._rejected[0])
             except Exception:
-                if time.monotonic() - self._refused_at >= self._give_up_s:
+                if time.monotonic() - self._rejected_at >= self._give_up_s:
                     self._give_up()
                     return
                 self._log_failure()
                 self._retry_after(min(2 * delay_s, _LONGEST_RETRY_S))
                 return
             with self._lock:
-                del self._refused[0]
-                if not self._refused:
+                del self._rejected[0]
+                if not self._rejected:
                     return
 
     def _give_up(self) -> None:
         with self._lock:
-            count = len(self._refused)
-            self._refused.clear()
+            count = len(self._rejected)
+            self._rejected.clear()
         _log.error(
-            "%s: the executor %r took nothing for %.0f s: %d callbacks are given up",
+            "%s: the executor %r rejected every callback for %.0f s: %d callbacks are dropped",
             self._name, self._executor, self._give_up_s, count, exc_info=True,
         )  # fmt: skip
 
     def _log_failure(self) -> None:
         self._failures.exception(
-            "%s: the executor %r raised instead of taking a callback, which it is given again",
+            "%s: the executor %r raised instead of accepting a callback, which is posted again",
             self._name,
             self._executor,
         )
 
 
 class LoopExecutor(Executor):
-    """Runs callbacks in an asyncio event loop, and coroutines.
+    """Runs callbacks and coroutines in an asyncio event loop.
 
     Args:
         loop: The loop.
@@ -229,10 +230,10 @@ class LoopExecutor(Executor):
 
     @classmethod
     def running(cls, callback: object, where: str) -> LoopExecutor:
-        """Return one for the loop that runs in this thread, for a coroutine function.
+        """Return the executor of this thread's running loop, for a coroutine function.
 
         Raises:
-            ArgumentError: None runs, so that `callback` could never be called.
+            ArgumentError: No loop runs here, so that `callback` could never be called.
         """
         import asyncio  # noqa: PLC0415 - only for those who use it
 
@@ -249,7 +250,7 @@ class LoopExecutor(Executor):
 
     @property
     def is_current(self) -> bool:
-        """Whether the calling thread runs the loop just now."""
+        """Whether the calling thread is running the loop."""
         import asyncio  # noqa: PLC0415 - only for those who use it
 
         try:
@@ -262,32 +263,32 @@ class LoopExecutor(Executor):
         self._loop.call_soon_threadsafe(job)
 
     def run(self, coroutine: Coroutine[Any, Any, Any]) -> Future[Any]:
-        """Run a coroutine in the loop; the future has what it returns."""
+        """Run a coroutine in the loop; return the future of its result."""
         import asyncio  # noqa: PLC0415 - only for those who use it
 
         return asyncio.run_coroutine_threadsafe(coroutine, self._loop)
 
 
 def is_coroutine_function(callback: object) -> bool:
-    """Return whether calling `callback` does nothing but make a coroutine."""
-    call = getattr(callback, "__call__", None)  # noqa: B004 - objects may be callable, too
+    """Return whether `callback` is a coroutine function, or an object with such a ``__call__``."""
+    call = getattr(callback, "__call__", None)  # noqa: B004 - for objects
     return inspect.iscoroutinefunction(callback) or inspect.iscoroutinefunction(call)
 
 
 def check_plain(callback: object, where: str = "", name: str = "callback") -> None:
-    """Raise ArgumentError unless `callback` can be called and is no coroutine function."""
+    """Raise ArgumentError unless `callback` is callable and no coroutine function."""
     if not callable(callback):
         raise ArgumentError(name, callback, "something that can be called", where)
     if is_coroutine_function(callback):
-        # It would be called, and nothing in it would ever run.
-        told = "a plain function (loop.call_soon_threadsafe() brings work into asyncio)"
-        raise ArgumentError(name, callback, told, where)
+        # Calling it would only create a coroutine that never runs.
+        expected = "a plain function (loop.call_soon_threadsafe() brings work into asyncio)"
+        raise ArgumentError(name, callback, expected, where)
 
 
 def executor_for(
     callback: Any, executor: Executor | None, default: Executor, where: str
 ) -> Executor:
-    """Return where a callback runs; raises ArgumentError when it cannot run."""
+    """Return the executor of a callback; raises ArgumentError if it could not run there."""
     if not callable(callback):
         raise ArgumentError("callback", callback, "something that can be called", where)
     if executor is not None and not isinstance(executor, Executor):
@@ -295,16 +296,16 @@ def executor_for(
     if not is_coroutine_function(callback):
         return executor or default
     if executor is not None:
-        told = "no executor beside a coroutine function, which runs in its event loop"
-        raise ArgumentError("executor", executor, told, where)
+        expected = "no executor beside a coroutine function, which runs in its event loop"
+        raise ArgumentError("executor", executor, expected, where)
     return LoopExecutor.running(callback, where)
 
 
 class InOrder:
     """Runs jobs one at a time, in order, in the threads that add them.
 
-    A thread that finds another one at it leaves its job to that one. So state that only jobs
-    touch needs no lock, and callbacks that jobs make come in the order of what they tell.
+    While one thread runs jobs, others leave theirs to it. State that only jobs touch therefore
+    needs no lock, and callbacks are called in the order of the events that they report.
     """
 
     def __init__(self) -> None:
@@ -313,7 +314,7 @@ class InOrder:
         self._busy = False
 
     def add(self, job: Callable[[], None]) -> None:
-        """Run `job` once all before it have run; exceptions are logged."""
+        """Run `job` after all jobs added before; logs exceptions."""
         with self._lock:
             self._jobs.append(job)
             if self._busy:
@@ -329,7 +330,7 @@ class InOrder:
                 job()
             except Exception:
                 _log.exception("a job failed")
-            except BaseException:  # Ctrl-C: the next one to come goes on
+            except BaseException:  # Ctrl-C: the next thread that adds a job continues
                 with self._lock:
                     self._busy = False
                 raise

@@ -1,4 +1,4 @@
-"""Callbacks that are told about a value, each on its own executor."""
+"""Lists of callbacks that are notified of values, each on its own executor."""
 
 from __future__ import annotations
 
@@ -15,34 +15,33 @@ if TYPE_CHECKING:
 __all__ = ["ChangeListeners", "Listener", "Listeners"]
 
 _T = TypeVar("_T")
-#: Values that wait for a callback at most: its executor may never run it.
+#: Most values that wait for a callback, as its executor may never run it.
 _MAX_WAITING = 1000
 
 
 class Listeners(Generic[_T]):
-    """A list of callbacks; true while there is one.
+    """A list of callbacks; true while it is not empty.
 
     Args:
-        merge: Whether a callback that has not run yet is only told the newest value, so that a
-            burst of changes costs one call.
-        depth: How many values wait for a callback that is slow, the newest ones; None for 1000.
-        where: What they listen to, e.g. a topic; for errors.
+        merge: Whether a waiting callback is called only with the newest value, so that a burst of
+            changes costs one call.
+        depth: How many values, the newest, wait for a slow callback; None for 1000.
+        where: What the callbacks listen to, e.g. a topic; for errors.
     """
 
     def __init__(self, merge: bool = False, depth: int | None = None, where: str = "") -> None:
         self._depth, self._where = 1 if merge else depth, where
-        #: In the order they came. Every use is one operation of the dictionary, which is atomic:
-        #: keys compare by identity.
+        #: In order of registration. Each use is one atomic operation of the dictionary.
         self._listeners: dict[Listener[_T], None] = {}
 
     def __bool__(self) -> bool:
         return bool(self._listeners)
 
     def add(self, callback: Callable[[_T], None], executor: Executor) -> Listener[_T]:
-        """Tell `callback` each new value on `executor`, until the handle is closed.
+        """Call `callback` with each new value on `executor`, until the handle is closed.
 
         Raises:
-            ArgumentError: One of the two is not what it should be.
+            ArgumentError: `callback` is no plain function, or `executor` no Executor.
         """
         check_plain(callback, self._where)
         if not isinstance(executor, Executor):
@@ -52,40 +51,40 @@ class Listeners(Generic[_T]):
         return listener
 
     def notify(self, value: _T) -> bool:
-        """Tell everyone `value`; from any thread, without waiting.
+        """Call all callbacks with `value`; from any thread, without waiting.
 
         Returns:
-            Whether everyone will be told all values; not so when one was dropped to make room.
+            False if an older value was dropped to make room for it.
         """
-        kept = [listener.tell(value) for listener in list(self._listeners)]
+        kept = [listener.notify(value) for listener in list(self._listeners)]
         return all(kept)
 
     def clear(self) -> None:
-        """Forget everyone."""
+        """Remove all callbacks."""
         for listener in list(self._listeners):
             listener.close()
 
     def remove(self, listener: Listener[_T]) -> None:
-        """Forget a listener; for listeners that are closed."""
+        """Remove a closed listener."""
         self._listeners.pop(listener, None)
 
 
 class ChangeListeners(Listeners[_T]):
-    """A list of callbacks that are told when a value has changed.
+    """A list of callbacks that are notified when a value has changed.
 
-    Who reads the value and registers a callback learns of every change after that, even when it has
-    changed back before anyone looked.
+    A program that reads the value and then registers a callback is notified of every later change,
+    even if the value has changed back before :meth:`update` looked.
 
     Args:
-        compute: Returns the value; it can be hashed.
-        told: What callbacks take for the value as long as they were told nothing.
-        where: What they listen to, e.g. a topic; for errors.
+        compute: Returns the value, which is hashable.
+        initial: The value that callbacks assume before the first notification.
+        where: What the callbacks listen to, e.g. a topic; for errors.
     """
 
-    def __init__(self, compute: Callable[[], _T], told: _T, where: str = "") -> None:
+    def __init__(self, compute: Callable[[], _T], initial: _T, where: str = "") -> None:
         super().__init__(where=where)
-        self._compute, self._told = compute, told
-        #: What was read since the last look, by any thread; every use is atomic.
+        self._compute, self._reported = compute, initial
+        #: Values read by any thread since the last update; each use is atomic.
         self._read: set[_T] = set()
 
     def read(self) -> _T:
@@ -95,26 +94,26 @@ class ChangeListeners(Listeners[_T]):
         return value
 
     def update(self) -> bool:
-        """Look, and tell the value if it has changed; by one thread only.
+        """Notify the callbacks if the value has changed; always called by the same thread.
 
         Returns:
-            Whether it was told.
+            Whether they were notified.
         """
         read = self._read.copy()
-        self._read.difference_update(read)  # what is read from here on is compared by the next look
+        self._read.difference_update(read)  # what is read from here on is for the next update
         value = self._compute()
-        if value == self._told and read <= {value}:
+        if value == self._reported and read <= {value}:
             return False
-        self._told = value
+        self._reported = value
         self.notify(value)
         return True
 
 
 class Listener(Handle, Generic[_T]):
-    """A callback of :class:`Listeners`; closing it ends it.
+    """A callback of :class:`Listeners`, until it is closed.
 
     Attributes:
-        closed: Whether it has ended.
+        closed: Whether it is closed.
     """
 
     def __init__(
@@ -128,16 +127,17 @@ class Listener(Handle, Generic[_T]):
         self._owner, self._callback = owner, callback
         self._executor = RetryingExecutor(executor, where or getattr(callback, "__qualname__", ""))
         self._depth = _MAX_WAITING if depth is None else depth
+        #: Guards the waiting values.
         self._lock = threading.Lock()
         self._waiting: list[_T] = []
         self.closed = False
 
-    def tell(self, value: _T) -> bool:
-        """Call back with `value` soon; returns whether no other value made room for it."""
+    def notify(self, value: _T) -> bool:
+        """Call back with `value` soon; return False if an older value was dropped for it."""
         with self._lock:
             self._waiting.append(value)
             if len(self._waiting) > self._depth:
-                # Its run is asked for already; it will find what is left.
+                # Its run was posted already, and takes the next value instead.
                 del self._waiting[0]
                 return False
         self._executor.post(self._run)
@@ -150,7 +150,7 @@ class Listener(Handle, Generic[_T]):
             run_job(lambda: self._callback(value))
 
     def close(self) -> None:
-        """Call back no more; safe to call twice."""
+        """Stop calling back; safe to call twice."""
         self.closed = True
         self._executor.close()
         self._owner.remove(self)

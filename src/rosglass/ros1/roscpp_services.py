@@ -13,8 +13,7 @@ import logging
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import IMMEDIATE, Handle, QoS
-from rosglass.comm.builtin_services import BuiltinProtocol
-from rosglass.comm.sim_time import USE_SIM_TIME, SimTime
+from rosglass.comm.builtin_services import USE_SIM_TIME, BuiltinProtocol, SimTime
 from rosglass.errors import ServiceError
 from rosglass.ros1.parameter_server import StartParameters
 

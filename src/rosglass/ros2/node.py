@@ -6,11 +6,10 @@ import logging
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import IMMEDIATE, Node, NodeName, QoS, Subscription
-from rosglass.comm.builtin_services import BuiltinProtocol, BuiltinServices
+from rosglass.comm.builtin_services import USE_SIM_TIME, BuiltinProtocol, BuiltinServices, SimTime
 from rosglass.comm.names import validate_namespace, validate_node_name
 from rosglass.comm.qos import check_profile
 from rosglass.comm.rclpy_names import check_order
-from rosglass.comm.sim_time import USE_SIM_TIME, SimTime
 from rosglass.comm.subscription_feed import SubscriptionFeed
 from rosglass.ros2.core import Core
 from rosglass.ros2.rmw_services import create_service_client, create_service_server

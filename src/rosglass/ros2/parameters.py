@@ -32,10 +32,10 @@ from rosglass.comm import (
     Range,
     SetResult,
 )
+from rosglass.comm.builtin_services import USE_SIM_TIME
 from rosglass.comm.executor import check_plain
 from rosglass.comm.other_node import OtherNode
 from rosglass.comm.parameters import RemoteParameters, check_values
-from rosglass.comm.sim_time import USE_SIM_TIME
 from rosglass.errors import NodeClosedError, ParameterError, shown
 
 if TYPE_CHECKING:
