@@ -234,5 +234,5 @@ def test_a_job_without_owner_is_given_up_and_counted(caplog):
     executor = RetryingExecutor(Refusing(10**9), "on_done() of a call", give_up_s=0.1)
     executor.post(lambda: None)
     executor.post(lambda: None)
-    eventually(lambda: "2 callbacks are given up" in caplog.text, timeout=LIMIT)
+    eventually(lambda: "2 callbacks are dropped" in caplog.text, timeout=LIMIT)
     assert "on_done() of a call" in caplog.text

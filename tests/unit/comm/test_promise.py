@@ -39,7 +39,7 @@ def test_an_error_comes_instead(promise):
 def test_waiting_ends_and_the_promise_stands(promise):
     with pytest.raises(rosglass.TimeoutError, match=r"the tea is not ready within 0\.01 s"):
         promise.result(0.01)
-    threading.Timer(0.3, promise.fulfil, [3]).start()
+    threading.Timer(0.3, promise.set_result, [3]).start()
     assert promise.result() == 3
 
 
@@ -68,7 +68,7 @@ def test_what_cannot_be_given_up_stays():
     async def main():
         with pytest.raises((asyncio.TimeoutError, TimeoutError)):
             await asyncio.wait_for(promise, 0.01)
-        threading.Timer(0.01, promise.fulfil, [1]).start()
+        threading.Timer(0.01, promise.set_result, [1]).start()
         return await promise
 
     assert asyncio.run(main()) == 1
