@@ -160,7 +160,7 @@ def turns(order: dict[str, Any]) -> dict[str, Any]:
         By contender, what was measured in each turn but for the first, which warms up.
     """
     from rosglass.rviz import Application
-    from rosglass.rviz.renderer_choice import choice
+    from rosglass.rviz.rendering import choice
 
     app = Application(renderer=order["renderer"], anti_aliasing=order["anti_aliasing"])
     app.window.widget.setGeometry(0, 0, *VIEW)
@@ -209,7 +209,7 @@ def save_bare(order: dict[str, Any]) -> dict[str, Any]:
 def dashboard(order: dict[str, Any]) -> dict[str, Any]:
     """Measure the dashboard of examples/rviz beside a live robot."""
     from rosglass.rviz import Application
-    from rosglass.rviz.renderer_choice import choice
+    from rosglass.rviz.rendering import choice
 
     config = DASHBOARD / "figure1.rviz"
     app = Application(config, url=order["url"], renderer=order["renderer"])

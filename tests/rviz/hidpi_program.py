@@ -23,7 +23,7 @@ def main() -> None:
     from rosglass.qt import QtCore
     from rosglass.rviz import Application, WidgetOverlay
     from rosglass.rviz.qt5 import QtWidgets
-    from rosglass.rviz.renderer_choice import choice
+    from rosglass.rviz.rendering import choice
 
     app = Application(renderer=renderer)
     app.window.widget.setGeometry(0, 0, 600, 450)

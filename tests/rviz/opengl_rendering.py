@@ -10,7 +10,7 @@ def colour(picture: Any, x: float, y: float) -> tuple[int, int, int]:
 
 
 def test_opengl_is_used_as_it_was_asked_for(show: Any, drawn: list[Any], frames: Any) -> None:
-    from rosglass.rviz.renderer_choice import choice
+    from rosglass.rviz.rendering import choice
 
     show('Rectangle { width: 60; height: 60; color: "red" }')
     frames(3)

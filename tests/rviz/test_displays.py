@@ -288,7 +288,7 @@ def test_own_classes_come_back(
     app: Any, wait: Callable[..., None], entries: Any, tmp_path: Path
 ) -> None:
     from rosglass.rviz import Overlay, register
-    from rosglass.rviz.display_classes import class_id_of
+    from rosglass.rviz.overlay import class_id_of
 
     class Gauge(Overlay):
         def __init__(self, name: str = "Gauge") -> None:

@@ -68,7 +68,7 @@ def refuse_qml(app: Any, file: Path, wait: Callable[..., None]) -> None:
 
 def fail_to_draw(app: Any, file: Path, wait: Callable[..., None]) -> None:
     from rosglass.rviz import QmlOverlay
-    from rosglass.rviz.renderer_choice import choice
+    from rosglass.rviz.rendering import choice
 
     del wait
     with pytest.MonkeyPatch.context() as patch:

@@ -140,7 +140,7 @@ def test_popup_follows_a_point(hand: Any, app: Any, view: Any) -> None:
 
 
 def test_dialog_is_moved_by_its_title_and_tells_its_button(hand: Any, app: Any) -> None:
-    from rosglass.rviz.dialog import Button, message
+    from rosglass.rviz.popup import Button, message
 
     dialog = app.add(message("Title", "Really?", buttons=Button.YES | Button.NO))
     hand.wait.frames(3)
@@ -159,8 +159,7 @@ def test_dialog_is_moved_by_its_title_and_tells_its_button(hand: Any, app: Any) 
 
 def test_bad_popups_are_refused(app: Any) -> None:
     from rosglass import Error
-    from rosglass.rviz.dialog import Button, message
-    from rosglass.rviz.popup import Popup
+    from rosglass.rviz.popup import Button, Popup, message
 
     with pytest.raises(Error, match="is no QWidget"):
         Popup(lambda: None, "None")

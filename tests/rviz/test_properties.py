@@ -41,8 +41,8 @@ def test_each_kind_keeps_its_values_and_refuses_others(
     app: Any, tmp_path: Path, kind: str, options: dict[str, Any], good: Any, bad: Any
 ) -> None:
     from rosglass.rviz.host import rviz
+    from rosglass.rviz.property_values import plain_config, to_config
     from rosglass.rviz.registered_properties import RegisteredProperties
-    from rosglass.rviz.saved_values import plain_config, to_config
 
     first, second = RegisteredProperties(), RegisteredProperties()
     made = first.register(kind, "It", **options)

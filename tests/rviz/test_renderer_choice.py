@@ -136,7 +136,7 @@ def test_what_the_user_asks_for_counts_for_more_than_anything_else(
 def test_a_renderer_cannot_be_another_one_later(
     app: Any, wait: Callable[..., None], qml: Any
 ) -> None:
-    from rosglass.rviz.renderer_choice import choice
+    from rosglass.rviz.rendering import choice
 
     overlay = app.add_qml(qml("Plain", PLAIN))
     assert choice.renderer == "software"
@@ -156,11 +156,11 @@ def test_a_renderer_cannot_be_another_one_later(
 
 def test_a_graphics_card_is_used(monkeypatch: pytest.MonkeyPatch, app: Any) -> None:
     from rosglass.qml import renderer_choice as qml_choice
-    from rosglass.rviz import renderer_choice
+    from rosglass.rviz.rendering import OverlayRendererChoice
 
     monkeypatch.setattr(qml_choice, "taken_renderer", lambda: "")
 
-    class Choice(renderer_choice.OverlayRendererChoice):
+    class Choice(OverlayRendererChoice):
         def _graphics_device(self) -> str:
             return "NVIDIA H200/PCIe/SSE2"
 

@@ -25,7 +25,7 @@ def steps(
     app: Any, steered: Any, hand: Any, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[list[tuple[float, float]]]:
     """What the keys shift the view by, ahead and to the left; a frame takes 0.1 s for them."""
-    from rosglass.rviz import view_keys
+    from rosglass.rviz import view_controller
 
     now, found = [0.0], []
 
@@ -36,7 +36,7 @@ def steps(
     def nudge(ahead: float, left: float) -> None:
         found.append((round(ahead, 3), round(left, 3)))
 
-    monkeypatch.setattr(view_keys, "time", SimpleNamespace(monotonic=later))
+    monkeypatch.setattr(view_controller, "time", SimpleNamespace(monotonic=later))
     monkeypatch.setattr(steered, "nudge", nudge)
     # A press on the free view gives it the keys.
     hand.click(600, 400)

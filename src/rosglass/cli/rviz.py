@@ -150,7 +150,7 @@ def _show(args: argparse.Namespace, config: str, remappings: list[str], received
     for file in args.overlays:
         interface_file(file)
     from rosglass.rviz.application import Application
-    from rosglass.rviz.renderer_choice import choice
+    from rosglass.rviz.rendering import choice
 
     install_message_handler()
     if received:

@@ -16,10 +16,8 @@ from rosglass.interrupts import InterruptsDeferred
 
 if TYPE_CHECKING:
     from rosglass.rviz.application import Application
-    from rosglass.rviz.dialog import Button, Dialog, message
-    from rosglass.rviz.display_classes import register
-    from rosglass.rviz.overlay import Overlay
-    from rosglass.rviz.popup import Anchor, Popup
+    from rosglass.rviz.overlay import Overlay, register
+    from rosglass.rviz.popup import Anchor, Button, Dialog, Popup, message
     from rosglass.rviz.qml_overlay import QmlOverlay
     from rosglass.rviz.widget_overlay import WidgetOverlay
 
@@ -38,15 +36,15 @@ __all__ = [
 
 _HOMES = {
     "Anchor": "popup",
-    "Button": "dialog",
-    "Dialog": "dialog",
-    "Popup": "popup",
-    "message": "dialog",
-    "register": "display_classes",
     "Application": "application",
+    "Button": "popup",
+    "Dialog": "popup",
     "Overlay": "overlay",
+    "Popup": "popup",
     "QmlOverlay": "qml_overlay",
     "WidgetOverlay": "widget_overlay",
+    "message": "popup",
+    "register": "overlay",
 }
 
 

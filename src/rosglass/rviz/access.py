@@ -7,13 +7,11 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from rosglass.qt import QtCore, Signal
+from rosglass.rviz.camera import Picker
 from rosglass.rviz.displays_access import Displays
-from rosglass.rviz.frames import Frames
-from rosglass.rviz.picking import Picker
 from rosglass.rviz.tools import Tools
-from rosglass.rviz.trackers import Trackers
-from rosglass.rviz.view import View
-from rosglass.rviz.views import Views
+from rosglass.rviz.trackers import Frames, Trackers
+from rosglass.rviz.view import View, Views
 from rosglass.rviz.watch import Hook
 
 if TYPE_CHECKING:

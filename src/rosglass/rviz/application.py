@@ -24,20 +24,17 @@ from rosglass.ros1.remapping_arguments import Arguments
 from rosglass.rviz import roscpp
 from rosglass.rviz.access import Access
 from rosglass.rviz.cpp import cpp_function
-from rosglass.rviz.entries import Entries
-from rosglass.rviz.guard import log_what_is_raised
+from rosglass.rviz.entries import Entries, OverlayMenu
 from rosglass.rviz.host import require_rviz
 from rosglass.rviz.lost_screen import LostScreen
 from rosglass.rviz.master import MasterWatch, wait_for_master
-from rosglass.rviz.nodes import connect_beside_rviz, name_node, shared_arguments
-from rosglass.rviz.overlay_menu import OverlayMenu
+from rosglass.rviz.overlay import log_what_is_raised
 from rosglass.rviz.qml_overlay import QmlOverlay
 from rosglass.rviz.qt5 import QtGui, QtWidgets
-from rosglass.rviz.renderer_choice import choice
+from rosglass.rviz.rendering import choice
+from rosglass.rviz.roscpp import connect_beside_rviz, name_node, shared_arguments
 from rosglass.rviz.stack import Stack
-from rosglass.rviz.view_entry import ViewEntry
-from rosglass.rviz.view_keys import ViewKeys
-from rosglass.rviz.view_services import ViewServices
+from rosglass.rviz.view_controller import ViewEntry, ViewKeys, ViewServices
 from rosglass.rviz.window import Window, config_file
 
 if TYPE_CHECKING:

@@ -7,14 +7,19 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rosglass.comm.names import similar
 from rosglass.errors import Error
 from rosglass.qt import QtCore, Signal
-from rosglass.rviz import property_access
 from rosglass.rviz.host import as_pyside
-from rosglass.rviz.plugins import DISPLAY, declared, require_class_id
+from rosglass.rviz.plugins import DISPLAY, Watched, declared, require_class_id
+from rosglass.rviz.properties import (
+    child_properties,
+    describe_properties,
+    find_property,
+    read_property,
+    write_property,
+)
+from rosglass.rviz.property_values import shown
 from rosglass.rviz.qt5 import QtWidgets
-from rosglass.rviz.shown import shown
 from rosglass.rviz.tools import failure
 from rosglass.rviz.watch import address, class_of
-from rosglass.rviz.watched import Watched
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -116,15 +121,15 @@ class Display:
         return self._read()[2] if self.exists else Status("error", f"{self.name} was removed")
 
     def properties(self) -> list[dict[str, Any]]:
-        """Return all its properties; see :func:`rosglass.rviz.property_access.describe`.
+        """Return all its properties; see :func:`rosglass.rviz.properties.describe_properties`.
 
         Raises:
             Error: It is gone.
         """
-        return property_access.describe(self.require())
+        return describe_properties(self.require())
 
     def get(self, path: str | Sequence[str]) -> Any:
-        """Return the value of a property; see :func:`rosglass.rviz.property_access.read`.
+        """Return the value of a property; see :func:`rosglass.rviz.properties.read_property`.
 
         Args:
             path: E.g. ``Offset/X``.
@@ -132,10 +137,10 @@ class Display:
         Raises:
             Error: It has no such property, or is gone.
         """
-        return property_access.read(property_access.find(self.require(), path, self.name))
+        return read_property(find_property(self.require(), path, self.name))
 
     def set(self, path: str | Sequence[str], value: Any) -> None:
-        """Change a property; see :func:`rosglass.rviz.property_access.write`.
+        """Change a property; see :func:`rosglass.rviz.properties.write_property`.
 
         Args:
             path: E.g. ``Offset/X``.
@@ -144,8 +149,8 @@ class Display:
         Raises:
             Error: It has no such property or is gone, or the property cannot hold the value.
         """
-        found = property_access.find(self.require(), path, self.name)
-        property_access.write(found, value, f"{self.name}/{path}")
+        found = find_property(self.require(), path, self.name)
+        write_property(found, value, f"{self.name}/{path}")
         self._owner.settle()
 
     def require(self) -> Any:
@@ -213,7 +218,7 @@ class Displays(Watched):
         Raises:
             Error: There is no such property.
         """
-        return property_access.read(self._find_property(path))
+        return read_property(self._find_property(path))
 
     def set(self, path: str | Sequence[str], value: Any) -> None:
         """Change a property of any display, or of RViz; see :meth:`get`.
@@ -222,30 +227,30 @@ class Displays(Watched):
             Error: There is no such property, or it cannot hold the value.
         """
         names = path if isinstance(path, str) else "/".join(map(str, path))
-        property_access.write(self._find_property(names), value, names[:120])
+        write_property(self._find_property(names), value, names[:120])
         self.settle()
 
     def options(self) -> list[dict[str, Any]]:
-        """Return RViz's global options; see :func:`rosglass.rviz.property_access.describe`."""
-        return property_access.describe(self._root)
+        """Return RViz's global options, as `describe_properties` does."""
+        return describe_properties(self._root)
 
     def _find_property(self, path: str | Sequence[str]) -> Any:
         names = path if isinstance(path, str) else "/".join(map(str, path))
         for display in self._items:
             if names.startswith(f"{display.name}/"):
                 rest = names[len(display.name) + 1 :]
-                return property_access.find(display.require(), rest, display.name)
+                return find_property(display.require(), rest, display.name)
         self._require_first(names)
-        return property_access.find(self._root, names, "RViz")
+        return find_property(self._root, names, "RViz")
 
     def _require_first(self, path: str) -> None:
         """Raise an Error where nothing in the panel has the first name of a path."""
         first, _, below = path.partition("/")
         displays = [display.name for display in self._items]
-        known = [*(str(c.getName()) for c in property_access.children(self._root)), *displays]
+        known = [*(str(c.getName()) for c in child_properties(self._root)), *displays]
         display = self.find(first)
         if display is not None and not below:
-            example = f"{first}/{next(property_access.children(display.handle)).getName()}"
+            example = f"{first}/{next(child_properties(display.handle)).getName()}"
             raise Error(f"{first!r} is a display; name one of its properties, e.g. {example!r}")
         if first not in known:
             hint = similar(first, known) or f"; there are: {', '.join(known)}"

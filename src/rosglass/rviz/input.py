@@ -1,15 +1,13 @@
-"""Who gets the mouse, the wheel, touch and the keys: an overlay, or RViz's view below it."""
+"""Mouse, touch and keys of RViz's 3D view, offered to the overlays from the top."""
 
 from __future__ import annotations
 
 import enum
 from typing import TYPE_CHECKING, Any
 
-from rosglass.qt import QtCore, is_alive
-from rosglass.rviz.events import DRAG, KEYS, PRESS, TOUCH, scaled
-from rosglass.rviz.guard import guarded
-from rosglass.rviz.qt5 import QtCore as Qt5Core
-from rosglass.rviz.qt5 import QtGui, QtWidgets
+from rosglass.qt import is_alive
+from rosglass.rviz.overlay import guarded
+from rosglass.rviz.qt5 import QtCore, QtGui, QtWidgets
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -18,10 +16,164 @@ if TYPE_CHECKING:
     from rosglass.rviz.stack import Stack
     from rosglass.rviz.window import Window
 
-__all__ = ["Input"]
+__all__ = [
+    "BUTTONS",
+    "DRAG",
+    "FAR_OUTSIDE",
+    "KEYS",
+    "MOUSE",
+    "PRESS",
+    "TOUCH",
+    "Input",
+    "position",
+    "release_outside",
+    "scaled",
+]
 
-_E = Qt5Core.QEvent
-_NONE = Qt5Core.Qt.NoButton
+
+_E = QtCore.QEvent
+#: A button of the mouse went down.
+PRESS = frozenset({_E.MouseButtonPress, _E.MouseButtonDblClick})
+#: Mouse events with a position and buttons.
+MOUSE = PRESS | {_E.MouseButtonRelease, _E.MouseMove}
+#: Touch screens.
+TOUCH = frozenset({_E.TouchBegin, _E.TouchUpdate, _E.TouchEnd, _E.TouchCancel})
+#: Keys, and whether one is a shortcut of the window.
+KEYS = frozenset({_E.KeyPress, _E.KeyRelease, _E.ShortcutOverride})
+#: Something is dragged here from elsewhere.
+DRAG = frozenset({_E.DragEnter, _E.DragMove, _E.Drop})
+
+#: Every button that a mouse may have.
+BUTTONS = [QtCore.Qt.MouseButton(1 << bit) for bit in range(27)]
+#: A place that is in no widget and no item.
+FAR_OUTSIDE = QtCore.QPointF(-1e5, -1e5)
+
+
+def release_outside(button: Any, left: Any) -> Any:
+    """Return a release for nothing.
+
+    Args:
+        button: What goes up.
+        left: The buttons that are still down.
+    """
+    none = QtCore.Qt.NoModifier
+    return QtGui.QMouseEvent(_E.MouseButtonRelease, FAR_OUTSIDE, button, left, none)
+
+
+def position(event: Any) -> Any:
+    """Return where an event happened, a QPointF; None for one that has no place."""
+    kind = event.type()
+    if kind in MOUSE:
+        return event.localPos()
+    if kind == _E.Wheel:
+        return event.position()
+    if kind in TOUCH:
+        points = event.touchPoints()
+        return points[0].pos() if points else None
+    if kind == _E.Drop:
+        return event.posF()
+    if kind in DRAG or kind in (_E.ContextMenu, _E.ToolTip):
+        return QtCore.QPointF(event.pos())
+    return None
+
+
+def scaled(event: Any, factor: float) -> Any:
+    """Return a copy of an event with its positions multiplied; itself when it has none."""
+    make = _MAKERS.get(event.type())
+    if make is None:
+        return event
+    made = make(event, factor)
+    if isinstance(event, QtGui.QInputEvent):
+        # QML tells from it how fast something is flicked.
+        made.setTimestamp(event.timestamp())
+    return made
+
+
+def _mouse(event: Any, factor: float) -> Any:
+    at = event.localPos() * factor
+    return QtGui.QMouseEvent(
+        event.type(),
+        at,
+        at,
+        event.screenPos(),
+        event.button(),
+        event.buttons(),
+        event.modifiers(),
+        event.source(),
+    )
+
+
+def _wheel(event: Any, factor: float) -> Any:
+    return QtGui.QWheelEvent(
+        event.position() * factor,
+        event.globalPosition(),
+        event.pixelDelta(),
+        event.angleDelta(),
+        event.buttons(),
+        event.modifiers(),
+        event.phase(),
+        event.inverted(),
+        event.source(),
+    )
+
+
+def _touch(event: Any, factor: float) -> Any:
+    points = [_touch_point(point, factor) for point in event.touchPoints()]
+    return QtGui.QTouchEvent(
+        event.type(), event.device(), event.modifiers(), event.touchPointStates(), points
+    )
+
+
+def _touch_point(point: Any, factor: float) -> Any:
+    made = QtGui.QTouchEvent.TouchPoint(point)
+    for now, setters in (
+        (point.pos(), (made.setPos, made.setScenePos)),
+        (point.startPos(), (made.setStartPos, made.setStartScenePos)),
+        (point.lastPos(), (made.setLastPos, made.setLastScenePos)),
+    ):
+        for put in setters:
+            put(now * factor)
+    return made
+
+
+def _drag(event: Any, factor: float) -> Any:
+    kind = {_E.DragEnter: QtGui.QDragEnterEvent, _E.DragMove: QtGui.QDragMoveEvent}
+    make = kind.get(event.type(), QtGui.QDropEvent)
+    at = position(event) * factor
+    if make is not QtGui.QDropEvent:
+        at = at.toPoint()
+    made = make(
+        at,
+        event.possibleActions(),
+        event.mimeData(),
+        event.mouseButtons(),
+        event.keyboardModifiers(),
+    )
+    made.setDropAction(event.dropAction())
+    return made
+
+
+def _context_menu(event: Any, factor: float) -> Any:
+    at = (position(event) * factor).toPoint()
+    return QtGui.QContextMenuEvent(event.reason(), at, event.globalPos(), event.modifiers())
+
+
+def _help(event: Any, factor: float) -> Any:
+    at = (position(event) * factor).toPoint()
+    return QtGui.QHelpEvent(event.type(), at, event.globalPos())
+
+
+_MAKERS: dict[Any, Callable[[Any, float], Any]] = {
+    **dict.fromkeys(MOUSE, _mouse),
+    **dict.fromkeys(TOUCH, _touch),
+    **dict.fromkeys(DRAG, _drag),
+    _E.Wheel: _wheel,
+    _E.ContextMenu: _context_menu,
+    _E.ToolTip: _help,
+}
+
+
+_NONE = QtCore.Qt.NoButton
 #: The mouse may be let go, and fingers lifted, without a word to RViz's window from then on.
 _LOSING = frozenset({_E.WindowDeactivate, _E.WindowBlocked, _E.Hide})
 #: Milliseconds after which it is noticed that the mouse went away without a word.
@@ -36,7 +188,7 @@ class Owner(enum.Enum):
     NOBODY = 2
 
 
-class Input(QtCore.QObject):
+class Input(QtCore.QObject):  # type: ignore[misc]
     """Routes the events of RViz's 3D view.
 
     The topmost overlay is asked first, popups before all others. The one that takes a button has
@@ -74,12 +226,12 @@ class Input(QtCore.QObject):
             _E.FocusIn: self._focus_event,
             _E.FocusOut: self._focus_event,
         }
-        self._panel.setAttribute(Qt5Core.Qt.WA_AcceptTouchEvents)
+        self._panel.setAttribute(QtCore.Qt.WA_AcceptTouchEvents)
         self._panel.setAcceptDrops(True)
         self._panel.installEventFilter(self)
         window.widget.installEventFilter(self)
         stack.changed.connect(self._overlays_changed)
-        self._look_around = Qt5Core.QTimer()
+        self._look_around = QtCore.QTimer()
         self._look_around.setInterval(_LOOK_AROUND)
         self._look_around.timeout.connect(self._look)
 
@@ -91,9 +243,9 @@ class Input(QtCore.QObject):
     def focus(self, overlay: Overlay | None) -> None:
         """Have an overlay get the keys, or RViz."""
         before, self._focused = self._focused, overlay
-        self._panel.setAttribute(Qt5Core.Qt.WA_InputMethodEnabled, overlay is not None)
+        self._panel.setAttribute(QtCore.Qt.WA_InputMethodEnabled, overlay is not None)
         if overlay is not None and not self._panel.hasFocus():
-            self._panel.setFocus(Qt5Core.Qt.MouseFocusReason)
+            self._panel.setFocus(QtCore.Qt.MouseFocusReason)
         if before is overlay:
             return
         for which in (before, overlay):
@@ -225,7 +377,7 @@ class Input(QtCore.QObject):
             overlay, open_to_rviz = self._offer(event)
             self.hover(overlay)
             if overlay is None and not open_to_rviz:
-                self._panel.setCursor(Qt5Core.Qt.ArrowCursor)
+                self._panel.setCursor(QtCore.Qt.ArrowCursor)
             return not (overlay is None and open_to_rviz)
         if not isinstance(self._owner, Owner):
             self._deliver(self._owner, event)
@@ -259,7 +411,7 @@ class Input(QtCore.QObject):
 
     def _show_cursor(self, overlay: Overlay) -> None:
         with guarded(overlay, "choosing the mouse's shape"):
-            self._panel.setCursor(overlay.cursor() or QtGui.QCursor(Qt5Core.Qt.ArrowCursor))
+            self._panel.setCursor(overlay.cursor() or QtGui.QCursor(QtCore.Qt.ArrowCursor))
 
     def _left(self, event: Any) -> bool:
         del event
@@ -332,13 +484,13 @@ class Input(QtCore.QObject):
             return any(overlay.is_modal for overlay in self._stack.topmost_first())
         if self._deliver(focused, event):
             return True
-        if event.type() == _E.KeyPress and event.key() == Qt5Core.Qt.Key_Escape:
+        if event.type() == _E.KeyPress and event.key() == QtCore.Qt.Key_Escape:
             self.focus(None)
         return focused.is_modal
 
     def _focus_event(self, event: Any) -> bool:
         told = [event.type() == _E.FocusIn]
-        if event.reason() == Qt5Core.Qt.PopupFocusReason:
+        if event.reason() == QtCore.Qt.PopupFocusReason:
             # A menu has all of the mouse and the keys while it is open: what is held must end, but
             # Qt Quick could not be given the keys back when it closes.
             told = [] if told[0] else [False, True]

@@ -1,15 +1,26 @@
-"""The seam between what is drawn over RViz's 3D view and RViz: QML, widgets, or your own."""
+"""The base class of overlays, their classes in ``.rviz`` files, and what guards RViz from them."""
 
 from __future__ import annotations
 
+import contextlib
+import logging
 import math
-from typing import TYPE_CHECKING
+import re
+import sys
+import threading
+import traceback
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rosglass.errors import Error
-from rosglass.qt import QtCore, Signal
+from rosglass.qt import QtCore, Signal, is_alive
+from rosglass.rviz.qt5 import QtWidgets
 from rosglass.rviz.registered_properties import RegisteredProperties
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from types import TracebackType
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -17,7 +28,18 @@ if TYPE_CHECKING:
     from rosglass.rviz.tiles import Rect
     from rosglass.rviz.window import Window
 
-__all__ = ["SCALES", "Overlay"]
+__all__ = [
+    "QML_CLASS",
+    "REFERENCE_QML_CLASS",
+    "SCALES",
+    "Overlay",
+    "class_id_of",
+    "guarded",
+    "log_what_is_raised",
+    "maker_of",
+    "register",
+]
+
 
 #: The smallest and the largest scale of an overlay.
 SCALES = (0.1, 10.0)
@@ -179,3 +201,166 @@ class Overlay(QtCore.QObject):
 
 def _is_number(value: object) -> bool:
     return isinstance(value, (int, float)) and math.isfinite(value)
+
+
+_T = TypeVar("_T", bound="type[Overlay]")
+#: Class id of a QML file.
+QML_CLASS = "rosglass/QmlOverlay"
+#: What hector_rviz_overlay calls it.
+REFERENCE_QML_CLASS = "hector_rviz_overlay_controls/QmlOverlay"
+_CLASS_ID = re.compile(r"[A-Za-z_]\w*/[A-Za-z_]\w*\Z", re.ASCII)
+_makers: dict[str, Callable[[str], Overlay]] = {}
+_ids: dict[type[Any], str] = {}
+
+
+def register(kind: _T, class_id: str = "", make: Callable[[str], Overlay] | None = None) -> _T:
+    """Have overlays of a class come back from a saved ``.rviz`` file; also as a decorator.
+
+    Do it before the file is loaded.
+
+    Args:
+        kind: The class.
+        class_id: Its name in files, e.g. ``my_robot/Gauges``; the Python package and the class by
+            default.
+        make: Returns a new one of a name; the class itself, called with the name, by default.
+
+    Raises:
+        Error: It is no class of overlays, or the class id is taken or not valid.
+    """
+    if not isinstance(kind, type) or not issubclass(kind, Overlay):
+        raise Error(f"{kind!r:.80} is no class derived from rosglass.rviz.Overlay")
+    name = class_id or _own_id(kind)
+    if not _CLASS_ID.match(name):
+        raise Error(f"the class id {name!r} is not of the form package/Class")
+    taken = next((one for one, taken in _ids.items() if taken == name and one is not kind), None)
+    if name in {QML_CLASS, REFERENCE_QML_CLASS} or taken is not None:
+        whose = taken.__qualname__ if taken is not None else "QML files"
+        raise Error(f"the class id {name!r} is that of {whose}; give another one")
+    _makers[name] = make or (lambda overlay_name: kind(name=overlay_name))
+    _ids[kind] = name
+    return kind
+
+
+def class_id_of(kind: type[Overlay]) -> str:
+    """Return the class id of a class, registered or not."""
+    return _ids.get(kind) or _own_id(kind)
+
+
+def maker_of(class_id: str) -> Callable[[str], Overlay] | None:
+    """Return what makes an overlay of a class id; None for ids that are not registered."""
+    return _makers.get(class_id)
+
+
+def _own_id(kind: type[Any]) -> str:
+    package = kind.__module__.partition(".")[0]
+    if package == "__main__":
+        package = re.sub(r"\W", "_", Path(sys.argv[0] or "program").stem, flags=re.ASCII)
+    return f"{package}/{kind.__name__}"
+
+
+_log = logging.getLogger("rosglass.rviz")
+#: Names by which a function may know the overlay that it was written for, the most telling first.
+_OWN = ("self", "overlay", "panel", "popup", "dialog", "root", "widget")
+
+
+@contextlib.contextmanager
+def guarded(overlay: Overlay, doing: str) -> Iterator[None]:
+    """Keep what an overlay raises, itself or in a slot or paintEvent of its own, from going on.
+
+    Args:
+        overlay: Whose code runs.
+        doing: What it does, e.g. ``drawing``.
+    """
+    last = ""
+
+    def tell(kind: type[BaseException], error: BaseException, trace: Any) -> None:
+        nonlocal last
+        # A menu that is open runs everything else meanwhile.
+        owner = _owner(trace) or overlay
+        text = f"{_what(kind, error, trace)} (while {doing})"
+        if text != last:
+            _tell(owner, text, (kind, error, trace))
+        last = text
+
+    before = sys.excepthook
+    # Qt's bindings hand to it what is raised in virtual functions and slots.
+    sys.excepthook = tell
+    try:
+        yield
+    except Exception as error:
+        tell(type(error), error, error.__traceback__)
+    finally:
+        sys.excepthook = before
+
+
+def log_what_is_raised() -> Callable[[], None]:
+    """Keep PyQt5 from aborting the process when something raises in a slot or virtual function.
+
+    It is the problem of the overlay that it belongs to, where the traceback tells. A hook that the
+    program has of its own hears of everything, too.
+
+    Returns:
+        Ends it.
+    """
+    before = sys.excepthook
+
+    def tell(kind: type[BaseException], error: BaseException, trace: Any) -> None:
+        owner = _owner(trace)
+        if owner is not None:
+            _tell(owner, _what(kind, error, trace), (kind, error, trace))
+        if before is not sys.__excepthook__:
+            before(kind, error, trace)
+        elif owner is None:
+            _log.error("%s", _what(kind, error, trace), exc_info=(kind, error, trace))
+
+    sys.excepthook = tell
+
+    def end() -> None:
+        if sys.excepthook is tell:
+            sys.excepthook = before
+
+    return end
+
+
+def _tell(overlay: Overlay, text: str, raised: Any) -> None:
+    # What is drawn anew raises anew with each frame, and a timer each time.
+    level = logging.DEBUG if text == overlay.problem else logging.ERROR
+    _log.log(level, "overlay %s: %s", overlay.name, text, exc_info=raised)
+    overlay.tell_problem(text)
+
+
+def _what(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> str:
+    try:
+        frames = traceback.extract_tb(trace)
+    except RecursionError:
+        # There is no room left to look at it.
+        frames = traceback.StackSummary()
+    place = f"{frames[-1].filename}:{frames[-1].lineno}: " if frames else ""
+    return f"{place}{kind.__name__}: {error}"
+
+
+def _owner(trace: TracebackType | None) -> Overlay | None:
+    """Return the overlay whose code has raised: the innermost one that a function knows."""
+    found: Overlay | None = None
+    while trace is not None and threading.current_thread() is threading.main_thread():
+        known = trace.tb_frame.f_locals
+        for name in _OWN:
+            owner = _overlay_of(known.get(name))
+            if owner is not None:
+                found = owner
+                break
+        trace = trace.tb_next
+    return found
+
+
+def _overlay_of(thing: object) -> Overlay | None:
+    """Return an overlay itself, or the one that shows a widget."""
+    if isinstance(thing, Overlay):
+        return thing if is_alive(thing) and hasattr(thing, "name") else None
+    widget: Any = thing
+    while isinstance(widget, QtWidgets.QWidget) and is_alive(widget):
+        shown_by = getattr(widget, "rosglass_overlay", None)
+        if shown_by is not None:
+            return _overlay_of(shown_by())
+        widget = widget.parentWidget()
+    return None

@@ -1,30 +1,444 @@
-"""Registered properties in RViz's property tree, each with the editor that suits its kind.
-
-What is derived from RViz's classes is called by C++, where an exception would end the process.
-"""
+"""RViz's tree of properties: any property by its path, and registered ones with their editors."""
 # ruff: noqa: N802 - the names of what C++ calls are RViz's
 
 from __future__ import annotations
 
 import logging
+import math
 from functools import cache, wraps
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from rosglass.comm.names import similar
 from rosglass.errors import Error
-from rosglass.qt import is_alive
-from rosglass.rviz.editors import make_editor
+from rosglass.qt import QtGui, is_alive
 from rosglass.rviz.host import pyqt, rviz
-from rosglass.rviz.registered_property import RegisteredProperty
+from rosglass.rviz.property_values import shown
+from rosglass.rviz.registered_properties import RegisteredProperty
+from rosglass.rviz.watch import class_of, is_a
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator, Sequence
 
-    from rosglass.rviz.property_sources import Sources
+    from rosglass.qml.session import Session
+    from rosglass.qml.tf_link import TfLink
     from rosglass.rviz.registered_properties import RegisteredProperties
 
-__all__ = ["PropertyTree", "given_to_rviz", "quiet", "take_out"]
+__all__ = [
+    "FIXED_FRAME",
+    "PropertyTree",
+    "Sources",
+    "child_properties",
+    "describe_properties",
+    "find_property",
+    "given_to_rviz",
+    "make_editor",
+    "quiet",
+    "read_property",
+    "take_out",
+    "write_property",
+]
+
+
+_LONGEST = 10_000
+_INT32 = (-(2**31), 2**31 - 1)
+#: What RViz keeps as text with its parts between semicolons, and the names of the parts.
+_PARTS = {"rviz::VectorProperty": "xyz", "rviz::QuaternionProperty": "xyzw"}
+_COLOUR = "rviz::ColorProperty"
+#: What tells how a display is, and cannot be changed.
+_STATUS = ("rviz::StatusList", "rviz::StatusProperty")
+
+
+def child_properties(item: Any) -> Iterator[Any]:
+    """Iterate over the properties below one, without displays and their status."""
+    for index in range(item.numChildren()):
+        child = item.childAt(index)
+        if class_of(child) not in _STATUS and not is_a(child, "rviz::Display"):
+            yield child
+
+
+def find_property(item: Any, path: str | Sequence[str], whose: str = "") -> Any:
+    """Return a property below another one.
+
+    Args:
+        item: The upper one.
+        path: Names with slashes between them, e.g. ``Offset/X``, or a list of names.
+        whose: Name of `item`, for the error.
+
+    Raises:
+        Error: There is none of this path; the error says which there are.
+    """
+    names = path if isinstance(path, str) else "/".join(map(str, path))
+    found = _below(item, names)
+    if found is None:
+        head = names.partition("/")[0]
+        known = [str(child.getName()) for child in child_properties(item)]
+        upper = next((c for c in child_properties(item) if str(c.getName()) == head), None)
+        if upper is not None and "/" in names:
+            known = [f"{head}/{child.getName()}" for child in child_properties(upper)]
+        hint = similar(names, known) or f"; there are: {', '.join(known) or 'none'}"
+        raise Error(f"{whose or item.getName()} has no property {names!r:.120}{hint}")
+    return found
+
+
+def _below(item: Any, path: str) -> Any:
+    # Names of topics and links have slashes of their own.
+    for child in child_properties(item):
+        name = str(child.getName())
+        if path == name:
+            return child
+        if path.startswith(f"{name}/"):
+            found = _below(child, path[len(name) + 1 :])
+            if found is not None:
+                return found
+    return None
+
+
+def read_property(item: Any) -> Any:
+    """Return the value of a property.
+
+    Returns:
+        Bool, int, float or text; colours as ``#rrggbb``, vectors and quaternions as dicts of x, y,
+        z and w, in RViz's order; None where it only holds others.
+    """
+    value, kind = item.getValue(), class_of(item)
+    if kind == _COLOUR:
+        parts = _split(value)
+        return "#{:02x}{:02x}{:02x}".format(*map(int, parts)) if len(parts) == 3 else str(value)
+    if kind in _PARTS:
+        return dict(zip(_PARTS[kind], _split(value), strict=False))
+    if isinstance(value, bool) or value is None:
+        return value
+    if isinstance(value, int):
+        return int(value)
+    if isinstance(value, float):
+        # RViz keeps 32 bits of each; these are the fewest digits that mean the same.
+        return float(str(np.float32(value)))
+    return str(value)
+
+
+def write_property(item: Any, value: Any, name: str = "") -> None:
+    """Change a property, as if it were done in the panel.
+
+    Args:
+        item: The property.
+        value: As :func:`read_property` gives it; colours also as ``QColor`` or by name, vectors as
+            lists.
+        name: What to call it in errors.
+
+    Raises:
+        Error: It cannot be changed, or holds no such value, or RViz keeps another one.
+    """
+    name = name or str(item.getName())
+    kind = class_of(item)
+    if item.getReadOnly() or kind in _STATUS:
+        raise Error(f"{name} cannot be changed; it is {read_property(item)!r}")
+    wanted, given = _convert(item, kind, value, name)
+    if item.getValue() == given:
+        return
+    item.setValue(given)
+    now = read_property(item)
+    if not _same(now, wanted):
+        raise Error(f"{name}: RViz does not take {shown(value)}, and has made it {shown(now)}")
+
+
+def describe_properties(item: Any, path: str = "") -> list[dict[str, Any]]:
+    """Return the properties below one as dicts.
+
+    Args:
+        item: The upper one.
+        path: Where it is; empty at the top.
+
+    Returns:
+        Of each `name`, `path` (for :func:`find_property`), `value`, `kind`, `description`,
+        `readOnly`, `hidden` and `properties`, those below it.
+    """
+    found = []
+    for child in child_properties(item):
+        name = str(child.getName())
+        here = f"{path}/{name}" if path else name
+        found.append(
+            {
+                "name": name,
+                "path": here,
+                "value": read_property(child),
+                "kind": _kind(child),
+                "description": " ".join(str(child.getDescription()).split()),
+                "readOnly": bool(child.getReadOnly()),
+                "hidden": bool(child.getHidden()),
+                "properties": describe_properties(child, here),
+            }
+        )
+    return found
+
+
+def _kind(item: Any) -> str:
+    """Return a word for what a property holds: ``bool``, ``int``, ``float``, ``color``, ..."""
+    kind = class_of(item).removeprefix("rviz::").removesuffix("Property").lower()
+    if kind:
+        return {"rostopic": "topic", "tfframe": "frame"}.get(kind, kind)
+    value = item.getValue()
+    names = {bool: "bool", int: "int", float: "float", str: "string"}
+    return names.get(type(value), "container")
+
+
+def _convert(item: Any, kind: str, value: Any, name: str) -> tuple[Any, Any]:
+    """Return a value as :func:`read_property` would give it, and as RViz takes it."""
+    if kind == _COLOUR:
+        return _colour(value, name)
+    if kind in _PARTS:
+        return _vector(value, _PARTS[kind], name)
+    now = item.getValue()
+    if now is None:
+        raise Error(f"{name} has no value of its own, only properties below it")
+    if isinstance(now, bool):
+        if not isinstance(value, bool):
+            raise Error(f"{name}: expected true or false, got {shown(value)}")
+        return value, value
+    if isinstance(now, (int, float)):
+        number = _number(value, name)
+        if isinstance(now, int):
+            if number != int(number) or not _INT32[0] <= number <= _INT32[1]:
+                raise Error(f"{name}: expected a whole number of 32 bits, got {shown(value)}")
+            return int(number), int(number)
+        return number, number
+    choices = _choices(item) if kind == "rviz::EnumProperty" else []
+    if choices and value not in choices:
+        raise Error(f"{name}: expected one of {', '.join(choices)}, got {shown(value)}")
+    if not isinstance(value, str) or len(value) > _LONGEST or not value.isprintable():
+        raise Error(f"{name}: expected a text of one line, got {shown(value)}")
+    return value, value
+
+
+def _choices(item: Any) -> list[str]:
+    """Return what can be chosen, which only the property's editor knows."""
+    widgets = pyqt("QtWidgets")
+    host = widgets.QWidget()
+    editor = item.createEditor(host, widgets.QStyleOptionViewItem())
+    found = isinstance(editor, widgets.QComboBox)
+    names = [str(editor.itemText(at)) for at in range(editor.count())] if found else []
+    host.deleteLater()
+    return names
+
+
+def _number(value: Any, name: str) -> float:
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        # Ogre ends the process at a place that is no number.
+        with np.errstate(over="ignore"):
+            if math.isfinite(value) and np.isfinite(np.float32(value)):
+                return float(value)
+    raise Error(f"{name}: expected a finite number, got {shown(value)}")
+
+
+def _colour(value: Any, name: str) -> tuple[str, str]:
+    parts = _split(value) if isinstance(value, str) and value.count(";") == 2 else []
+    if len(parts) == 3 and all(0 <= part <= 255 and part == int(part) for part in parts):
+        value = QtGui.QColor(*map(int, parts))
+    colour = QtGui.QColor(value) if isinstance(value, (str, QtGui.QColor)) else QtGui.QColor()
+    if not colour.isValid():
+        raise Error(f"{name}: expected a colour, e.g. '#ff8800' or 'orange', got {shown(value)}")
+    if colour.alpha() != 255:
+        raise Error(f"{name}: RViz keeps no transparency with a colour; set the property Alpha")
+    plain = (colour.red(), colour.green(), colour.blue())
+    return "#{:02x}{:02x}{:02x}".format(*plain), "; ".join(map(str, plain))
+
+
+def _vector(value: Any, names: str, name: str) -> tuple[dict[str, float], str]:
+    if isinstance(value, (list, tuple)) and len(value) == len(names):
+        value = dict(zip(names, value, strict=True))
+    if not isinstance(value, dict) or set(value) != set(names):
+        example = shown({part: int(part == "w") for part in names})
+        raise Error(f"{name}: expected {', '.join(names)}, e.g. {example}, got {shown(value)}")
+    parts = {part: _number(value[part], f"{name}/{part.upper()}") for part in names}
+    return parts, "; ".join(f"{number:.9g}" for number in parts.values())
+
+
+def _split(value: Any) -> list[float]:
+    try:
+        return [float(part) for part in str(value).split(";")]
+    except ValueError:
+        return []
+
+
+def _same(now: Any, wanted: Any) -> bool:
+    if isinstance(wanted, dict):
+        return isinstance(now, dict) and all(_same(now.get(key), wanted[key]) for key in wanted)
+    if isinstance(wanted, float) and isinstance(now, (int, float)):
+        return math.isclose(now, wanted, rel_tol=1e-5, abs_tol=1e-6)
+    return bool(now == wanted)
+
 
 _log = logging.getLogger("rosglass.rviz")
+#: As RViz's own displays call the fixed frame.
+FIXED_FRAME = "<Fixed Frame>"
+
+
+class Sources:
+    """Asks a session's node; knows nothing while there is none.
+
+    Args:
+        session: The session.
+        tell: Shows a text to who edits, e.g. in RViz's status bar.
+    """
+
+    def __init__(self, session: Session, tell: Callable[[str], Any]) -> None:
+        self._session, self._tell = session, tell
+        self._link: TfLink | None = None
+        self._linked: Any = None
+
+    def topics(self, type_name: str) -> list[str]:
+        """Return the topics of a type, of all types where it is empty."""
+        node = self._session.node
+        if node is None:
+            return []
+        wanted = type_name.replace("/msg/", "/")
+        try:
+            known = node.topics()
+        except Error as error:
+            _log.warning("topics cannot be listed: %s", error)
+            return []
+        names = {
+            name: {kind.replace("/msg/", "/") for kind in kinds} for name, kinds in known.items()
+        }
+        return sorted(name for name, kinds in names.items() if not wanted or wanted in kinds)
+
+    def frames(self, *, fixed: bool) -> list[str]:
+        """Return the frames that are known, before them the fixed one if that is asked for."""
+        self.listen()
+        known = sorted(self._link.buffer.tree()) if self._link is not None else []
+        return [FIXED_FRAME, *known] if fixed else known
+
+    def listen(self) -> None:
+        """Begin to receive frames, for a chooser that is to be opened."""
+        node = self._session.node
+        if node is not self._linked:
+            self.close()
+            self._linked = node
+            if node is not None:
+                from rosglass.qml.tf_link import TfLink  # noqa: PLC0415 - brings in the transforms
+
+                self._link = TfLink.join(self._session, node, "/", self)
+
+    def edit(self, model: RegisteredProperty, value: Any) -> None:
+        """Change a property for who has chosen a value; a refused one is told."""
+        try:
+            if not model.readOnly:
+                model.set(value)
+        except Error as error:
+            self.complain(f"{'/'.join(model.path)}: {error}")
+
+    def complain(self, text: str) -> None:
+        """Tell who edits what is wrong."""
+        _log.warning("property %s", text)
+        self._tell(text)
+
+    def close(self) -> None:
+        """Receive frames no longer; safe to call twice."""
+        link, self._link, self._linked = self._link, None, None
+        if link is not None:
+            link.leave(self)
+
+
+def make_editor(model: RegisteredProperty, parent: Any, sources: Sources) -> Any:
+    """Return the widget that edits a property; None where RViz's own will do.
+
+    Args:
+        model: The property.
+        parent: The widget that it is shown in.
+        sources: What choosers offer.
+    """
+    kind, options = model.kind.NAME, model.kind.options
+    if kind == "int":
+        return _spin_box(model, parent)
+    if kind == "enum":
+        return _combo_box(parent, list(options["choices"]), sources, model, editable=False)
+    if kind == "topic":
+        offered = sources.topics(options.get("messageType", ""))
+        return _combo_box(parent, offered, sources, model, editable=True)
+    if kind == "frame":
+        offered = sources.frames(fixed=options.get("includeFixedFrame", False))
+        return _combo_box(parent, offered, sources, model, editable=True)
+    if kind in {"color", "path"}:
+        return _line_with_button()(model, parent, sources)
+    return None
+
+
+def _spin_box(model: RegisteredProperty, parent: Any) -> Any:
+    box = pyqt("QtWidgets").QSpinBox(parent)
+    kind: Any = model.kind
+    box.setRange(kind.min, kind.max)
+    box.setSingleStep(kind.step)
+    box.setFrame(False)
+    return box
+
+
+def _combo_box(
+    parent: Any, offered: list[str], sources: Sources, model: RegisteredProperty, *, editable: bool
+) -> Any:
+    box = pyqt("QtWidgets").QComboBox(parent)
+    box.setFrame(False)
+    box.setEditable(editable)
+    box.addItems(offered)
+    if editable:
+        box.setInsertPolicy(pyqt("QtWidgets").QComboBox.NoInsert)
+        box.setEditText(str(model.get()))
+
+    def choose(text: str) -> None:
+        sources.edit(model, text)
+
+    box.textActivated.connect(choose)
+    return box
+
+
+@cache
+def _line_with_button() -> Any:
+    core, widgets = pyqt(), pyqt("QtWidgets")
+
+    class LineWithButton(widgets.QLineEdit):  # type: ignore[name-defined,misc]
+        """A text, and a button that opens a dialog to choose it with."""
+
+        def __init__(self, model: RegisteredProperty, parent: Any, sources: Sources) -> None:
+            super().__init__(parent)
+            self.setFrame(False)
+            action = self.addAction(
+                self.style().standardIcon(widgets.QStyle.SP_DirOpenIcon)
+                if model.kind.NAME == "path"
+                else _colour_icon(model),
+                widgets.QLineEdit.TrailingPosition,
+            )
+            window = self.window()
+            # The dialog takes the focus, which ends this editor.
+            action.triggered.connect(
+                lambda: core.QTimer.singleShot(0, lambda: _choose(model, window, sources))
+            )
+
+    return LineWithButton
+
+
+def _colour_icon(model: RegisteredProperty) -> Any:
+    gui = pyqt("QtGui")
+    picture = gui.QPixmap(16, 16)
+    picture.fill(gui.QColor(model.kind.saved(model.get())))
+    return gui.QIcon(picture)
+
+
+def _choose(model: RegisteredProperty, window: Any, sources: Sources) -> None:
+    widgets = pyqt("QtWidgets")
+    if model.kind.NAME == "color":
+        gui = pyqt("QtGui")
+        dialog = widgets.QColorDialog(gui.QColor(model.kind.saved(model.get())), window)
+        dialog.setOption(widgets.QColorDialog.ShowAlphaChannel)
+        dialog.colorSelected.connect(
+            lambda colour: sources.edit(model, colour.name(gui.QColor.HexArgb))
+        )
+    else:
+        dialog = widgets.QFileDialog(window, model.path[-1], str(model.get()))
+        dialog.setFileMode(widgets.QFileDialog.ExistingFile)
+        dialog.setNameFilter(model.kind.options.get("filter", "All files (*)"))
+        dialog.fileSelected.connect(lambda file: sources.edit(model, file))
+    dialog.setAttribute(pyqt().Qt.WA_DeleteOnClose)
+    dialog.open()
 
 
 def quiet(otherwise: Any = None) -> Callable[[Any], Any]:

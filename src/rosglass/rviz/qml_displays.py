@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.errors import Error
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot
 from rosglass.rviz.face import VARIANT, Face, given, switch_of, taking, text_of
-from rosglass.rviz.shown import shown
+from rosglass.rviz.property_values import shown
 
 if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime

@@ -9,8 +9,8 @@ from rosglass.errors import Error
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot
 from rosglass.rviz.face import Face, given, taking
 from rosglass.rviz.host import pyqt
+from rosglass.rviz.property_values import shown
 from rosglass.rviz.qt5 import QtGui, QtQuick
-from rosglass.rviz.shown import shown
 
 if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime

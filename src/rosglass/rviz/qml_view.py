@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 from rosglass.errors import Error
 from rosglass.qt import Property, QJSValue, QtCore, QtGui, Signal, Slot
 from rosglass.rviz.face import VARIANT, Face, given, place, taking, text_of
-from rosglass.rviz.shown import shown
-from rosglass.rviz.view import ViewMode
-from rosglass.rviz.view_settings import ViewSettings
+from rosglass.rviz.property_values import shown
+from rosglass.rviz.view import ViewMode, ViewSettings
 
 if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime

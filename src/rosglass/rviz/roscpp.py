@@ -1,23 +1,40 @@
-"""RViz's own node, made with roscpp before RViz would: so it has a name, and leaves Ctrl-C alone.
+"""RViz's own node, made with roscpp before RViz makes one, and the overlays' node beside it.
 
-RViz asks roscpp for a node of a name made up at random, whose Ctrl-C handler takes the place of
-Python's. Where roscpp is initialized already, RViz leaves it as it is; there are no bindings of it,
-so its C++ functions are called by their names in the library (Itanium C++ ABI, libstdc++'s
-``std::string``; https://docs.ros.org/en/noetic/api/roscpp/html/init_8h.html).
+RViz asks roscpp for a node of a random name, whose Ctrl-C handler takes the place of Python's.
+Where roscpp is initialized already, RViz leaves it as it is. roscpp has no Python bindings: its C++
+functions are called by their names in the library (Itanium C++ ABI, libstdc++'s ``std::string``;
+https://docs.ros.org/en/noetic/api/roscpp/html/init_8h.html).
 """
 
 from __future__ import annotations
 
 import ctypes
 import logging
+import os
 from typing import TYPE_CHECKING
 
+from rosglass.comm import anonymous_name
+from rosglass.errors import InvalidNameError
 from rosglass.rviz.cpp import cpp_function
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-__all__ = ["initialize", "is_initialized", "is_running", "node_name", "set_log_level", "shut_down"]
+    from rosglass.comm.node import Node
+    from rosglass.ros1.options import Ros1Options
+
+__all__ = [
+    "connect_beside_rviz",
+    "initialize",
+    "is_initialized",
+    "is_running",
+    "name_node",
+    "node_name",
+    "set_log_level",
+    "shared_arguments",
+    "shut_down",
+]
+
 
 _STRING = "NSt7__cxx1112basic_stringIcSt11char_traitsIcESaIcEEE"
 _INIT = f"_ZN3ros4initERiPPcRK{_STRING}j"
@@ -86,3 +103,49 @@ def set_log_level(level: int) -> None:
 def shut_down() -> None:
     """End RViz's node: it says goodbye to the master."""
     cpp_function("libroscpp", "_ZN3ros8shutdownEv")()
+
+
+_log = logging.getLogger("rosglass.rviz")
+
+
+def name_node(name: str, options: Ros1Options) -> None:
+    """Make RViz's node, unless the program has one of roscpp already.
+
+    Args:
+        name: Its name; empty for ``rviz`` with what makes it unique.
+        options: Its master, and what else it is told.
+    """
+    # Plugins of RViz may ask for it, too.
+    os.environ["ROS_MASTER_URI"] = options.master
+    if not is_initialized():
+        set_log_level(_log.getEffectiveLevel())
+        initialize(name or anonymous_name("rviz"), shared_arguments(options))
+
+
+def shared_arguments(options: Ros1Options) -> list[str]:
+    """Return what was told to both nodes, for each has a name of its own."""
+    told = options.arguments
+    words = [f"{old}:={new}" for old, new in told.rules]
+    words += [f"_{key}:={value}" for key, value in told.parameters.items()]
+    words += [f"__ns:={told.namespace}"] if told.namespace else []
+    words += [f"__hostname:={options.address}"] if options.address else []
+    return words
+
+
+def connect_beside_rviz(
+    url: str | None, name: str, namespace: str, arguments: Sequence[str] = ()
+) -> Node:
+    """Return the node of overlays, as :func:`rosglass.connect` does.
+
+    Raises:
+        InvalidNameError: It has the name of RViz's own.
+    """
+    from rosglass.connection import connect  # noqa: PLC0415 - not before someone connects
+
+    full = f"{namespace.rstrip('/')}/{name}"
+    if full == node_name():
+        raise InvalidNameError(
+            f"{full} is RViz's own node, which the master would end for a second one of its name; "
+            "give the overlays' node or RViz another name"
+        )
+    return connect(url, name, namespace, arguments=arguments)

@@ -13,13 +13,12 @@ from rosglass.qml.runtime import runtime_of
 from rosglass.qt import Property, QJSValue, QtCore, QtQml, Signal, Slot
 from rosglass.rviz.access import Access
 from rosglass.rviz.displays_access import Status
-from rosglass.rviz.face import VARIANT, given, place, switch_of, taking, text_of
+from rosglass.rviz.face import VARIANT, given, place, spelled, switch_of, taking, text_of
+from rosglass.rviz.property_values import shown
 from rosglass.rviz.qml_displays import QmlDisplays, path_of
 from rosglass.rviz.qml_tools import PROVIDER, QmlToolManager, ToolIcons
 from rosglass.rviz.qml_view import QmlView
 from rosglass.rviz.registered_properties import RegisteredProperties
-from rosglass.rviz.shown import shown
-from rosglass.rviz.spelling import spelled
 from rosglass.rviz.window import config_file
 
 if TYPE_CHECKING:

@@ -1,7 +1,7 @@
 """RViz's camera, moved as hector_rviz_plugins' view controller moves it.
 
-It steers RViz's own views, ``rviz/Orbit`` in 3D and ``rviz/TopDownOrtho`` in 2D, through their
-properties, so that the mouse keeps working as in any RViz.
+It moves RViz's own views, ``rviz/Orbit`` in 3D and ``rviz/TopDownOrtho`` in 2D, through their
+properties, so that the mouse works as in any RViz.
 """
 
 from __future__ import annotations
@@ -10,24 +10,363 @@ import enum
 import logging
 import math
 import time
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar, overload
 
+from rosglass.comm.names import similar
 from rosglass.errors import Error
 from rosglass.qt import QtCore, Signal
-from rosglass.rviz.current_view import FLAT, ORBIT, CurrentView
-from rosglass.rviz.orbit import STEEPEST, Orbit, Place, Point, ease, shortest_turn
-from rosglass.rviz.shown import shown
-from rosglass.rviz.view_settings import ViewSettings
+from rosglass.ros1.names import expand
+from rosglass.rviz.camera import Camera
+from rosglass.rviz.host import as_pyside
+from rosglass.rviz.orbit import NEAREST, STEEPEST, Orbit, Place, Point, ease, shortest_turn
+from rosglass.rviz.plugins import VIEW, declared
+from rosglass.rviz.property_values import shown
+from rosglass.rviz.qt5 import QtCore as Qt5Core
+from rosglass.rviz.qt5 import QtWidgets
+from rosglass.rviz.registered_properties import RegisteredProperties
+from rosglass.rviz.trackers import FIXED_FRAME
+from rosglass.rviz.watch import Hook
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
-    from rosglass.rviz.frames import Frames
+    from rosglass.rviz.registered_properties import RegisteredProperty
+    from rosglass.rviz.trackers import Frames
     from rosglass.rviz.window import Window
 
-__all__ = ["View", "ViewMode"]
+__all__ = ["FLAT", "ORBIT", "CurrentView", "View", "ViewMode", "ViewSettings", "Views"]
+
 
 _log = logging.getLogger("rosglass.rviz")
+_T = TypeVar("_T", bool, float, str)
+
+
+class _Setting(Generic[_T]):
+    """One setting, an attribute of :class:`ViewSettings`.
+
+    Args:
+        kind: Of registered properties.
+        name: In the panel and in files.
+        default: Where neither a file nor a program says otherwise.
+        about: What it does, for people.
+        check: Raises an Error for what is not valid, besides what the kind refuses.
+        options: Of the kind.
+    """
+
+    def __init__(
+        self,
+        kind: str,
+        name: str,
+        default: _T,
+        about: str,
+        check: Callable[[_T], object] = bool,
+        **options: Any,
+    ) -> None:
+        self.kind, self.name, self.about, self.options = kind, name, about, options
+        self.default: _T = default
+        self._check: Callable[[_T], object] = check
+
+    @overload
+    def __get__(self, settings: None, kind: type[ViewSettings]) -> _Setting[_T]: ...
+
+    @overload
+    def __get__(self, settings: ViewSettings, kind: type[ViewSettings]) -> _T: ...
+
+    def __get__(self, settings: ViewSettings | None, kind: type[ViewSettings]) -> _T | _Setting[_T]:
+        if settings is None:
+            return self
+        value: _T = self.of(settings).get()
+        return value
+
+    def __set__(self, settings: ViewSettings, value: _T) -> None:
+        try:
+            self.give(settings, value)
+        except Error as error:
+            raise Error(f"{self.name}: {error}") from None
+
+    def give(self, settings: ViewSettings, value: object) -> None:
+        """Set it, for a program; the error does not name it.
+
+        Raises:
+            Error: It cannot be that.
+        """
+        try:
+            read = self.of(settings).kind.read(value)
+            self._check(read)
+        except Error:
+            if "max" not in self.options:
+                raise
+            low, high = self.options["min"], self.options["max"]
+            raise Error(f"expected a number from {low:g} to {high:g}, got {shown(value)}") from None
+        settings.by_program[self.name] = read
+        self.of(settings).set(read)
+
+    def of(self, settings: ViewSettings) -> RegisteredProperty:
+        """Return the property with its value, and the signal that it is another."""
+        return settings.properties.properties[self.name]
+
+
+class ViewSettings:
+    """How the camera is moved, and by whom besides the mouse.
+
+    Attributes are read and set::
+
+        app.view.settings.animation_duration = 0.5
+
+    Raises:
+        Error: One is set to what it cannot be; the error says what it can.
+    """
+
+    animation_duration = _Setting(
+        "float",
+        "Animation Duration",
+        1.0,
+        "Seconds that a movement takes; 0 jumps.",
+        min=0.0,
+        max=60.0,
+        step=0.1,
+    )
+    tracking_gain = _Setting(
+        "float",
+        "Tracking Gain",
+        3.0,
+        "How quickly the camera follows the tracked frame, in 1/s: high ones follow at once, "
+        "low ones smoothly.",
+        min=0.0,
+        max=1000.0,
+        step=0.5,
+    )
+    keys = _Setting(
+        "bool",
+        "Keyboard Navigation",
+        True,
+        "Whether arrow keys shift the view, twice as fast with Shift, and Ctrl+D switches between "
+        "2D and 3D, while the 3D view has the keys.",
+    )
+    speed = _Setting(
+        "float",
+        "Movement Speed",
+        4.0,
+        "Metres per second while an arrow key is held.",
+        min=0.0,
+        max=1000.0,
+    )
+    topics = _Setting(
+        "bool", "Enable Topics", True, "Whether robots are told the mode and the tracked frame."
+    )
+    services = _Setting(
+        "bool", "Enable Services", True, "Whether robots may move the camera by services."
+    )
+    namespace = _Setting(
+        "string",
+        "Namespace",
+        "~hector_view_controller",
+        "Where topics and services are: a name of ROS, of which ~ stands for RViz's node.",
+        lambda name: expand(name, "rviz", "/"),
+    )
+
+    def __init__(self) -> None:
+        #: As the panel shows them.
+        self.properties = RegisteredProperties()
+        #: What has been set by Python or QML, by name.
+        self.by_program: dict[str, Any] = {}
+        for found in vars(ViewSettings).values():
+            if isinstance(found, _Setting):
+                self.properties.register(
+                    found.kind,
+                    found.name,
+                    default=found.default,
+                    description=found.about,
+                    **found.options,
+                )
+
+    def save(self) -> dict[str, Any]:
+        """Return all values by name, as a file keeps them."""
+        return self.properties.save()
+
+    def load(self, saved: dict[str, Any]) -> None:
+        """Take what a file has; what it does not have is as a program has set it, or as at first.
+
+        Args:
+            saved: Values by name, which may be text; one that does not fit is told in the log.
+        """
+        for setting in vars(ViewSettings).values():
+            if isinstance(setting, _Setting):
+                found, name = setting.of(self), setting.name
+                value = self.by_program.get(name, setting.default)
+                if name in saved:
+                    try:
+                        value = found.kind.restore(saved[name])
+                    except Error as error:
+                        _log.warning("the view's %s in the file: %s", name.lower(), error)
+                found.set(value)
+
+
+#: RViz's class of the view in 3D.
+ORBIT = "rviz/Orbit"
+#: RViz's class of the view from above, without perspective.
+FLAT = "rviz/TopDownOrtho"
+_TARGET = "Target Frame"
+_INVERTED = "Invert Z Axis"
+_NAMES: dict[str, tuple[str, ...]] = {
+    ORBIT: (
+        *(f"Focal Point/{axis}" for axis in "XYZ"),
+        "Distance",
+        "Yaw",
+        "Pitch",
+        _INVERTED,
+        "Field of View",
+    ),
+    FLAT: ("X", "Y", "Scale", "Angle"),
+}
+#: Radians, of RViz's perspective views unless they are told otherwise.
+_FIELD_OF_VIEW = math.pi / 4
+
+
+class CurrentView(QtCore.QObject):
+    """The view that RViz shows, whichever it is, as an `Orbit`.
+
+    Args:
+        window: RViz.
+    """
+
+    #: Another view is the current one; whether by :meth:`write`.
+    changed = Signal(bool)
+
+    def __init__(self, window: Window) -> None:
+        super().__init__()
+        self._window = window
+        self._manager: Any = window.manager.getViewManager()
+        self._properties: dict[str, Any] = {}
+        self._own = False
+        #: What is seen from above has no height: that of what was looked at before.
+        self._height = 0.0
+        self._field_of_view = _FIELD_OF_VIEW
+        wrapped = as_pyside(self._manager, QtCore.QObject)
+        Qt5Core.QObject.connect(wrapped, Qt5Core.SIGNAL("currentChanged()"), self._changed)
+
+    @property
+    def kind(self) -> str:
+        """Its class, as RViz names it."""
+        return str(self._manager.getCurrent().getClassId())
+
+    @property
+    def state(self) -> tuple[Any, ...]:
+        """What its properties say: class, target frame, and whatever moves the camera.
+
+        Of :data:`ORBIT`, the focus follows, of :data:`FLAT` its x and y.
+        """
+        kind = self.kind
+        return (kind, self._get(_TARGET), *(self._get(name) for name in _NAMES.get(kind, ())))
+
+    def read(self) -> Orbit:
+        """Return what is seen."""
+        kind = self.kind
+        if kind not in _NAMES or self._get(_TARGET) != FIXED_FRAME:
+            return self._seen(kind)
+        if kind == FLAT:
+            return self._from_above(self._get("X"), self._get("Y"))
+        x, y, z, distance, yaw, pitch, inverted, self._field_of_view = (
+            self._get(name) for name in _NAMES[ORBIT]
+        )
+        sign = -1 if inverted else 1
+        return Orbit(Point(x, y, z), distance, sign * yaw, sign * pitch)
+
+    def write(self, where: Orbit, kind: str) -> None:
+        """Show something.
+
+        Args:
+            where: What.
+            kind: :data:`ORBIT`, or :data:`FLAT`, which shows it from above.
+        """
+        if self.kind != kind:
+            self._use(kind)
+        if self._get(_TARGET) != FIXED_FRAME:
+            self._set(_TARGET, FIXED_FRAME)
+        if kind == FLAT:
+            self._height = where.focus.z
+            scale = self._pixels_at_one_metre() / where.distance
+            angle = _positive(where.yaw + math.pi / 2)
+            self._set_all(FLAT, where.focus.x, where.focus.y, scale, angle)
+        else:
+            sign = -1 if self._get(_INVERTED) else 1
+            yaw, pitch = _positive(sign * where.yaw), sign * where.pitch
+            self._set_all(ORBIT, *where.focus, where.distance, yaw, pitch)
+
+    def close(self) -> None:
+        """Let go of what is RViz's."""
+        self._properties.clear()
+
+    def _from_above(self, x: float, y: float) -> Orbit:
+        distance = self._pixels_at_one_metre() / max(self._get("Scale"), 1e-9)
+        yaw = self._get("Angle") - math.pi / 2
+        return Orbit(Point(x, y, self._height), distance, yaw, STEEPEST)
+
+    def _seen(self, kind: str) -> Orbit:
+        """Return what the camera itself says, for views of any kind and of any frame."""
+        camera = Camera(self._window)
+        eye = Point(*camera.eye)
+        if kind == FLAT:
+            return self._from_above(eye.x, eye.y)
+        width, height, ratio = self._window.view_size()
+        ahead = camera.unproject(width / ratio / 2, height / ratio / 2, 0.9)
+        if ahead is None:
+            return Orbit.between(eye, Point(0.0, 0.0, 0.0))
+        way = Point(*ahead) - eye
+        view = self._manager.getCurrent()
+        names = [str(view.childAt(at).getName()) for at in range(view.numChildren())]
+        # As RViz does when it goes on with another view: as far away as the frame it is in.
+        distance = self._get("Distance") if "Distance" in names else math.hypot(*eye)
+        part = max(distance, NEAREST) / (math.hypot(*way) or 1.0)
+        return Orbit.between(eye, eye.towards(ahead, part))
+
+    def _use(self, kind: str) -> None:
+        self._own = True
+        try:
+            self._manager.setCurrentViewControllerType(kind)
+        finally:
+            self._own = False
+
+    def _changed(self) -> None:
+        self._properties.clear()
+        # RViz's panels are told later which properties are hidden, by their addresses, and crash
+        # when another view has come by then and this one is gone.
+        for child in self._window.widget.findChildren(QtWidgets.QTreeView):
+            if child.metaObject().className() == "rviz::PropertyTreeWidget":
+                Qt5Core.QCoreApplication.sendPostedEvents(child, Qt5Core.QEvent.MetaCall)
+        if not self._own:
+            self._height = 0.0
+        self.changed.emit(self._own)
+
+    def _pixels_at_one_metre(self) -> float:
+        """Return how many pixels a metre takes for the camera in 3D, one metre away."""
+        return max(self._window.view_size()[1], 1) / (2 * math.tan(self._field_of_view / 2))
+
+    def _property(self, name: str) -> Any:
+        found = self._properties.get(name)
+        if found is None:
+            found = self._manager.getCurrent()
+            for part in name.split("/"):
+                found = found.subProp(part)
+            self._properties[name] = found
+        return found
+
+    def _get(self, name: str) -> Any:
+        return self._property(name).getValue()
+
+    def _set(self, name: str, value: Any) -> None:
+        self._property(name).setValue(value)
+
+    def _set_all(self, kind: str, *values: float) -> None:
+        for name, value in zip(_NAMES[kind], values, strict=False):
+            self._set(name, value)
+
+
+def _positive(angle: float) -> float:
+    """Return an angle from 0 to 2 pi, as RViz's own mouse leaves it."""
+    return math.remainder(angle, math.tau) % math.tau
+
+
 #: What the camera is set to by :meth:`View.reset`.
 _START = Orbit.between(Point(4.0, 0.0, 3.0), Point(0.0, 0.0, 0.0))
 #: Metres from the fixed frame's origin; RViz's numbers have 32 bits, and its renderer crashes
@@ -434,3 +773,122 @@ def _is_shifted(before: tuple[Any, ...], now: tuple[Any, ...]) -> bool:
     """Return whether what is looked at is elsewhere, by the states of the same view."""
     axes = 2 if now[0] == FLAT else 3
     return before[2 : 2 + axes] != now[2 : 2 + axes]
+
+
+_LONGEST = 1000
+
+
+class Views(QtCore.QObject):
+    """The views of an RViz.
+
+    Args:
+        window: RViz.
+    """
+
+    #: Another kind of view is shown.
+    kind_changed = Signal()
+    #: Views were saved, removed or renamed.
+    saved_changed = Signal()
+
+    def __init__(self, window: Window) -> None:
+        super().__init__()
+        self._manager = window.manager.getViewManager()
+        self._told = (self.kind, self.saved)
+        self._scheduled = False
+        self._hook = Hook(self._on_change)
+        self._hook.watch(self._manager, "currentChanged()", "configChanged()")
+
+    @property
+    def kinds(self) -> list[str]:
+        """Ids of the kinds that there are, e.g. ``rviz/Orbit``."""
+        return list(declared(VIEW))
+
+    @property
+    def kind(self) -> str:
+        """Id of the kind that is shown."""
+        return str(self._manager.getCurrent().getClassId())
+
+    @kind.setter
+    def kind(self, kind: str) -> None:
+        # RViz crashes at one that it does not know.
+        if kind not in declared(VIEW):
+            raise Error(
+                f"there is no kind of view {shown(kind)}{self._hint(kind)}; "
+                f"there are {', '.join(self.kinds)}"
+            )
+        if kind != self.kind:
+            self._manager.setCurrentViewControllerType(kind)
+        self.settle()
+
+    @property
+    def saved(self) -> list[str]:
+        """Names of the saved views, as in the Views panel; several may have the same."""
+        manager = self._manager
+        return [str(manager.getViewAt(at).getName()) for at in range(manager.getNumViews())]
+
+    def save(self, name: str) -> None:
+        """Save the view that is shown, in place of one of this name.
+
+        Raises:
+            Error: It is no name.
+        """
+        if not (isinstance(name, str) and name.strip() and name.isprintable()):
+            raise Error(f"expected a name for the view, a text of one line, got {shown(name)}")
+        if len(name) > _LONGEST:
+            raise Error(f"expected a name of at most {_LONGEST} characters")
+        if name in self.saved:
+            self._manager.takeAt(self.saved.index(name)).deleteLater()
+        self._manager.copyCurrentToList()
+        self._manager.getViewAt(self._manager.getNumViews() - 1).setName(name)
+        self.settle()
+
+    def show(self, name: str | int) -> None:
+        """Show a saved view.
+
+        Args:
+            name: Its name, or its place among the saved ones.
+
+        Raises:
+            Error: There is none of this name.
+        """
+        self._manager.setCurrentFrom(self._manager.getViewAt(self._index(name)))
+        self.settle()
+
+    def remove(self, name: str | int) -> None:
+        """Remove a saved view; see :meth:`show`.
+
+        Raises:
+            Error: There is none of this name.
+        """
+        self._manager.takeAt(self._index(name)).deleteLater()
+        self.settle()
+
+    def settle(self) -> None:
+        """Tell what has changed since it was told last."""
+        self._scheduled = False
+        (kind, saved), self._told = self._told, (self.kind, self.saved)
+        if kind != self._told[0]:
+            self.kind_changed.emit()
+        if saved != self._told[1]:
+            self.saved_changed.emit()
+
+    def _hint(self, kind: object) -> str:
+        if not isinstance(kind, str) or not kind:
+            return ""
+        base = kind.lower().rpartition("/")[2]
+        like = [one for one in self.kinds if one.lower().endswith("/" + base)]
+        return f"; did you mean {like[0]}?" if like else similar(kind, self.kinds)
+
+    def _index(self, name: Any) -> int:
+        saved = self.saved
+        if isinstance(name, str) and name in saved:
+            return saved.index(name)
+        if isinstance(name, int) and not isinstance(name, bool) and 0 <= name < len(saved):
+            return name
+        there = f"saved are {', '.join(map(repr, saved))}" if saved else "none is saved yet"
+        raise Error(f"there is no saved view {shown(name)}; {there}")
+
+    def _on_change(self) -> None:
+        if not self._scheduled:
+            self._scheduled = True
+            QtCore.QTimer.singleShot(0, self.settle)

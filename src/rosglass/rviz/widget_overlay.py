@@ -2,27 +2,286 @@
 
 from __future__ import annotations
 
+import logging
+import math
+import os
+import re
 import weakref
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from rosglass.errors import Error
-from rosglass.qt import is_alive
-from rosglass.rviz.canvas import Canvas
-from rosglass.rviz.events import BUTTONS, DRAG, KEYS, MOUSE, PRESS, position, release_outside
-from rosglass.rviz.guard import guarded
-from rosglass.rviz.overlay import Overlay
+from rosglass.qml.places import locate
+from rosglass.qt import Signal, is_alive
+from rosglass.rviz.input import BUTTONS, DRAG, KEYS, MOUSE, PRESS, position, release_outside
+from rosglass.rviz.overlay import Overlay, guarded
 from rosglass.rviz.qt5 import QtCore, QtGui, QtWidgets
-from rosglass.rviz.style_sheet import StyleSheet
+from rosglass.rviz.tiles import Rect
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from rosglass.rviz.window import Window
 
-__all__ = ["WidgetOverlay", "make_widget"]
+__all__ = ["Canvas", "StyleSheet", "WidgetOverlay", "make_widget", "read_style_sheet"]
+
+
+#: Rectangles that are painted one by one; of more, what is around them is.
+_MOST_RECTS = 12
+
+
+class Canvas(QtWidgets.QGraphicsView):  # type: ignore[misc]
+    """A view of a scene that is seen nowhere, though Qt takes it for visible.
+
+    Only a visible view hears which part of an item has changed: the scene's own signal names the
+    whole item, here the widget that fills everything.
+
+    Args:
+        scene: The scene.
+        root: The widget that fills it.
+    """
+
+    #: Something looks another way now.
+    stale = Signal()
+
+    def __init__(self, scene: Any, root: Any) -> None:
+        super().__init__(scene)
+        self._root = root
+        #: The picture: shape (height, width), each pixel 0xAARRGGBB with premultiplied colours.
+        self.pixels: NDArray[np.uint32] = np.zeros((0, 0), np.uint32)
+        self._stale = QtGui.QRegion()
+        self._painting = False
+        self.setAttribute(QtCore.Qt.WA_DontShowOnScreen)
+        self.setAttribute(QtCore.Qt.WA_ShowWithoutActivating)
+        # A program may end with its last window.
+        self.setAttribute(QtCore.Qt.WA_QuitOnClose, False)
+        for part in (self, self.viewport()):
+            part.setAttribute(QtCore.Qt.WA_OpaquePaintEvent)
+            part.setAttribute(QtCore.Qt.WA_NoSystemBackground)
+        self.setFocusPolicy(QtCore.Qt.NoFocus)
+        self.setInteractive(False)
+        self.setFrameShape(QtWidgets.QFrame.NoFrame)
+        self.setHorizontalScrollBarPolicy(QtCore.Qt.ScrollBarAlwaysOff)
+        self.setVerticalScrollBarPolicy(QtCore.Qt.ScrollBarAlwaysOff)
+        self.setAlignment(QtCore.Qt.AlignLeft | QtCore.Qt.AlignTop)
+        self.setRenderHint(QtGui.QPainter.Antialiasing)
+
+    def fit(self, width: int, height: int, ratio: float) -> None:
+        """Set the size; all of it is painted next time.
+
+        Args:
+            width: Pixels.
+            height: Pixels.
+            ratio: Pixels for one unit of the scene.
+        """
+        own = self.devicePixelRatioF()
+        self.pixels = np.zeros((height, width), np.uint32)
+        self.setTransform(QtGui.QTransform.fromScale(ratio / own, ratio / own))
+        self.resize(math.ceil(width / own), math.ceil(height / own))
+        self.show()
+        self._stale = QtGui.QRegion(self.viewport().rect())
+
+    def paintEvent(self, event: Any) -> None:  # noqa: N802 - Qt's
+        """Take note of what Qt would have painted now, unless it is painted."""
+        if self._painting:
+            super().paintEvent(event)
+        else:
+            self._stale += event.region()
+            self.stale.emit()
+
+    def paint(self) -> list[Rect]:
+        """Paint what has changed, and return where that is in :attr:`pixels`."""
+        everything, own = QtGui.QRegion(self.viewport().rect()), self.devicePixelRatioF()
+        stale, self._stale = self._stale & everything, QtGui.QRegion()
+        if stale.isEmpty():
+            return []
+        if own != round(own) or self._shadows_are_larger():
+            stale = everything
+        elif stale.rectCount() > _MOST_RECTS:
+            stale = QtGui.QRegion(stale.boundingRect())
+        # Qt rounds what is exposed of widgets, and would leave out a row at the edge.
+        more = math.ceil(self.transform().m11()) + 1
+        around = QtGui.QRegion()
+        for rect in stale.rects():
+            around += rect.adjusted(-more, -more, more, more)
+        picture = _scratch(self.pixels.shape, own)
+        self._render(around & everything, picture)
+        words = np.frombuffer(picture.constBits(), np.uint32).reshape(self.pixels.shape)
+        rects = [self._in_pixels(rect, own) for rect in stale.rects()]
+        for rect in rects:
+            place = slice(rect.top, rect.bottom), slice(rect.left, rect.right)
+            self.pixels[place] = words[place]
+        return rects
+
+    def _render(self, region: Any, picture: Any) -> None:
+        # Shadows would be elsewhere if it were drawn elsewhere than where it is.
+        at = region.boundingRect().topLeft()
+        painter = QtGui.QPainter(picture)
+        painter.setCompositionMode(QtGui.QPainter.CompositionMode_Source)
+        painter.fillRect(region.boundingRect(), QtCore.Qt.transparent)
+        painter.end()
+        self._painting = True
+        try:
+            self.viewport().render(picture, at, region, QtWidgets.QWidget.RenderFlags())
+        finally:
+            self._painting = False
+
+    def _shadows_are_larger(self) -> bool:
+        """Return whether effects may reach further than Qt knows: it does not scale them down."""
+        if self.transform().m11() >= 1:
+            return False
+        return self._root.findChild(QtWidgets.QGraphicsEffect) is not None
+
+    def _in_pixels(self, rect: Any, own: float) -> Rect:
+        height, width = self.pixels.shape
+        return Rect(
+            math.floor(rect.left() * own),
+            math.floor(rect.top() * own),
+            min(math.ceil((rect.left() + rect.width()) * own), width),
+            min(math.ceil((rect.top() + rect.height()) * own), height),
+        )
+
+
+@lru_cache(maxsize=1)
+def _scratch(shape: tuple[int, int], ratio: float) -> Any:
+    """Return the picture of a size that all canvases paint into before they take what they need."""
+    picture = QtGui.QImage(shape[1], shape[0], QtGui.QImage.Format_ARGB32_Premultiplied)
+    picture.setDevicePixelRatio(ratio)
+    return picture
+
+
+_log = logging.getLogger("rosglass.rviz")
+_URL = re.compile(r"""url\(\s*(["']?)([^"')]+)\1\s*\)""")
+_MAX_BYTES = 1 << 20
+#: Milliseconds after a change of the file: editors write in several steps.
+_DEBOUNCE = 80
+
+
+def read_style_sheet(source: str) -> tuple[str, Path | None]:
+    """Return a style sheet, and the file that it was read from; None where it is written out.
+
+    Args:
+        source: Path of a ``.qss`` file, ``package://package/file.qss``, or the style sheet itself.
+            Relative ``url()`` in a file are taken from the file's folder.
+
+    Raises:
+        Error: The file is missing, too large, or no text; its braces do not match.
+    """
+    if "{" in source or not source.strip():
+        _check(source, "style sheet")
+        return source, None
+    path = locate(source.strip())
+    try:
+        size = path.stat().st_size
+        if size > _MAX_BYTES:
+            raise Error(f"style sheet {path}: {size} bytes are more than a megabyte")
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise Error(f"style sheet {source}: {why}") from None
+    _check(text, f"style sheet {path}")
+    return _URL.sub(lambda match: _absolute(match, path.parent), text), path
+
+
+def _absolute(match: re.Match[str], folder: Path) -> str:
+    url = match[2].strip()
+    if url.startswith(":") or os.path.isabs(url):  # noqa: PTH117 - a URL, no path
+        return match[0]
+    if url.startswith("package://"):
+        return f'url("{locate(url)}")'
+    return f'url("{folder / url}")'
+
+
+def _check(text: str, what: str) -> None:
+    """Find what Qt would only print."""
+    bare = re.sub(r"/\*.*?\*/", lambda m: "\n" * m[0].count("\n"), text, flags=re.DOTALL)
+    depth = 0
+    for number, line in enumerate(bare.split("\n"), 1):
+        for letter in line:
+            depth += (letter == "{") - (letter == "}")
+            if depth not in (0, 1):
+                raise Error(f"{what}:{number}: this {letter!r} has no counterpart")
+    if depth:
+        raise Error(f"{what}: the last '{{' is not closed")
+
+
+class StyleSheet(QtCore.QObject):  # type: ignore[misc]
+    """A style sheet in use, read anew when its file changes.
+
+    Args:
+        name: Of the overlay, for messages.
+        use: Called with the text.
+        failed: Called with what is wrong.
+    """
+
+    def __init__(
+        self, name: str, use: Callable[[str], None], failed: Callable[[str], None]
+    ) -> None:
+        super().__init__()
+        self._name, self._use, self._failed = name, use, failed
+        #: As it was given.
+        self.source = ""
+        #: Whether the file is watched.
+        self.watch = False
+        self._path: Path | None = None
+        self._watcher: Any = None
+        self._pause = QtCore.QTimer()
+        self._pause.setSingleShot(True)
+        self._pause.setInterval(_DEBOUNCE)
+        self._pause.timeout.connect(self._read)
+
+    def use(self, source: str, *, watch: bool = False, strict: bool = False) -> None:
+        """Use another one.
+
+        Args:
+            source: See :func:`read_style_sheet`.
+            watch: Whether to read the file anew when it changes.
+            strict: Whether to raise what is wrong, instead of telling it.
+
+        Raises:
+            Error: Only if `strict`.
+        """
+        self.source, self.watch = source, watch
+        self._stop_watching()
+        self._read(strict=strict)
+        if watch and self._path is not None:
+            # Editors replace the file; its folder tells of that.
+            self._watcher = QtCore.QFileSystemWatcher([str(self._path), str(self._path.parent)])
+            self._watcher.fileChanged.connect(self._soon)
+            self._watcher.directoryChanged.connect(self._soon)
+
+    def _soon(self, path: str) -> None:
+        del path
+        self._pause.start()
+
+    def _read(self, *, strict: bool = False) -> None:
+        try:
+            text, self._path = read_style_sheet(self.source)
+        except Error as error:
+            if strict:
+                raise
+            _log.error("overlay %s: %s", self._name, error)
+            self._failed(str(error))
+            return
+        if self._watcher is not None and str(self._path) not in self._watcher.files():
+            self._watcher.addPath(str(self._path))
+        self._use(text)
+
+    def _stop_watching(self) -> None:
+        watcher, self._watcher = self._watcher, None
+        if watcher is not None:
+            watcher.deleteLater()
+
+    def close(self) -> None:
+        """Watch nothing any longer."""
+        self._pause.stop()
+        self._stop_watching()
+
 
 _E = QtCore.QEvent
 #: A widget with this dynamic property, or below one, leaves the wheel to what is below.

@@ -1,19 +1,63 @@
-"""Kinds of registered properties: which values each takes, and how a ``.rviz`` file keeps them."""
+"""Which values registered properties take, and how ``.rviz`` files keep values of any shape."""
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from rosglass.errors import Error
-from rosglass.qt import QtGui
-from rosglass.rviz.shown import shown
+from rosglass.errors import ConversionError, Error
+from rosglass.qt import QtCore, QtGui
 
-__all__ = ["KINDS", "Kind"]
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+__all__ = [
+    "KINDS",
+    "Kind",
+    "from_config",
+    "merged",
+    "plain_config",
+    "shown",
+    "to_config",
+    "writable",
+]
+
+
+_MAX_SHOWN, _MAX_SHOWN_DEPTH = 80, 4
+
+
+def shown(value: object) -> str:
+    """Return a value as JavaScript writes it, in one line of at most 80 characters."""
+    text = _shown_text(value, 0)
+    return text if len(text) <= _MAX_SHOWN else f"{text[: _MAX_SHOWN - 3]}..."
+
+
+def _shown_text(value: object, depth: int) -> str:
+    if value is None:
+        return "null"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float) and not math.isfinite(value):
+        return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
+    if isinstance(value, (dict, list, tuple)) and depth >= _MAX_SHOWN_DEPTH:
+        return "..."
+    if isinstance(value, dict):
+        # No more of it than can be shown.
+        parts = [f"{key}: {_shown_text(value[key], depth + 1)}" for key in list(value)[:_MAX_SHOWN]]
+        return f"{{{', '.join(parts)}}}"
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(_shown_text(item, depth + 1) for item in value[:_MAX_SHOWN])}]"
+    if isinstance(value, QtGui.QColor):
+        return str(value.name())
+    if isinstance(value, QtCore.QObject):
+        return str(getattr(value, "CALLED", "") or value.metaObject().className())
+    return repr(value)
+
 
 _INT32 = (-(2**31), 2**31 - 1)
 _TOPIC = re.compile(r"([~/]?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*|/)?\Z")
@@ -377,3 +421,130 @@ KINDS: dict[str, type[Kind]] = {
         _Quaternion,
     )
 }
+
+
+_INT = re.compile(r"[-+]?[0-9]+\Z")
+_FLOAT = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\Z")
+_WORDS: dict[str, Any] = {
+    "true": True,
+    "false": False,
+    "null": None,
+    "~": None,
+    ".inf": math.inf,
+    "-.inf": -math.inf,
+    ".nan": math.nan,
+    "{}": {},
+    "[]": [],
+}
+_WANTED = "null, true, false, a number, a text, a list or a map of these"
+_DEEPEST = 50
+#: What YAML has no way to write, or what would not come back as it was.
+_UNWRITABLE = re.compile(r"[\0-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff\ufeff\u2028\u2029]")
+
+
+def writable(value: Any, path: str) -> Any:
+    """Return a value with lists for tuples, after a look whether a file can keep it.
+
+    Raises:
+        ConversionError: It cannot; the error says where in it.
+    """
+    return _writable(value, path, 0)
+
+
+def _writable(value: Any, path: str, depth: int) -> Any:
+    if depth > _DEEPEST:
+        raise ConversionError(path[:60], "more", f"values nested at most {_DEEPEST} deep")
+    if isinstance(value, dict):
+        for key in value:
+            if not isinstance(key, str) or _UNWRITABLE.search(key):
+                raise ConversionError(path, key, "names that are texts without control characters")
+        items = value.items()
+        return {key: _writable(inner, f"{path}.{key}", depth + 1) for key, inner in items}
+    if isinstance(value, (list, tuple)):
+        return [_writable(inner, f"{path}[{at}]", depth + 1) for at, inner in enumerate(value)]
+    if value is None or isinstance(value, (bool, int, float)):
+        return value
+    if isinstance(value, str) and not _UNWRITABLE.search(value):
+        return value
+    raise ConversionError(path, value, _WANTED)
+
+
+def to_config(config: Any, value: Any, *, plain: bool = False) -> None:
+    """Write a value to RViz's ``Config``.
+
+    Args:
+        config: RViz's; as yet empty.
+        value: From :func:`writable`.
+        plain: Write texts as they are, for a reader who knows what is a text.
+    """
+    if isinstance(value, dict) and value:
+        for key, inner in value.items():
+            to_config(config.mapMakeChild(key), inner, plain=plain)
+    elif isinstance(value, list) and value:
+        for inner in value:
+            to_config(config.listAppendNew(), inner, plain=plain)
+    else:
+        config.setValue(value if plain and isinstance(value, str) else _text(value))
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, str):
+        # What would be read as something else is kept as JSON would have it.
+        return value if _scalar(value) == value and value[:1] != '"' else json.dumps(value)
+    if isinstance(value, float) and not math.isfinite(value):
+        return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"
+    if value is None or isinstance(value, bool):
+        return {None: "null", True: "true", False: "false"}[value]
+    return repr(value)
+
+
+def _scalar(text: str) -> Any:
+    if text.lower() in _WORDS:
+        word = _WORDS[text.lower()]
+        return type(word)() if isinstance(word, (dict, list)) else word
+    if text[:1] == '"':
+        try:
+            return json.loads(text)
+        except ValueError:
+            return text
+    if _INT.match(text) and len(text) < 20:
+        return int(text)
+    return float(text) if _FLOAT.match(text) else text
+
+
+def from_config(config: Any) -> Any:
+    """Return what :func:`to_config`, or the overlays of hector_rviz_overlay, have written."""
+    return _typed(plain_config(config))
+
+
+def _typed(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _typed(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_typed(inner) for inner in value]
+    return _scalar(value) if isinstance(value, str) else value
+
+
+def plain_config(config: Any) -> Any:
+    """Return an RViz ``Config`` as dicts, lists and scalars, which are text in a file's."""
+    kinds = type(config)
+    kind = config.getType()
+    if kind == kinds.Map:
+        found, at = {}, config.mapIterator()
+        while at.isValid():
+            found[str(at.currentKey())] = plain_config(at.currentChild())
+            at.advance()
+        return found
+    if kind == kinds.List:
+        return [plain_config(config.listChildAt(at)) for at in range(config.listLength())]
+    return config.getValue() if kind == kinds.Value else None
+
+
+def merged(older: Mapping[str, Any], newer: Mapping[str, Any]) -> dict[str, Any]:
+    """Return `newer` with what only `older` has."""
+    found = {**older, **newer}
+    for key, value in newer.items():
+        before = older.get(key)
+        if isinstance(before, dict):
+            found[key] = merged(before, value if isinstance(value, dict) else {"Value": value})
+    return found

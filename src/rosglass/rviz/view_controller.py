@@ -1,0 +1,601 @@
+"""What moves RViz's camera from outside: robots, keys, and its entry in the Displays panel."""
+# ruff: noqa: N802 - the names of what C++ calls are RViz's
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from functools import cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rosglass.comm.qos import QoS
+from rosglass.errors import Error, ServiceError
+from rosglass.qt import QtCore, Signal, Slot, is_alive
+from rosglass.ros1.names import expand, split
+from rosglass.rviz.entries import camera_icon, display_class, tell_status
+from rosglass.rviz.host import pyqt
+from rosglass.rviz.properties import PropertyTree, given_to_rviz, quiet, take_out
+from rosglass.rviz.property_values import plain_config
+from rosglass.rviz.qt5 import QtCore as Qt5Core
+from rosglass.rviz.registered_properties import RegisteredProperties
+from rosglass.rviz.view import ViewMode
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rosglass.comm.handle import Handle
+    from rosglass.comm.node import Node
+    from rosglass.comm.publisher import Publisher
+    from rosglass.messages import Message
+    from rosglass.qml.session import Session
+    from rosglass.rviz.entries import Entries
+    from rosglass.rviz.stack import Stack
+    from rosglass.rviz.view import View
+    from rosglass.rviz.window import Window
+
+__all__ = ["VIEW_CLASS", "ViewEntry", "ViewKeys", "ViewServices"]
+
+
+_log = logging.getLogger("rosglass.rviz")
+_E, _Qt = Qt5Core.QEvent, Qt5Core.Qt
+#: How far ahead and to the left each key leads.
+_ARROWS = {
+    _Qt.Key_Up: (1, 0),
+    _Qt.Key_Down: (-1, 0),
+    _Qt.Key_Left: (0, 1),
+    _Qt.Key_Right: (0, -1),
+}
+#: Seconds; a frame that takes longer moves the camera no farther.
+_LONGEST_STEP = 0.2
+
+
+class ViewKeys(QtCore.QObject):
+    """Arrow keys shift the view, twice as fast with Shift; Ctrl+D switches between 2D and 3D.
+
+    Only while the 3D view has the focus, and no overlay has the keys.
+
+    Args:
+        window: RViz.
+        view: What they move.
+        overlays: Who else may have the keys.
+    """
+
+    def __init__(self, window: Window, view: View, overlays: Stack) -> None:
+        super().__init__()
+        self._window, self._view, self._overlays = window, view, overlays
+        self._panel = window.panel
+        self._settings = view.settings
+        self._held: set[int] = set()
+        self._twice = False
+        self._last_step = 0.0
+        self._panel.installEventFilter(self)
+        window.before_frame.connect(self._step)
+        window.closing.connect(self.close)
+
+    def close(self) -> None:
+        """Leave the keys to RViz; safe to call twice."""
+        self._held.clear()
+        if is_alive(self._panel):
+            self._panel.removeEventFilter(self)
+
+    def eventFilter(self, watched: Any, event: Any) -> bool:
+        """Return whether a key is ours, and RViz is to hear nothing of it."""
+        del watched
+        kind = event.type()
+        if kind in (_E.FocusOut, _E.Hide, _E.WindowDeactivate):
+            self._held.clear()
+        if kind not in (_E.KeyPress, _E.KeyRelease, _E.ShortcutOverride) or not self._settings.keys:
+            return False
+        if self._is_elsewhere():
+            self._held.clear()
+            return False
+        if _is_toggle(event):
+            if kind == _E.ShortcutOverride:
+                # RViz's Displays panel would take it as its own shortcut otherwise.
+                event.accept()
+            elif kind == _E.KeyPress and not event.isAutoRepeat():
+                self._toggle()
+            return True
+        return self._arrow(event)
+
+    def _arrow(self, event: Any) -> bool:
+        kind, key = event.type(), event.key()
+        if kind == _E.ShortcutOverride:
+            return False
+        pressed = kind == _E.KeyPress
+        if key == _Qt.Key_Shift:
+            self._twice = pressed
+            return False
+        if key not in _ARROWS:
+            return False
+        if not pressed:
+            ours = key in self._held
+            if not event.isAutoRepeat():
+                self._held.discard(key)
+            return ours
+        if event.modifiers() & ~(_Qt.ShiftModifier | _Qt.KeypadModifier):
+            return False
+        self._twice = bool(event.modifiers() & _Qt.ShiftModifier)
+        if not self._held:
+            self._last_step = time.monotonic()
+        self._held.add(key)
+        return True
+
+    def _is_elsewhere(self) -> bool:
+        shown = self._overlays.topmost_first()
+        return self._overlays.input.focused is not None or any(o.is_modal for o in shown)
+
+    def _toggle(self) -> None:
+        flat = self._view.mode is ViewMode.MODE_2D
+        self._view.set_mode(ViewMode.MODE_3D if flat else ViewMode.MODE_2D)
+
+    def _step(self) -> None:
+        if not self._held:
+            return
+        now = time.monotonic()
+        passed, self._last_step = min(now - self._last_step, _LONGEST_STEP), now
+        if self._is_elsewhere() or not self._settings.keys:
+            # Who has the keys now gets to know when they are released.
+            self._held.clear()
+            return
+        ahead = sum(_ARROWS[key][0] for key in self._held)
+        left = sum(_ARROWS[key][1] for key in self._held)
+        length = math.hypot(ahead, left)
+        if not length or not passed:
+            return
+        metres = self._settings.speed * (2 if self._twice else 1) * passed / length
+        try:
+            self._view.nudge(ahead * metres, left * metres)
+        except Error as error:
+            self._held.clear()
+            _log.warning("%s", error)
+
+
+def _is_toggle(event: Any) -> bool:
+    return bool(event.key() == _Qt.Key_D and event.modifiers() == _Qt.ControlModifier)
+
+
+_PACKAGE = "hector_rviz_plugins"
+
+
+class ViewServices(QtCore.QObject):
+    """Lets robots move the camera, and tells them what it does.
+
+    Topics ``tracked_frame`` and ``view_mode``, both latched; services ``move_eye``,
+    ``move_eye_and_focus``, ``set_view_mode`` and ``set_tracked_frame``. What cannot be done is an
+    error of the service, with the reason.
+
+    Args:
+        view: The camera.
+        session: Whose node offers them; one of ROS 1.
+        node_name: Full name of RViz's own node, which ``~`` stands for.
+    """
+
+    #: Why they are not there; empty when they are, or nothing has to be.
+    problem_changed = Signal(str)
+    #: All that is wanted is there now.
+    opened = Signal()
+
+    def __init__(
+        self,
+        view: View,
+        session: Session,
+        node_name: str = "/rviz",
+    ) -> None:
+        super().__init__()
+        self._view, self._session = view, session
+        self._settings = view.settings
+        self._rviz = split(node_name)
+        self._wanted = self._asked_for()
+        self._problem = ""
+        self._node: Node | None = None
+        self._generation = 0
+        self._handles: list[Handle] = []
+        #: What the worker is making now.
+        self._making: _Made | None = None
+        self._publishers: dict[str, Publisher] = {}
+        self._closed = False
+        session.node_changed.connect(self._node_changed)
+        session.connection_changed.connect(self._connection_changed)
+        view.mode_changed.connect(self._tell_mode)
+        view.tracked_frame_changed.connect(self._tell_frame)
+        self._settings.properties.edited.connect(self._on_edited)
+        self._node_changed()
+
+    @property
+    def namespace(self) -> str:
+        """Where topics and services are, as an absolute name; empty where that is no valid one."""
+        return self._wanted.namespace
+
+    @property
+    def problem(self) -> str:
+        """Why they are not there; empty when they are, or nothing has to be."""
+        return self._problem
+
+    @property
+    def is_open(self) -> bool:
+        """Whether there is anything now."""
+        return bool(self._handles)
+
+    def close(self) -> None:
+        """Withdraw them; safe to call twice."""
+        if not self._closed:
+            self._closed = True
+            self._shut()
+
+    def _asked_for(self) -> _Wanted:
+        settings, (above, name) = self._settings, self._rviz
+        try:
+            namespace = expand(settings.namespace, name, above).rstrip("/")
+        except Error as error:
+            return _Wanted(settings.topics, settings.services, "", str(error))
+        return _Wanted(settings.topics, settings.services, namespace, "")
+
+    def _on_edited(self) -> None:
+        wanted = self._asked_for()
+        if wanted != self._wanted and not self._closed:
+            self._wanted = wanted
+            self._open()
+
+    def _node_changed(self) -> None:
+        if self._session.node is not self._node and not self._closed:
+            self._node = self._session.node
+            self._open()
+
+    def _connection_changed(self) -> None:
+        """Tell that others have ended the node, and what was made from it with it."""
+        if self._node is not None and self._session.state == "failed" and not self._closed:
+            self._shut()
+            self._tell_problem(self._session.detail)
+
+    def _shut(self) -> None:
+        self._generation += 1
+        handles, self._handles, self._publishers = self._handles, [], {}
+        making, self._making = self._making, None
+        if handles:
+            self._session.background(lambda: _close_all(handles))
+        if making is not None:
+            # Made by then, and closed before others take its names: jobs keep their order.
+            self._session.background(lambda: _close_all(making.handles))
+
+    def _open(self) -> None:
+        self._shut()
+        node, generation, wanted = self._node, self._generation, self._wanted
+        if node is None or not (wanted.topics or wanted.services):
+            self._tell_problem("")
+            return
+        if wanted.wrong:
+            self._tell_problem(wanted.wrong)
+            return
+        if node.wire != "ros1":
+            self._tell_problem(f"{node.url}: the services of the camera are of ROS 1")
+            return
+        made = self._making = _Made()
+
+        def done(result: _Made | Error) -> None:
+            if generation != self._generation:
+                return
+            self._making = None
+            if isinstance(result, Error):
+                self._tell_problem(str(result))
+            else:
+                self._handles, self._publishers = made.handles, made.publishers
+                self._tell_problem("")
+                self._tell_mode()
+                self._tell_frame()
+                self.opened.emit()
+
+        self._session.background(lambda: self._make(node, wanted, made), done)
+
+    def _make(self, node: Node, wanted: _Wanted, made: _Made) -> _Made:
+        """Make topics and services, on the worker thread."""
+        try:
+            if wanted.topics:
+                for topic, kind in (
+                    ("tracked_frame", "std_msgs/String"),
+                    ("view_mode", f"{_PACKAGE}/ViewMode"),
+                ):
+                    name = f"{wanted.namespace}/{topic}"
+                    made.publishers[topic] = node.create_publisher(name, kind, QoS.latched())
+                    made.handles.append(made.publishers[topic])
+            for name, kind, answer in self._services() if wanted.services else ():
+                made.handles.append(
+                    node.create_service_server(
+                        f"{wanted.namespace}/{name}",
+                        f"{_PACKAGE}/srv/{kind}",
+                        _refusing(answer),
+                        executor=self._session.executor,
+                    )
+                )
+        except Error:
+            _close_all(made.handles)
+            raise
+        return made
+
+    def _services(self) -> tuple[tuple[str, str, Callable[[Message], None]], ...]:
+        return (
+            ("move_eye", "MoveEye", self._move_eye),
+            ("move_eye_and_focus", "MoveEyeAndFocus", self._move_eye_and_focus),
+            ("set_view_mode", "SetViewMode", self._set_view_mode),
+            ("set_tracked_frame", "TrackFrame", self._set_tracked_frame),
+        )
+
+    def _move_eye(self, request: Any) -> None:
+        self._view.move_eye(
+            _point(request.eye),
+            request.header.frame_id,
+            animate=not request.disable_animation,
+            stop_tracking=request.stop_tracking,
+            switch_to_3d=request.switch_to_3d_mode,
+        )
+
+    def _move_eye_and_focus(self, request: Any) -> None:
+        self._view.move_eye_and_focus(
+            _point(request.eye),
+            _point(request.focus),
+            request.header.frame_id,
+            animate=not request.disable_animation,
+            stop_tracking=request.stop_tracking,
+        )
+
+    def _set_view_mode(self, request: Any) -> None:
+        self._view.set_mode(request.mode.mode, animate=not request.disable_animation)
+
+    def _set_tracked_frame(self, request: Any) -> None:
+        self._view.track(request.frame)
+
+    def _tell_mode(self) -> None:
+        self._publish("view_mode", mode=int(self._view.mode))
+
+    def _tell_frame(self) -> None:
+        self._publish("tracked_frame", data=self._view.tracked_frame)
+
+    def _publish(self, topic: str, **fields: Any) -> None:
+        publisher = self._publishers.get(topic)
+        if publisher is not None:
+            try:
+                publisher.publish(**fields)
+            except Error as error:
+                _log.warning("%s/%s: %s", self.namespace, topic, error)
+
+    def _tell_problem(self, problem: str) -> None:
+        if problem != self._problem:
+            self._problem = problem
+            if problem:
+                _log.warning("robots cannot move the camera: %s", problem)
+            self.problem_changed.emit(problem)
+
+
+class _Wanted(NamedTuple):
+    """What is to be there, and where; what is wrong with that."""
+
+    topics: bool
+    services: bool
+    namespace: str
+    wrong: str
+
+
+class _Made:
+    """What the worker has made."""
+
+    def __init__(self) -> None:
+        self.handles: list[Handle] = []
+        self.publishers: dict[str, Publisher] = {}
+
+
+def _refusing(answer: Callable[[Message], None]) -> Callable[[Message], None]:
+    """Have what a callback cannot do be an answer, not a fault of ours."""
+
+    def call(request: Message) -> None:
+        try:
+            answer(request)
+        except Error as error:
+            raise ServiceError(str(error)) from error
+
+    return call
+
+
+def _close_all(handles: list[Handle]) -> None:
+    for handle in handles:
+        handle.close()
+
+
+def _point(point: Any) -> tuple[float, float, float]:
+    return point.x, point.y, point.z
+
+
+#: Class id in ``.rviz`` files.
+VIEW_CLASS = "rosglass/ViewController"
+_NAME = "View Controller"
+_OK, _WARN = 0, 1
+
+
+@cache
+def _class() -> Any:
+    """Return our kind of RViz's display: one that cannot be switched off."""
+    base, core = display_class(), pyqt()
+
+    class Display(base):  # type: ignore[misc,valid-type]
+        @quiet()
+        def getViewData(self, column: int, role: int) -> Any:
+            if column == 1 and role == core.Qt.CheckStateRole:
+                return None
+            return base.getViewData(self, column, role)
+
+        @quiet(core.Qt.ItemFlags())
+        def getViewFlags(self, column: int) -> Any:
+            return base.getViewFlags(self, column) & ~core.Qt.ItemIsUserCheckable
+
+    return Display
+
+
+class _Entry:
+    """One entry; a second one, as when it was duplicated, shows the same settings."""
+
+    def __init__(self, view: View, now: RegisteredProperties, entries: Entries) -> None:
+        self._settings = view.settings
+        #: RViz's display.
+        self.display: Any = given_to_rviz(_class()())
+        self.display.entry = self
+        self.display.setClassId(VIEW_CLASS)
+        self.display.setName(_NAME)
+        self.display.setIcon(camera_icon())
+        self.display.setDescription(
+            "How the camera is moved by keys, by interfaces and by robots. "
+            "Without this entry, it is as at first."
+        )
+        self._trees = [
+            PropertyTree(owner, self.display, entries.sources)
+            for owner in (now, view.settings.properties)
+        ]
+
+    @property
+    def alive(self) -> bool:
+        """Whether RViz still has it."""
+        return not pyqt("sip").isdeleted(self.display)
+
+    def save(self, config: Any) -> None:
+        """Write what a ``.rviz`` file keeps of it to RViz's ``Config``."""
+        for name, value in self._settings.save().items():
+            config.mapSetValue(name, value)
+
+    def load(self, config: Any) -> None:
+        """Take what a ``.rviz`` file has."""
+        self._settings.load(plain_config(config))
+
+    def close(self) -> None:
+        """Follow the settings no longer."""
+        for tree in self._trees:
+            tree.close()
+
+
+class ViewEntry(QtCore.QObject):
+    """Shows the settings of the camera in the panel: by the menu Overlays, or as a file has it.
+
+    A file that has no entry, and removing it, leave the settings as a program has made them, or as
+    at first.
+
+    Args:
+        window: RViz.
+        entries: The entries of the overlays.
+        view: The camera.
+        services: What robots reach it by.
+    """
+
+    def __init__(
+        self, window: Window, entries: Entries, view: View, services: ViewServices
+    ) -> None:
+        super().__init__()
+        self._window, self._entries, self._view, self._services = window, entries, view, services
+        self._shown: list[_Entry] = []
+        self._loading = self._loaded = False
+        #: What no file keeps.
+        self._now = RegisteredProperties()
+        about = "What the camera follows and turns with; empty for nothing."
+        self._frame = self._now.register("frame", "Tracked Frame", description=about)
+        about = "Whether it is seen straight from above, without perspective."
+        self._flat = self._now.register("bool", "2D Mode", description=about)
+        self._frame.valueChanged.connect(self._track)
+        self._flat.valueChanged.connect(self._flatten)
+        menu = window.menu("&Overlays")
+        self._action = menu.addAction("&View controller")
+        self._action.setCheckable(True)
+        self._action.setToolTip("Settings of the camera, among the displays")
+        self._choose = quiet()(self._on_action)
+        self._action.triggered.connect(self._choose)
+        window.config_loading.connect(self._on_loading)
+        window.config_loaded.connect(self._on_loaded)
+        window.closing.connect(self.close)
+        window.before_frame.connect(self._look)
+        entries.replaced.connect(self._settle)
+        services.problem_changed.connect(self._tell)
+        services.opened.connect(self._tell)
+        view.problem_changed.connect(self._tell)
+        view.tracked_frame_changed.connect(self._tell)
+        view.mode_changed.connect(self._tell)
+        entries.welcome(VIEW_CLASS, self._make)
+
+    @property
+    def shown(self) -> bool:
+        """Whether there is an entry; one that is set to False is removed."""
+        return bool(self._shown)
+
+    @shown.setter
+    def shown(self, shown: bool) -> None:
+        if shown and not self._shown:
+            self._window.manager.addDisplay(self._make().display, True)
+        elif not shown:
+            self.close()
+            self._settle()
+        self._action.setChecked(shown)
+
+    def close(self) -> None:
+        """Take the entry out of the panel; safe to call twice."""
+        shown, self._shown = self._shown, []
+        for entry in shown:
+            entry.close()
+            take_out(entry.display)
+
+    def _make(self) -> _Entry:
+        entry = _Entry(self._view, self._now, self._entries)
+        self._shown.append(entry)
+        self._action.setChecked(True)
+        self._tell()
+        return entry
+
+    def _on_action(self, *_: Any) -> None:
+        self.shown = not self.shown
+
+    @Slot()
+    def _look(self) -> None:
+        """See what RViz has deleted, which no signal tells to Python."""
+        gone = [entry for entry in self._shown if not entry.alive]
+        for entry in gone:
+            self._shown.remove(entry)
+            entry.close()
+        if gone and not self._loading:
+            self._settle()
+
+    @Slot()
+    def _on_loading(self) -> None:
+        self._loading = True
+
+    @Slot()
+    def _on_loaded(self) -> None:
+        self._loaded = True
+
+    @Slot()
+    def _settle(self) -> None:
+        """Have the settings be as without an entry if there is none, once a file is loaded."""
+        if self._loading and not self._loaded:
+            return
+        self._loading = self._loaded = False
+        if not any(entry.alive for entry in self._shown):
+            self._action.setChecked(False)
+            self._view.settings.load({})
+
+    def _track(self, frame: str) -> None:
+        try:
+            self._view.track(frame)
+        except Error as error:
+            self._entries.sources.complain(f"Tracked Frame: {error}")
+            self._frame.set(self._view.tracked_frame)
+
+    def _flatten(self, flat: bool) -> None:
+        self._view.set_mode(ViewMode.MODE_2D if flat else ViewMode.MODE_3D)
+
+    @Slot()
+    def _tell(self, *_: Any) -> None:
+        services, view = self._services, self._view
+        self._frame.set(view.tracked_frame)
+        self._flat.set(view.mode is ViewMode.MODE_2D)
+        where = services.namespace if services.is_open else "not connected, or switched off"
+        follows = view.tracked_frame or "nothing is followed"
+        for entry in self._shown:
+            for row, problem, fine in (
+                ("Robots", services.problem, where),
+                ("Tracked Frame", view.problem, follows),
+            ):
+                if entry.alive:
+                    tell_status(entry.display, row, _WARN if problem else _OK, problem or fine)
