@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from rosglass.errors import Error
 from rosglass.qt import QtCore, Signal
 from rosglass.rviz.camera import Picker
 from rosglass.rviz.displays_access import Displays
@@ -13,12 +15,15 @@ from rosglass.rviz.tools import Tools
 from rosglass.rviz.trackers import Frames, Trackers
 from rosglass.rviz.view import View, Views
 from rosglass.rviz.watch import Hook
+from rosglass.rviz.window import config_file
 
 if TYPE_CHECKING:
     from rosglass.qml.session import Session
     from rosglass.rviz.window import Window
 
 __all__ = ["Access"]
+
+_log = logging.getLogger("rosglass.rviz")
 
 
 class Access(QtCore.QObject):
@@ -31,6 +36,14 @@ class Access(QtCore.QObject):
         session: The node that receives transforms.
     """
 
+    #: RViz is about to draw.
+    before_frame = Signal()
+    #: A config file was loaded: every display, view and tool is another one now. Its path.
+    config_loaded = Signal(str)
+    #: :attr:`fullscreen` is another.
+    fullscreen_changed = Signal()
+    #: :attr:`bare` is another.
+    bare_changed = Signal()
     #: Another frame is the fixed one.
     fixed_frame_changed = Signal()
     #: :attr:`frame_rate` is another.
@@ -40,7 +53,13 @@ class Access(QtCore.QObject):
         super().__init__()
         self.window, self._session = window, session
         self._rate, self._frames_drawn, self._since = 0.0, 0, time.monotonic()
-        window.before_frame.connect(self._count)
+        window.before_frame.connect(self._on_frame)
+        window.config_loaded.connect(self.config_loaded)
+        window.bare.changed.connect(self.bare_changed)
+        # RViz signals it before it does it.
+        window.fullscreen_changed.connect(
+            lambda _: QtCore.QTimer.singleShot(0, self.fullscreen_changed.emit)
+        )
         self._timer = QtCore.QTimer(self)
         self._timer.setInterval(1000)
         self._timer.timeout.connect(self._measure)
@@ -92,7 +111,54 @@ class Access(QtCore.QObject):
 
     @fixed_frame.setter
     def fixed_frame(self, frame: str) -> None:
+        if frame == "":
+            raise Error("expected the name of a frame, e.g. 'map', got ''")
         self.displays.set("Global Options/Fixed Frame", frame)
+
+    @property
+    def fullscreen(self) -> bool:
+        """Whether RViz fills the screen."""
+        return self.window.fullscreen
+
+    @fullscreen.setter
+    def fullscreen(self, fullscreen: bool) -> None:
+        self.window.fullscreen = fullscreen
+
+    @property
+    def bare(self) -> bool:
+        """Whether RViz's window shows the 3D view alone."""
+        return self.window.bare.on
+
+    @bare.setter
+    def bare(self, bare: bool) -> None:
+        self.window.bare.on = bare
+
+    def load_config(self, file: str) -> None:
+        """Load a ``.rviz`` file as soon as the event loop is reached.
+
+        Raises:
+            Error: The file is missing or is no config of RViz.
+        """
+        path = config_file(file)
+
+        def load() -> None:
+            try:
+                self.displays.settle_panel()
+                self.window.load_config(path)
+            except Error as error:
+                _log.error("rviz.loadConfig: %s", error)
+
+        QtCore.QTimer.singleShot(0, load)
+
+    def save_config(self, file: str = "") -> None:
+        """Save RViz's config; without a file, where it was loaded from.
+
+        Raises:
+            Error: There is no such folder, or no config is loaded.
+        """
+        if not (file or self.window.config):
+            raise Error("no config file is loaded; say where to save it")
+        self.window.save_config(file)
 
     @property
     def frame_rate(self) -> float:
@@ -106,8 +172,9 @@ class Access(QtCore.QObject):
             if name in ("displays", "frames"):
                 part.close()
 
-    def _count(self) -> None:
+    def _on_frame(self) -> None:
         self._frames_drawn += 1
+        self.before_frame.emit()
 
     def _measure(self) -> None:
         now = time.monotonic()

@@ -33,6 +33,7 @@ from rosglass.rviz.qml_overlay import QmlOverlay
 from rosglass.rviz.qt5 import QtGui, QtWidgets
 from rosglass.rviz.rendering import choice
 from rosglass.rviz.roscpp import connect_beside_rviz, name_node, shared_arguments
+from rosglass.rviz.rviz_object import ACCESS
 from rosglass.rviz.stack import Stack
 from rosglass.rviz.view_controller import ViewEntry, ViewKeys, ViewServices
 from rosglass.rviz.window import Window, config_file
@@ -176,7 +177,7 @@ class Application(Handle):
         self.window.before_frame.connect(self._screen.look)
         #: RViz's tools, displays, views and camera.
         self.rviz = Access(self.window, self.session)
-        self.session.shared[Access] = self.rviz
+        self.session.shared[ACCESS] = self.rviz
         #: The overlays, the lowest first.
         self.overlays = Stack(self.window)
         #: Their entries in RViz's Displays panel.
@@ -328,7 +329,7 @@ class Application(Handle):
             self.entries.close,
             self.overlays.close,
             self.view_services.close,
-            lambda: self.session.shared.pop(Access, None),
+            lambda: self.session.shared.pop(ACCESS, None),
             self.rviz.close,
             *([self.session.close] if self._owns_session else []),
             roscpp.shut_down,

@@ -153,6 +153,14 @@ class Display:
         write_property(found, value, f"{self.name}/{path}")
         self._owner.settle()
 
+    def remove(self) -> None:
+        """Remove it from RViz.
+
+        Raises:
+            Error: It is gone.
+        """
+        self._owner.remove(self)
+
     def require(self) -> Any:
         """Return RViz's display.
 
@@ -189,11 +197,6 @@ class Displays(Watched):
         self._timer.setInterval(_PERIOD)
         self._timer.timeout.connect(self.settle)
         self._timer.start()
-
-    @property
-    def all(self) -> list[Display]:
-        """The displays in the order of the panel."""
-        return list(self._items)
 
     @property
     def classes(self) -> list[str]:

@@ -120,6 +120,11 @@ class Watched(QtCore.QObject):
         self._scheduled = False
         self._hook = Hook(self._on_change)
 
+    @property
+    def all(self) -> list[Any]:
+        """The items in RViz's order."""
+        return list(self._items)
+
     def settle(self) -> None:
         """Tell what has changed since it was told last."""
         self._scheduled = False

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 from rosglass.errors import Error
 from rosglass.qml.plain import plain_from_js
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
-from rosglass.rviz.face import VARIANT, given, spelled, switch_of, text_of
+from rosglass.rviz.face import VARIANT, errors_to_js, spell_checked, switch, text, to_python
 from rosglass.rviz.property_values import KINDS, merged, shown, writable
 
 if TYPE_CHECKING:
@@ -19,28 +19,10 @@ if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime
     from rosglass.rviz.property_values import Kind
 
-__all__ = ["RegisteredProperties", "RegisteredProperty", "answering", "python_value"]
+__all__ = ["RegisteredProperties", "RegisteredProperty"]
 
 
 _log = logging.getLogger("rosglass.rviz")
-
-
-def python_value(value: Any) -> Any:
-    """Return what JavaScript gave, as Python and Qt have it.
-
-    Raises:
-        ConversionError: It is a function, refers to itself, or is too large.
-    """
-    return given(value) if isinstance(value, QJSValue) else value
-
-
-def answering(runtime: Runtime | None, what: str, error: Error, *given_by_js: Any) -> None:
-    """Throw an error into the JavaScript that is running; where none is, raise it."""
-    # Where JavaScript's own getters have thrown, it no longer tells where it is.
-    sure = any(isinstance(value, QJSValue) for value in given_by_js)
-    if runtime is None or not (sure or runtime.caller().file != "<python>"):
-        raise Error(f"{what}: {error}") from error
-    runtime.throw(f"{what}: {error}")
 
 
 class RegisteredProperty(QtCore.QObject):
@@ -95,17 +77,15 @@ class RegisteredProperty(QtCore.QObject):
         Raises:
             Error: The property cannot hold it.
         """
-        new = self.kind.read(python_value(value))
+        new = self.kind.read(to_python(value))
         if new != self._value or type(new) is not type(self._value):
             self._value = new
             self.valueChanged.emit(new)
             self._owner.edited.emit()
 
     def _set_value(self, value: Any) -> None:
-        try:
+        with errors_to_js(self._owner.runtime, f"property {'/'.join(self.path)}", value):
             self.set(value)
-        except Error as error:
-            answering(self._owner.runtime, f"property {'/'.join(self.path)}", error, value)
 
     #: The value; one that does not fit throws.
     value = Property(VARIANT, get, _set_value, notify=valueChanged)
@@ -117,16 +97,16 @@ class RegisteredProperty(QtCore.QObject):
     def _get_description(self) -> str:
         return cast("str", self._about["description"])
 
-    def _set_description(self, text: Any) -> None:
-        self._change("description", text, text_of)
+    def _set_description(self, value: Any) -> None:
+        self._change("description", value, text())
 
     description = Property(VARIANT, _get_description, _set_description, notify=aboutChanged)
 
     def _get_read_only(self) -> bool:
         return cast("bool", self._about["readOnly"])
 
-    def _set_read_only(self, read_only: Any) -> None:
-        self._change("readOnly", read_only, switch_of)
+    def _set_read_only(self, value: Any) -> None:
+        self._change("readOnly", value, switch())
 
     #: People cannot change it; the interface can.
     readOnly = Property(VARIANT, _get_read_only, _set_read_only, notify=aboutChanged)
@@ -134,19 +114,18 @@ class RegisteredProperty(QtCore.QObject):
     def _get_hidden(self) -> bool:
         return cast("bool", self._about["hidden"])
 
-    def _set_hidden(self, hidden: Any) -> None:
-        self._change("hidden", hidden, switch_of)
+    def _set_hidden(self, value: Any) -> None:
+        self._change("hidden", value, switch())
 
     #: It is not shown in the panel.
     hidden = Property(VARIANT, _get_hidden, _set_hidden, notify=aboutChanged)
 
-    def _change(self, name: str, value: Any, read: Callable[[Any], Any]) -> None:
-        try:
-            self._tell(**{name: read(value)})
-        except Error as error:
-            answering(self._owner.runtime, f"property {'/'.join(self.path)}.{name}", error, value)
+    def _change(self, name: str, value: Any, takes: Callable[[Any], Any]) -> None:
+        what = f"property {'/'.join(self.path)}.{name}"
+        with errors_to_js(self._owner.runtime, what, value):
+            self._update(**{name: takes(to_python(value))})
 
-    def _tell(self, **about: Any) -> None:
+    def _update(self, **about: Any) -> None:
         if not about.items() <= self._about.items():
             self._about.update(about)
             self.aboutChanged.emit()
@@ -160,7 +139,7 @@ class RegisteredProperty(QtCore.QObject):
         """
         changed = kind.options != self.kind.options
         self.kind = kind
-        self._tell(**about)
+        self._update(**about)
         if changed:
             self.aboutChanged.emit()
             try:
@@ -255,10 +234,8 @@ class RegisteredProperties(QtCore.QObject):
             self.edited.emit()
 
     def _set_config(self, config: Any) -> None:
-        try:
+        with errors_to_js(self.runtime, "rviz.config", config):
             self.set_config(config)
-        except Error as error:
-            answering(self.runtime, "rviz.config", error, config)
 
     #: Assign whole maps: a change inside of what was read is not seen.
     config = Property(VARIANT, get_config, _set_config, notify=configChanged)
@@ -335,13 +312,9 @@ class RegisteredProperties(QtCore.QObject):
         options: dict[str, Any],
     ) -> RegisteredProperty | None:
         names = ("name", *order) if "description" in order else ("name", *order, "description")
-        try:
-            return self.register(
-                kind, **_named(names, [python_value(a) for a in arguments], options)
-            )
-        except Error as error:
-            answering(self.runtime, f"rviz.{function}", error, *arguments)
-            return None
+        with errors_to_js(self.runtime, f"rviz.{function}", *arguments):
+            return self.register(kind, **_named(names, [to_python(a) for a in arguments], options))
+        return None
 
     def register(
         self,
@@ -394,9 +367,9 @@ class RegisteredProperties(QtCore.QObject):
         siblings: dict[str, RegisteredProperty],
         about: dict[str, Any],
     ) -> RegisteredProperty:
-        made._tell(**about)
+        made._update(**about)
         if self.runtime is not None:
-            made.for_js = spelled(self.runtime, made)
+            made.for_js = spell_checked(self.runtime, made)
         siblings[made.path[-1]] = made
         saved: Any = self._saved
         for step in made.path:

@@ -1,4 +1,7 @@
-"""The object ``rviz`` that QML over RViz finds, one for each overlay."""
+"""The object ``rviz`` that QML over RViz finds, one for each overlay, and the objects below it.
+
+They know the 3D view by :class:`rosglass.rviz.access.Access` alone (docs/architecture.md, 6).
+"""
 # ruff: noqa: N802 N815 - the names of slots, properties and signals are QML's
 
 from __future__ import annotations
@@ -10,27 +13,390 @@ from typing import TYPE_CHECKING, Any
 from rosglass.errors import Error
 from rosglass.qml.log import Caller, log_from_qml, plain_path
 from rosglass.qml.runtime import runtime_of
-from rosglass.qt import Property, QJSValue, QtCore, QtQml, Signal, Slot
-from rosglass.rviz.access import Access
-from rosglass.rviz.displays_access import Status
-from rosglass.rviz.face import VARIANT, given, place, spelled, switch_of, taking, text_of
+from rosglass.qt import Property, QJSValue, QtCore, QtGui, QtQml, Signal, Slot
+from rosglass.rviz.face import (
+    LIST,
+    VARIANT,
+    Face,
+    ItemFaces,
+    anything,
+    member,
+    options,
+    passing,
+    point,
+    point_of,
+    property_path,
+    slot,
+    spell_checked,
+    switch,
+    text,
+)
 from rosglass.rviz.property_values import shown
-from rosglass.rviz.qml_displays import QmlDisplays, path_of
-from rosglass.rviz.qml_tools import PROVIDER, QmlToolManager, ToolIcons
-from rosglass.rviz.qml_view import QmlView
+from rosglass.rviz.qt5 import QtGui as Qt5Gui
+from rosglass.rviz.qt5 import QtQuick
 from rosglass.rviz.registered_properties import RegisteredProperties
-from rosglass.rviz.window import config_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from rosglass.qml.runtime import Runtime
+    from rosglass.rviz.access import Access
+    from rosglass.rviz.orbit import Point
     from rosglass.rviz.overlay import Overlay
+    from rosglass.rviz.tools import Tool, Tools
 
-__all__ = ["RvizObject"]
+__all__ = ["ACCESS", "RvizObject"]
 
-_log = logging.getLogger("rosglass.rviz")
-_LIST: Any = "QVariantList"
-_PATH = "Grid/Color"
+#: In `Session.shared`: the Access of the session's 3D view.
+ACCESS = "3D view"
+#: What the addresses of icons begin with, after ``image://``.
+_ICONS = "rviz_tool_icons"
+#: Pixels of an icon that is asked for without a size, and at most.
+_ICON_SIZE, _MAX_ICON_SIZE = 48, 1024
+#: Metres below which the camera counts as standing still.
+_STILL = 1e-4
+_FRAME = "the name of a frame, or '' for none"
+
+
+def _mode(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise Error(f"expected rviz.view.MODE_3D (0) or MODE_2D (1), got {shown(value)}")
+    return value
+
+
+def _vector(place: Point) -> QtGui.QVector3D:
+    return QtGui.QVector3D(*place)
+
+
+class QmlTool(Face):
+    """One tool. Its members stay readable once it is removed."""
+
+    CALLED = "tool"
+
+    isSelectedChanged = Signal()
+    #: Of name and description.
+    changed = Signal()
+    existsChanged = Signal()
+
+    def __init__(self, tool: Tool, runtime: Runtime, parent: QtCore.QObject) -> None:
+        super().__init__(tool, runtime, parent)
+        self.existsChanged.connect(self.isSelectedChanged)
+
+    isSelected = member("isSelected", bool, isSelectedChanged, of="model.selected")
+    exists = member("exists", bool, existsChanged)
+    name = member("name", str, changed)
+    description = member("description", str, changed)
+    shortcutKey = member("shortcutKey", str)
+    classId = member("classId", str)
+    iconSource = member(
+        "iconSource", str, of="model.class_id", gives=f"image://{_ICONS}/{{}}".format
+    )
+    select = passing("select")
+    remove = passing("remove")
+
+
+class QmlToolManager(Face):
+    """RViz's tools, ``rviz.toolManager``."""
+
+    CALLED = "rviz.toolManager"
+
+    toolsChanged = Signal()
+    toolAdded = Signal(QtCore.QObject, arguments=["tool"])
+    toolRemoved = Signal(QtCore.QObject, arguments=["tool"])
+    #: Another tool has the mouse.
+    toolChanged = Signal(QtCore.QObject, arguments=["tool"])
+
+    def __init__(self, tools: Tools, runtime: Runtime, parent: QtCore.QObject) -> None:
+        super().__init__(tools, runtime, parent)
+        self.faces = ItemFaces(tools, QmlTool, runtime, self)
+        self.faces.changed.connect(self.toolsChanged)
+        self.faces.added.connect(self.toolAdded)
+        self.faces.removed.connect(self.toolRemoved)
+        tools.selected.connect(self._on_selected)
+
+    @property
+    def current(self) -> QmlTool | None:
+        """The tool that has the mouse."""
+        return self.faces.of(self.model.current)  # type: ignore[no-any-return]
+
+    #: In the order of their buttons.
+    tools = Property(LIST, lambda self: self.faces.all(), notify=toolsChanged)
+    #: The tool that has the mouse; set by a tool, its index, or the id of a class.
+    currentTool = member(
+        "currentTool",
+        QJSValue,
+        toolChanged,
+        of="current",
+        takes=anything,
+        sets=lambda self, wanted: self._wanted(wanted).select(),
+    )
+    #: Ids of the classes that can be added.
+    toolClasses = member("toolClasses", LIST, of="model.classes")
+
+    @slot(1, classId=anything)
+    def addTool(self, class_id: Any = None) -> QmlTool | None:
+        """Add a tool of a class, and return it; without one, show RViz's dialog instead."""
+        if class_id is None:
+            self.model.ask_for_new()
+            return None
+        return self.faces.of(self.model.add(class_id))  # type: ignore[no-any-return]
+
+    @slot(classId=text("the id of a class, e.g. 'rviz/Measure'"))
+    def getTool(self, class_id: str) -> QmlTool | None:
+        """Return the first tool of a class; null where there is none."""
+        return self.faces.of(self.model.find(class_id))  # type: ignore[no-any-return]
+
+    @slot(tool=anything)
+    def removeTool(self, tool: Any) -> None:
+        """Remove a tool; takes a tool, its index among the tools, or the id of a class."""
+        self.model.remove(self._wanted(tool))
+
+    removeAll = passing("removeAll")
+
+    def _wanted(self, wanted: Any) -> Tool:
+        there = self.model.all
+        if isinstance(wanted, QmlTool):
+            return wanted.model  # type: ignore[no-any-return]
+        if isinstance(wanted, int) and not isinstance(wanted, bool):
+            if 0 <= wanted < len(there):
+                return there[wanted]  # type: ignore[no-any-return]
+            known = f"there are {len(there)}, the first one is 0" if there else "there are none"
+            raise Error(f"there is no tool {wanted}; {known}")
+        if isinstance(wanted, str):
+            found = self.model.find(wanted)
+            if found is not None:
+                return found  # type: ignore[no-any-return]
+            known = ", ".join(tool.class_id for tool in there) or "none"
+            named = [t.class_id for t in there if wanted in (t.name, t.class_id.rpartition("/")[2])]
+            hint = f"; did you mean {named[0]!r}?" if named else f"; there are: {known}"
+            raise Error(f"there is no tool of the class {shown(wanted)}{hint}")
+        raise Error(f"expected a tool, its place, or the id of a class, got {shown(wanted)}")
+
+    @Slot()
+    def _on_selected(self) -> None:
+        for face in self.faces.known():
+            face.isSelectedChanged.emit()
+        self.toolChanged.emit(self.current)
+
+
+class ToolIcons(QtQuick.QQuickImageProvider):  # type: ignore[misc]
+    """Provides ``image://rviz_tool_icons/<classId>``; asked in the GUI thread only.
+
+    The largest size there is, scaled to what is asked for, 48 pixels otherwise; a width or height
+    alone keeps the proportions.
+
+    Args:
+        tools: The tools.
+    """
+
+    def __init__(self, tools: Tools) -> None:
+        super().__init__(QtQuick.QQuickImageProvider.Pixmap)
+        self._tools = tools
+
+    def requestPixmap(self, name: str, size: Any, requested: Any) -> Any:
+        """Return an icon; transparent where there is no such tool, or no icon."""
+        tool = self._tools.find(name)
+        picture = Qt5Gui.QPixmap() if tool is None else tool.picture()
+        width, height = (requested.width(), requested.height())
+        if picture.isNull():
+            side = min(max(width, height, 0) or _ICON_SIZE, _MAX_ICON_SIZE)
+            picture = Qt5Gui.QPixmap(side, side)
+            picture.fill(Qt5Gui.QColor(0, 0, 0, 0))
+        wide, high = picture.width(), picture.height()
+        if width <= 0 and height <= 0:
+            factor = _ICON_SIZE / max(wide, high)
+            width, height = round(wide * factor), round(high * factor)
+        elif width <= 0:
+            width = round(wide * height / high)
+        elif height <= 0:
+            height = round(high * width / wide)
+        width, height = (min(max(side, 1), _MAX_ICON_SIZE) for side in (width, height))
+        scaled = picture.scaled(
+            width,
+            height,
+            QtCore.Qt.AspectRatioMode.KeepAspectRatio,
+            QtCore.Qt.TransformationMode.SmoothTransformation,
+        )
+        if size is not None:
+            size.setWidth(scaled.width())
+            size.setHeight(scaled.height())
+        return scaled
+
+
+class QmlDisplay(Face):
+    """One display. Its name and class stay readable once it is removed."""
+
+    CALLED = "display"
+
+    #: Of name, status, and whether it is shown.
+    changed = Signal()
+    existsChanged = Signal()
+
+    def _get_properties(self) -> QJSValue:
+        return self.runtime.value(self.model.properties() if self.model.exists else [])
+
+    exists = member("exists", bool, existsChanged)
+    name = member("name", VARIANT, changed, takes=text("a name, a text of one line"))
+    classId = member("classId", str)
+    enabled = member("enabled", VARIANT, changed, takes=switch())
+    #: ``ok``, ``warn`` or ``error``.
+    status = member("status", str, changed, of="model.status.level")
+    #: What it says about itself, one line for each.
+    statusText = member("statusText", str, changed, of="model.status.text")
+    #: All its properties as they are now, nested.
+    properties = Property(QJSValue, _get_properties, notify=existsChanged)
+
+    @slot(path=property_path("Offset/X"))
+    def get(self, path: str | list[str]) -> QJSValue:
+        """Return the value of a property, e.g. of ``Offset/X``."""
+        return self.runtime.value(self.model.get(path))
+
+    set = passing("set", path=property_path("Offset/X"), value=anything)
+    remove = passing("remove")
+
+
+class QmlView(Face):
+    """The camera, ``rviz.view``; places are in metres, of the fixed frame unless one is given."""
+
+    CALLED = "rviz.view"
+
+    modeChanged = Signal()
+    trackedFrameChanged = Signal()
+    problemChanged = Signal()
+    #: The camera, or what it looks at, is elsewhere.
+    moved = Signal()
+    animationDurationChanged = Signal()
+    trackingGainChanged = Signal()
+    typeChanged = Signal()
+    savedViewsChanged = Signal()
+
+    def __init__(self, access: Access, runtime: Runtime, parent: QtCore.QObject) -> None:
+        super().__init__(access.view, runtime, parent)
+        self.views = access.views
+        self._last_seen = self._seen()
+        self.model.mode_changed.connect(self.modeChanged)
+        self.model.tracked_frame_changed.connect(self.trackedFrameChanged)
+        self.model.problem_changed.connect(self._on_problem)
+        self.views.kind_changed.connect(self.typeChanged)
+        self.views.saved_changed.connect(self.savedViewsChanged)
+        settings = self.model.settings
+        settings.changed("animation_duration").connect(self.animationDurationChanged)
+        settings.changed("tracking_gain").connect(self.trackingGainChanged)
+        access.before_frame.connect(self._on_frame)
+
+    #: 0 in 3D, 1 in 2D, seen from above.
+    mode = member(
+        "mode",
+        QJSValue,
+        modeChanged,
+        takes=_mode,
+        sets=lambda self, mode: self.model.set_mode(mode),
+    )
+    MODE_3D = Property(int, lambda _self: 0, constant=True)
+    MODE_2D = Property(int, lambda _self: 1, constant=True)
+    #: The frame that the camera follows; empty for none.
+    trackedFrame = member(
+        "trackedFrame",
+        VARIANT,
+        trackedFrameChanged,
+        takes=text(_FRAME),
+        sets=lambda self, frame: self.model.track(frame),
+    )
+    #: Why the tracked frame cannot be followed now; empty when it can.
+    problem = member("problem", str, problemChanged)
+    eye = member("eye", QtGui.QVector3D, moved, gives=_vector)
+    focus = member("focus", QtGui.QVector3D, moved, gives=_vector)
+    #: Seconds that a movement takes.
+    animationDuration = member(
+        "animationDuration",
+        VARIANT,
+        animationDurationChanged,
+        of="model.settings.animation_duration",
+        takes=anything,
+        sets=lambda self, value: self.model.settings.set("animation_duration", value),
+    )
+    #: How quickly the camera follows, in 1/s.
+    trackingGain = member(
+        "trackingGain",
+        VARIANT,
+        trackingGainChanged,
+        of="model.settings.tracking_gain",
+        takes=anything,
+        sets=lambda self, value: self.model.settings.set("tracking_gain", value),
+    )
+    #: The kind of RViz's view, e.g. ``rviz/Orbit``.
+    type = member(
+        "type",
+        VARIANT,
+        typeChanged,
+        of="views.kind",
+        takes=text("a kind of view, e.g. 'rviz/Orbit'"),
+    )
+    viewTypes = member("viewTypes", LIST, of="views.kinds")
+    #: Names of the saved views.
+    savedViews = member("savedViews", LIST, savedViewsChanged, of="views.saved")
+
+    moveEye = passing(
+        "moveEye",
+        1,
+        eye=point("eye"),
+        options=options(frame=str, animate=bool, stopTracking=bool, switchTo3D=bool),
+    )
+    moveEyeAndFocus = passing(
+        "moveEyeAndFocus",
+        1,
+        eye=point("eye"),
+        focus=point("focus"),
+        options=options(frame=str, animate=bool, stopTracking=bool),
+    )
+
+    @slot(1, mode=_mode, animate=switch("animate"))
+    def setMode(self, mode: Any, animate: bool = True) -> None:
+        """Switch between 3D (0) and 2D (1); without animation where `animate` is false."""
+        self.model.set_mode(mode, animate=animate)
+
+    track = passing("track", frame=text(_FRAME))
+    reset = passing("reset")
+    saveView = passing("saveView", 0, "views.save", name=anything)
+    showView = passing("showView", 0, "views.show", name=anything)
+    removeView = passing("removeView", 0, "views.remove", name=anything)
+
+    @Slot(str)
+    def _on_problem(self, problem: str) -> None:
+        del problem
+        self.problemChanged.emit()
+
+    def _seen(self) -> tuple[Point, Point]:
+        seen = self.model.seen
+        return seen.eye, seen.focus
+
+    @Slot()
+    def _on_frame(self) -> None:
+        now = self._seen()
+        for new, old in zip(now, self._last_seen, strict=True):
+            if max(abs(n) for n in new - old) > _STILL:
+                self._last_seen = now
+                self.moved.emit()
+                return
+
+
+def _file_path(use: str = "") -> Callable[[Any], str]:
+    """Return what takes a file, named by a path or a ``file:`` address.
+
+    Args:
+        use: What it is for, where ``package://`` will not do.
+    """
+
+    def take(value: Any) -> str:
+        if isinstance(value, str) and value and "\0" not in value and len(value) <= 4096:
+            address = QtCore.QUrl(value)
+            if address.isLocalFile():
+                return address.toLocalFile()
+            if "://" not in value or (not use and value.startswith("package://")):
+                return value
+        raise Error(f"expected the path of a file{f' {use}' if use else ''}, got {shown(value)}")
+
+    return take
 
 
 class RvizObject(RegisteredProperties):
@@ -41,7 +407,7 @@ class RvizObject(RegisteredProperties):
         engine: Its engine, which has a session.
     """
 
-    #: What errors call it.
+    #: Its name in errors.
     CALLED = "rviz"
 
     visibleChanged = Signal()
@@ -56,418 +422,244 @@ class RvizObject(RegisteredProperties):
     #: A config file was loaded: every display, view and tool is another one now.
     configLoaded = Signal(str, arguments=["file"])
 
+    runtime: Runtime
+
     def __init__(self, overlay: Overlay, engine: QtQml.QQmlEngine) -> None:
         super().__init__()
-        runtime = self.runtime = runtime_of(engine)
+        runtime = runtime_of(engine)
         assert runtime is not None
+        self.runtime = runtime
         self._engine = engine
-        self._overlay = overlay
+        self.overlay = overlay
         self._visible = overlay.visible
-        self._leaving: list[Callable[[], Any]] = []
-        #: Held: the engine owns it, and Python would let its half go.
+        self._disconnects: list[Callable[[], Any]] = []
+        #: Held: the engine owns it, and Python would release its half.
         self._icons: ToolIcons | None = None
         QtQml.QQmlEngine.setObjectOwnership(self, QtQml.QQmlEngine.ObjectOwnership.CppOwnership)
         # QML may look at it for as long as there is an engine.
-        held = [self, spelled(runtime, self)]
+        held = [self, spell_checked(runtime, self)]
         engine.destroyed.connect(lambda *_: held.clear())
         self._follow(overlay.arranged, self._on_arranged)
-        access = runtime.session.shared.get(Access)
+        access = runtime.session.shared.get(ACCESS)
         if access is not None:
-            self._follow(access.window.fullscreen_changed, self._on_fullscreen)
-            self._follow(access.window.bare.changed, self._on_bare)
-            self._follow(access.window.config_loaded, self._on_config_loaded)
-            self._follow(access.fixed_frame_changed, self._on_fixed_frame)
-            self._follow(access.frame_rate_changed, self._on_frame_rate)
+            self._follow(access.fullscreen_changed, self.isFullscreenChanged)
+            self._follow(access.bare_changed, self.isBareChanged)
+            self._follow(access.config_loaded, self.configLoaded)
+            self._follow(access.fixed_frame_changed, self.fixedFrameChanged)
+            self._follow(access.frame_rate_changed, self.frameRateChanged)
 
     def _follow(self, signal: Any, slot: Any) -> None:
         signal.connect(slot)
-        self._leaving.append(lambda: signal.disconnect(slot))
+        self._disconnects.append(lambda: signal.disconnect(slot))
 
     def close(self) -> None:
-        """Follow RViz no longer; safe to call twice."""
-        leaving, self._leaving = self._leaving, []
-        for leave in leaving:
-            leave()
-        access = self.__dict__.get("_access")
-        if access is not None and self.runtime is not None:
+        """Disconnect from RViz; safe to call twice."""
+        disconnects, self._disconnects = self._disconnects, []
+        for disconnect in disconnects:
+            disconnect()
+        access = self.__dict__.get("access")
+        if access is not None:
             # Without an event loop of its own, a program may keep the engine for long.
-            access.trackers.let_go(self.runtime)
+            access.trackers.remove_all(self.runtime)
 
     @cached_property
-    def _access(self) -> Access:
-        assert self.runtime is not None
-        found: Access | None = self.runtime.session.shared.get(Access)
+    def access(self) -> Access:
+        """The 3D view.
+
+        Raises:
+            Error: There is none.
+        """
+        found: Access | None = self.runtime.session.shared.get(ACCESS)
         if found is None:
             raise Error("there is no RViz: the overlay's session is not that of an Application")
         return found
 
     @cached_property
-    def _tool_face(self) -> QmlToolManager:
-        assert self.runtime is not None
-        self._icons = ToolIcons(self._access.tools)
-        self._engine.addImageProvider(PROVIDER, self._icons)
-        return QmlToolManager(self._access.tools, self.runtime, self._engine)
+    def tool_manager(self) -> QmlToolManager:
+        """What QML has as `toolManager`."""
+        self._icons = ToolIcons(self.access.tools)
+        self._engine.addImageProvider(_ICONS, self._icons)
+        return QmlToolManager(self.access.tools, self.runtime, self._engine)
 
     @cached_property
-    def _display_faces(self) -> QmlDisplays:
-        assert self.runtime is not None
-        faces = QmlDisplays(self._access.displays, self.runtime, self._engine)
+    def display_faces(self) -> ItemFaces:
+        """What QML has for displays."""
+        displays = self.access.displays
+        faces = ItemFaces(displays, QmlDisplay, self.runtime, self._engine)
         faces.changed.connect(self.displaysChanged)
         faces.added.connect(self.displayAdded)
         faces.removed.connect(self.displayRemoved)
-        faces.statusChanged.connect(self.statusChanged)
+        displays.status_changed.connect(self.statusChanged)
         return faces
 
     @cached_property
-    def _view_face(self) -> QmlView:
-        assert self.runtime is not None
-        return QmlView(self._access, self.runtime, self._engine)
-
-    def _asked(self, what: str, work: Callable[[], Any], otherwise: Any = None) -> Any:
-        """Return what RViz answers; an error is thrown into the JavaScript that is running."""
-        try:
-            return work()
-        except Error as error:
-            self.throw(f"rviz.{what}: {error}")
-            return otherwise
-
-    def throw(self, text: str) -> None:
-        """Throw an error into the JavaScript that is running."""
-        if self.runtime is not None:
-            self.runtime.throw(text)
-
-    def _js(self, item: QtCore.QObject | None) -> QJSValue:
-        if item is None or self.runtime is None or self.runtime.engine is None:
-            return QJSValue(QJSValue.SpecialValue.NullValue)
-        return self.runtime.engine.newQObject(item)
-
-    def _value(self, value: Any) -> QJSValue:
-        return QJSValue() if self.runtime is None else self.runtime.value(value)
+    def camera(self) -> QmlView:
+        """What QML has as `view`."""
+        return QmlView(self.access, self.runtime, self._engine)
 
     # The overlay and the window.
 
-    def _set_fullscreen(self, fullscreen: Any) -> None:
-        def work() -> None:
-            self._access.window.fullscreen = switch_of(fullscreen)
-
-        self._asked("isFullscreen", work)
-
-    def _set_bare(self, bare: Any) -> None:
-        def work() -> None:
-            self._access.window.bare.on = switch_of(bare)
-
-        self._asked("isBare", work)
-
-    def _set_fixed_frame(self, frame: Any) -> None:
-        def work() -> None:
-            wanted = "the name of a frame, e.g. 'map'"
-            name = text_of(frame, wanted)
-            if not name:
-                raise Error(f"expected {wanted}, got {shown(name)}")
-            self._access.fixed_frame = name
-
-        self._asked("fixedFrame", work)
-
     #: Whether this overlay is shown.
-    visible = Property(bool, lambda self: self._overlay.visible, notify=visibleChanged)
-    isFullscreen = Property(
+    visible = member("visible", bool, visibleChanged, of="overlay.visible")
+    isFullscreen = member(
+        "isFullscreen",
         VARIANT,
-        lambda self: self._asked("isFullscreen", lambda: self._access.window.fullscreen, False),
-        _set_fullscreen,
-        notify=isFullscreenChanged,
+        isFullscreenChanged,
+        of="access.fullscreen",
+        takes=switch(),
+        otherwise=False,
     )
     #: Whether RViz's window has nothing but the 3D view in it.
-    isBare = Property(
-        VARIANT,
-        lambda self: self._asked("isBare", lambda: self._access.window.bare.on, False),
-        _set_bare,
-        notify=isBareChanged,
+    isBare = member(
+        "isBare", VARIANT, isBareChanged, of="access.bare", takes=switch(), otherwise=False
     )
-    fixedFrame = Property(
+    fixedFrame = member(
+        "fixedFrame",
         VARIANT,
-        lambda self: self._asked("fixedFrame", lambda: self._access.fixed_frame, ""),
-        _set_fixed_frame,
-        notify=fixedFrameChanged,
+        fixedFrameChanged,
+        of="access.fixed_frame",
+        takes=text("the name of a frame, e.g. 'map'"),
+        otherwise="",
     )
     #: Frames that RViz has drawn in the last second.
-    frameRate = Property(
-        float,
-        lambda self: self._asked("frameRate", lambda: self._access.frame_rate, 0.0),
-        notify=frameRateChanged,
-    )
+    frameRate = member("frameRate", float, frameRateChanged, of="access.frame_rate", otherwise=0.0)
     #: How RViz is: ``ok``, ``warn`` or ``error``.
-    status = Property(str, lambda self: self._get_status("status").level, notify=statusChanged)
+    status = member("status", str, statusChanged, of="rviz_status.level", otherwise="error")
     #: What RViz says about itself, one line for each.
-    statusText = Property(
-        str, lambda self: self._get_status("statusText").text, notify=statusChanged
+    statusText = member(
+        "statusText", str, statusChanged, of="rviz_status.text", otherwise="there is no RViz"
     )
 
-    def _get_status(self, what: str) -> Any:
-        return self._asked(
-            what, lambda: self._display_faces.displays.status, Status("error", "there is no RViz")
-        )
+    @property
+    def rviz_status(self) -> Any:
+        """RViz's own status; its changes are signalled from now on."""
+        displays = self.access.displays
+        if "display_faces" not in self.__dict__:
+            self.display_faces  # noqa: B018 - connects the signal
+        return displays.status
 
-    @taking(1, 2, None)
-    def screenshot(self, file: QJSValue, window: QJSValue | None = None) -> None:
+    @slot(1, file=_file_path("to save to"), window=switch("window"))
+    def screenshot(self, file: str, window: bool = False) -> None:
         """Save a picture of the 3D view with its overlays; of the whole window if `window`."""
+        self.access.picker.screenshot(file, window=window)
 
-        def work() -> None:
-            whole = given(window)
-            if whole is not None and not isinstance(whole, bool):
-                raise Error(f"window: expected true or false, got {shown(whole)}")
-            path = _file(given(file), "to save to")
-            self._access.picker.screenshot(path, window=whole is True)
-
-        self._asked("screenshot", work)
-
-    @taking(1, 1, None)
-    def loadConfig(self, file: QJSValue) -> None:
-        """Load a ``.rviz`` file, once the function that calls this has returned.
-
-        What has changed since the last one was saved is lost, and so may be this overlay.
-        """
-
-        def work() -> None:
-            window, path = self._access.window, config_file(_file(given(file)))
-
-            def load() -> None:
-                try:
-                    self._access.displays.settle_panel()
-                    window.load_config(path)
-                except Error as error:
-                    _log.error("rviz.loadConfig: %s", error)
-
-            QtCore.QTimer.singleShot(0, load)
-
-        self._asked("loadConfig", work)
-
-    @taking(0, 1, None)
-    def saveConfig(self, file: QJSValue | None = None) -> None:
-        """Save RViz's config; without a file, where it was loaded from."""
-
-        def work() -> None:
-            wanted, window = given(file), self._access.window
-            if wanted is None and not window.config:
-                raise Error("no config file is loaded; say where to save it")
-            window.save_config("" if wanted is None else _file(wanted, "to save to"))
-
-        self._asked("saveConfig", work)
+    #: Load a ``.rviz`` file, once the function that calls this has returned. What has changed since
+    #: the last one was saved is lost, and so may be this overlay.
+    loadConfig = passing("loadConfig", 0, "access.load_config", file=_file_path())
+    #: Save RViz's config; without a file, where it was loaded from.
+    saveConfig = passing("saveConfig", 1, "access.save_config", file=_file_path("to save to"))
 
     # Tools, camera, displays.
 
-    toolManager = Property(
-        QtCore.QObject,
-        lambda self: self._asked("toolManager", lambda: self._tool_face),
-        constant=True,
-    )
-    view = Property(
-        QtCore.QObject, lambda self: self._asked("view", lambda: self._view_face), constant=True
-    )
+    toolManager = member("toolManager", QtCore.QObject, of="tool_manager")
+    view = member("view", QtCore.QObject, of="camera")
     #: All displays, those in groups included, in the order of the panel.
-    displays = Property(
-        _LIST,
-        lambda self: self._all_displays(),
-        notify=displaysChanged,
+    displays = member(
+        "displays",
+        LIST,
+        displaysChanged,
+        of="display_faces.all",
+        gives=lambda faces: faces(),
+        otherwise=[],
     )
     #: Ids of the classes of which displays can be added.
-    displayClasses = Property(
-        _LIST,
-        lambda self: self._asked("displayClasses", lambda: self._access.displays.classes, []),
-        constant=True,
-    )
+    displayClasses = member("displayClasses", LIST, of="access.displays.classes", otherwise=[])
 
-    def _all_displays(self) -> list[Any]:
-        found: list[Any] = self._asked("displays", lambda: [*self._display_faces.all()], [])
-        return found
-
-    @taking(1, 1)
-    def display(self, name: QJSValue) -> QJSValue:
+    @slot(name=text("the name of a display, e.g. 'Grid'"))
+    def display(self, name: str) -> QmlDisplay | None:
         """Return the first display of a name; null where there is none."""
+        return self.display_faces.of(self.access.displays.find(name))  # type: ignore[no-any-return]
 
-        def work() -> QJSValue:
-            faces = self._display_faces
-            wanted = text_of(name, "the name of a display, e.g. 'Grid'")
-            found = faces.displays.find(wanted)
-            return self._js(None if found is None else faces.face(found))
-
-        return self._answer("display", work)
-
-    @taking(1, 3)
+    @slot(2, classId=anything, name=text("a text", "name"), enabled=switch("enabled"))
     def addDisplay(
-        self,
-        class_id: QJSValue,
-        name: QJSValue | None = None,
-        enabled: QJSValue | None = None,
-    ) -> QJSValue:
+        self, class_id: Any, name: str | None = None, enabled: bool = True
+    ) -> QmlDisplay:
         """Add a display of a class, and return it."""
+        faces = self.display_faces
+        return faces.of(  # type: ignore[no-any-return]
+            self.access.displays.add(class_id, name or "", enabled=enabled)
+        )
 
-        def work() -> QJSValue:
-            wanted, title, on = given(class_id), given(name), given(enabled)
-            if on is not None and not isinstance(on, bool):
-                raise Error(f"enabled: expected true or false, got {shown(on)}")
-            if title is not None and not isinstance(title, str):
-                raise Error(f"name: expected a text, got {shown(title)}")
-            faces = self._display_faces
-            made = faces.displays.add(wanted, title or "", enabled=on is not False)
-            return self._js(faces.face(made))
-
-        return self._answer("addDisplay", work)
-
-    @taking(1, 1, None)
-    def removeDisplay(self, display: QJSValue) -> None:
+    @slot(display=anything)
+    def removeDisplay(self, display: Any) -> None:
         """Remove a display; takes a display or its name."""
+        displays = self.access.displays
+        found = display.model if isinstance(display, QmlDisplay) else None
+        if found is None and not isinstance(display, str):
+            raise Error(f"expected a display or its name, got {shown(display)}")
+        if found is None:
+            found = displays.find(display)
+        if found is None:
+            names = ", ".join(there.name for there in displays.all) or "none"
+            raise Error(f"there is no display {shown(display)}; there are: {names}")
+        displays.remove(found)
 
-        def work() -> None:
-            faces = self._display_faces
-            faces.displays.remove(faces.wanted(given(display)))
-
-        self._asked("removeDisplay", work)
-
-    @taking(1, 1)
-    def getProperty(self, path: QJSValue) -> QJSValue:
+    @slot(path=property_path("Grid/Color"))
+    def getProperty(self, path: str | list[str]) -> QJSValue:
         """Return the value of any property, e.g. of ``Global Options/Background Color``."""
-        displays = self._access.displays
-        return self._answer("getProperty", lambda: self._value(displays.get(path_of(path, _PATH))))
+        return self.runtime.value(self.access.displays.get(path))
 
-    @taking(2, 2, None)
-    def setProperty(self, path: QJSValue, value: QJSValue) -> None:
-        """Change any property, as if it were done in the panel."""
-        displays = self._access.displays
-        self._asked("setProperty", lambda: displays.set(path_of(path, _PATH), given(value)))
+    #: Change any property, as if it were done in the panel.
+    setProperty = passing(
+        "setProperty", 0, "access.displays.set", path=property_path("Grid/Color"), value=anything
+    )
 
     # Points.
 
-    @taking(1, 3)
-    def pick(
-        self, x: QJSValue, y: QJSValue | None = None, radius: QJSValue | None = None
-    ) -> QJSValue:
+    @slot(2, x=anything, y=anything, radius=anything)
+    def pick(self, *given: Any) -> dict[str, float] | None:
         """Return the point of the fixed frame that is seen at a place; null where there is none.
 
         Args:
-            x: Units of the overlay; or a point with x and y.
-            y: The same.
-            radius: How far around to look, in the same units.
+            given: x, y and a radius, in units of the overlay; or a point with x and y, and a
+                radius. The radius says how far around to look.
         """
+        at = [*given, None, None]
+        if isinstance(at[0], dict) and {"x", "y"} <= set(at[0]):
+            at[:1] = [at[0]["x"], at[0]["y"]]
+        at[2] = 0.0 if at[2] is None else at[2]
+        for name, number in zip(("x", "y", "radius"), at, strict=False):
+            if isinstance(number, bool) or not isinstance(number, (int, float)):
+                wanted = "expected a number, in units of the overlay"
+                raise Error(f"{name}: {wanted}, got {shown(number)}")
+        found = self.access.picker.pick(*(number * self.overlay.scale for number in at[:3]))
+        return None if found is None else dict(zip("xyz", found, strict=True))
 
-        def work() -> QJSValue:
-            at, scale = [given(part) for part in (x, y, radius)], self._overlay.scale
-            if isinstance(at[0], dict) and {"x", "y"} <= set(at[0]):
-                at = [at[0]["x"], at[0]["y"], at[1]]
-            at[2] = 0.0 if at[2] is None else at[2]
-            for name, number in zip(("x", "y", "radius"), at, strict=True):
-                if isinstance(number, bool) or not isinstance(number, (int, float)):
-                    wanted = "expected a number, in units of the overlay"
-                    raise Error(f"{name}: {wanted}, got {shown(number)}")
-            found = self._access.picker.pick(*(number * scale for number in at))
-            if found is None:
-                return self._js(None)
-            return self._value(dict(zip("xyz", found, strict=True)))
-
-        return self._answer("pick", work)
-
-    @taking(1, 4)
-    def createPositionTracker(
-        self,
-        x: QJSValue,
-        y: QJSValue | None = None,
-        z: QJSValue | None = None,
-        frame: QJSValue | None = None,
-    ) -> QJSValue:
-        """Return an object that tells where on the overlay a point is seen.
+    @slot(3, x=anything, y=anything, z=anything, frame=anything)
+    def createPositionTracker(self, *given: Any) -> QJSValue:
+        """Return an object that says where on the overlay a point is seen.
 
         Args:
-            x: Metres; or a point with x, y and z.
-            y: Metres; or the frame.
-            z: Metres.
-            frame: What the point moves with; the fixed frame by default.
+            given: x, y and z in metres, or a point with x, y and z; and the frame that the point
+                moves with, the fixed frame by default.
         """
-
-        def work() -> QJSValue:
-            parts = [given(part) for part in (x, y, z, frame)]
-            if isinstance(parts[0], (dict, list)):
-                point, whose = place(parts[0]), parts[1]
-            else:
-                point, whose = place([part for part in parts[:3] if part is not None]), parts[3]
-            return self._track(point, "" if whose is None else whose)
-
-        return self._answer("createPositionTracker", work)
-
-    def _track(self, point: tuple[float, float, float], frame: str) -> QJSValue:
-        overlay, runtime = self._overlay, self.runtime
-        trackers = self._access.trackers
-        made = trackers.add(point, frame, lambda: overlay.scale, runtime)
-        assert runtime is not None
-        runtime.keep(made)
-        return spelled(runtime, made)
-
-    def _answer(self, what: str, work: Callable[[], QJSValue]) -> QJSValue:
-        answer: QJSValue = self._asked(what, work, QJSValue())
-        return answer
+        parts = [*given, None, None, None]
+        if not isinstance(parts[0], (dict, list)):
+            parts[:3] = [[part for part in parts[:3] if part is not None]]
+        overlay, frame = self.overlay, "" if parts[1] is None else parts[1]
+        made = self.access.trackers.add(
+            point_of(parts[0]), frame, lambda: overlay.scale, self.runtime
+        )
+        self.runtime.keep(made)
+        return spell_checked(self.runtime, made)
 
     @Slot(QtCore.QObject, str)
     def refuse(self, item: QtCore.QObject, message: str) -> None:
-        """Log what is wrong with an item, with the file that it is used in, not its own."""
+        """Log an error of an item, with the file that it is used in, not its own."""
         self._log_for(item, logging.ERROR, message)
 
     @Slot(QtCore.QObject, str)
     def warn(self, item: QtCore.QObject, message: str) -> None:
-        """Log what has become of an item, with the file that it is used in."""
+        """Log a warning about an item, with the file that it is used in."""
         self._log_for(item, logging.WARNING, message)
 
     def _log_for(self, item: QtCore.QObject, level: int, message: str) -> None:
         context = QtQml.QQmlEngine.contextForObject(item)
         file = "" if context is None else plain_path(context.baseUrl().toString())
-        log_from_qml("", level, message, Caller(file or self._overlay.name, 0, ""))
-
-    # Signals of RViz.
+        log_from_qml("", level, message, Caller(file or self.overlay.name, 0, ""))
 
     @Slot()
     def _on_arranged(self) -> None:
-        if self._overlay.visible != self._visible:
-            self._visible = self._overlay.visible
+        if self.overlay.visible != self._visible:
+            self._visible = self.overlay.visible
             self.visibleChanged.emit()
-
-    @Slot(bool)
-    def _on_fullscreen(self, fullscreen: bool) -> None:
-        del fullscreen
-        # RViz tells it before it does it.
-        QtCore.QTimer.singleShot(0, self._tell_fullscreen)
-
-    @Slot()
-    def _tell_fullscreen(self) -> None:
-        self.isFullscreenChanged.emit()
-
-    @Slot()
-    def _on_bare(self) -> None:
-        self.isBareChanged.emit()
-
-    @Slot(str)
-    def _on_config_loaded(self, file: str) -> None:
-        self.configLoaded.emit(file)
-
-    @Slot()
-    def _on_fixed_frame(self) -> None:
-        self.fixedFrameChanged.emit()
-
-    @Slot()
-    def _on_frame_rate(self) -> None:
-        self.frameRateChanged.emit()
-
-
-def _file(value: Any, use: str = "") -> str:
-    """Return a file that QML names by a path or a ``file:`` address.
-
-    Args:
-        value: What was given.
-        use: What it is for, where ``package://`` will not do.
-
-    Raises:
-        Error: It is neither.
-    """
-    if isinstance(value, str) and value and "\0" not in value and len(value) <= 4096:
-        address = QtCore.QUrl(value)
-        if address.isLocalFile():
-            return address.toLocalFile()
-        if "://" not in value or (not use and value.startswith("package://")):
-            return value
-    raise Error(f"expected the path of a file{f' {use}' if use else ''}, got {shown(value)}")

@@ -10,6 +10,7 @@ from rosglass.qt import Signal
 from rosglass.rviz.host import pyqt
 from rosglass.rviz.overlay import QML_CLASS, REFERENCE_QML_CLASS
 from rosglass.rviz.plugins import DISPLAY, TOOL, Watched, declared, require_class_id
+from rosglass.rviz.qt5 import QtGui
 from rosglass.rviz.watch import address, type_name
 
 if TYPE_CHECKING:
@@ -75,6 +76,29 @@ class Tool:
         """
         self._owner.select(self)
 
+    def remove(self) -> None:
+        """Remove it from RViz.
+
+        Raises:
+            Error: It was removed.
+        """
+        self._owner.remove(self)
+
+    def picture(self) -> Any:
+        """Return the largest size of its icon, a ``QPixmap``; a null one where there is none."""
+        made, icon = QtGui.QPixmap(), self.icon()
+        sizes = icon.availableSizes() if icon is not None else []
+        if sizes:
+            largest = icon.pixmap(max(sizes, key=lambda size: size.width() * size.height()))
+            core = pyqt()
+            kept, buffer = core.QByteArray(), core.QBuffer()
+            buffer.setBuffer(kept)
+            buffer.open(core.QIODevice.WriteOnly)
+            # A pixmap of PyQt5 is none of PySide2.
+            largest.save(buffer, "PNG")
+            made.loadFromData(bytes(kept.data()), "PNG")
+        return made
+
     def icon(self) -> Any:
         """Return its icon, a ``QIcon`` of PyQt5; None once it is removed."""
         return None if self.handle is None else self.handle.getIcon()
@@ -99,11 +123,6 @@ class Tools(Watched):
         self._hook.watch(self._manager, *signals, "toolRefreshed(Tool*)")
         self._match()
         self._told, self._told_current = list(self._items), self.current
-
-    @property
-    def all(self) -> list[Tool]:
-        """The tools in the order of their buttons."""
-        return list(self._items)
 
     @property
     def classes(self) -> list[str]:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import time
 from typing import TYPE_CHECKING, Any
@@ -14,11 +13,11 @@ from rosglass.qml.element import DEFAULT_TIMEOUT
 from rosglass.qml.tf_link import TfLink
 from rosglass.qt import Property, QJSValue, QtCore, QtGui, Signal, is_alive
 from rosglass.rviz.camera import Camera
-from rosglass.rviz.face import VARIANT, given, place
+from rosglass.rviz.face import VARIANT, errors_to_js, point_of, to_python
 from rosglass.rviz.property_values import shown
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Sequence
 
     from rosglass.comm.node import Node
     from rosglass.comm.time import Time
@@ -229,7 +228,7 @@ class Tracker(QtCore.QObject):
         Raises:
             Error: It is no point.
         """
-        new = place(point)
+        new = point_of(point)
         if new != self._point:
             self._point = new
             self.pointChanged.emit()
@@ -249,12 +248,12 @@ class Tracker(QtCore.QObject):
             self.look()
 
     def _set_point(self, point: Any) -> None:
-        with _answering(self._runtime, "tracker.point"):
-            self.move(given(point) if isinstance(point, QJSValue) else point)
+        with errors_to_js(self._runtime, "tracker.point", point):
+            self.move(to_python(point))
 
     def _set_frame(self, frame: Any) -> None:
-        with _answering(self._runtime, "tracker.frame"):
-            self.use_frame(given(frame) if isinstance(frame, QJSValue) else frame)
+        with errors_to_js(self._runtime, "tracker.frame", frame):
+            self.use_frame(to_python(frame))
 
     def _get_point(self) -> QJSValue | tuple[float, float, float]:
         if self._runtime is None:
@@ -302,7 +301,7 @@ class Trackers:
         Raises:
             Error: It is no point, or no frame.
         """
-        made = Tracker(self, place(point), "", scale, runtime)
+        made = Tracker(self, point_of(point), "", scale, runtime)
         if self._camera is not None:
             # Nobody may have asked for it for a while.
             self._camera.update()
@@ -316,8 +315,8 @@ class Trackers:
         if tracker in self._trackers:
             self._trackers.remove(tracker)
 
-    def let_go(self, runtime: Runtime) -> None:
-        """Follow nothing any longer for a QML engine that is about to go."""
+    def remove_all(self, runtime: Runtime) -> None:
+        """Remove the trackers of a QML engine that is about to be destroyed."""
         self._trackers = [t for t in self._trackers if is_alive(t) and t._runtime is not runtime]
 
     def __len__(self) -> int:
@@ -360,17 +359,6 @@ class Trackers:
                 self._scales[tracker] = scale
                 tracker.look()
         self._scales = {t: s for t, s in self._scales.items() if t in self._trackers}
-
-
-@contextlib.contextmanager
-def _answering(runtime: Runtime | None, what: str) -> Iterator[None]:
-    """Throw errors where there is JavaScript; otherwise let them through."""
-    try:
-        yield
-    except Error as error:
-        if runtime is None:
-            raise
-        runtime.throw(f"{what}: {error}")
 
 
 def _differ(new: Sequence[float], old: Sequence[float]) -> bool:

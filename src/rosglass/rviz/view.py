@@ -80,12 +80,12 @@ class _Setting(Generic[_T]):
 
     def __set__(self, settings: ViewSettings, value: _T) -> None:
         try:
-            self.give(settings, value)
+            self.set(settings, value)
         except Error as error:
             raise Error(f"{self.name}: {error}") from None
 
-    def give(self, settings: ViewSettings, value: object) -> None:
-        """Set it, for a program; the error does not name it.
+    def set(self, settings: ViewSettings, value: object) -> None:
+        """Set it for a program; the error does not name it.
 
         Raises:
             Error: It cannot be that.
@@ -179,6 +179,20 @@ class ViewSettings:
                     description=found.about,
                     **found.options,
                 )
+
+    def set(self, attribute: str, value: object) -> None:
+        """Set an attribute; the error does not name it.
+
+        Raises:
+            Error: It cannot be that.
+        """
+        setting: _Setting[Any] = getattr(ViewSettings, attribute)
+        setting.set(self, value)
+
+    def changed(self, attribute: str) -> Any:
+        """Return the signal of an attribute's changes."""
+        setting: _Setting[Any] = getattr(ViewSettings, attribute)
+        return setting.of(self).valueChanged
 
     def save(self) -> dict[str, Any]:
         """Return all values by name, as a file keeps them."""
