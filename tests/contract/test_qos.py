@@ -47,7 +47,7 @@ def test_profiles_that_do_not_match_are_told_to_both(
         eventually(lambda side=side, problem=problem: problem in side.problem)
     if wire.name != "zenoh":  # which leaves it to its users
         assert "nothing is received" in subscription.problem
-        assert "it receives nothing from us; offer what it asks for" in publisher.problem
+        assert "it receives nothing from us; offer what it requests" in publisher.problem
         assert (subscription.publisher_count(), publisher.subscription_count()) == (0, 0)
         publisher.publish(data="x")
         assert subscription.wait(0.3) is None

@@ -184,7 +184,7 @@ def test_a_subscription_without_type_waits_for_the_first_publisher(
 ):
     subscription = console.create_subscription(topic)
     assert subscription.type is None
-    assert "nobody publishes" in eventually(lambda: subscription.hint)
+    assert "has no publisher" in eventually(lambda: subscription.hint)
     robot.create_publisher(topic, TEXT, QoS.latched()).publish(data="first")
     eventually(lambda: subscription.type is not None)
     assert subscription.type.name == TEXT
@@ -372,9 +372,7 @@ def test_a_publisher_without_subscriptions_hints_at_a_name_that_is_alike(
     console.create_subscription(f"{topic}/cmd_vel", TEXT)
     publisher = robot.create_publisher(f"{topic}/cmd_vle", TEXT)
     eventually(lambda: "did you mean" in publisher.hint, lambda: publisher.hint)
-    assert publisher.hint == (
-        f"nobody subscribes to {topic}/cmd_vle; did you mean {topic}/cmd_vel?"
-    )
+    assert publisher.hint == (f"{topic}/cmd_vle has no subscriber; did you mean {topic}/cmd_vel?")
     console.create_subscription(f"{topic}/cmd_vle", TEXT)
     eventually(lambda: publisher.hint == "")
     publisher.close()
@@ -514,7 +512,7 @@ def test_a_subscription_says_which_publisher_left(robot, console, topic, eventua
     eventually(lambda: [end.node.full for end in console.publishers(topic)] == ["/robot"])
     assert subscription.problem == ""
     publisher.close()
-    left = re.compile(r"nobody has published it since \d\d:\d\d:\d\d, when /robot left")
+    left = re.compile(r"it has had no publisher since \d\d:\d\d:\d\d, when /robot left")
     told = eventually(lambda: left.fullmatch(subscription.problem), lambda: subscription.problem)
     assert [r for r in caplog.records if r.levelname == "WARNING"] == []
     assert robot.create_publisher(topic, TEXT)
@@ -537,7 +535,7 @@ def test_hints_at_topics_that_were_meant(robot, console, topic, eventually):
     name = f"{topic}_lidar".strip("/")
     published = robot.create_publisher(f"{topic}/front/{name}", TEXT)
     subscription = console.create_subscription(f"/{name}", TEXT)
-    hint = f"nobody publishes /{name}; did you mean {topic}/front/{name}?"
+    hint = f"/{name} has no publisher; did you mean {topic}/front/{name}?"
     eventually(lambda: subscription.hint == hint, lambda: subscription.hint)
     assert subscription.problem == ""
     assert console.create_subscription(published.topic).hint == ""
@@ -637,8 +635,10 @@ def test_odd_arguments_of_a_subscription_are_refused(console, topic):
     subscription = console.create_subscription(topic)
     with pytest.raises(rosglass.ConversionError, match=f"{topic}: sample: expected"):
         subscription.lateness(7)
-    with pytest.raises(rosglass.ConversionError, match=f"{topic}: patient: expected True or False"):
-        subscription.set_patient(1)
+    with pytest.raises(
+        rosglass.ConversionError, match=f"{topic}: batching: expected True or False"
+    ):
+        subscription.set_batching(1)
 
 
 async def _coroutine(*_):

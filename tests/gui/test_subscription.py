@@ -504,11 +504,11 @@ def test_a_topic_much_faster_than_it_is_shown_may_come_some_messages_at_a_time(
 
     def patient() -> bool:
         chat.publish(data="x")
-        return received.patient
+        return received.batching
 
     wait(patient)
     sub.setProperty("throttleRate", 0)
-    wait(lambda: not received.patient)
+    wait(lambda: not received.batching)
 
 
 @pytest.mark.parametrize("url", ["zenoh"], indirect=True, scope="module")

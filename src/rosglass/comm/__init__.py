@@ -6,8 +6,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rosglass.comm.action import ActionResult, CancelAnswer, GoalStatus
-    from rosglass.comm.action_client import ActionClient, ClientGoal
+    from rosglass.comm.action_client import (
+        ActionClient,
+        ActionResult,
+        CancelAnswer,
+        ClientGoal,
+        GoalStatus,
+    )
     from rosglass.comm.action_server import ActionServer, ServerGoal
     from rosglass.comm.clock import Clock, ClockChange, Jump, Timer
     from rosglass.comm.events import (
@@ -23,7 +28,7 @@ if TYPE_CHECKING:
     from rosglass.comm.executor import IMMEDIATE, Dispatcher, LoopExecutor, executor_for
     from rosglass.comm.graph import ConnectionState, EndpointInfo, EndpointKind, NodeName, Status
     from rosglass.comm.handle import Executor, Handle
-    from rosglass.comm.inbox import INBOX_LIMIT
+    from rosglass.comm.inbox import INBOX_LIMIT, Sample
     from rosglass.comm.lifecycle import LifecycleClient, State, Transition, TransitionEvent
     from rosglass.comm.listeners import Listeners
     from rosglass.comm.names import anonymous_name
@@ -41,11 +46,10 @@ if TYPE_CHECKING:
     from rosglass.comm.promise import Promise
     from rosglass.comm.publisher import Publisher
     from rosglass.comm.qos import BEST_AVAILABLE, Durability, History, Liveliness, QoS, Reliability
-    from rosglass.comm.sample import Sample
     from rosglass.comm.service_client import Call, ServiceClient
     from rosglass.comm.service_server import Answer, ServiceServer
     from rosglass.comm.statistics import Statistics
-    from rosglass.comm.subscription import Source, Subscription
+    from rosglass.comm.subscription import Subscription
     from rosglass.comm.time import Duration, Time
     from rosglass.comm.timers import Timers, Worker
 
@@ -102,7 +106,6 @@ __all__ = [
     "ServiceClient",
     "ServiceServer",
     "SetResult",
-    "Source",
     "State",
     "Statistics",
     "Status",
@@ -120,14 +123,12 @@ __all__ = [
 
 _HOMES = {
     "names": ("anonymous_name",),
-    "action": (
-        "ActionResult",
-        "CancelAnswer",
-        "GoalStatus",
-    ),
     "action_client": (
         "ActionClient",
+        "ActionResult",
+        "CancelAnswer",
         "ClientGoal",
+        "GoalStatus",
     ),
     "action_server": (
         "ActionServer",
@@ -162,7 +163,10 @@ _HOMES = {
         "NodeName",
         "Status",
     ),
-    "inbox": ("INBOX_LIMIT",),
+    "inbox": (
+        "INBOX_LIMIT",
+        "Sample",
+    ),
     "lifecycle": (
         "LifecycleClient",
         "State",
@@ -195,7 +199,6 @@ _HOMES = {
         "QoS",
         "Reliability",
     ),
-    "sample": ("Sample",),
     "service_client": (
         "Call",
         "ServiceClient",
@@ -205,10 +208,7 @@ _HOMES = {
         "ServiceServer",
     ),
     "statistics": ("Statistics",),
-    "subscription": (
-        "Source",
-        "Subscription",
-    ),
+    "subscription": ("Subscription",),
     "time": (
         "Duration",
         "Time",

@@ -9,10 +9,10 @@ from __future__ import annotations
 import threading
 import time
 from abc import abstractmethod
+from enum import Enum
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
-from rosglass.comm.action import ActionResult, CancelAnswer, GoalStatus
 from rosglass.comm.client import Client, untyped
 from rosglass.comm.handle import Executor, Handle
 from rosglass.comm.listeners import Listeners
@@ -37,7 +37,16 @@ if TYPE_CHECKING:
 
     _T = TypeVar("_T")
 
-__all__ = ["FEEDBACK_DEPTH", "GRACE_S", "OUTAGE_S", "ActionClient", "ClientGoal"]
+__all__ = [
+    "FEEDBACK_DEPTH",
+    "GRACE_S",
+    "OUTAGE_S",
+    "ActionClient",
+    "ActionResult",
+    "CancelAnswer",
+    "ClientGoal",
+    "GoalStatus",
+]
 
 #: Feedback that waits for a slow callback.
 FEEDBACK_DEPTH = 10
@@ -45,6 +54,54 @@ FEEDBACK_DEPTH = 10
 GRACE_S = 5.0
 #: The same while this program itself is cut off, when nothing can be said of the server.
 OUTAGE_S = 10.0
+
+
+class GoalStatus(Enum):
+    """What has become of a goal."""
+
+    PENDING = "pending"
+    REJECTED = "rejected"
+    ACCEPTED = "accepted"
+    EXECUTING = "executing"
+    CANCELING = "canceling"
+    SUCCEEDED = "succeeded"
+    CANCELED = "canceled"
+    ABORTED = "aborted"
+    #: The server went away, or never came: nobody knows.
+    LOST = "lost"
+
+    @property
+    def is_active(self) -> bool:
+        """Whether the goal has not ended."""
+        return self in _ACTIVE
+
+
+_ACTIVE = (GoalStatus.PENDING, GoalStatus.ACCEPTED, GoalStatus.EXECUTING, GoalStatus.CANCELING)
+
+
+class ActionResult(NamedTuple):
+    """How a goal ended.
+
+    Attributes:
+        status: SUCCEEDED, CANCELED or ABORTED.
+        result: What the server sent with it; the type's defaults for a goal that was cancelled
+            before it was sent.
+    """
+
+    status: GoalStatus
+    result: Message
+
+
+class CancelAnswer(NamedTuple):
+    """What a server answers to a request to cancel.
+
+    Attributes:
+        accepted: Ids of the goals that are being cancelled.
+        reason: Why there are none, in words; empty when there are.
+    """
+
+    accepted: tuple[bytes, ...]
+    reason: str = ""
 
 
 @hint_at_members

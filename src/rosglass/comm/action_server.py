@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from concurrent.futures import Future
 from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
 
-from rosglass.comm.action import GoalStatus
+from rosglass.comm.action_client import GoalStatus
 from rosglass.comm.executor import LoopExecutor, executor_for
 from rosglass.comm.handle import Handle
 from rosglass.comm.promise import Promise

@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from rosglass.comm.core import NodeCore
+    from rosglass.comm.inbox import Sample
     from rosglass.comm.log import NodeLog
     from rosglass.comm.node import Node
     from rosglass.comm.parameters import Parameters
-    from rosglass.comm.sample import Sample
     from rosglass.comm.subscription import Subscription
 
 __all__ = ["USE_SIM_TIME", "BuiltinProtocol", "BuiltinServices", "SimTime"]

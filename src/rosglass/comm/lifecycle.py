@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from rosglass.comm.other_node import OtherNode
 from rosglass.comm.promise import Deadline
+from rosglass.comm.service_client import OtherNode
 from rosglass.comm.time import Time
 from rosglass.errors import TransitionError
 

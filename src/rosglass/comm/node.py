@@ -12,8 +12,7 @@ from rosglass.comm.handle import Handle, check_flag, check_may_wait
 from rosglass.comm.publisher import Publisher
 from rosglass.comm.qos import QoS, check_profile
 from rosglass.comm.rclpy_names import check_order, hint_at_members
-from rosglass.comm.subscription import Subscription
-from rosglass.comm.subscription_feed import find_subscribed_type
+from rosglass.comm.subscription import Subscription, find_subscribed_type
 from rosglass.errors import (
     NodeClosedError,
     TimeoutError,  # noqa: A004 - the field's own word
@@ -30,11 +29,11 @@ if TYPE_CHECKING:
     from rosglass.comm.core import NodeCore
     from rosglass.comm.graph import EndpointInfo
     from rosglass.comm.handle import Executor
+    from rosglass.comm.inbox import Sample
     from rosglass.comm.lifecycle import LifecycleClient
     from rosglass.comm.log import NodeLogger
     from rosglass.comm.parameters import ParameterClient, Parameters
     from rosglass.comm.promise import Promise
-    from rosglass.comm.sample import Sample
     from rosglass.comm.service_client import ServiceClient
     from rosglass.comm.service_server import Answer, ServiceServer
     from rosglass.comm.time import Duration, Time

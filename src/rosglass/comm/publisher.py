@@ -1,4 +1,4 @@
-"""A topic's publisher, the same above every wire."""
+"""Publishing a topic."""
 
 from __future__ import annotations
 
@@ -19,12 +19,18 @@ from rosglass.comm.events import (
 )
 from rosglass.comm.graph import EndpointInfo, EndpointKind, Graph
 from rosglass.comm.handle import Handle
+from rosglass.comm.inbox import Sample
 from rosglass.comm.names import similar
 from rosglass.comm.qos import Liveliness
 from rosglass.comm.rclpy_names import hint_at_members
-from rosglass.comm.sample import Sample
 from rosglass.comm.timers import Watchdog
-from rosglass.errors import ConversionError, NodeClosedError, TypeNotFoundError, UnsupportedError
+from rosglass.errors import (
+    ArgumentError,
+    ConversionError,
+    NodeClosedError,
+    TypeNotFoundError,
+    UnsupportedError,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -38,11 +44,11 @@ if TYPE_CHECKING:
 __all__ = ["Publisher"]
 
 _SUBSCRIPTION = EndpointKind.SUBSCRIPTION
-#: Subscriptions that left since the last look, and are reported at the next one.
+#: Subscriptions that left and are reported with the next update; more are forgotten.
 _MAX_LEFT = 1000
-#: Payloads above this size are handed on in parts, so that arrays in them are not copied.
+#: Payloads above this size are written in parts, so that arrays in them are not copied.
 _BIG_BYTES = 64 * 1024
-#: Tells `publish()` from `publish(None)`.
+#: Distinguishes `publish()` from `publish(None)`.
 _NO_MESSAGE: Any = object()
 
 
@@ -54,12 +60,12 @@ class Publisher(Handle):
         core: The node.
         topic: Absolute topic name.
         type: The message type.
-        qos: The quality of service offered, which may leave policies open.
+        qos: The quality of service to offer, which may leave policies open.
 
     Attributes:
         topic: As given.
         type: As given.
-        qos: The quality of service offered; what was left open is decided.
+        qos: The quality of service offered, with no policy left open.
     """
 
     def __init__(self, core: NodeCore, topic: str, type: MessageType, qos: QoS) -> None:
@@ -69,15 +75,16 @@ class Publisher(Handle):
         self._closed = False
         self._process = os.getpid()
         self._problem = ""
-        #: The subscriptions in the graph at the last look; None asks for another one.
+        #: The subscriptions in the graph at the last update; None requests another one.
         self._known: list[EndpointInfo] | None = None
         self._left: deque[EndpointInfo] = deque(maxlen=_MAX_LEFT)
         self._big = False
-        self._events = PublisherEvents(core.dispatcher, self._look, topic)
+        self._events = PublisherEvents(core.dispatcher, self._request_update, topic)
+        #: Guards the watchdogs, and that none is added after closing.
         self._lock = threading.Lock()
         self._watchdogs: dict[str, Watchdog] = {}
         self._missed = self._lost = 0
-        self._sent_at = self._shown_at = self._lost_since = 0.0
+        self._sent_at = self._asserted_at = self._lost_since = 0.0
         self.qos = qos.for_publisher([s.qos for s in self._subscriptions() if s.type == type.name])
         # Read the clock per message only if a deadline or lease is set.
         self._timed = self.qos.deadline is not None or self.qos.lease_duration is not None
@@ -87,10 +94,10 @@ class Publisher(Handle):
         if self._writer.gid:
             core.local_gids.add(self._writer.gid)
         core.add(self, self._follow)
-        # A wire that does not know its subscribers has a graph that tells who leaves.
-        graph = core.graph if self._writer.subscribers() is None else None
-        if isinstance(graph, Graph):
-            graph.watch(topic, self._on_endpoint_removed)
+        # Where the wire does not know its subscribers, the graph does.
+        self._graph = core.graph if self._writer.subscribers() is None else None
+        if isinstance(self._graph, Graph):
+            self._graph.watch(topic, self._on_endpoint_removed)
             self._writer.match(self._matching(self._subscriptions()))
 
     def __repr__(self) -> str:
@@ -105,27 +112,28 @@ class Publisher(Handle):
     def publish(self, message: Message | dict[str, Any] = _NO_MESSAGE, /, **fields: Any) -> None:
         """Send a message.
 
-        In ROS 1, as with rospy and roscpp, ``header.seq`` of what is sent is the running number of
-        the node's messages on the topic, from 1 on, if the message begins with a header.
+        In ROS 1, as with rospy and roscpp, ``header.seq`` of the message sent is a sequence number
+        of the node's messages on the topic, from 1 on, if the message begins with a header.
 
         Args:
             message: A :class:`Message`, or a dict of fields; missing fields get their defaults.
-                None is refused: it is what a function that forgot its return gives.
+                None is refused: it is the result of a function without return statement.
             fields: The fields as keyword arguments, instead of `message`.
 
         Raises:
             ConversionError: A value does not fit its field; nothing is sent.
+            ArgumentError: Both a message and keyword fields are given.
             TypeNotFoundError: The type is opaque: only bytes can be sent.
             NodeClosedError: The publisher is closed.
         """
         if message is not _NO_MESSAGE and fields:
-            raise ConversionError(
+            raise ArgumentError(
                 "", fields, "either a message or keyword fields, not both", self.type.name
             )
         if self._closed or self._process != os.getpid():
-            raise self._gone()
+            raise self._closed_error()
         if message is None:
-            # Most likely a function that forgot its return: it must not become a zero command.
+            # Most likely a missing return statement: it must not become an all-zero command.
             raise ConversionError("", None, "a message, a dict or keyword fields", self.type.name)
         value = fields if message is _NO_MESSAGE else message
         number = self._writer.number
@@ -142,57 +150,57 @@ class Publisher(Handle):
         else:
             self._writer.write_parts(parts if number is None else number(parts))
         if self._timed:
-            self._note_sending()
+            self._on_sent()
 
     def publish_serialized(self, data: bytes | bytearray | memoryview | Sample) -> None:
-        """Send what is encoded already in the node's wire format, unchanged.
+        """Send a message that is already encoded in the node's wire format, unchanged.
 
         Args:
             data: The bytes, in ROS 2 with their 4-byte encapsulation header, or a received sample
                 to pass on.
 
         Raises:
-            ConversionError: These are no such bytes, or the sample is of another type.
-            UnsupportedError: The wire cannot carry big-endian bytes, and without a definition they
-                cannot be turned round.
+            ArgumentError: The argument is neither bytes nor a sample.
+            ConversionError: The bytes are not valid, or the sample is of another type.
+            UnsupportedError: The wire cannot carry big-endian bytes, and converting them needs a
+                definition of the type.
             NodeClosedError: The publisher is closed.
         """
         if self._closed or self._process != os.getpid():
-            raise self._gone()
+            raise self._closed_error()
         if isinstance(data, Sample):
-            data = self._content(data)
+            data = self._check_sample(data)
         elif not isinstance(data, (bytes, bytearray, memoryview)):
-            raise ConversionError(
-                "", data, "bytes, a bytearray, a memoryview or a Sample", self.type.name
-            )
-        payload = data if type(data) is bytes else _octets(data)
+            expected = "bytes, a bytearray, a memoryview or a Sample"
+            raise ArgumentError("", data, expected, self.type.name)
+        payload = data if type(data) is bytes else _byte_view(data)
         if self._wire == "cdr":
-            payload = self._sendable(payload)
+            payload = self._in_wire_order(payload)
         if type(payload) is bytes:
             self._writer.write(payload)
         else:
             # Copied by the wire: the caller may reuse its buffer at once.
             self._writer.write_parts((payload,))
         if self._timed:
-            self._note_sending()
+            self._on_sent()
 
     def assert_liveliness(self) -> None:
-        """Show that the publisher is alive, without sending anything.
+        """Assert that the publisher is alive, without sending a message.
 
-        For publishers with manual liveliness; sending shows it as well. Zenoh cannot carry it.
+        For publishers with manual liveliness, which sending asserts as well. Zenoh cannot carry it.
 
         Raises:
             NodeClosedError: The publisher is closed.
             UnsupportedError: ROS 1 cannot carry it.
         """
         if self._closed or self._process != os.getpid():
-            raise self._gone()
+            raise self._closed_error()
         self._writer.assert_liveliness()
-        self._shown_at = time.monotonic()
-        self._watch()
+        self._asserted_at = time.monotonic()
+        self._start_watchdogs()
 
-    def _content(self, sample: Sample) -> bytes | memoryview:
-        """Return the bytes of a sample that can be passed on here."""
+    def _check_sample(self, sample: Sample) -> bytes | memoryview:
+        """Return the bytes of a sample of this publisher's type; raises ConversionError."""
         given, ours = sample.type, self.type
         if sample.wire != self._wire:
             raise ConversionError("wire", sample.wire, f"a sample as {self._wire}", self.topic)
@@ -207,8 +215,8 @@ class Publisher(Handle):
             raise ConversionError(name, version, expected, self.topic)
         return sample.data
 
-    def _sendable(self, payload: bytes | memoryview) -> bytes | memoryview:
-        """Return CDR bytes in an order that the wire can carry."""
+    def _in_wire_order(self, payload: bytes | memoryview) -> bytes | memoryview:
+        """Return CDR bytes in a byte order that the wire can carry."""
         if len(payload) < 4 or payload[0] != 0:
             expected = "CDR bytes with their 4-byte encapsulation header"
             raise ConversionError("", bytes(payload), expected, self.type.name)
@@ -218,22 +226,21 @@ class Publisher(Handle):
             return self.type.encode(self.type.decode(payload, wire="cdr").copy(), wire="cdr")
         except TypeNotFoundError as error:
             raise UnsupportedError(
-                f"{self.topic}: big-endian bytes cannot be passed on over DDS, and turning them "
-                f"round needs the type's definition: {error}"
+                f"{self.topic}: big-endian bytes cannot be sent over DDS, and converting them "
+                f"needs the type's definition: {error}"
             ) from error
 
-    def _note_sending(self) -> None:
+    def _on_sent(self) -> None:
         first = not self._sent_at
-        self._sent_at = self._shown_at = time.monotonic()
+        self._sent_at = self._asserted_at = time.monotonic()
         if first:
-            self._watch()
+            self._start_watchdogs()
 
-    def _gone(self) -> NodeClosedError:
-        """Return the reason why nothing can be sent any more."""
+    def _closed_error(self) -> NodeClosedError:
         if self._process != os.getpid():
             return NodeClosedError(
-                f"the publisher of {self.topic} belongs to the process that made it, and does not "
-                "work after a fork; connect again in this process"
+                f"the publisher of {self.topic} belongs to the process that created it, and does "
+                "not work after a fork; connect again in this process"
             )
         return NodeClosedError(f"the publisher of {self.topic} is closed; create another one")
 
@@ -249,9 +256,8 @@ class Publisher(Handle):
         self._events.clear()
         if self._process != os.getpid():
             return
-        graph = self._core.graph if self._writer.subscribers() is None else None
-        if isinstance(graph, Graph):
-            graph.unwatch(self.topic, self._on_endpoint_removed)
+        if isinstance(self._graph, Graph):
+            self._graph.unwatch(self.topic, self._on_endpoint_removed)
         self._writer.close()
         self._core.retire_gid(self._writer.gid)
         self._core.remove(self)
@@ -259,9 +265,9 @@ class Publisher(Handle):
     # -- subscriptions ---------------------------------------------------------------------------
 
     def subscription_count(self) -> int:
-        """Return how many subscriptions match this publisher now; 0 after closing.
+        """Return the number of matching subscriptions; 0 after closing.
 
-        In ROS 1, those are the subscribers that are connected.
+        In ROS 1, those are the connected subscribers.
         """
         if self._closed:
             return 0
@@ -270,7 +276,7 @@ class Publisher(Handle):
 
     @property
     def dropped(self) -> int:
-        """How many messages on the topic made room for newer ones because a subscriber is slow.
+        """How many messages on the topic were dropped because a subscriber is too slow.
 
         Always 0 on wires that do not count them: DDS, Zenoh.
         """
@@ -278,31 +284,31 @@ class Publisher(Handle):
 
     @property
     def problem(self) -> str:
-        """Why some subscriptions get nothing, or not all, in words; empty when all is well."""
+        """Why subscriptions miss messages, in words; empty if there is no problem."""
         return self._problem
 
     @property
     def hint(self) -> str:
-        """What may be wrong when nobody subscribes to the topic, e.g. a name much like it."""
+        """A hint why the topic has no subscriber, e.g. a similar topic name."""
         if self._closed or self._writer.subscribers() or self._subscriptions():
             return ""
         graph = self._core.graph
-        wanted = [name for name in graph.topics() if graph.endpoints(_SUBSCRIPTION, name)]
-        return f"nobody subscribes to {self.topic}{similar(self.topic, wanted)}"
+        subscribed = [name for name in graph.topics() if graph.endpoints(_SUBSCRIPTION, name)]
+        return f"{self.topic} has no subscriber{similar(self.topic, subscribed)}"
 
-    def _look(self) -> None:
-        """Look at the subscriptions soon, whether or not they change."""
+    def _request_update(self) -> None:
+        """Request an update soon, even if the subscriptions do not change."""
         self._known = None
         self._core.wake()
 
     def _on_endpoint_removed(self, endpoint: EndpointInfo) -> None:
-        """Report a matching subscription that left, even if no look has found it."""
+        """Report a matching subscription that left, even if it was never seen in an update."""
         if endpoint.kind is _SUBSCRIPTION and self._matching([endpoint]):
             self._left.append(endpoint)
-            self._look()
+            self._request_update()
 
-    def _follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - both look alike here
-        """Follow the subscriptions, on the node's own thread."""
+    def _follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - nothing is periodic here
+        """Follow the subscriptions, on the node's graph thread."""
         if self._closed:
             return
         if self._writer.subscribers() is not None:
@@ -312,12 +318,12 @@ class Publisher(Handle):
         elif moved:
             self._follow_graph()
         if self._timed:
-            self._watch()
+            self._start_watchdogs()
 
     def _follow_graph(self) -> None:
         subscriptions = self._subscriptions()
         if subscriptions == self._known:
-            return  # what changed in the graph is elsewhere
+            return
         self._known = subscriptions
         matching, conflicting = self._matching(subscriptions), self._conflicts(subscriptions)
         self._writer.match(matching)
@@ -330,14 +336,14 @@ class Publisher(Handle):
         found: list[EndpointInfo] = self._core.graph.endpoints(_SUBSCRIPTION, self.topic)
         return found
 
-    def _agrees(self, endpoint: EndpointInfo) -> bool:
-        """Return whether a subscription's type is our version of it, as far as it says."""
+    def _has_same_hash(self, endpoint: EndpointInfo) -> bool:
+        """Return whether a subscription's type has our hash, or one of the two is not announced."""
         return not self._hash or endpoint.type_hash in ("", self._hash)
 
     def _receives(self, endpoint: EndpointInfo) -> bool:
-        """Return whether a subscription's type lets it receive what we send."""
+        """Return whether the wire delivers our messages to a subscription of its type."""
         same = endpoint.type == self.type.name
-        return same and (self._agrees(endpoint) or not self._core.middleware.matches_hashes)
+        return same and (self._has_same_hash(endpoint) or not self._core.middleware.matches_hashes)
 
     def _matching(self, subscriptions: Sequence[EndpointInfo]) -> list[EndpointInfo]:
         found = [one for one in subscriptions if self._receives(one)]
@@ -369,9 +375,9 @@ class Publisher(Handle):
             if one.type != name:
                 wrong = f"{one.node} subscribes to {one.type} here, not {name}"
                 problems[f"{wrong}: it receives nothing from us"] = None
-            elif not self._agrees(one):
+            elif not self._has_same_hash(one):
                 effect = (
-                    "it receives our messages all the same, and may take them for something else"
+                    "it receives our messages all the same, and may misinterpret them"
                     if self._receives(one)
                     else "it receives nothing from us"
                 )
@@ -385,7 +391,7 @@ class Publisher(Handle):
             else "it is served without that guarantee"
         )
         for one, policies in conflicting.items():
-            remedy = "; offer what it asks for" if one.qos.conflicts(self.qos) else ""
+            remedy = "; offer what it requests" if one.qos.conflicts(self.qos) else ""
             problems[
                 f"quality of service requested by {one.node} does not match ({words(policies)}): "
                 f"{effect}{remedy}"
@@ -405,16 +411,16 @@ class Publisher(Handle):
     def on_matched(
         self, callback: Callable[[Matched], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` when a subscription comes that matches, and when it goes.
+        """Call `callback` when a matching subscription appears or leaves.
 
-        Those that are there already are told first.
+        The subscriptions that exist already are reported first.
 
         Args:
-            callback: Told who, and how many there are now.
+            callback: Called with the subscription, and how many match now.
             executor: Where it runs; None for the node's own dispatcher thread.
 
         Raises:
-            ConversionError: One of the arguments is not what it should be.
+            ArgumentError: The callback is not callable, or the executor is not an Executor.
         """
         events = self._events
         return events.added(events.matched.add(callback, executor or events.executor))
@@ -422,9 +428,9 @@ class Publisher(Handle):
     def on_incompatible_qos(
         self, callback: Callable[[IncompatibleQoS], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` when a subscription comes that asks for more than is offered.
+        """Call `callback` when a subscription appears that requests more than is offered.
 
-        Those that are there already are told first; arguments as for :meth:`on_matched`.
+        The ones that exist already are reported first; arguments as for :meth:`on_matched`.
         """
         events = self._events
         return events.added(events.incompatible.add(callback, executor or events.executor))
@@ -432,9 +438,9 @@ class Publisher(Handle):
     def on_deadline_missed(
         self, callback: Callable[[DeadlineMissed], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` each time that nothing was sent within the profile's deadline.
+        """Call `callback` each time that no message was sent within the profile's deadline.
 
-        Time runs from the first message. Arguments as for :meth:`on_matched`.
+        Time runs from the first message on. Arguments as for :meth:`on_matched`.
         """
         events = self._events
         return events.added(events.deadline.add(callback, executor or events.executor))
@@ -442,7 +448,7 @@ class Publisher(Handle):
     def on_liveliness_lost(
         self, callback: Callable[[LivelinessLost], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` when manual liveliness was not shown within the lease duration.
+        """Call `callback` when manual liveliness was not asserted within the lease duration.
 
         Arguments as for :meth:`on_matched`.
         """
@@ -452,15 +458,15 @@ class Publisher(Handle):
     def on_problem_change(
         self, callback: Callable[[str], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` with :attr:`problem` whenever it changes; empty when all is well again.
+        """Call `callback` with :attr:`problem` whenever that changes.
 
         Arguments as for :meth:`on_matched`.
         """
         events = self._events
         return events.added(events.problem.add(callback, executor or events.executor))
 
-    def _watch(self) -> None:
-        """Watch the limits that have a listener, from the first sending on."""
+    def _start_watchdogs(self) -> None:
+        """Watch the limits that have a listener, from the first message on."""
         limit, lease = self.qos.deadline, self.qos.lease_duration
         manual = self.qos.liveliness is Liveliness.MANUAL_BY_TOPIC
         timers, known = self._core.timers, self._watchdogs
@@ -469,26 +475,28 @@ class Publisher(Handle):
                 return
             sent = self._sent_at and self._events.deadline
             if limit is not None and sent and "deadline" not in known:
-                known["deadline"] = Watchdog(timers, limit, lambda: self._sent_at, self._miss)
-            shown = manual and self._shown_at and self._events.liveliness
-            if lease is not None and shown and "lease" not in known:
-                known["lease"] = Watchdog(timers, lease, lambda: self._shown_at, self._lose)
+                known["deadline"] = Watchdog(timers, limit, lambda: self._sent_at, self._on_missed)
+            asserted = manual and self._asserted_at and self._events.liveliness
+            if lease is not None and asserted and "lease" not in known:
+                known["lease"] = Watchdog(
+                    timers, lease, lambda: self._asserted_at, self._on_liveliness_lost
+                )
 
-    def _miss(self, count: int) -> None:
+    def _on_missed(self, count: int) -> None:
         self._missed += count
         self._events.deadline.notify(DeadlineMissed(count, self._missed))
 
-    def _lose(self, count: int) -> None:  # noqa: ARG002 - lost once, however long it lasts
-        if self._shown_at != self._lost_since:
-            self._lost_since = self._shown_at
+    def _on_liveliness_lost(self, count: int) -> None:  # noqa: ARG002 - lost once, not per period
+        if self._asserted_at != self._lost_since:
+            self._lost_since = self._asserted_at
             self._lost += 1
             self._events.liveliness.notify(LivelinessLost(self._lost))
 
 
-def _octets(data: bytes | bytearray | memoryview) -> bytes | memoryview:
-    """Return a buffer as a view of its bytes, or as bytes when that cannot be had."""
+def _byte_view(data: bytes | bytearray | memoryview) -> bytes | memoryview:
+    """Return a buffer as a view of its bytes, or a copy of them if it is not contiguous."""
     view = memoryview(data)
     try:
         return view.cast("B")
-    except (TypeError, ValueError):  # not contiguous, or of a foreign format
+    except (TypeError, ValueError):
         return view.tobytes()

@@ -1,66 +1,51 @@
-"""How a subscription is doing: counts, rates, and how old what it receives is."""
+"""The statistics of a subscription: counts, rates, and the latency of what it receives."""
 
 from __future__ import annotations
 
-import math
 import time
-from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from rosglass.comm.time import Duration
-
 if TYPE_CHECKING:
+    from collections import deque
     from collections.abc import Sequence
 
-    from rosglass.comm.sample import Sample
+    from rosglass.comm.time import Duration
 
-__all__ = [
-    "MARK_PERIOD",
-    "LatencyEstimator",
-    "Meter",
-    "Statistics",
-    "fading_rate",
-    "note_time",
-    "rate_of",
-]
+__all__ = ["LatencyEstimator", "Statistics", "fading_rate", "note_time", "rate_of"]
 
-#: Rates are taken over so many marks ...
-_MARKS = 30
-#: ... which are at least so many seconds apart.
-MARK_PERIOD = 1 / 30
-#: A rate begins to fall when the next is so many periods late, ...
+#: A rate starts to fall when the next event is this many periods late, ...
 _LATE_PERIODS = 1.5
-#: ... and is 0 so many periods or seconds after that, whichever is longer.
+#: ... and is 0 this many periods or seconds after that, whichever is longer.
 _FADE_PERIODS, _FADE_S = 2.0, 2.0
-#: Publishers remembered; more come only from a robot that restarts for days.
+#: Most publishers to remember; only a robot that restarts for days has more.
 _MAX_PUBLISHERS = 256
-#: By how much two clocks run apart at worst; NTP lets a clock run wrong by no more (500 ppm).
+#: Largest drift between two clocks; NTP slews a clock by at most 500 ppm.
 _MAX_DRIFT = 500e-6
-#: Steps of this machine's clock below this many nanoseconds are not looked for.
+#: Steps of this machine's clock below this are ignored.
 _MIN_STEP_NS = 50_000_000
 
 
 def fading_rate(period: float, age: float) -> float:
-    """Return how often something comes a second; 0 once it has stopped.
+    """Return the rate of an event in hertz, which falls to 0 once the event no longer occurs.
 
     Args:
-        period: Seconds from one to the next, on average.
-        age: Seconds since the last one.
+        period: Mean time between two events in seconds.
+        age: Time since the last event in seconds.
     """
     overdue = max(0.0, age - _LATE_PERIODS * period)
     return max(0.0, 1 - overdue / max(_FADE_S, _FADE_PERIODS * period)) / period
 
 
 def rate_of(times: Sequence[float], now: float) -> float:
-    """Return how often something comes a second, given when it came last; see `fading_rate`."""
+    """Return the rate of an event in hertz, given its last times; see :func:`fading_rate`."""
     if len(times) < 2 or times[-1] <= times[0]:
         return 0.0
     return fading_rate((times[-1] - times[0]) / (len(times) - 1), now - times[-1])
 
 
 def note_time(times: deque[float], now: float) -> None:
-    """Append a time for `rate_of`; after a silence the rate is taken anew."""
+    """Append a time for :func:`rate_of`; after a pause the rate is measured anew."""
     if len(times) > 1 and rate_of(times, now) == 0:
         times.clear()
     times.append(now)
@@ -68,21 +53,21 @@ def note_time(times: deque[float], now: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Statistics:
-    """How a subscription is doing.
+    """The statistics of a subscription.
 
     Attributes:
         received: Samples received since creation.
-        dropped: Samples thrown out of a full inbox before anyone took them.
-        frequency: Samples per second over the last 30, or the last second where there are more;
-            0 from 3.5 s without any, or 3.5 periods where they come more rarely than once a second.
+        dropped: Samples that a full inbox dropped before they were taken.
+        frequency: Samples per second over the last 30, or the last second if there were more;
+            0 after 3.5 s without any, or after 3.5 periods if they are longer than a second.
         bandwidth: Bytes per second over the same samples.
-        age: Time since the last sample, None before the first.
-        lost: Samples that were sent, by the publishers' running numbers, and have not arrived.
+        age: Time since the last sample; None before the first.
+        lost: Samples that were sent, by the publishers' sequence numbers, and did not arrive.
         latency: Time from sending to reception, the median of the same samples. Publisher and
-            receiver each have their own clock, so that it may be wrong by the difference, even
-            negative. None when publishers do not stamp what they send.
-        lateness: How much longer the last sample took than the fastest of its publisher, whatever
-            the clocks say: large when a silent link hands on what it had kept back.
+            receiver each have their own clock, so that it may be wrong by their difference, and
+            even be negative. None if publishers do not stamp their samples.
+        lateness: How much longer the last sample took than the fastest one of its publisher,
+            independent of the clocks: large after an outage, when a link delivers what it held up.
     """
 
     received: int
@@ -95,88 +80,29 @@ class Statistics:
     lateness: Duration | None = None
 
 
-class Meter:
-    """Keeps what the rates are made of: where the counts stood at some thirty moments.
-
-    Samples may come one by one or, when nobody waits for them, some at a time.
-    """
-
-    def __init__(self) -> None:
-        self._marks: deque[tuple[float, int, int]] = deque(maxlen=_MARKS)
-        self._took: deque[tuple[int, int]] = deque(maxlen=_MARKS)
-        self._lateness = LatencyEstimator()
-
-    def mark(self, now: float, last: float, count: int, size: int, sample: Sample) -> None:
-        """Note where the counts stood when the last sample before `sample`, of `now`, had come."""
-        if self._marks and self._rate(now, last, count) == 0:
-            # After a silence the rates are taken anew.
-            self._marks.clear()
-        elif count:
-            self._marks.append((last, count, size))
-        sent = sample.sent_ns
-        if sent is not None:
-            late = self._lateness.see(sample.publisher, sample.received_ns, sent)
-            self._took.append((sample.received_ns - sent, late))
-
-    def lateness(self, sample: Sample) -> Duration:
-        """Return how much longer `sample` took than the fastest of its publisher."""
-        if sample.sent_ns is None:
-            return Duration()
-        return Duration(self._lateness.of(sample.publisher, sample.received_ns, sample.sent_ns))
-
-    def read(
-        self, now: float, last: float, received: int, size: int, dropped: int, lost: int
-    ) -> Statistics:
-        """Return the figures as of `now`, given the counts and the time of the last sample."""
-        frequency = self._rate(now, last, received)
-        bandwidth = 0.0
-        if frequency:
-            _, count, before = self._marks[0]
-            bandwidth = (size - before) / (received - count) * frequency
-        age = now - last
-        ways = sorted(way for way, _ in self._took)
-        return Statistics(
-            received,
-            dropped,
-            frequency,
-            bandwidth,
-            Duration.from_seconds(age) if math.isfinite(age) else None,
-            lost,
-            Duration(ways[len(ways) // 2]) if ways else None,
-            Duration(self._took[-1][1]) if ways else None,
-        )
-
-    def _rate(self, now: float, last: float, received: int) -> float:
-        if not self._marks:
-            return 0.0
-        start, count, _ = self._marks[0]
-        if received <= count or last <= start:
-            return 0.0
-        return fading_rate((last - start) / (received - count), now - last)
-
-
 class _Publisher(NamedTuple):
-    """What is known of a publisher, in nanoseconds."""
+    """The measurements of one publisher, in nanoseconds."""
 
+    #: Shortest time from stamp to reception, corrected for drift.
     fastest: int
-    #: When that was brought up to date.
-    at: int
+    #: When that was updated.
+    updated: int
     #: Its newest stamp.
     newest: int
-    #: Whether the last sample was stamped before that: late itself, or by a clock set back.
+    #: Whether the last stamp was older than that: a late sample, or a clock that was set back.
     behind: bool
 
 
 class LatencyEstimator:
-    """How much longer than usual samples were on their way, whatever the clocks say.
+    """Measures how much longer than usual samples took, without comparing two clocks.
 
-    A link that was silent for ten seconds may hand on, all at once, what was sent in that time. By
-    its reception such a sample is new, by its contents it is old. The time stamps of publisher and
-    receiver come from two clocks, so that their difference says nothing by itself; but the fastest
-    sample of a publisher took about no time, and how much more another one took is its lateness.
+    After an outage of ten seconds a link may deliver, all at once, the samples of that time: new by
+    their reception, old by their contents. The stamps of publisher and receiver are by two clocks,
+    so that their difference alone says nothing. But the fastest sample of a publisher took about
+    no time, and the lateness of another one is how much longer it took.
 
-    What a publisher's first sample cannot tell: it may be late itself. Either clock may be set in
-    between: a step of ours is measured, a publisher's step back shows in its stamps, and one
+    A publisher's first sample may be late itself; that cannot be known. Clocks may be set: a step
+    of this machine's clock is measured, a step back of the publisher's shows in its stamps, and one
     forward makes its samples look faster than any before.
     """
 
@@ -184,8 +110,8 @@ class LatencyEstimator:
         self._publishers: dict[bytes, _Publisher] = {}
         self._offset = _offset()
 
-    def see(self, publisher: bytes, received: int, sent: int) -> int:
-        """Remember a sample and return its lateness; times in nanoseconds."""
+    def add(self, publisher: bytes, received: int, sent: int) -> int:
+        """Take a sample into account and return its lateness; times in nanoseconds."""
         self._follow_clock()
         took = received - sent
         known = self._publishers.get(publisher)
@@ -195,13 +121,14 @@ class LatencyEstimator:
             fastest = took
             known = None
         else:
-            fastest = min(took, known.fastest + round(max(0, received - known.at) * _MAX_DRIFT))
+            drift = round(max(0, received - known.updated) * _MAX_DRIFT)
+            fastest = min(took, known.fastest + drift)
         behind = known is not None and sent < known.newest
         newest = sent if known is None else max(sent, known.newest)
         self._publishers[publisher] = _Publisher(fastest, received, newest, behind)
         return took - fastest
 
-    def of(self, publisher: bytes, received: int, sent: int) -> int:
+    def lateness(self, publisher: bytes, received: int, sent: int) -> int:
         """Return the lateness of a sample, 0 for unknown publishers; times in nanoseconds."""
         self._follow_clock()
         known = self._publishers.get(publisher)
@@ -215,14 +142,14 @@ class LatencyEstimator:
         self._offset = offset
         for publisher, known in self._publishers.items():
             self._publishers[publisher] = known._replace(
-                fastest=known.fastest + step, at=known.at + step
+                fastest=known.fastest + step, updated=known.updated + step
             )
 
 
 def _offset() -> int:
-    """Return by how much the system's clock is ahead of one that nobody sets.
+    """Return the difference between the system's clock and a steady one, in nanoseconds.
 
-    That clock goes on while the machine sleeps, where there is such a one.
+    The steady one goes on while the machine sleeps, if the system has such a clock.
     """
     clock = getattr(time, "CLOCK_BOOTTIME", None)
     steady = time.monotonic_ns() if clock is None else time.clock_gettime_ns(clock)

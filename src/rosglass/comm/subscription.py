@@ -1,4 +1,4 @@
-"""Receiving: a topic's samples, to be taken, waited for or called back with."""
+"""Receiving a topic: the subscription that users hold, and the feed that connects it to a wire."""
 
 from __future__ import annotations
 
@@ -6,76 +6,71 @@ import logging
 import math
 import threading
 import time
+import warnings
+from abc import ABC, abstractmethod
+from collections import deque
 from contextlib import suppress
 from functools import wraps
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from rosglass.comm.events import SubscriptionEvents
+from rosglass.comm.core import NodeMember
+from rosglass.comm.events import (
+    DeadlineMissed,
+    LivelinessChanged,
+    Matched,
+    SamplesLost,
+    SubscriptionEvents,
+    conflict_events,
+)
 from rosglass.comm.executor import IMMEDIATE, check_plain
+from rosglass.comm.graph import ConnectionState, EndpointKind
 from rosglass.comm.handle import Executor, Handle, check_flag, check_may_wait
-from rosglass.comm.inbox import ImmediateInbox, Inbox
+from rosglass.comm.inbox import ImmediateInbox, Inbox, Sample
+from rosglass.comm.names import similar
 from rosglass.comm.promise import check_timeout
 from rosglass.comm.rclpy_names import hint_at_members
-from rosglass.comm.sample import Sample
-from rosglass.errors import ConversionError
+from rosglass.comm.timers import Watchdog
+from rosglass.errors import ArgumentError, Error, NodeClosedError, TypeNotFoundError
+from rosglass.interfaces.names import join_name
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Callable, Iterator
+    from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+    from collections.abc import Set as AbstractSet
 
-    from rosglass.comm.events import (
-        DeadlineMissed,
-        IncompatibleQoS,
-        LivelinessChanged,
-        Matched,
-        SamplesLost,
-    )
+    from rosglass.comm.core import NodeCore
+    from rosglass.comm.events import IncompatibleQoS
+    from rosglass.comm.graph import EndpointInfo, NodeName, Status
     from rosglass.comm.qos import QoS
     from rosglass.comm.statistics import Statistics
     from rosglass.comm.time import Duration
     from rosglass.messages import Message, MessageType
+    from rosglass.wires.base import Reader
 
-__all__ = ["Source", "Subscription"]
+__all__ = [
+    "Problem",
+    "Subscription",
+    "SubscriptionFeed",
+    "TopicMatching",
+    "find_subscribed_type",
+]
 
 _log = logging.getLogger("rosglass.comm")
-#: Seconds that a subscription counts as watched after somebody waited for it.
-_MEMORY = 1.0
-#: Longest uninterrupted wait in seconds: on Windows a lock that is waited for holds up Ctrl-C.
-_SLICE = 0.2
-
-
-class Source:
-    """What a subscription asks of its world; a world overrides what it can do."""
-
-    def publisher_count(self) -> int:
-        """Return how many publishers match now."""
-        return 0
-
-    def hint(self) -> str:
-        """Return what a person could do about a topic without publishers, empty if nothing."""
-        return ""
-
-    def attend(self) -> None:
-        """Hand on samples as they come from now on, if :attr:`Subscription.watched`."""
-
-    def refresh(self) -> None:
-        """Deliver, in the calling thread, what waits to be delivered."""
-
-    def inform(self) -> None:
-        """Look at the subscription soon, without waiting: listeners or patience are new."""
-
-    def lost(self) -> int:
-        """Return how many samples were sent and have not arrived."""
-        return 0
+_PUBLISHER = EndpointKind.PUBLISHER
+#: How long samples count as awaited after the last wait for one.
+_AWAITED_S = 1.0
+#: Longest uninterrupted wait: on Windows, Ctrl-C does not interrupt one for a lock.
+_MAX_BLOCK_S = 0.2
+#: Publishers that left and are reported with the next update; more are forgotten.
+_MAX_LEFT = 1000
 
 
 @hint_at_members
 class Subscription(Handle):
-    """Receives the messages of one topic.
-
-    Once closed, it has nothing more to take: :attr:`closed` tells a polling loop when to end.
+    """Receives the messages of one topic; made by :meth:`Node.create_subscription`.
 
     ``for sample in subscription`` and ``async for sample in subscription`` wait for each sample and
-    end when the subscription is closed.
+    end when the subscription is closed. A closed subscription has no samples; :attr:`closed` tells
+    a polling loop when to end.
 
     Attributes:
         topic: Absolute topic name.
@@ -89,38 +84,36 @@ class Subscription(Handle):
         executor: Executor,
         callback: Callable[[Message], None] | None = None,
         raw_callback: Callable[[Sample], None] | None = None,
-        on_close: Callable[[], None] | None = None,
     ) -> None:
         for name, given in (("callback", callback), ("raw_callback", raw_callback)):
             if given is not None:
                 check_plain(given, topic, name)
         if callback is not None and raw_callback is not None:
-            told = "None beside a callback: one of the two is called, not both"
-            raise ConversionError("raw_callback", raw_callback, told, topic)
+            expected = "None beside a callback: one of the two is called, not both"
+            raise ArgumentError("raw_callback", raw_callback, expected, topic)
         if not isinstance(executor, Executor):
-            raise ConversionError("executor", executor, "a rosglass.comm.Executor", topic)
+            raise ArgumentError("executor", executor, "a rosglass.comm.Executor", topic)
         self.topic = topic
-        # What has an underscore is also for the feed, which fills and closes it.
-        self._on_close = on_close
-        self._source = Source()
         self._events = SubscriptionEvents(topic)
         self._qos, self._type, self._executor = qos, message_type, executor
-        self._called = callback is not None or raw_callback is not None
-        self._decodes = callback is not None and raw_callback is None
-        #: An item for each thread or task that waits for a sample.
-        self._waiting: list[None] = []
-        self._watched_at = -math.inf
-        self._patient = False
-        self._problem = self._logged = ""
-        call = raw_callback
-        if call is None and callback is not None:
-            call = _decoding(callback)
+        self._decodes = callback is not None
+        #: Set by the feed, which also fills the inbox and reads the members below.
+        self._feed: SubscriptionFeed | None = None
+        #: One item per thread or task that waits for a sample.
+        self._waits: list[None] = []
+        self._last_wait = -math.inf
+        self._batching = False
+        self._problem = self._logged_problem = ""
+        call = raw_callback if callback is None else _decoding(callback)
+        self._has_callback = call is not None
         if call is not None and executor is IMMEDIATE:
             self._inbox: Inbox = ImmediateInbox(topic, qos, call, callback)
         else:
             self._inbox = Inbox(topic, qos, executor, call, callback)
 
-    # -- what it is ------------------------------------------------------------------------------
+    def __repr__(self) -> str:
+        kind = self._type.name if self._type is not None else "type not known yet"
+        return f"<{type(self).__name__} {self.topic} [{kind}]{' closed' * self.closed}>"
 
     @property
     def type(self) -> MessageType | None:
@@ -129,64 +122,60 @@ class Subscription(Handle):
 
     @property
     def qos(self) -> QoS:
-        """The quality of service requested; what was left open is filled in as it is decided."""
+        """The requested quality of service; open policies are filled in once they are decided."""
         return self._qos
 
     @property
     def problem(self) -> str:
-        """Why nothing can be received, in words; empty when all is well.
+        """Why messages cannot be received, in words; empty if there is no problem.
 
-        Also when whoever published has left, or the connection is lost; :attr:`hint` helps when
-        nobody has published yet.
+        That includes publishers that left, and a lost connection. While there has never been a
+        publisher, see :attr:`hint`.
         """
         return self._problem
 
     @property
     def hint(self) -> str:
-        """What may be wrong when nobody publishes the topic, e.g. a name much like it."""
-        return "" if self.closed else self._source.hint()
+        """A hint why the topic has no publisher, e.g. a similar topic name; empty if it has one."""
+        return "" if self.closed or self._feed is None else self._feed.hint()
 
     @property
     def closed(self) -> bool:
         """Whether :meth:`close` was called."""
         return self._inbox.closed
 
-    def __repr__(self) -> str:
-        kind = self._type.name if self._type is not None else "type not known yet"
-        return f"<{type(self).__name__} {self.topic} [{kind}]{' closed' * self.closed}>"
-
     def publisher_count(self) -> int:
-        """Return how many publishers match this subscription now; 0 after closing."""
-        return 0 if self.closed else self._source.publisher_count()
+        """Return the number of matching publishers; 0 after closing."""
+        return 0 if self.closed or self._feed is None else self._feed.publisher_count()
 
-    # -- taking ----------------------------------------------------------------------------------
+    # -- taking samples --------------------------------------------------------------------------
 
     def take(self) -> Sample | None:
         """Return the oldest waiting sample, or None."""
-        self._source.refresh()
+        self._flush()
         return self._inbox.pop()
 
     def take_latest(self) -> Sample | None:
-        """Return the newest waiting sample and forget the older ones (they count as dropped)."""
-        self._source.refresh()
+        """Return the newest waiting sample, or None; the older ones are dropped and counted."""
+        self._flush()
         return self._inbox.pop_latest()
 
     def wait(self, timeout: float | None = None) -> Sample | None:
-        """Return the oldest waiting sample, waiting for one if need be.
+        """Return the oldest sample, waiting for one if there is none.
 
         Args:
-            timeout: Seconds to wait, None for ever.
+            timeout: Seconds to wait; None waits forever.
 
         Returns:
-            None when none came in time, or when the subscription was closed.
+            None if none arrived in time, or if the subscription was closed.
 
         Raises:
-            ConversionError: The timeout is no number of seconds.
-            UnsupportedError: Called in a thread that receives, where none could come.
+            ArgumentError: The timeout is not a number of seconds.
+            UnsupportedError: Called in a thread that receives samples, which would block itself.
         """
         left = check_timeout(timeout, f"{self.topic}: wait()")
         deadline = math.inf if left is None else time.monotonic() + left
-        self._watch()
+        self._begin_wait()
         try:
             while True:
                 sample = self.take()
@@ -194,20 +183,21 @@ class Subscription(Handle):
                 if sample is not None or self.closed or remaining <= 0:
                     return sample
                 check_may_wait(self.topic, following=True)
+                # A one-shot event of this wait: released once a sample is ready.
                 ready = threading.Lock()
                 ready.acquire()
-                if self._inbox.enlist(ready.release):
-                    ready.acquire(timeout=min(remaining, _SLICE))
-                    self._inbox.dismiss(ready.release)
+                if self._inbox.add_waiter(ready.release):
+                    ready.acquire(timeout=min(remaining, _MAX_BLOCK_S))
+                    self._inbox.remove_waiter(ready.release)
         finally:
-            self._unwatch()
+            self._end_wait()
 
     def __iter__(self) -> Iterator[Sample]:
         while (sample := self.wait()) is not None:
             yield sample
 
     async def __aiter__(self) -> AsyncIterator[Sample]:
-        import asyncio  # noqa: PLC0415 - only for those who use it
+        import asyncio  # noqa: PLC0415 - only needed in asyncio programs
 
         loop = asyncio.get_running_loop()
         arrived = asyncio.Event()
@@ -216,7 +206,7 @@ class Subscription(Handle):
             with suppress(RuntimeError):  # the loop has ended
                 loop.call_soon_threadsafe(arrived.set)
 
-        self._watch()
+        self._begin_wait()
         try:
             while True:
                 sample = self.take()
@@ -224,61 +214,73 @@ class Subscription(Handle):
                     yield sample
                 elif self.closed:
                     return
-                elif self._inbox.enlist(wake):
+                elif self._inbox.add_waiter(wake):
                     await arrived.wait()
                     arrived.clear()
         finally:
-            self._inbox.dismiss(wake)
-            self._unwatch()
+            self._inbox.remove_waiter(wake)
+            self._end_wait()
+
+    @property
+    def batching(self) -> bool:
+        """Whether callbacks may be delayed to receive in batches; see :meth:`set_batching`."""
+        return self._batching
+
+    def set_batching(self, batching: bool) -> None:
+        """Allow callbacks to run a tenth of a second late, for several samples at a time.
+
+        For callbacks that need a fast topic's data only now and then: receiving costs a fraction of
+        the time if the middleware does not have to deliver each sample at once.
+
+        Raises:
+            ArgumentError: The value is neither True nor False.
+        """
+        check_flag(batching, "batching", self.topic)
+        if batching != self._batching:
+            self._batching = batching
+            self._request_update()
 
     @property
     def patient(self) -> bool:
-        """Whether callbacks may come late; see :meth:`set_patient`."""
-        return self._patient
+        """Deprecated name of :attr:`batching`."""
+        warnings.warn("Subscription.patient is now batching", DeprecationWarning, stacklevel=2)
+        return self.batching
 
     def set_patient(self, patient: bool) -> None:
-        """Say whether callbacks may come a tenth of a second late, for some samples at a time.
-
-        For callbacks that look at a fast topic now and then: receiving takes a fraction of the time
-        where the middleware need not hand on each sample by itself.
-
-        Raises:
-            ConversionError: It is neither True nor False.
-        """
-        check_flag(patient, "patient", self.topic)
-        if patient != self._patient:
-            self._patient = patient
-            self._source.inform()
+        """Do the same as :meth:`set_batching`; the name is deprecated."""
+        text = "Subscription.set_patient() is now set_batching()"
+        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        self.set_batching(patient)
 
     def set_inbox_limit(self, limit: int) -> None:
-        """Bound the memory of an inbox that keeps all; 256 MiB unless set.
+        """Limit the memory of an inbox that keeps all samples; the default is 256 MiB.
 
-        Beyond it the oldest samples are dropped and counted, and the log says who is too slow. An
-        inbox that keeps the last so many is bounded by that.
+        Beyond it the oldest samples are dropped and counted, and the log names the slow consumer.
+        Without effect with keep-last history, which is limited by its depth.
 
         Args:
-            limit: Bytes; each sample counts with its data and some 500 bytes more.
+            limit: Bytes; each sample counts as its data and about 500 bytes more.
 
         Raises:
-            ConversionError: It is no number of bytes.
+            ArgumentError: The limit is not a positive number of bytes.
         """
         self._inbox.set_limit(limit)
 
     def statistics(self) -> Statistics:
-        """Return counts and rates as of now."""
-        self._source.refresh()
-        return self._inbox.statistics(self._source.lost())
+        """Return the current counts and rates."""
+        self._flush()
+        return self._inbox.statistics(0 if self._feed is None else self._feed.lost())
 
     def lateness(self, sample: Sample) -> Duration:
-        """Return how much longer a sample took than the fastest of its publisher.
+        """Return how much longer a sample took than the fastest one of its publisher.
 
-        Zero when nothing is known about that. See :attr:`Statistics.lateness`.
+        Zero if that is unknown. See :attr:`Statistics.lateness`.
 
         Raises:
-            ConversionError: It is no sample.
+            ArgumentError: The argument is not a sample.
         """
         if not isinstance(sample, Sample):
-            raise ConversionError("sample", sample, "a rosglass.comm.Sample", self.topic)
+            raise ArgumentError("sample", sample, "a rosglass.comm.Sample", self.topic)
         return self._inbox.lateness(sample)
 
     # -- events ----------------------------------------------------------------------------------
@@ -286,114 +288,126 @@ class Subscription(Handle):
     def on_matched(
         self, callback: Callable[[Matched], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` when a publisher comes that matches, and when it goes.
+        """Call `callback` when a matching publisher appears or leaves.
 
-        Those that are there already are told first.
+        The publishers that exist already are reported first.
 
         Args:
-            callback: Told who, and how many there are now.
+            callback: Called with the publisher, and how many match now.
             executor: Where it runs; None for where the subscription's own callbacks run.
 
         Raises:
-            ConversionError: One of the arguments is not what it should be.
+            ArgumentError: The callback is not callable, or the executor is not an Executor.
         """
-        return self._inform(self._events.matched.add(callback, executor or self._executor))
+        return self._added(self._events.matched.add(callback, executor or self._executor))
 
     def on_incompatible_qos(
         self, callback: Callable[[IncompatibleQoS], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` when a publisher comes that offers less than was asked for.
+        """Call `callback` when a publisher appears that offers less than requested.
 
-        Those that are there already are told first; arguments as for :meth:`on_matched`.
+        The publishers that exist already are reported first; arguments as for :meth:`on_matched`.
         """
-        return self._inform(self._events.incompatible.add(callback, executor or self._executor))
+        return self._added(self._events.incompatible.add(callback, executor or self._executor))
 
     def on_deadline_missed(
         self, callback: Callable[[DeadlineMissed], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` each time that nothing came within the profile's deadline.
+        """Call `callback` each time that no sample arrived within the profile's deadline.
 
-        Time runs from the moment that a publisher matches. Arguments as for :meth:`on_matched`.
+        Time runs while a publisher matches. Arguments as for :meth:`on_matched`.
         """
-        return self._inform(self._events.deadline.add(callback, executor or self._executor))
+        return self._added(self._events.deadline.add(callback, executor or self._executor))
 
     def on_liveliness_change(
         self, callback: Callable[[LivelinessChanged], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` when a publisher becomes alive, and when it is alive no more.
+        """Call `callback` when a publisher becomes alive, or is no longer alive.
 
-        A publisher is alive while it is seen; one that promises to show its liveliness itself
-        (manual by topic), while it does so in time. Arguments as for :meth:`on_matched`.
+        A publisher is alive while it is in the graph; one with manual liveliness (by topic), while
+        it asserts that in time. Arguments as for :meth:`on_matched`.
         """
-        return self._inform(self._events.liveliness.add(callback, executor or self._executor))
+        return self._added(self._events.liveliness.add(callback, executor or self._executor))
 
     def on_samples_lost(
         self, callback: Callable[[SamplesLost], None], executor: Executor | None = None
     ) -> Handle:
         """Call `callback` when samples were lost on the way; arguments as for :meth:`on_matched`.
 
-        What a full inbox drops is no loss of this kind: :meth:`statistics` counts it.
+        Samples that a full inbox drops are not lost in this sense; :meth:`statistics` counts them.
         """
-        return self._inform(self._events.lost.add(callback, executor or self._executor))
+        return self._added(self._events.lost.add(callback, executor or self._executor))
 
     def on_problem_change(
         self, callback: Callable[[str], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` with :attr:`problem` whenever it changes; empty when all is well again.
+        """Call `callback` with :attr:`problem` whenever that changes.
 
         Arguments as for :meth:`on_matched`.
         """
-        return self._inform(self._events.problem.add(callback, executor or self._executor))
+        return self._added(self._events.problem.add(callback, executor or self._executor))
 
     # -- the end ---------------------------------------------------------------------------------
 
     def close(self) -> None:
-        """Stop receiving; waiting samples are forgotten. Safe to call twice, from any thread."""
+        """Stop receiving, and discard waiting samples.
+
+        Safe to call twice, and from any thread.
+        """
         if not self._inbox.close():
             return
         self._events.clear()
-        if self._on_close is not None:
-            self._on_close()
+        if self._feed is not None:
+            self._feed.end()
 
-    # -- inside ----------------------------------------------------------------------------------
+    # -- internals -------------------------------------------------------------------------------
 
     @property
-    def _watched(self) -> bool:
-        """Whether samples are waited for, to be taken or called back with, or were just now."""
-        recent = time.monotonic() - self._watched_at < _MEMORY
-        return (self._called and not self._patient) or bool(self._waiting) or recent
+    def _awaited(self) -> bool:
+        """Whether samples are awaited: by a callback, or by a wait now or within a second."""
+        recent = time.monotonic() - self._last_wait < _AWAITED_S
+        return (self._has_callback and not self._batching) or bool(self._waits) or recent
 
     def _set_problem(
         self, problem: str, level: int = logging.WARNING, logged: str | None = None
     ) -> None:
-        """Take why nothing can be received, and log it once.
+        """Set :attr:`problem`, and log it once.
 
         Args:
-            problem: Why, in words; empty when all is well.
-            level: Of what is logged.
-            logged: What of it is logged, where others log the rest; None for all.
+            problem: Why messages cannot be received, in words; empty if there is no problem.
+            level: Level of the log line.
+            logged: The part of it to log, if the rest is logged elsewhere; None for all.
         """
         logged = problem if logged is None else logged
-        if logged != self._logged:
-            self._logged = logged
+        if logged != self._logged_problem:
+            self._logged_problem = logged
             if logged:
                 _log.log(level, "%s: %s", self.topic, logged)
         if problem != self._problem:
             self._problem = problem
             self._events.problem.notify(problem)
 
-    def _inform(self, handle: Handle) -> Handle:
-        self._source.inform()
-        return handle
+    def _flush(self) -> None:
+        if self._feed is not None:
+            self._feed.flush()
 
-    def _watch(self) -> None:
-        self._waiting.append(None)
-        self._watched_at = time.monotonic()
-        self._source.attend()
+    def _request_update(self) -> None:
+        if self._feed is not None:
+            self._feed.request_update()
 
-    def _unwatch(self) -> None:
-        self._watched_at = time.monotonic()
-        self._waiting.pop()
+    def _added(self, listener: Handle) -> Handle:
+        self._request_update()
+        return listener
+
+    def _begin_wait(self) -> None:
+        self._waits.append(None)
+        self._last_wait = time.monotonic()
+        if self._feed is not None:
+            self._feed.update_eagerness()
+
+    def _end_wait(self) -> None:
+        self._last_wait = time.monotonic()
+        self._waits.pop()
 
 
 def _decoding(callback: Callable[[Message], None]) -> Callable[[Sample], None]:
@@ -402,3 +416,368 @@ def _decoding(callback: Callable[[Message], None]) -> Callable[[Sample], None]:
         callback(sample[2].decode(sample[0], sample[1]))  # as message() does, a step sooner
 
     return call
+
+
+# -- the feed ------------------------------------------------------------------------------------
+
+
+def find_subscribed_type(
+    core: NodeCore, topic: str, wanted: MessageType | str | None
+) -> MessageType | None:
+    """Return the type that a subscription was created with; None if publishers define it.
+
+    Raises:
+        TypeNotFoundError: There is no definition, and the topic is not in the graph with that type.
+        UnsupportedError: It is a type of the other ROS version.
+    """
+    if wanted is None:
+        return None
+    try:
+        found: MessageType = core.types.message(wanted)
+    except TypeNotFoundError:
+        announced = core.graph.topics().get(topic, ())
+        if isinstance(wanted, str) and join_name(wanted) in announced:
+            return None
+        raise
+    return found
+
+
+class Problem(NamedTuple):
+    """A reason why samples of a topic do not arrive.
+
+    Attributes:
+        text: The reason in words.
+        level: Level of its log line.
+        logged: Whether the subscription logs it; False if it is logged once for all topics.
+    """
+
+    text: str
+    level: int = logging.WARNING
+    logged: bool = True
+
+
+class TopicMatching(ABC):
+    """Matches a subscription with publishers, and reads from them, as a wire's protocol does it.
+
+    Attributes:
+        reader: Receives the samples; None while their type is unknown.
+        outlives_discovery: Whether samples continue to arrive while the node's connection is lost,
+            over connections of their own.
+    """
+
+    reader: Reader | None = None
+    outlives_discovery = False
+
+    @abstractmethod
+    def open(self, feed: SubscriptionFeed, publishers: Sequence[EndpointInfo]) -> None:
+        """Decide on the profile, and create the reader as soon as the type is known.
+
+        Args:
+            feed: The feed to deliver samples to.
+            publishers: The topic's publishers in the graph.
+        """
+
+    @abstractmethod
+    def update(self, publishers: Sequence[EndpointInfo], idle: bool) -> list[Problem]:
+        """Follow the publishers; called on the node's graph thread.
+
+        Args:
+            publishers: The topic's publishers in the graph.
+            idle: Whether this is the periodic update, about once a second.
+
+        Returns:
+            The reasons why samples do not arrive.
+        """
+
+    @abstractmethod
+    def find_matching(self, publishers: Sequence[EndpointInfo]) -> list[EndpointInfo]:
+        """Return the publishers whose samples are received; called from any thread."""
+
+    def find_conflicts(
+        self,
+        publishers: Sequence[EndpointInfo],  # noqa: ARG002 - ROS 1 has none
+    ) -> dict[EndpointInfo, dict[str, str]]:
+        """Return the publishers with incompatible profiles: the conflict in words by policy."""
+        return {}
+
+    def find_alive(self, matching: Sequence[EndpointInfo]) -> list[EndpointInfo]:
+        """Return the matching publishers that assert their liveliness in time."""
+        return list(matching)
+
+    def lost(self) -> int:
+        """Return how many samples were sent and did not arrive."""
+        return 0
+
+    @abstractmethod
+    def close(self) -> None:
+        """Stop reading; safe to call twice."""
+
+
+class SubscriptionFeed(NodeMember):
+    """The wire's side of a subscription: its publishers, its reader, its problem and its events.
+
+    Args:
+        core: The node it belongs to.
+        subscription: The subscription to feed, until it is closed.
+        matching: The matching of the wire's protocol.
+        ignored: Identities of publishers to ignore.
+
+    Attributes:
+        subscription: As given.
+        topic: Absolute topic name.
+        decodes: Whether the callback takes messages: bytes without definition are of no use to it.
+        deliver: Takes a received sample, from any thread.
+        deliver_many: Takes samples that arrived together, at least one.
+    """
+
+    def __init__(
+        self,
+        core: NodeCore,
+        subscription: Subscription,
+        matching: TopicMatching,
+        ignored: AbstractSet[bytes] = frozenset(),
+    ) -> None:
+        self.subscription, self.topic = subscription, subscription.topic
+        self.decodes = subscription._decodes
+        self._inbox, self._events = subscription._inbox, subscription._events
+        self.deliver, self.deliver_many = self._inbox.put, self._inbox.put_many
+        self._core, self._matching, self._ignored = core, matching, ignored
+        self._loss_monitor = PublisherLossMonitor(core.name, core.status)
+        #: Held, never waited for, while the reader is switched between eager and lazy.
+        self._eagerness_lock = threading.Lock()
+        self._eagerness_changed = False
+        #: The reader while no sample is awaited.
+        self._lazy_reader: Reader | None = None
+        self._closed = False
+        #: The publishers at the last update; None requests another one.
+        self._known: list[EndpointInfo] | None = None
+        self._left: deque[EndpointInfo] = deque(maxlen=_MAX_LEFT)
+        self._reported_losses = self._missed = 0
+        self._deadline: Watchdog | None = None
+        subscription._feed = self
+        matching.open(self, self._publishers())
+        self.update_eagerness()
+        self.request_update()
+
+    # -- for the wire's protocol -----------------------------------------------------------------
+
+    @property
+    def type(self) -> MessageType | None:
+        """The type to receive; None while it is unknown."""
+        return self.subscription.type
+
+    def set_type(self, message_type: MessageType) -> None:
+        """Set the type that was discovered."""
+        self.subscription._type = message_type
+
+    @property
+    def qos(self) -> QoS:
+        """The profile to request."""
+        return self.subscription.qos
+
+    def set_qos(self, qos: QoS) -> None:
+        """Set the profile that was decided on."""
+        self.subscription._qos = qos
+
+    @property
+    def waiting(self) -> int:
+        """How many samples wait to be taken, or for their callback."""
+        return self._inbox.waiting
+
+    def on_publisher_left(self, endpoint: EndpointInfo) -> None:
+        """Report a matching publisher that left, even if it was never seen in an update.
+
+        Called from any thread.
+        """
+        self._left.append(endpoint)
+        self.request_update()
+
+    def update_eagerness(self) -> None:
+        """Switch the reader to eager delivery while samples are awaited; from any thread."""
+        self._eagerness_changed = True
+        # Never blocks: flush() may lead back here. The thread that holds the lock checks again.
+        while self._eagerness_changed and self._eagerness_lock.acquire(False):
+            try:
+                self._eagerness_changed = False
+                reader, eager = self._matching.reader, self.subscription._awaited
+                if reader is None or eager == (reader is not self._lazy_reader):
+                    continue
+                self._lazy_reader = None if eager else reader
+                reader.set_eager(eager)
+                if eager:
+                    reader.flush()
+            finally:
+                self._eagerness_lock.release()
+
+    def request_update(self) -> None:
+        """Request an update soon, on the node's graph thread; from any thread."""
+        self._known = None
+        self._core.wake()
+
+    # -- for the subscription --------------------------------------------------------------------
+
+    def publisher_count(self) -> int:
+        """Return the number of matching publishers."""
+        return len(self._matching.find_matching(self._publishers()))
+
+    def hint(self) -> str:
+        """Return a hint why the topic has no publisher; empty if it has one."""
+        if self._publishers() or self.publisher_count():
+            return ""
+        topic, graph = self.topic, self._core.graph
+        published = [name for name in graph.topics() if graph.endpoints(_PUBLISHER, name)]
+        return f"{topic} has no publisher{similar(topic, published)}"
+
+    def flush(self) -> None:
+        """Deliver the samples that a lazy reader holds back, in the calling thread."""
+        reader = self._lazy_reader
+        if reader is not None:
+            reader.flush()
+
+    def lost(self) -> int:
+        """Return how many samples were sent and did not arrive."""
+        return self._matching.lost()
+
+    def end(self) -> None:
+        """Stop reading, as the subscription is closed; safe to call twice."""
+        self._closed, self._lazy_reader = True, None
+        self._matching.close()
+        self._watch_deadline(published=False)
+        self._core.remove(self)
+
+    # -- following the graph ---------------------------------------------------------------------
+
+    def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - definitions may be added
+        """Follow the publishers; retry missing definitions with each periodic update."""
+        if self._closed:
+            return
+        publishers = self._publishers()
+        if publishers == self._known and not idle:
+            return
+        self._known = publishers
+        try:
+            problems = self._matching.update(publishers, idle)
+        except NodeClosedError:
+            raise
+        except Error as error:
+            problems = [Problem(str(error))]
+        matching = self._matching.find_matching(publishers)
+        left = [self._left.popleft() for _ in range(len(self._left))]
+        if left:
+            self._loss_monitor.follow(left)
+        self._report_problems(problems, matching or publishers, bool(matching))
+        self._report_events(publishers, matching, left)
+        self.update_eagerness()
+        if idle:
+            self._report_losses()
+        if self._closed:  # by another thread in the meantime
+            self.end()
+
+    def close(self) -> None:
+        """Close the subscription; safe to call twice."""
+        self.subscription.close()
+
+    def _publishers(self) -> list[EndpointInfo]:
+        found: list[EndpointInfo] = self._core.graph.endpoints(_PUBLISHER, self.topic)
+        if self._ignored:
+            found = [one for one in found if one.gid not in self._ignored]
+        return found
+
+    def _report_problems(
+        self, problems: list[Problem], publishers: Sequence[EndpointInfo], received: bool
+    ) -> None:
+        losses = self._loss_monitor.follow(publishers)
+        if not (received and self._matching.outlives_discovery):
+            # INFO: that a publisher left is not an error.
+            problems = problems + [Problem(text, logging.INFO) for text in losses]
+        self.subscription._set_problem(
+            _joined(problems),
+            max((problem.level for problem in problems), default=logging.INFO),
+            _joined([problem for problem in problems if problem.logged]),
+        )
+
+    # -- events ----------------------------------------------------------------------------------
+
+    def _report_events(
+        self,
+        publishers: Sequence[EndpointInfo],
+        matching: list[EndpointInfo],
+        left: Sequence[EndpointInfo],
+    ) -> None:
+        events = self._events
+        events.matched.update(matching, Matched, left)
+        if events.incompatible:
+            found = self._matching.find_conflicts(publishers)
+            events.incompatible.update(found, conflict_events(found))
+        if events.liveliness:
+
+            def changed(
+                endpoint: EndpointInfo, change: int, count: int, _total: int
+            ) -> LivelinessChanged:
+                return LivelinessChanged(endpoint, change, count, len(matching) - count)
+
+            events.liveliness.update(self._matching.find_alive(matching), changed)
+        self._watch_deadline(bool(matching))
+
+    def _watch_deadline(self, published: bool) -> None:
+        limit = self.qos.deadline
+        listened = published and bool(self._events.deadline)
+        wanted = limit is not None and listened and not self._closed
+        if self._deadline is not None and not (wanted and self._deadline.limit == limit):
+            self._deadline.close()
+            self._deadline = None
+        if wanted and self._deadline is None and limit is not None:
+            self._deadline = Watchdog(
+                self._core.timers, limit, self._last_arrival, self._on_deadline_missed
+            )
+
+    def _last_arrival(self) -> float:
+        self.flush()
+        return self._inbox.last_time
+
+    def _on_deadline_missed(self, count: int) -> None:
+        self._missed += count
+        self._events.deadline.notify(DeadlineMissed(count, self._missed))
+
+    def _report_losses(self) -> None:
+        events = self._events
+        if not events.lost:
+            return
+        total = self.lost()
+        change, self._reported_losses = total - self._reported_losses, total
+        if change > 0:
+            events.lost.notify(SamplesLost(change, total))
+
+
+class PublisherLossMonitor:
+    """Detects that a topic has lost its publishers; the node's own publishers do not count.
+
+    Args:
+        own: The node's name.
+        status: Returns the status of the node's connection.
+    """
+
+    def __init__(self, own: NodeName, status: Callable[[], Status]) -> None:
+        self._own, self._status = own, status
+        #: Names of the last publishers, and the time of day since when there are none.
+        self._last = self._since = ""
+
+    def follow(self, publishers: Sequence[EndpointInfo]) -> list[str]:
+        """Update the monitor; return in words why publishers are missing."""
+        others = {one.node.full for one in publishers if one.node != self._own}
+        if publishers:
+            self._last, self._since = ", ".join(sorted(others)), ""
+        elif self._last and not self._since:
+            # Not an age: that would change the text, and have it reported again, every second.
+            self._since = time.strftime("%H:%M:%S")
+        problems = []
+        if self._since:
+            problems.append(f"it has had no publisher since {self._since}, when {self._last} left")
+        status = self._status()
+        if self._last and status.state is ConnectionState.LOST:
+            problems.append(status.detail)
+        return problems
+
+
+def _joined(problems: Sequence[Problem]) -> str:
+    return "; ".join(dict.fromkeys(problem.text for problem in problems))

@@ -19,8 +19,8 @@ from rosglass.images.transports import choose
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from rosglass.comm.inbox import Sample
     from rosglass.comm.node import Node
-    from rosglass.comm.sample import Sample
     from rosglass.comm.subscription import Subscription
     from rosglass.images.frame import RawImage
     from rosglass.images.transports import Choice, PictureReader, Transport

@@ -20,7 +20,7 @@ from rosglass.images.theora import TheoraDecoder
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from rosglass.comm.sample import Sample
+    from rosglass.comm.inbox import Sample
     from rosglass.messages import MessageType
 
 __all__ = ["TRANSPORTS", "Choice", "PictureReader", "Transport", "choose"]

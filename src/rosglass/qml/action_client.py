@@ -6,7 +6,7 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from rosglass.comm.action import GoalStatus
+from rosglass.comm.action_client import GoalStatus
 from rosglass.errors import Error, NodeClosedError
 from rosglass.qml.callbacks import Deferred, call_back
 from rosglass.qml.client_element import ClientElement
@@ -18,8 +18,8 @@ from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rosglass.comm.action import CancelAnswer
     from rosglass.comm.action_client import ActionClient as Sender
+    from rosglass.comm.action_client import CancelAnswer
     from rosglass.comm.node import Node
     from rosglass.comm.promise import Promise
     from rosglass.qml.runtime import Runtime

@@ -7,7 +7,7 @@ import logging
 import time
 from typing import TYPE_CHECKING, NamedTuple
 
-from rosglass.comm.action import GoalStatus
+from rosglass.comm.action_client import GoalStatus
 from rosglass.comm.time import Time
 from rosglass.errors import Error
 from rosglass.qml.client_element import given_fields, named
@@ -18,8 +18,7 @@ from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from rosglass.comm.action import CancelAnswer
-    from rosglass.comm.action_client import ActionClient, ClientGoal
+    from rosglass.comm.action_client import ActionClient, CancelAnswer, ClientGoal
     from rosglass.comm.handle import Executor
     from rosglass.comm.promise import Promise
     from rosglass.messages import Message

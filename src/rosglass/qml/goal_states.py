@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rosglass.qt import QtCore
 
 if TYPE_CHECKING:
-    from rosglass.comm.action import GoalStatus
+    from rosglass.comm.action_client import GoalStatus
 
 __all__ = [
     "ActionCommStates",

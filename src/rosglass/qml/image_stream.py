@@ -15,8 +15,8 @@ from rosglass.qml.image_rendering import Look, Picture, Renderer
 from rosglass.qt import QtCore, is_alive
 
 if TYPE_CHECKING:
+    from rosglass.comm.inbox import Sample
     from rosglass.comm.node import Node
-    from rosglass.comm.sample import Sample
     from rosglass.images.frame import RawImage
     from rosglass.qml.session import Session
 

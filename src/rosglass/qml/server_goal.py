@@ -17,7 +17,7 @@ from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rosglass.comm.action import GoalStatus
+    from rosglass.comm.action_client import GoalStatus
     from rosglass.comm.action_server import ServerGoal
     from rosglass.messages import ActionType
     from rosglass.qml.dialect import Dialect

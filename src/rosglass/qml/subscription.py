@@ -19,8 +19,8 @@ from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from rosglass.comm.inbox import Sample
     from rosglass.comm.node import Node
-    from rosglass.comm.sample import Sample
     from rosglass.comm.subscription import Subscription as Received
     from rosglass.qml.executor import GuiExecutor
     from rosglass.qml.runtime import Runtime
@@ -474,9 +474,9 @@ class Subscription(TopicElement):
             frequency, bandwidth = statistics.frequency, statistics.bandwidth
             # Thinning out a topic is what throttling is for; only what was wanted can be lost.
             dropped = statistics.dropped if self._throttle == 0 else 0
-            enough = _HARDLY_FASTER if subscription.patient else _MUCH_FASTER
+            enough = _HARDLY_FASTER if subscription.batching else _MUCH_FASTER
             fast = frequency > enough * self._throttle
-            subscription.set_patient(self._throttle > 0 and fast)
+            subscription.set_batching(self._throttle > 0 and fast)
             if self._inner_problem != subscription.problem:
                 self._inner_problem = subscription.problem
                 self.problemChanged.emit()

@@ -23,9 +23,9 @@ from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from rosglass.comm.inbox import Sample
     from rosglass.comm.node import Node
     from rosglass.comm.qos import QoS
-    from rosglass.comm.sample import Sample
     from rosglass.comm.subscription import Subscription as Received
     from rosglass.qml.executor import GuiExecutor
     from rosglass.qml.runtime import Runtime

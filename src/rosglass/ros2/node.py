@@ -10,7 +10,7 @@ from rosglass.comm.builtin_services import USE_SIM_TIME, BuiltinProtocol, Builti
 from rosglass.comm.names import validate_namespace, validate_node_name
 from rosglass.comm.qos import check_profile
 from rosglass.comm.rclpy_names import check_order
-from rosglass.comm.subscription_feed import SubscriptionFeed
+from rosglass.comm.subscription import SubscriptionFeed
 from rosglass.ros2.core import Core
 from rosglass.ros2.rmw_services import create_service_client, create_service_server
 from rosglass.ros2.ros_arguments import NO_ARGUMENTS

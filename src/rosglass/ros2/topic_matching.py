@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointInfo, EndpointKind, Liveliness, Sample
 from rosglass.comm.events import conflicts, words
-from rosglass.comm.subscription_feed import Problem, TopicMatching
+from rosglass.comm.subscription import Problem, TopicMatching
 from rosglass.errors import Error
 from rosglass.ros2.announced import nodes_of
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Set as AbstractSet
 
     from rosglass.comm import Handle, QoS, Timers
-    from rosglass.comm.subscription_feed import SubscriptionFeed
+    from rosglass.comm.subscription import SubscriptionFeed
     from rosglass.comm.types import Types
     from rosglass.messages import MessageType
     from rosglass.ros2.core import Core
@@ -63,9 +63,14 @@ class GraphMatching(TopicMatching):
     def open(self, feed: SubscriptionFeed, publishers: Sequence[EndpointInfo]) -> None:
         """Decide on the profile, and read as soon as the type is known."""
         self._feed, self._topic, self._wanted = feed, feed.topic, feed.qos
-        self._liveness = Liveness(self._core.timers, self._repeats, feed.inform)
+        self._liveness = Liveness(self._core.timers, self._repeats, feed.request_update)
         self._types = TopicTypes(
-            feed.topic, self._core.types, self._type, feed.type, not feed.decodes, feed.inform
+            feed.topic,
+            self._core.types,
+            self._type,
+            feed.type,
+            not feed.decodes,
+            feed.request_update,
         )
         feed.set_qos(self._wanted.for_subscription(self._offers(publishers)))
         self._core.graph.watch(self._topic, self._on_endpoint_removed)
@@ -189,7 +194,7 @@ class GraphMatching(TopicMatching):
         if self.reader is None:
             reader.close()
         else:
-            self._feed.attend()
+            self._feed.update_eagerness()
 
     def _receiver(self) -> OnSample:
         """Return what takes the samples; every line of it is paid for by each sample."""

@@ -14,8 +14,8 @@ from rosglass.tf.topics import DEPTH, TYPE, qos_of, topic_of
 
 if TYPE_CHECKING:
     from rosglass.comm.clock import Jump
+    from rosglass.comm.inbox import Sample
     from rosglass.comm.node import Node
-    from rosglass.comm.sample import Sample
     from rosglass.comm.subscription import Subscription
     from rosglass.tf.cache import Entry
 

@@ -176,7 +176,7 @@ def test_publishing(run: Any, robot: Node) -> None:
         assert "YAML such as '{data: ''}'" in err
     code, _, err = run("topic", "pub", "/quiet", "std_msgs/msg/Bool", "--once", "--timeout", "3")
     assert code == 1
-    assert err.startswith("rosglass: waiting: nobody subscribes to /quiet")
+    assert err.startswith("rosglass: waiting: /quiet has no subscriber")
     assert "0 of 1 subscriptions" in err
 
 

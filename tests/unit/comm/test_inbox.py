@@ -39,7 +39,9 @@ def test_keep_all_is_bounded_by_bytes_counts_what_it_drops_and_complains_once(ca
     assert waiting == list(range(94, 100)), "1000 bytes and some 500 more for each"
     assert (sub.statistics().received, sub.statistics().dropped) == (100, 94)
     (line,) = caplog.messages
-    assert line.startswith("/t: messages are dropped, the oldest first, 1 so far: nobody takes")
+    assert line.startswith(
+        "/t: messages are dropped, the oldest first, 1 so far: they are not taken"
+    )
 
 
 def test_the_slow_callback_is_named(caplog):

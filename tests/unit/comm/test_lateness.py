@@ -24,7 +24,7 @@ def offset(monkeypatch):
 def lateness_of(*samples):
     """Return the lateness in ms of samples given by (received, sent), in ms."""
     seen = LatencyEstimator()
-    return [seen.see(P, received * MS, sent * MS) / MS for received, sent in samples]
+    return [seen.add(P, received * MS, sent * MS) / MS for received, sent in samples]
 
 
 @pytest.mark.parametrize("skew", [0, 5_000_000, -5_000_000], ids=["same clock", "ahead", "behind"])
@@ -80,18 +80,18 @@ def test_one_sample_that_was_overtaken_does_not_count_as_a_clock_set_back(offset
 @pytest.mark.parametrize("step", [3600 * S, -3600 * S])
 def test_a_step_of_our_own_clock_is_measured(offset, step):
     seen = LatencyEstimator()
-    assert seen.see(P, 100 * S, 100 * S) == 0
+    assert seen.add(P, 100 * S, 100 * S) == 0
     offset[0] = step
-    assert seen.see(P, 101 * S + step, 101 * S) == pytest.approx(0, abs=MS)
-    assert seen.of(P, 105 * S + step, 101 * S) == pytest.approx(4 * S, rel=0.01)
+    assert seen.add(P, 101 * S + step, 101 * S) == pytest.approx(0, abs=MS)
+    assert seen.lateness(P, 105 * S + step, 101 * S) == pytest.approx(4 * S, rel=0.01)
 
 
 def test_unknown_publishers_and_many_of_them(offset):
     seen = LatencyEstimator()
-    assert seen.of(P, 10, 5) == 0
+    assert seen.lateness(P, 10, 5) == 0
     for number in range(2000):
-        seen.see(number.to_bytes(16, "big"), 10, 5)
-    known = [n for n in range(2000) if seen.of(n.to_bytes(16, "big"), 10 + S, 5)]
+        seen.add(number.to_bytes(16, "big"), 10, 5)
+    known = [n for n in range(2000) if seen.lateness(n.to_bytes(16, "big"), 10 + S, 5)]
     assert 1 <= len(known) <= 256
 
 

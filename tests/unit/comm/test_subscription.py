@@ -97,20 +97,14 @@ def test_a_message_that_cannot_be_decoded_is_logged_and_the_next_one_arrives(cap
 
 
 def test_a_callback_may_close_its_subscription_and_gets_nothing_more():
-    closed, seen = [], []
-    executor = Manual()
-    sub = subscription(
-        executor,
-        callback=lambda m: (seen.append(m), sub.close()),
-        on_close=lambda: closed.append(1),
-    )
+    seen, executor = [], Manual()
+    sub = subscription(executor, callback=lambda m: (seen.append(m), sub.close()))
     feed(sub, "a", "b")
     executor.run()
     feed(sub, "c")
     executor.run()
     sub.close()
     assert seen == ["a"]
-    assert closed == [1]
     assert sub.take() is None
 
 
@@ -133,3 +127,22 @@ def test_frequency_and_bandwidth_fall_when_samples_stop(monkeypatch):
     stale = sub.statistics()
     assert (stale.frequency, stale.bandwidth) == (0, 0)
     assert stale.age.seconds == pytest.approx(4.1)
+
+
+def test_patient_is_a_deprecated_name_of_batching():
+    sub = subscription()
+    with pytest.warns(DeprecationWarning, match=r"set_patient\(\) is now set_batching\(\)"):
+        sub.set_patient(True)
+    assert sub.batching
+    with pytest.warns(DeprecationWarning, match="patient is now batching"):
+        assert sub.patient
+
+
+def test_wrong_arguments_are_type_errors():
+    for wrong in ({"callback": print, "raw_callback": print}, {"executor": 1}):
+        with pytest.raises(TypeError):
+            subscription(**wrong)
+    with pytest.raises(TypeError, match=r"a rosglass\.comm\.Sample"):
+        subscription().lateness(7)
+    with pytest.raises(TypeError, match="a number of bytes"):
+        subscription().set_inbox_limit(0)

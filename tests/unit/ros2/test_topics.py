@@ -100,7 +100,7 @@ def test_a_subscription_says_who_left_and_when_the_connection_is_lost(
     assert came.wait(30)
     middleware.graph.remove(key)
     told = eventually(lambda: subscription.problem)
-    assert re.fullmatch(r"nobody has published it since \d\d:\d\d:\d\d, when /robot left", told)
+    assert re.fullmatch(r"it has had no publisher since \d\d:\d\d:\d\d, when /robot left", told)
     assert [r for r in caplog.records if r.levelname == "WARNING"] == []
     middleware.become(ConnectionState.LOST, "connection to the router lost")
     eventually(lambda: subscription.problem == f"{told}; connection to the router lost")
@@ -272,7 +272,7 @@ def test_samples_that_nobody_waits_for_are_fetched_when_somebody_looks(node, mid
 def test_who_waits_is_told_at_once_and_who_waited_last_not_for_ever(
     node, middleware, eventually, monkeypatch
 ):
-    monkeypatch.setattr("rosglass.comm.subscription._MEMORY", 0.0)
+    monkeypatch.setattr("rosglass.comm.subscription._AWAITED_S", 0.0)
     subscription = node.create_subscription("/t", STRING)
     (reader,) = middleware.readers
     reader.waiting = [HELLO]
@@ -298,14 +298,14 @@ def test_patient_callbacks_get_samples_late_and_may_look_themselves(node, middle
         "/t", STRING, raw_callback=callback, executor=IMMEDIATE, qos=QoS.best_available()
     )
     (reader,) = middleware.readers
-    subscription.set_patient(True)
+    subscription.set_batching(True)
     eventually(lambda: not reader.eager)
     reader.waiting = [HELLO]
     subscription.statistics()
     assert seen == [HELLO]
     eventually(lambda: not reader.eager)
     reader.waiting = [HELLO]
-    subscription.set_patient(False)
+    subscription.set_batching(False)
     eventually(lambda: len(seen) == 2)
     assert reader.eager
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm.action import GoalStatus
+from rosglass.comm.action_client import GoalStatus
 from rosglass.errors import Error
 from rosglass.qml.goal_handle import GoalHandle
 from rosglass.qml.goal_states import (

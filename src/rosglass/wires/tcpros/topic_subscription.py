@@ -16,7 +16,7 @@ from itertools import repeat
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointInfo, EndpointKind, NodeName, Sample
-from rosglass.comm.subscription_feed import Problem, TopicMatching
+from rosglass.comm.subscription import Problem, TopicMatching
 from rosglass.errors import (
     ConnectionLostError,
     ConversionError,
@@ -55,7 +55,7 @@ __all__ = [
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from rosglass.comm.subscription_feed import SubscriptionFeed
+    from rosglass.comm.subscription import SubscriptionFeed
     from rosglass.messages import MessageType, OpaqueType
     from rosglass.wires.tcpros.core import BlockingPool, TcprosCore
     from rosglass.wires.tcpros.io_loop import IoLoop
@@ -123,7 +123,7 @@ class TopicSubscription(Member):
                 reader.take(link, [data], time.time_ns())
         elif link.latched is not None:
             reader.take(link, [link.latched], time.time_ns())
-        reader.feed.inform()
+        reader.feed.request_update()
 
     def leave(self, reader: TypeNegotiation) -> bool:
         """Hand on nothing more to a subscription; return whether it was the last one."""
@@ -151,7 +151,7 @@ class TopicSubscription(Member):
     def inform(self) -> None:
         """Let the subscriptions' feeds look soon; from any thread."""
         for reader in self.readers:
-            reader.feed.inform()
+            reader.feed.request_update()
 
     def on_publisher_connected(self, link: PublisherLink) -> None:
         """Negotiate the type with every subscription, then resume reading."""

@@ -10,7 +10,7 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointKind, QoS
-from rosglass.comm.subscription_feed import SubscriptionFeed
+from rosglass.comm.subscription import SubscriptionFeed
 from rosglass.errors import Error, TypeNotFoundError
 from rosglass.interfaces import ros1_name
 from rosglass.wires.tcpros.connection import ANY

@@ -433,7 +433,7 @@ class ZenohReader(Declaration, Reader):
                 self._hurry()
             type_hash, lifespan = known
             # Not by the difference of two clocks, but by how long others of its kind took.
-            if lifespan and gid and self._lateness.see(gid, received, sent) > lifespan:
+            if lifespan and gid and self._lateness.add(gid, received, sent) > lifespan:
                 return
             self._on_sample(data, received, sent, gid, sequence, type_hash)
         except Exception:
