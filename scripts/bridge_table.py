@@ -1,8 +1,8 @@
-"""Print the table of what maps to what between ROS 1 and ROS 2, or write it into docs/bridge.md.
+"""Print the table of corresponding ROS 1 and ROS 2 types, or write it into docs/bridge.md.
 
     python scripts/bridge_table.py [--write]
 
-The table says what the code does (rosglass.interfaces.Counterparts) with the types that ship with
+The table lists the result of rosglass.interfaces.Counterparts for the types that ship with
 rosglass: Noetic's and Jazzy's. A test compares the two.
 """
 
@@ -52,20 +52,20 @@ def table() -> str:
         if other.source.provider.startswith("derived"):
             own[package].append(base)
         elif other.name != name or lost or added:
-            told = "; ".join(
+            differences = "; ".join(
                 f"{which} only: {', '.join(f'`{path}`' for path in paths)}"
                 for which, paths in (("ROS 1", lost), ("ROS 2", added))
                 if paths
             )
-            rows.append(f"| `{ros1_name(name)}` | `{ros1_name(other.name)}` | {told} |")
+            rows.append(f"| `{ros1_name(name)}` | `{ros1_name(other.name)}` | {differences} |")
         else:
             same[package].append(base)
-    lines = ["The same in both, `Header.seq` and times excepted:", "", "| Package | Types |"]
+    lines = ["The same in both, except for `Header.seq` and times:", "", "| Package | Types |"]
     lines += ["|---|---|"]
     lines += [f"| `{package}` | {', '.join(names)} |" for package, names in same.items()]
-    lines += ["", "Different in name, or with fields that only one has:", ""]
+    lines += ["", "Different in name, or with fields that only one of them has:", ""]
     lines += ["| ROS 1 | ROS 2 | |", "|---|---|---|", *rows]
-    lines += ["", "Types of ROS 1 that ROS 2 has not; they are derived:", ""]
+    lines += ["", "Types of ROS 1 without a counterpart in ROS 2; they are derived:", ""]
     lines += ["| Package | Types |", "|---|---|"]
     lines += [f"| `{package}` | {', '.join(names)} |" for package, names in own.items()]
     return "\n".join(lines) + "\n"
