@@ -24,12 +24,11 @@ from rosglass.comm.time import Time
 from rosglass.errors import Error, NodeClosedError, UnsupportedError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from rosglass.comm.core import NodeCore
     from rosglass.comm.inbox import Sample
     from rosglass.comm.log import NodeLog
-    from rosglass.comm.node import Node
     from rosglass.comm.parameters import Parameters
     from rosglass.comm.subscription import Subscription
 
@@ -156,12 +155,12 @@ class SimTime(Handle):
     """Makes a node's clock follow ``/clock``, or the system time.
 
     Args:
-        node: The node, which subscribes to ``/clock``.
-        core: Its core.
+        core: The core of the node.
+        create_subscription: :meth:`Node.create_subscription`.
     """
 
-    def __init__(self, node: Node, core: NodeCore) -> None:
-        self._node, self._clock, self._timers = node, core.clock, core.timers
+    def __init__(self, core: NodeCore, create_subscription: Callable[..., Subscription]) -> None:
+        self._core, self._create_subscription = core, create_subscription
         #: Makes following and closing exclude each other.
         self._lock = threading.Lock()
         self._subscription: Subscription | None = None
@@ -188,7 +187,7 @@ class SimTime(Handle):
                 return
             if wanted:
                 try:
-                    made = self._node.create_subscription(
+                    made = self._create_subscription(
                         "/clock",
                         "rosgraph_msgs/msg/Clock",
                         qos=QoS.clock(),
@@ -196,25 +195,25 @@ class SimTime(Handle):
                         executor=IMMEDIATE,
                     )
                 except Error:
-                    _log.exception("%s: cannot follow simulated time", self._node)
+                    _log.exception("%s: cannot follow simulated time", self._core.name)
                     return
             old, self._subscription = self._subscription, made
         if old is not None:
             old.close()
         # Not `wanted`: another thread may have changed it since.
-        self._clock.simulate(self.following)
+        self._core.clock.simulate(self.following)
         if wanted:
-            self._timers.after(_FIRST_TIME_TIMEOUT_S, self._warn_no_time)
+            self._core.timers.after(_FIRST_TIME_TIMEOUT_S, self._warn_no_time)
 
     def _on_time(self, sample: Sample) -> None:
-        self._clock.advance(Time(sample.message().clock.nanoseconds))
+        self._core.clock.advance(Time(sample.message().clock.nanoseconds))
 
     def _warn_no_time(self) -> None:
         """Log why time stands still, if it does."""
-        if self.following and not self._clock.now().nanoseconds:
+        if self.following and not self._core.clock.now().nanoseconds:
             _log.warning(
                 "%s: %s is set, but nothing was received on /clock: time stands still at zero "
                 "until a simulation publishes it, or the parameter is false",
-                self._node,
+                self._core.name,
                 USE_SIM_TIME,
             )

@@ -16,6 +16,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.core import NodeMember
+from rosglass.comm.publisher import Publisher
 from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.comm.timers import Worker
 from rosglass.errors import Error, escape_controls
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from rosglass.comm.core import NodeCore
-    from rosglass.comm.node import Node
-    from rosglass.comm.publisher import Publisher
     from rosglass.comm.qos import QoS
 
 __all__ = [
@@ -73,7 +72,6 @@ class NodeLog:
     """A node's log: its logger, and its publisher of ``/rosout``.
 
     Args:
-        node: Publishes the messages.
         core: What the node consists of.
         name: The logger's name.
         rosout: What is published; None publishes nothing.
@@ -84,7 +82,6 @@ class NodeLog:
 
     def __init__(
         self,
-        node: Node,
         core: NodeCore,
         name: str,
         rosout: RosoutTopic | None,
@@ -100,7 +97,7 @@ class NodeLog:
         self._handler: RosoutHandler | None = None
         self._library: LibraryLog | None = None
         if rosout is not None:
-            self._handler = RosoutHandler(node, core, name, rosout)
+            self._handler = RosoutHandler(core, name, rosout)
             self.logger.addHandler(self._handler)
             self._library = LibraryLog(self._handler, core.runs_here)
         if to_python:
@@ -173,15 +170,14 @@ class RosoutHandler(logging.Handler):
     long ones are cut.
 
     Args:
-        node: Publishes them.
         core: What the node consists of.
         name: The node's logger, for what the handler has to say itself.
         topic: What a message looks like.
     """
 
-    def __init__(self, node: Node, core: NodeCore, name: str, topic: RosoutTopic) -> None:
+    def __init__(self, core: NodeCore, name: str, topic: RosoutTopic) -> None:
         super().__init__()
-        self._node, self._core, self._label, self._topic = node, core, name, topic
+        self._core, self._label, self._topic = core, name, topic
         self._first_wait_s = topic.first_wait_s
         self._waiting: deque[dict[str, Any]] = deque()
         self._lost = 0
@@ -197,7 +193,10 @@ class RosoutHandler(logging.Handler):
         with self._start:
             if self._publisher is None and not self._closed:
                 topic = self._topic
-                self._publisher = self._node.create_publisher(_TOPIC, topic.type, topic.qos)
+                core = self._core
+                core.check_open()
+                message_type = core.types.message(topic.type)
+                self._publisher = Publisher(core, core.resolve(_TOPIC), message_type, topic.qos)
                 # Members close in reverse order: what waits is published before the publisher ends.
                 self._core.add(_Flush(self, self._core))
 

@@ -76,7 +76,7 @@ class RoscppServices(BuiltinProtocol["Ros1Parameters"]):
         """
         services.own(self._server)
         self._core.add(StartParameters(self._server))
-        sim_time = SimTime(self._node, self._core)
+        sim_time = SimTime(self._core, self._node.create_subscription)
         services.own(sim_time)
         # As rospy has it: 1 counts, too.
         services.own(
@@ -121,7 +121,7 @@ class RoscppServices(BuiltinProtocol["Ros1Parameters"]):
 
         topic = RosoutTopic("rosgraph_msgs/Log", _ROSOUT_QOS, fields, _ROSOUT_WAIT_S)
         name = "ros." + core.name.full.strip("/").replace("/", ".")
-        return NodeLog(self._node, core, name, topic)
+        return NodeLog(core, name, topic)
 
     def offer(self, services: BuiltinServices[Ros1Parameters]) -> Iterator[None]:
         """Announce ``/rosout``, and offer the services for log levels."""

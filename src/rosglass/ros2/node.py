@@ -241,7 +241,7 @@ class RclServices(BuiltinProtocol["Ros2Parameters"]):
 
         core, full = self._core, self._core.name.full
         parameters = Ros2Parameters(full, core.dispatcher, core.arguments.parameters(full))
-        sim_time = SimTime(self._node, core)
+        sim_time = SimTime(core, self._node.create_subscription)
 
         def follow() -> None:
             sim_time.follow(parameters.typed_value(USE_SIM_TIME).value is True)
@@ -262,7 +262,6 @@ class RclServices(BuiltinProtocol["Ros2Parameters"]):
         core, arguments = self._core, self._core.arguments
         topic = RosoutTopic("rcl_interfaces/msg/Log", QoS.rosout(), _log_fields)
         return NodeLog(
-            self._node,
             core,
             core.name.full.strip("/").replace("/", "."),
             topic if arguments.rosout else None,

@@ -10,13 +10,12 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
-from rosglass.comm import Handle
+from rosglass.comm.handle import Handle
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from rosglass.comm import EndpointInfo, NodeName, Status
-    from rosglass.comm.graph import Graph
+    from rosglass.comm.graph import EndpointInfo, Graph, NodeName, Status
     from rosglass.errors import Error
     from rosglass.interfaces import Definition
 
