@@ -1,4 +1,4 @@
-"""What everything created from one node shares: its middleware, graph, types and threads."""
+"""The core of a ROS 2 node: its middleware, graph and types."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ _log = logging.getLogger("rosglass.ros2")
 
 
 class Core(NodeCore):
-    """Holds what a node consists of, and keeps its members informed.
+    """The core of a ROS 2 node.
 
     Args:
         name: The node's name.
-        url: What it was connected with, for people to read.
-        middleware: Opened and closed here.
-        library: Where definitions come from; None for the shared library.
-        arguments: What the program was told with ``--ros-args``.
+        url: The URL it was connected with, for messages.
+        middleware: Opened and closed by the core.
+        library: Source of type definitions; None for the shared library.
+        arguments: The program's ``--ros-args``.
 
     Attributes:
         graph: What is seen of the ROS graph.
         types: Finds types.
-        windows: The open requests to each service, which all its clients share.
+        windows: The open requests to each service, shared by all its clients.
 
     Raises:
         ConnectionLostError: The middleware cannot start on this machine.
@@ -79,7 +79,7 @@ class Core(NodeCore):
             self._worker.close()
             middleware.close()
             raise
-        # Threads that hand on samples must not meet an interpreter that is being taken down.
+        # Threads that deliver samples must not run while the interpreter shuts down.
         atexit.register(self.close)
 
     def resolve(self, name: str, kind: str = "topic") -> str:

@@ -1,4 +1,4 @@
-"""A node in a ROS 2 graph, over whichever middleware."""
+"""The ROS 2 node, over any middleware."""
 
 from __future__ import annotations
 
@@ -44,18 +44,17 @@ __all__ = ["RclServices", "Ros2Node"]
 
 
 class Ros2Node(Node):
-    """A ROS 2 node; made by :func:`rosglass.connect`.
+    """A ROS 2 node; created by :func:`rosglass.connect`.
 
     Args:
         middleware: Opened and closed by the node.
-        url: What it was connected with, for people to read.
+        url: The URL it was connected with, for messages.
         name: Base name.
         namespace: Absolute namespace.
-        library: Where definitions come from; None for the shared library.
-        arguments: What the program was told with ``--ros-args``; name and namespace are the
-            final ones.
-        own_services: Whether other nodes find what every ROS 2 node offers: its parameters, its
-            log, descriptions of its types.
+        library: Source of type definitions; None for the shared library.
+        arguments: The program's ``--ros-args``; already applied to name and namespace.
+        own_services: Whether to offer what every ROS 2 node offers: its parameters, its log and
+            descriptions of its types.
 
     Raises:
         InvalidNameError: The name or namespace breaks ROS's rules.
@@ -93,7 +92,7 @@ class Ros2Node(Node):
     def _receive(
         self, subscription: Subscription, type: str | MessageType | None, ignore_local: bool
     ) -> None:
-        """Let a new subscription find its publishers."""
+        """Connect a new subscription with its publishers."""
         ignored = self._core.local_gids if ignore_local else frozenset[bytes]()
         matching = GraphMatching(self._core, type, ignored)
         self._core.add(SubscriptionFeed(self._core, subscription, matching, ignored))
@@ -185,25 +184,25 @@ class Ros2Node(Node):
         node: str | NodeName | None = None,
         timeout: float | None = 5.0,
     ) -> Promise[MessageType | ServiceType | ActionType]:
-        """Ask for a type; see :meth:`rosglass.comm.Node.fetch_type_async`."""
+        """Request a type; see :meth:`rosglass.comm.Node.fetch_type_async`."""
         self._core.check_open()
         owner = "" if node is None else self._node_name(node)
         return self._fetcher.fetch(name, hash=hash, node=owner, timeout=timeout)
 
     def duplicate_nodes(self) -> dict[str, int]:
-        """Return the full names that several nodes bear, and how many do."""
+        """Return the full names that several nodes share, and how many."""
         return self._core.graph.duplicate_nodes()
 
     def unnamed_programs(self) -> int:
-        """Return how many; see :meth:`rosglass.comm.Node.unnamed_programs`."""
+        """Return how many programs are unnamed; see :meth:`rosglass.comm.Node.unnamed_programs`."""
         return self._core.middleware.unnamed()
 
     def services(self) -> dict[str, list[str]]:
-        """Return every service that is offered or called, with the types announced for it."""
+        """Return every service that is offered or called, with its announced types."""
         return self._core.graph.services()
 
     def actions(self) -> dict[str, list[str]]:
-        """Return every action in the graph with the types announced for it."""
+        """Return every action in the graph with its announced types."""
         return self._core.graph.actions()
 
 
@@ -220,14 +219,14 @@ class RclServices(BuiltinProtocol["Ros2Parameters"]):
 
     Args:
         node: The node.
-        core: What it consists of.
+        core: Its core.
     """
 
     def __init__(self, node: Node, core: Core) -> None:
         self._node, self._core = node, core
 
     def open(self, services: BuiltinServices[Ros2Parameters]) -> None:
-        """Set the levels of the library's loggers, and follow the simulation's time if asked to."""
+        """Set the levels of the library's loggers, and follow simulated time if requested."""
         arguments, name = self._core.arguments, self._core.name
         for logger, level in arguments.logger_levels.items():
             if logger.partition(".")[0] == "rosglass":
@@ -236,7 +235,7 @@ class RclServices(BuiltinProtocol["Ros2Parameters"]):
             _ = services.parameters
 
     def create_parameters(self, services: BuiltinServices[Ros2Parameters]) -> Ros2Parameters:
-        """Return the parameters; with them, the clock begins to follow ``use_sim_time``."""
+        """Return the parameters; from now on, the clock follows ``use_sim_time``."""
         from rosglass.ros2.parameters import Ros2Parameters  # noqa: PLC0415
 
         core, full = self._core, self._core.name.full

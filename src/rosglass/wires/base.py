@@ -1,7 +1,8 @@
-"""The small seam that ROS 2's middlewares share: writers, readers, and news of the graph.
+"""The seam below the client layer: writers, readers, requesters, repliers, and the graph.
 
-A :class:`Middleware` moves bytes and tells who is there. What ROS 2 means by it (names, types,
-profiles that match or not, callbacks) is :mod:`rosglass.ros2.node`'s business, once for all.
+A wire moves bytes and reports endpoints. What ROS means by them (names, types, QoS, callbacks,
+deadlines) is defined once, in :mod:`rosglass.comm`. TCPROS implements the four
+endpoints; DDS, Zenoh and ``local://`` also the :class:`Middleware` of ROS 2 nodes.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ __all__ = [
 
 
 class OnSample(Protocol):
-    """Takes a received sample; called on the middleware's thread, must return at once."""
+    """Receives samples; called on the wire's thread, must return at once."""
 
     def __call__(
         self,
@@ -48,164 +49,163 @@ class OnSample(Protocol):
         sequence: int,
         hash: str,
     ) -> None:
-        """Take a sample.
+        """Receive a sample.
 
         Args:
             data: The payload, with its encapsulation header. A read-only view keeps the
-                middleware's buffer alive for as long as it lives itself.
-            received: System time of reception, nanoseconds since the Unix epoch.
-            sent: The publisher's time stamp in the same unit, None when there is none.
-            gid: Identity of the publisher, empty when unknown.
-            sequence: The publisher's running number, -1 when unknown.
-            hash: The publisher's RIHS01 type hash, empty when it has none.
+                middleware's buffer alive.
+            received: System time of reception in nanoseconds since the Unix epoch.
+            sent: The publisher's time stamp in the same unit; None if there is none.
+            gid: Identity of the publisher; empty if unknown.
+            sequence: The publisher's sequence number; -1 if unknown.
+            hash: The publisher's RIHS01 type hash; empty if it has none.
         """
 
 
 class Writer(Handle):
     """Sends the samples of one publisher."""
 
-    #: Identity of the publisher, as readers are told it with samples; empty when unknown.
+    #: Identity of the publisher, as readers receive it with samples; empty if unknown.
     gid: bytes = b""
-    #: Why some subscribers get nothing, or not all, in words; empty when all is well. The graph is
-    #: not considered: it is for the publisher to say which subscriptions there do not match.
+    #: Why some subscribers receive nothing, or not everything, in words; empty if all is well. The
+    #: publisher reports which subscriptions in the graph do not match.
     problem: str = ""
-    #: Puts the wire's running number into a message that was encoded here, given and returned in
-    #: parts; None where messages bear none.
+    #: Writes the wire's sequence number into an encoded message, given and returned in parts; None
+    #: if messages have none.
     number: Callable[[Sequence[Buffer]], Sequence[Buffer]] | None = None
 
     @abstractmethod
     def write(self, data: bytes | bytearray) -> None:
-        """Send a payload, which begins with its encapsulation header where the format has one."""
+        """Send a payload, which begins with its encapsulation header if the format has one."""
 
     def write_parts(self, parts: Sequence[Buffer]) -> None:
-        """Send a payload that comes in parts, which may change as soon as this returns.
+        """Send a payload given in parts, which the caller may change as soon as this returns.
 
-        The first begins as the payload of :meth:`write`; views are contiguous and of bytes. For
-        middlewares that take big payloads without another copy; all others join them.
+        The first part begins like the payload of :meth:`write`; views are contiguous bytes. Wires
+        that can send big payloads without another copy override this.
         """
         self.write(b"".join(parts))
 
     def match(self, subscriptions: Sequence[EndpointInfo]) -> None:
-        """Take note of the subscriptions in the graph that want these samples.
+        """Update the matching subscriptions, for middlewares that address them individually.
 
-        For middlewares that must address them one way or the other; called on every change of
-        the graph, never on a thread of the middleware.
+        Called on every change of the graph, never on a thread of the middleware.
         """
 
     def subscribers(self) -> list[EndpointInfo] | None:
-        """Return the subscribers that are connected; called from any thread.
+        """Return the connected subscribers; called from any thread.
 
-        None on wires where the graph alone tells which subscriptions match.
+        None on wires where only the graph says which subscriptions match.
         """
         return None
 
     def changes(self) -> list[list[EndpointInfo]]:
-        """Return the subscribers after each change since the last call, those of now last.
+        """Return the subscribers after each change since the last call, the current ones last.
 
-        For wires with :meth:`subscribers`: one may come and go between two looks.
+        For wires with :meth:`subscribers`, as one may connect and leave between two calls.
         """
         return []
 
     def lost(self) -> int:
-        """Return how many messages made room for newer ones because a subscriber is slow."""
+        """Return how many messages were dropped for newer ones because a subscriber is slow."""
         return 0
 
     def assert_liveliness(self) -> None:
-        """Show that the publisher is alive; nothing where the middleware has no word for it."""
+        """Assert the publisher's liveliness; does nothing if the middleware cannot."""
 
 
 class Reader(Handle):
     """Receives the samples of one subscription."""
 
     def set_eager(self, eager: bool) -> None:
-        """Say whether samples are handed on as they come, which is how a reader starts.
+        """Set whether samples are delivered one by one, which is the default.
 
-        A reader that is not eager may hand samples on in batches, several times a second, so that
+        A reader that is not eager may deliver samples in batches, several times a second, so that
         a topic that no consumer waits for costs next to nothing.
         """
 
     def flush(self) -> None:
-        """Hand on, in the calling thread, what waits to be handed on."""
+        """Deliver the samples held back, in the calling thread."""
 
     def lost(self) -> int:
-        """Return how many samples the middleware knows to be lost, those without number only.
+        """Return how many samples the middleware reports as lost, of those without sequence number.
 
-        Gaps in the running numbers of samples that were handed on are counted by who takes them.
+        Gaps in sequence numbers are counted by the subscription.
         """
         return 0
 
     def alive(self) -> int | None:
-        """Return how many publishers asserted their liveliness in time; None where unknown."""
+        """Return how many publishers asserted their liveliness in time; None if unknown."""
         return None
 
 
-#: What a requester gives as the reason when nobody will answer any more; by all other reasons
-#: somebody said no.
+#: Reasons that a requester gives for a call that will never be answered; any other reason is a
+#: server's refusal.
 SERVER_LEFT, CALL_DROPPED = "its server went away", "its server ended the call without a reply"
 
 
 class OnReply(Protocol):
-    """Takes the reply to a request; called on the middleware's thread, must return at once."""
+    """Receives replies; called on the wire's thread, must return at once."""
 
     def __call__(self, number: int, data: bytes | memoryview | None, error: str | Error) -> None:
-        """Take a reply.
+        """Receive a reply.
 
         Args:
-            number: What :meth:`Requester.send` was given with the request.
-            data: The response with its encapsulation header; None when there is none.
-            error: Why there is none, :data:`SERVER_LEFT` and :data:`CALL_DROPPED` among others, or
-                the error with which the call ends.
+            number: The request's number, as given to :meth:`Requester.send`.
+            data: The response with its encapsulation header; None if there is none.
+            error: Why there is none, e.g. :data:`SERVER_LEFT` or :data:`CALL_DROPPED`, or the error
+                with which the call ends.
         """
 
 
 class Requester(Handle):
     """Sends the requests of one service client."""
 
-    #: Why some servers in the graph cannot be called, in words; empty when all can.
+    #: Why some servers in the graph cannot be called, in words; empty if all can.
     problem: str = ""
-    #: Called, from any thread, when what :meth:`ready` returns may have changed; set by whoever
-    #: created it. Without such calls, a server is noticed up to a second late.
+    #: Called from any thread when the result of :meth:`ready` may have changed; set by the client.
+    #: Without such calls, a server is discovered up to a second late.
     changed: Callable[[], None] | None = None
-    #: Returns whether taking the reply to the request with a number runs none but our own code, and
-    #: at once: it may be taken in the middle of receiving then. Set by the requester's owner.
+    #: Returns whether the reply to a request, given by its number, only runs fast code of ours, so
+    #: that it may run in the middle of receiving. Set by the client.
     quick: Callable[[int], bool] | None = None
 
     @abstractmethod
     def ready(self) -> bool:
-        """Return whether a server is linked, so that a request sent now is not lost."""
+        """Return whether a server is connected, so that a request sent now is not lost."""
 
     @abstractmethod
     def send(self, number: int, data: bytes | bytearray, timeout: float | None) -> None:
         """Send a request.
 
         Args:
-            number: What the reply will bear, above those of the requests before. The reply may
-                come before this returns.
+            number: Identifies the reply; higher than those of earlier requests. The reply may be
+                received before this returns.
             data: The payload with its encapsulation header.
-            timeout: Seconds after which the reply is of no use any more, None for never. The
-                caller keeps the time; the middleware may forget the request then.
+            timeout: Seconds after which the reply is useless; None for never. The client ends the
+                call; the middleware may drop the request then.
         """
 
     def stranded(self, number: int) -> bool:
-        """Return whether everyone who was sent a request has left since, even if they are back.
+        """Return whether every server that was sent a request has left since, even if it is back.
 
-        For middlewares that lose what a server sends meanwhile, and do not know whether it did.
+        For middlewares that lose replies sent in between, without knowing.
         """
         return False
 
     @abstractmethod
     def forget(self, number: int) -> None:
-        """Drop the reply to a request, should it still come."""
+        """Drop the reply to a request if it still arrives."""
 
 
 @dataclass(frozen=True)
 class RequestId:
-    """Which request a reply answers.
+    """Identifies the request that a reply answers.
 
     Attributes:
-        client: Identity of the client that asked.
-        sequence: The client's number for the request.
-        handle: What the middleware needs besides; nobody else looks into it.
+        client: Identity of the client.
+        sequence: The client's sequence number of the request.
+        handle: Private to the wire.
     """
 
     client: bytes
@@ -214,44 +214,44 @@ class RequestId:
 
 
 class OnRequest(Protocol):
-    """Takes a request; called on the middleware's thread, must return at once."""
+    """Receives requests; called on the wire's thread, must return at once."""
 
     def __call__(self, request: RequestId, data: bytes | memoryview) -> None:
-        """Take a request, to be answered at any time, or never, with :meth:`Replier.reply`."""
+        """Receive a request, to be answered at any time, or never, with :meth:`Replier.reply`."""
 
 
 class Replier(Handle):
     """Receives the requests of one service server and sends the replies."""
 
-    #: Why some clients in the graph cannot be served, in words; empty when all can.
+    #: Why some clients in the graph cannot be served, in words; empty if all can.
     problem: str = ""
-    #: Whether taking a request only puts it aside for another thread: it may be taken in the
-    #: middle of receiving then. Set by whoever created the replier.
+    #: Whether receiving a request only queues it for another thread, so that it may run in the
+    #: middle of receiving. Set by the server.
     quick: bool = False
-    #: Whether :meth:`fail` tells anything.
+    #: Whether :meth:`fail` reaches the client.
     tells_failures: bool = False
-    #: Most bytes that a response may have; None for any number.
+    #: Largest response in bytes; None for no limit.
     max_reply: int | None = None
-    #: Whether a ServiceError that the callback raises is an answer, as in rospy, and no failure.
+    #: Whether a ServiceError raised by the callback is an answer, as in rospy, not a failure.
     has_refusals: bool = False
 
     @abstractmethod
     def reply(self, request: RequestId, data: bytes | bytearray) -> None:
-        """Answer a request; a client that is gone is no error."""
+        """Answer a request; ignores clients that have left."""
 
     def fail(self, request: RequestId, reason: str) -> None:
-        """Tell the client that no response will come, where the middleware can say so."""
+        """Report to the client that there will be no response, if the wire can."""
 
     def describe_failure(self, error: Exception) -> str:
-        """Return what :meth:`fail` tells of an exception that the service's callback raised."""
+        """Return the reason given to :meth:`fail` for an exception of the service's callback."""
         return f"{type(error).__name__}: {error}"
 
     def abandoned(self, request: RequestId) -> bool:
-        """Return whether the client of a request has gone, so that its answer is of no use."""
+        """Return whether the client of a request has left, so that its answer is useless."""
         return False
 
     def client_name(self, request: RequestId) -> str:
-        """Return who sent a request, for people."""
+        """Return the name of a request's client, for messages."""
         return f"client {request.client.hex()}"
 
 
@@ -259,11 +259,11 @@ class Middleware(ABC):
     """A connection to a ROS 2 domain.
 
     Attributes:
-        matches_qos: Whether a writer and a reader with incompatible profiles exchange nothing.
-        matches_hashes: Whether endpoints whose types have one name but different hashes exchange
+        matches_qos: Whether endpoints with incompatible profiles exchange nothing.
+        matches_hashes: Whether endpoints with the same type name but different type hashes exchange
             nothing.
-        keeps_byte_order: Whether big-endian payloads arrive as such.
-        wire: Format of the payloads, ``cdr`` or ``ros1``.
+        keeps_byte_order: Whether big-endian payloads are delivered unchanged.
+        wire: Wire format of the payloads, ``cdr`` or ``ros1``.
     """
 
     matches_qos: bool
@@ -272,17 +272,17 @@ class Middleware(ABC):
     wire: str = "cdr"
     #: Whether a service's hash in the graph may be that of its request's type.
     announces_requests: bool = False
-    #: Whether :meth:`describe_type` can tell anything.
+    #: Whether :meth:`describe_type` is supported.
     describes_types: bool = False
 
     @abstractmethod
     def open(self, graph: Graph, changed: Callable[[], None]) -> None:
-        """Start: put what appears into `graph`, call `changed` when :meth:`status` changes.
+        """Join the domain: keep `graph` up to date, and call `changed` when :meth:`status` changes.
 
-        Returns without waiting for anyone to answer; both are told from the middleware's threads.
+        Returns without waiting for an answer; both are updated from the middleware's threads.
 
         Raises:
-            ConnectionLostError: This machine cannot do it, e.g. the address to listen on is taken.
+            ConnectionLostError: Impossible on this machine, e.g. the address to listen on is taken.
         """
 
     @abstractmethod
@@ -290,7 +290,7 @@ class Middleware(ABC):
         """Return the state of the connection."""
 
     def unnamed(self) -> int:
-        """Return how many programs are there that have not said yet which nodes they have."""
+        """Return how many discovered programs have not announced their nodes yet."""
         return 0
 
     @abstractmethod
@@ -299,31 +299,31 @@ class Middleware(ABC):
 
     @abstractmethod
     def create_writer(self, endpoint: EndpointInfo) -> Writer:
-        """Announce a publisher and return its sending end.
+        """Announce a publisher and return its writer.
 
         Args:
-            endpoint: What it is to be, without identity: that comes from here. A service's type is
-                called ``pkg/srv/Type``, or ``pkg/action/Type_SendGoal`` and the like.
+            endpoint: The endpoint, without GID, which the middleware assigns. A service's type is
+                named ``pkg/srv/Type``, or ``pkg/action/Type_SendGoal`` and the like.
         """
 
     @abstractmethod
     def create_reader(self, endpoint: EndpointInfo, on_sample: OnSample) -> Reader:
-        """Announce a subscription and hand what arrives to `on_sample`.
+        """Announce a subscription, which delivers samples to `on_sample`.
 
-        Samples whose type has the same name but another hash are handed over too: whether they
-        can be understood is for the caller to say.
+        Samples of a type with the same name but another hash are delivered, too; the subscription
+        decides whether it can decode them.
         """
 
     @abstractmethod
     def create_requester(self, endpoint: EndpointInfo, on_reply: OnReply) -> Requester:
-        """Announce a service client, whose replies `on_reply` takes; return its sending end."""
+        """Announce a service client, which delivers replies to `on_reply`."""
 
     @abstractmethod
     def create_replier(self, endpoint: EndpointInfo, on_request: OnRequest) -> Replier:
-        """Announce a service server, whose requests `on_request` takes."""
+        """Announce a service server, which delivers requests to `on_request`."""
 
     def conflicts(self, endpoint: EndpointInfo) -> Mapping[str, str]:
-        """Say what keeps a publisher or subscription from all of ours, besides its profile.
+        """Return why a remote endpoint cannot match any of ours, apart from its profile.
 
         Returns:
             The conflict in words for each policy, as :meth:`QoS.conflicts` does.
@@ -331,23 +331,23 @@ class Middleware(ABC):
         return {}
 
     def describe_type(self, endpoint: EndpointInfo, timeout: float) -> Definition | None:
-        """Return the definition of a message that a publisher or subscription itself announces.
+        """Return the message definition that a publisher or subscription announces itself.
 
         Waits for its answer; called on a thread of its own.
 
         Returns:
-            None when it announces none.
+            The definition; None if it announces none.
 
         Raises:
             TimeoutError: It does not answer within `timeout` seconds.
-            DefinitionError: What it announces is no message of ROS 2.
+            DefinitionError: The announced type is no ROS 2 message.
         """
         return None
 
     @abstractmethod
     def poll(self) -> None:
-        """Do what has to be done now and then; called about once a second on a thread of ours."""
+        """Do periodic work; called about once a second on the node's thread."""
 
     @abstractmethod
     def close(self) -> None:
-        """Leave the domain; safe to call twice. Nothing is called back afterwards."""
+        """Leave the domain; safe to call twice. There are no callbacks afterwards."""
