@@ -13,7 +13,7 @@ from enum import Enum
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
-from rosglass.comm.client import Client, untyped
+from rosglass.comm.client import Client, copy_value
 from rosglass.comm.handle import Executor, Handle
 from rosglass.comm.listeners import Listeners
 from rosglass.comm.names import similar
@@ -439,7 +439,7 @@ class ActionClient(Client):
         if executor is not None and not isinstance(executor, Executor):
             raise ArgumentError("executor", executor, "a rosglass.comm.Executor", self.name)
         kind = self.type
-        value = untyped(goal, self.name) if kind is None else kind.goal.create(goal)
+        value = copy_value(goal, self.name) if kind is None else kind.goal.create(goal)
         made = self._make_goal(value, timeout, typed=kind is not None)
         if on_feedback is not None:
             made.on_feedback(on_feedback, executor)

@@ -1,4 +1,4 @@
-"""Asking a server that may come and go: what clients of services and of actions have in common."""
+"""What clients of services and of actions have in common: they follow whether there is a server."""
 
 from __future__ import annotations
 
@@ -20,18 +20,14 @@ if TYPE_CHECKING:
     from rosglass.comm.core import NodeCore
     from rosglass.comm.handle import Executor
 
-__all__ = [
-    "Client",
-    "Readiness",
-    "untyped",
-]
+__all__ = ["Client", "Readiness", "copy_value"]
 
-#: Longest sleep in seconds of a thread that waits: not every middleware tells at once.
-_WAIT_SLICE_S = 0.1
+#: Longest wait without a check: not every middleware reports a server at once.
+_POLL_PERIOD_S = 0.1
 
 
 class Client(Handle):
-    """A client of a service or an action; it follows whether there is a server.
+    """A client of a service or an action.
 
     Args:
         core: The node it belongs to.
@@ -44,29 +40,29 @@ class Client(Handle):
     def __init__(self, core: NodeCore, name: str) -> None:
         self._core, self.name = core, name
         self._closed = False
-        self._warned = ""
+        self._logged_conflicts = ""
         self._readiness = Readiness(name, self._is_ready, self._check_open, core.dispatcher)
 
     @property
     def ready(self) -> bool:
-        """Whether a server is there that understands what it is asked."""
+        """Whether a compatible server is available."""
         return self._readiness.read()
 
     @abstractmethod
     def _is_ready(self) -> bool:
-        """Return whether a server is there that understands what it is asked."""
+        """Return whether a compatible server is available."""
 
     @abstractmethod
     def _conflicts(self) -> list[str]:
-        """Say what a person has to mend."""
+        """Return the problems that a person has to fix, in words."""
 
     @abstractmethod
     def _absence(self) -> str:
-        """Say why no server is there although nothing is wrong."""
+        """Return why there is no server, if there are no conflicts."""
 
     @property
     def problem(self) -> str:
-        """Why the server cannot be asked, in words; empty when all is well."""
+        """Why the server cannot be called, in words; empty if there is no problem."""
         if self._closed:
             return "the client is closed"
         problems = self._conflicts()
@@ -75,17 +71,17 @@ class Client(Handle):
         return "; ".join(problems)
 
     def wait_for_server(self, timeout: float | None = None) -> bool:
-        """Wait up to `timeout` seconds (None: for ever) for a server; return whether it is there.
+        """Wait up to `timeout` seconds (None: forever) for a server; return whether there is one.
 
         Raises:
-            NodeClosedError: The client is closed, or gets closed meanwhile.
+            NodeClosedError: The client is closed, or is closed during the wait.
         """
         return self._readiness.wait(timeout)
 
     def on_ready_change(
         self, callback: Callable[[bool], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` with :attr:`ready` whenever it changes, to and fro.
+        """Call `callback` with :attr:`ready` whenever that changes.
 
         Args:
             callback: Called with the new value.
@@ -93,12 +89,12 @@ class Client(Handle):
         """
         return self._readiness.add(callback, executor)
 
-    def _warn(self, log: logging.Logger, level: int = logging.WARNING) -> None:
-        """Log what a person has to mend, once."""
-        problem = "; ".join(self._conflicts())
-        if problem and problem != self._warned:
-            log.log(level, "%s: %s", self.name, problem)
-        self._warned = problem
+    def _log_conflicts(self, log: logging.Logger, level: int = logging.WARNING) -> None:
+        """Log the problems that a person has to fix, once."""
+        conflicts = "; ".join(self._conflicts())
+        if conflicts and conflicts != self._logged_conflicts:
+            log.log(level, "%s: %s", self.name, conflicts)
+        self._logged_conflicts = conflicts
 
     def _check_open(self) -> None:
         self._core.check_open()
@@ -107,13 +103,13 @@ class Client(Handle):
 
 
 class Readiness:
-    """Whether the server of a service or action is there: waited for, and told when it changes.
+    """Whether a server is available: to be read, waited for and listened to.
 
     Args:
-        name: Of the service or action, for messages.
-        ready: Says whether the server is there.
-        check_open: Raises NodeClosedError when it makes no sense to wait any more.
-        default: Where callbacks run unless told otherwise.
+        name: Name of the service or action, for errors.
+        ready: Returns whether a server is available.
+        check_open: Raises NodeClosedError if waiting is of no use any more.
+        default: Executor of callbacks that are added without one.
     """
 
     def __init__(
@@ -124,15 +120,16 @@ class Readiness:
         default: Executor,
     ) -> None:
         self._name, self._check_open, self._default = name, check_open, default
+        #: Guards no data; wakes the threads that wait.
         self._changed = threading.Condition()
         self._listeners = ChangeListeners(ready, False, where=name)
 
     def read(self) -> bool:
-        """Return whether the server is there."""
+        """Return whether a server is available."""
         return self._listeners.read()
 
     def wait(self, timeout: float | None) -> bool:
-        """Wait up to `timeout` seconds, None for ever; return whether the server is there."""
+        """Wait up to `timeout` seconds, None forever; return whether a server is available."""
         timeout = check_timeout(timeout, self._name)
         deadline = None if timeout is None else time.monotonic() + timeout
         while True:
@@ -140,26 +137,26 @@ class Readiness:
             if self.read():
                 return True
             check_may_wait(self._name)
-            left = _WAIT_SLICE_S if deadline is None else deadline - time.monotonic()
+            left = _POLL_PERIOD_S if deadline is None else deadline - time.monotonic()
             if left <= 0:
                 return False
             with self._changed:
-                self._changed.wait(min(left, _WAIT_SLICE_S))
+                self._changed.wait(min(left, _POLL_PERIOD_S))
 
     def add(self, callback: Callable[[bool], None], executor: Executor | None) -> Handle:
-        """Tell `callback` each change."""
+        """Call `callback` with each change; see :meth:`Client.on_ready_change`."""
         self._check_open()
         if not callable(callback):
             raise ArgumentError("callback", callback, "something that can be called", self._name)
         return self._listeners.add(callback, executor or self._default)
 
     def update(self) -> None:
-        """Look, and tell; by one thread only."""
+        """Check for a change, and notify listeners and waiting threads; by one thread only."""
         self._wake()
         self._listeners.update()
 
     def close(self) -> None:
-        """Forget the listeners, and let those who wait find out."""
+        """Remove all listeners, and wake the threads that wait."""
         self._wake()
         self._listeners.clear()
 
@@ -168,8 +165,8 @@ class Readiness:
             self._changed.notify_all()
 
 
-def untyped(value: Any, where: str) -> Any:
-    """Return a copy of what will become a message once its type is known: it may change meanwhile.
+def copy_value(value: Any, where: str) -> Any:
+    """Return a copy of a value to encode later, when its type is known.
 
     Raises:
         ConversionError: It is neither a message nor a dict, nor None.

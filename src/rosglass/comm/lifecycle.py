@@ -177,7 +177,7 @@ class LifecycleClient(OtherNode):
         self._check_open()
         if not callable(callback):
             raise TransitionError(f"watch() needs something that can be called, got {callback!r}")
-        return self._watch(
+        return self._subscribe(
             f"{self.node}/transition_event",
             _EVENT_TYPE,
             lambda message: callback(_event(message)),

@@ -1,4 +1,4 @@
-"""Promises of what comes later (a response, a goal's end, an answer), and limits of waiting."""
+"""Futures of asynchronous operations (a call, a goal, a request), and timeouts."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ __all__ = [
 ]
 
 _T = TypeVar("_T")
-#: Longest uninterrupted wait in seconds: on Windows a lock that is waited for holds up Ctrl-C.
-_SLICE = 0.2
-#: Seconds after which a callback is given up whose executor raises each time.
-_GIVE_UP_S = 30.0
+#: Longest uninterrupted wait: on Windows, Ctrl-C does not interrupt one for a lock.
+_MAX_BLOCK_S = 0.2
+#: How long a callback is posted again to an executor that raises.
+_MAX_RETRY_S = 30.0
 
 
 def check_timeout(timeout: float | None, where: str) -> float | None:
-    """Return a timeout in seconds, None for infinite ones; raises ArgumentError."""
+    """Return a timeout in seconds, None for an infinite one; raises ArgumentError."""
     if timeout is None:
         return None
     if isinstance(timeout, bool) or not isinstance(timeout, (int, float)) or not timeout >= 0:
@@ -41,62 +41,65 @@ def check_timeout(timeout: float | None, where: str) -> float | None:
 
 
 class Promise(Future[_T]):
-    """Something that comes later, or the error that comes instead.
+    """The result of an operation that has not ended yet, or its error.
 
-    A :class:`concurrent.futures.Future` that can also be awaited in asyncio, and that Ctrl-C
+    A :class:`concurrent.futures.Future` that can also be awaited in asyncio, and whose waits Ctrl-C
     interrupts on every system. Callbacks added with ``add_done_callback`` run in the thread that
-    completes it, often the middleware's: they must not wait for anything. :meth:`on_done` brings
-    them elsewhere.
+    completes it, often the middleware's: they must not block. :meth:`on_done` runs them on an
+    executor.
 
     Args:
-        what: What has not come when a wait is over, e.g. ``/add has not answered``.
-        executor: Where :meth:`on_done` calls back unless told otherwise; None for the thread that
-            completes it.
-        cancellable: Whether :meth:`cancel` gives it up. Otherwise it stays as it is, and only
-            the waiting ends, as when ``asyncio.wait_for`` has waited long enough.
+        what: The message of a timeout, without the time, e.g. ``/add has not answered``.
+        executor: Default executor of :meth:`on_done`; None for the thread that completes it.
+        cancellable: Whether :meth:`cancel` cancels the operation. Otherwise it has no effect, so
+            that ``asyncio.wait_for`` ends the wait only.
     """
 
     def __init__(
-        self, what: str = "it has not come", executor: Executor | None = None, *, cancellable: bool
+        self,
+        what: str = "there is no result",
+        executor: Executor | None = None,
+        *,
+        cancellable: bool,
     ) -> None:
         super().__init__()
         self._what, self._executor, self._cancellable = what, executor, cancellable
         if cancellable:
-            self.add_done_callback(_tell_waiters)
+            self.add_done_callback(_notify_cancel)
 
     def __await__(self) -> Generator[Any, None, _T]:
-        import asyncio  # noqa: PLC0415 - only for those who use it
+        import asyncio  # noqa: PLC0415 - only needed in asyncio programs
 
         return asyncio.wrap_future(self).__await__()
 
     def result(self, timeout: float | None = None) -> _T:
-        """Wait for it and return it, or raise the error that came instead.
+        """Wait for the result and return it, or raise the operation's error.
 
         Args:
-            timeout: Seconds to wait, None for ever.
+            timeout: Seconds to wait; None waits forever.
 
         Raises:
-            TimeoutError: It has not come within the time; it may still come.
-            UnsupportedError: Called in a thread that receives, where it could never come.
-            concurrent.futures.CancelledError: It was given up.
+            TimeoutError: The operation did not end in time; it continues.
+            UnsupportedError: Called in a thread that receives, which would block itself.
+            concurrent.futures.CancelledError: It was cancelled.
         """
         self._wait(timeout)
         return super().result(0)
 
     def exception(self, timeout: float | None = None) -> BaseException | None:
-        """Wait for it and return the error that came instead, None when there was none."""
+        """Wait for the end and return the operation's error, None if it succeeded."""
         self._wait(timeout)
         return super().exception(0)
 
     def cancel(self) -> bool:
-        """Give it up; returns whether that was still possible."""
+        """Cancel the operation; return whether that was possible."""
         return self._cancellable and super().cancel()
 
     def on_done(self, callback: Callable[..., None], executor: Executor | None = None) -> None:
-        """Call `callback` with this object once it has come, failed or was given up.
+        """Call `callback` with this promise once it is completed or cancelled.
 
         Args:
-            callback: Told at once when that has happened already.
+            callback: Called at once if it is done already.
             executor: Where it runs; None for the node's own dispatcher thread.
         """
         if not callable(callback):
@@ -105,7 +108,7 @@ class Promise(Future[_T]):
         if chosen is None:
             self.add_done_callback(callback)
         else:
-            poster = RetryingExecutor(chosen, f"on_done() of {self._what}", _GIVE_UP_S)
+            poster = RetryingExecutor(chosen, f"on_done() of {self._what}", _MAX_RETRY_S)
             self.add_done_callback(lambda _: poster.post(lambda: run_job(lambda: callback(self))))
 
     def set_result(self, value: _T) -> None:
@@ -126,7 +129,7 @@ class Promise(Future[_T]):
         while True:
             left = deadline - time.monotonic()
             try:
-                super().exception(max(0.0, min(left, _SLICE)))
+                super().exception(max(0.0, min(left, _MAX_BLOCK_S)))
             except CancelledError:
                 return
             except _NotYet:
@@ -136,21 +139,21 @@ class Promise(Future[_T]):
                 return
 
 
-def _tell_waiters(promise: Future[Any]) -> None:
-    """Let ``concurrent.futures.wait`` notice that a promise was given up."""
+def _notify_cancel(promise: Future[Any]) -> None:
+    """Notify ``concurrent.futures.wait`` of a cancelled promise."""
     if promise.cancelled():
         promise.set_running_or_notify_cancel()
 
 
 class Deadline:
-    """The end of the time that a caller gives.
+    """A point in time up to which an operation of several steps may take.
 
     Args:
-        timeout: Seconds from now, None for ever.
-        where: What is asked, in errors.
+        timeout: Seconds from now; None for no limit.
+        where: The operation, for errors.
 
     Raises:
-        ConversionError: The timeout is none.
+        ArgumentError: The timeout is not a number of seconds.
     """
 
     def __init__(self, timeout: float | None, where: str) -> None:
@@ -158,6 +161,6 @@ class Deadline:
         self._end = None if timeout is None else time.monotonic() + timeout
 
     def left(self) -> float | None:
-        """Return the seconds that are left, None when there is no end."""
-        # Rounded: people read it when the time is over.
+        """Return the seconds left; None without limit."""
+        # Rounded, because errors quote it.
         return None if self._end is None else max(0.0, round(self._end - time.monotonic(), 2))

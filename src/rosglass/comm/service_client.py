@@ -1,4 +1,4 @@
-"""Calling a service: from a request to its response, or to the error that comes instead."""
+"""Calling services: the client, its pending calls, and the services of another node."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm.client import Client, untyped
+from rosglass.comm.client import Client, copy_value
 from rosglass.comm.handle import Handle, check_may_wait
 from rosglass.comm.promise import Promise, check_timeout
 from rosglass.comm.rclpy_names import hint_at_members
@@ -46,30 +46,30 @@ _log = logging.getLogger("rosglass.comm")
 
 
 class Call(Promise["Message"]):
-    """A service call on its way: the promise of the response.
+    """The promise of a service's response.
 
     ``result(timeout)`` waits for it, ``await call`` does in asyncio, :meth:`on_done` calls back.
-    ``cancel()`` gives the call up: a request that waits for a server is not sent any more, and
-    the response to one that was sent is dropped (the server is not told: ROS has no such message).
+    ``cancel()`` cancels the call: a request that waits for a server is not sent, and the response
+    to a sent one is ignored (the server does not learn of it: ROS has no message for that).
     """
 
 
 @dataclass(eq=False, kw_only=True)
 class PendingCall:
-    """A call that has not ended; its client owns it, and keeps its time.
+    """A call that has not ended; its client owns it, and enforces its deadline.
 
     Attributes:
-        number: Tells it from the client's other calls; later calls have higher ones.
-        call: What the caller holds.
-        value: The encoded request, or the value to encode while the type is not known.
-        type: The type it is encoded for.
-        max_size: Most bytes that the request may have; None for any number.
+        number: Identifies it among the client's calls; ascending.
+        call: The caller's promise.
+        value: The encoded request, or the value to encode while the type is unknown.
+        type: The type it is encoded for; None while that is unknown.
+        max_size: Largest size of a request in bytes; None for no limit.
         deadline: Monotonic time at which it ends without response; None for never.
-        timer: Ends it at its deadline, unless the caller waits for it and does so.
+        timer: Ends it at its deadline; None in :meth:`ServiceClient.call`, which does so itself.
         sent: Monotonic time at which its requester sent the request, None before.
-        answered: Whether it is known what became of the request.
+        answered: Whether a reply, or a reason why there is none, was received.
         private: Whether the caller waits in :meth:`ServiceClient.call`: its end runs no callback.
-        route: What its requester needs besides; nothing else looks into it.
+        route: Private data of its requester.
     """
 
     number: int
@@ -85,7 +85,7 @@ class PendingCall:
     route: Any = None
 
     def encode(self, kind: ServiceType) -> bytes:
-        """Return the request's bytes for a type that may have been found only after the call.
+        """Return the request's bytes for a type that may have been discovered after the call.
 
         Raises:
             ConversionError: A value does not fit its field.
@@ -99,7 +99,7 @@ class PendingCall:
 
 
 def encode_request(kind: ServiceType, value: Any, max_size: int | None) -> bytes:
-    """Return the bytes of a request's value; raises ConversionError."""
+    """Return the encoded request; raises ConversionError."""
     data = kind.request.encode(value)
     if max_size is not None and len(data) > max_size:
         limit = f"at most {max_size} bytes, as its server takes no larger request"
@@ -108,16 +108,16 @@ def encode_request(kind: ServiceType, value: Any, max_size: int | None) -> bytes
 
 
 class ServiceRequester(ABC):
-    """Finds a service's servers for a client and sends them its requests, as a protocol has it.
+    """Finds a service's servers and sends them a client's requests, as the wire's protocol does it.
 
-    It sends each request it is given as soon as there is a server, in the order of the calls, and
-    passes on what becomes of it. Times are the client's business.
+    It sends each request as soon as there is a server, in the order of the calls, and reports its
+    outcome. Timeouts are up to the client.
 
     Attributes:
         type: The service type; None while it is not discovered yet.
         waiters: How many threads wait for a server; set by the client.
-        max_request: Most bytes that a request may have; None for any number.
-        warn_level: At which level the client logs conflicts; None where its owner does that.
+        max_request: Largest size of a request in bytes; None for no limit.
+        warn_level: Level at which the client logs conflicts; None if its owner logs them.
     """
 
     type: ServiceType | None
@@ -127,50 +127,50 @@ class ServiceRequester(ABC):
 
     @abstractmethod
     def ready(self) -> bool:
-        """Return whether a server is there that understands the requests."""
+        """Return whether a compatible server is available."""
 
     @abstractmethod
     def conflicts(self) -> list[str]:
-        """Say what a person has to mend."""
+        """Return the problems that a person has to fix, in words."""
 
     @abstractmethod
     def absence(self) -> str:
-        """Say why no server is there although nothing is wrong."""
+        """Return why there is no server, if there are no conflicts."""
 
     @abstractmethod
     def server_name(self) -> str:
-        """Return who has the service, for people."""
+        """Return the server's name for error messages."""
 
     @abstractmethod
     def send(self, pending: PendingCall) -> None:
-        """Send a request as soon as that is possible; from any thread, returns at once.
+        """Send a request as soon as there is a server; from any thread, without waiting.
 
         Sets :attr:`PendingCall.sent` when it does.
         """
 
     @abstractmethod
     def withdraw(self, pending: PendingCall) -> bool:
-        """Do not send a request any more; return False if it is on its way already."""
+        """Cancel the sending of a request; return False if it was sent already."""
 
     @abstractmethod
     def forget(self, pending: PendingCall) -> None:
-        """Take note that a call has ended: do not send it, drop its response; from any thread."""
+        """Drop a call that has ended: do not send it, ignore its response; from any thread."""
 
     @abstractmethod
     def delay(self, pending: PendingCall) -> str:
-        """Say why a request was not sent although all is well."""
+        """Return why a request was not sent although there is a server."""
 
     @abstractmethod
     def look(self) -> None:
-        """Look for a server now, because a thread waits for one; from any thread."""
+        """Search for a server now, because a thread waits for one; from any thread."""
 
     @abstractmethod
     def follow(self, moved: bool, idle: bool) -> None:
-        """Follow the graph: the type, whether a server is there, calls whose server went."""
+        """Follow the graph: the type, the servers, and calls whose server has left."""
 
     @abstractmethod
     def close(self) -> None:
-        """Close what leads to the servers; safe to call twice."""
+        """Close the connections to servers; safe to call twice."""
 
 
 @hint_at_members
@@ -181,9 +181,8 @@ class ServiceClient(Client):
         core: The node it belongs to.
         name: Absolute service name.
         qos: The quality of service of requests and replies.
-        create_requester: Makes what sends the requests, with the calls that have not ended by
-            number, what takes responses, and what to call when a server has come or gone, or may
-            have.
+        create_requester: Creates the requester, given the pending calls by number, a callback for
+            replies, and a callback for when a server may have appeared or left.
 
     Attributes:
         name: Absolute service name.
@@ -201,9 +200,9 @@ class ServiceClient(Client):
     ) -> None:
         super().__init__(core, name)
         self.qos = qos
+        #: Guards that no call is added after closing, and the number of waiting threads.
         self._lock = threading.Lock()
         self._numbers = itertools.count(1)
-        #: The calls that have not ended; the lock keeps those out that would outlive the client.
         self._pending: dict[int, PendingCall] = {}
         self._requester = create_requester(self._pending, self._on_reply, self._on_change)
         core.add(self, self._follow)
@@ -212,7 +211,7 @@ class ServiceClient(Client):
         kind = self.type.name if self.type is not None else "type not known yet"
         return f"<{type(self).__name__} {self.name} [{kind}]>"
 
-    # -- who is there ------------------------------------------------------------------------------
+    # -- the server ------------------------------------------------------------------------------
 
     @property
     def type(self) -> ServiceType | None:
@@ -220,7 +219,6 @@ class ServiceClient(Client):
         return self._requester.type
 
     def _is_ready(self) -> bool:
-        """Return whether a server is there that understands the requests."""
         return not self._closed and self._requester.ready()
 
     def _conflicts(self) -> list[str]:
@@ -230,10 +228,10 @@ class ServiceClient(Client):
         return self._requester.absence()
 
     def wait_for_server(self, timeout: float | None = None) -> bool:
-        """Wait up to `timeout` seconds (None: for ever) for a server; return whether it is there.
+        """Wait up to `timeout` seconds (None: forever) for a server; return whether there is one.
 
         Raises:
-            NodeClosedError: The client is closed, or gets closed meanwhile.
+            NodeClosedError: The client is closed, or is closed during the wait.
         """
         with self._lock:
             self._requester.waiters += 1
@@ -248,18 +246,18 @@ class ServiceClient(Client):
     def _on_change(self) -> None:
         """Log conflicts and report changes of :attr:`ready`; by one thread only."""
         if self._requester.warn_level is not None:
-            self._warn(_log, self._requester.warn_level)
+            self._log_conflicts(_log, self._requester.warn_level)
         self._readiness.update()
 
     def _follow(self, moved: bool, idle: bool) -> None:
         if not self._closed:
             self._requester.follow(moved, idle)
 
-    # -- calling -----------------------------------------------------------------------------------
+    # -- calling ---------------------------------------------------------------------------------
 
     @property
     def pending(self) -> int:
-        """Calls that have not ended."""
+        """The number of calls that have not ended."""
         return len(self._pending)
 
     def call(
@@ -267,27 +265,26 @@ class ServiceClient(Client):
     ) -> Message:
         """Call the service and wait for its response.
 
-        Callbacks may do this, too, as long as the server does not need their thread. Where
-        nothing may wait, as on a user interface's thread, take :meth:`call_async`.
+        Also allowed in callbacks, unless the server needs their thread. Use :meth:`call_async` on
+        threads that must not block, such as a user interface's.
 
         Args:
             request: A message or a dict of fields; missing fields, and None, get the defaults.
-            timeout: Seconds to wait in all, for the server to appear and to answer; None for ever.
+            timeout: Seconds to wait in all, for a server and for its response; None for no limit.
 
         Raises:
             ConversionError: A value does not fit its field; nothing is sent.
-            ServiceUnavailableError: No server appeared within the time; nothing was sent.
-            TimeoutError: The server did not answer within the time; it may still do what it was
-                asked to.
-            ServiceError: The server says that it failed, or its response cannot be decoded.
-            ConnectionLostError: The server went away before it answered.
-            UnsupportedError: The calling thread is one that the answer needs.
-            NodeClosedError: The client is closed, or gets closed meanwhile.
+            ServiceUnavailableError: No server appeared in time; nothing was sent.
+            TimeoutError: The server did not answer in time; it may still carry out the request.
+            ServiceError: The server reports a failure, or its response cannot be decoded.
+            ConnectionLostError: The server left before it answered.
+            UnsupportedError: The calling thread is needed for the answer.
+            NodeClosedError: The client is closed, or is closed during the call.
         """
         if served_by_this_thread(self._core, self.name):
             raise UnsupportedError(
                 f"{self.name}: this callback would wait for itself: the server runs on the same "
-                "thread of this node; take call_async() here, or give the server an executor "
+                "thread of this node; use call_async() here, or give the server an executor "
                 "of its own"
             )
         check_may_wait(self.name)
@@ -299,23 +296,24 @@ class ServiceClient(Client):
                 try:
                     return pending.call.result(timeout)
                 except TimeoutError:
-                    # Either the call's own end, or that of the waiting: then this is its end.
+                    # Raised by the call, or by the wait for it: then it ends here.
                     self._expire(pending, timeout)
             return pending.call.result()
         except BaseException:
-            pending.call.cancel()  # Ctrl-C: the response is not waited for any more
+            pending.call.cancel()  # Ctrl-C
             raise
 
     def call_async(
         self, request: Message | dict[str, Any] | None = None, /, *, timeout: float | None = 10.0
     ) -> Call:
-        """Call the service and return at once; the call carries the response or the error.
+        """Call the service without waiting; return the promise of the response.
 
-        A request for which there is no server yet waits for one, and is sent as soon as it is
-        there. Requests are sent in the order of the calls; not in ROS 1, unless the client is
-        persistent: there each call has a connection of its own, and they run side by side.
-        Arguments and errors as in :meth:`call`; a ConversionError is raised here already, unless
-        the type is not known yet.
+        A request waits for a server, and is sent as soon as there is one, in the order of the
+        calls. In ROS 1 the order holds for persistent clients only: otherwise each call has its own
+        connection, and calls run in parallel.
+
+        Arguments and errors as in :meth:`call`. A ConversionError is raised immediately, unless the
+        type is not known yet.
         """
         timeout = check_timeout(timeout, self.name)
         pending = self._enter(request, timeout, private=False)
@@ -326,13 +324,15 @@ class ServiceClient(Client):
         return pending.call
 
     def _enter(self, value: Any, timeout: float | None, *, private: bool) -> PendingCall:
-        """Return a new pending call; raises ConversionError."""
+        """Register and return a new pending call; raises ConversionError."""
         self._check_open()
         kind, max_size = self.type, self._requester.max_request
-        # Encoded, or copied, now: the caller may change it while it waits for the server.
-        taken = untyped(value, self.name) if kind is None else encode_request(kind, value, max_size)
+        # Encoded, or copied, now: the caller may change it while the call waits for a server.
+        taken = (
+            copy_value(value, self.name) if kind is None else encode_request(kind, value, max_size)
+        )
         call = Call(
-            f"{self.name} has not answered, and the call goes on: no response",
+            f"{self.name} has not answered, and the call continues: no response",
             self._core.dispatcher,
             cancellable=True,
         )
@@ -355,21 +355,21 @@ class ServiceClient(Client):
         return pending
 
     def _withdraw(self, call: Call) -> bool:
-        """Cancel a call if its request was not sent yet; return whether that was so."""
+        """Cancel a call whose request was not sent yet; return whether that was possible."""
         pending = next((p for p in tuple(self._pending.values()) if p.call is call), None)
         return pending is not None and self._requester.withdraw(pending) and call.cancel()
 
-    # -- how a call ends ---------------------------------------------------------------------------
+    # -- the end of a call -----------------------------------------------------------------------
 
     def _on_end(self, pending: PendingCall) -> None:
-        """Clean up after a call; in any thread."""
+        """Clean up after a call; on any thread."""
         if pending.timer is not None:
             pending.timer.close()
         self._pending.pop(pending.number, None)
         self._requester.forget(pending)
 
     def _expire(self, pending: PendingCall, timeout: float) -> None:
-        """End a call whose time is over."""
+        """End a call at its deadline."""
         if pending.call.done():
             return
         error: Error
@@ -388,52 +388,52 @@ class ServiceClient(Client):
         pending.call.set_exception(error)
 
     def _on_reply(self, number: int, data: bytes | memoryview | None, error: str | Error) -> None:
-        """End a call with the response that came, or with the error; in a thread that receives."""
+        """End a call with its response or its error; called on a thread that receives."""
         pending = self._pending.get(number)
         if pending is None:
             return
         pending.answered = True
         try:
             if data is not None:
-                self._fulfil(pending, data)
+                self._complete(pending, data)
             elif isinstance(error, Error):
                 pending.call.set_exception(error)
             elif error in (SERVER_LEFT, CALL_DROPPED):
-                pending.call.set_exception(self._loss(pending))
+                pending.call.set_exception(self._loss_error(pending))
             else:
                 reason = error or "there is no response"
                 pending.call.set_exception(
                     ServiceError(f"the call of {self.name} failed: {reason}")
                 )
         except Exception:
-            _log.exception("%s: taking a response failed", self.name)
+            _log.exception("%s: processing a response failed", self.name)
 
-    def _fulfil(self, pending: PendingCall, data: bytes | memoryview) -> None:
+    def _complete(self, pending: PendingCall, data: bytes | memoryview) -> None:
         assert pending.type is not None  # it was sent
         kind = pending.type.response
         try:
             message = decode_checked(kind, data)
         except DecodeError as problem:
-            rubbish = ServiceError(
+            invalid = ServiceError(
                 f"{self._requester.server_name()} answered the call of {self.name} with bytes that "
-                f"are no {kind.name}: {problem}; it was probably built from another definition of "
-                "the type: add that to the library"
+                f"are not a {kind.name}: {problem}; it was probably built from another definition "
+                "of the type: add that to the library"
             )
-            rubbish.__cause__ = problem
-            pending.call.set_exception(rubbish)
+            invalid.__cause__ = problem
+            pending.call.set_exception(invalid)
         else:
             pending.call.set_result(message)
 
-    def _loss(self, pending: PendingCall) -> ConnectionLostError:
+    def _loss_error(self, pending: PendingCall) -> ConnectionLostError:
         since = time.monotonic() - (pending.sent or time.monotonic())
         return ConnectionLostError(
             f"the server of {self.name} went away before it answered the request sent {since:.1f} "
-            f"s ago, and may have carried it out or not; look what happened, and call again "
+            f"s ago, and may have carried it out or not; check that, and call again "
             f"({self._core.url}: {self._core.status()})"
         )
 
     def close(self) -> None:
-        """End pending calls with NodeClosedError, and withdraw the client; safe to call twice."""
+        """Close the client; pending calls end with NodeClosedError. Safe to call twice."""
         with self._lock:
             if self._closed:
                 return
@@ -451,15 +451,15 @@ class ServiceClient(Client):
 
 
 class OtherNode(Handle):
-    """Another node's services of one kind; each has a client from its first call on.
+    """Clients of the services that another node has by itself, and subscriptions to its events.
 
     Args:
-        owner: The node that asks.
-        node: Full name of the node that is asked.
-        services: Their types by their names, without the node's.
-        first: The one that tells whether the node is there. It has a client at once, so that this
-            finds its server while the caller still prepares its question.
-        qos: The services' profile; None for the usual one.
+        owner: The node that the clients belong to.
+        node: Full name of the other node.
+        services: Types of the services by name, relative to the node.
+        first: The service whose server shows that the node is available. Its client is created at
+            once, so that it finds the server before the first call.
+        qos: The services' profile; None for the default.
     """
 
     def __init__(
@@ -472,29 +472,28 @@ class OtherNode(Handle):
     ) -> None:
         self.node = node
         self._owner, self._services, self._qos = owner, services, qos
-        self._lock = threading.Lock()
+        #: Every use is atomic; what is added while another thread closes them is closed there.
         self._clients: dict[str, ServiceClient] = {}
-        self._watches: list[Subscription] = []
+        self._subscriptions: dict[Subscription, None] = {}
         self._closed = False
         self._first = first
         self._client(first)
 
     @property
     def ready(self) -> bool:
-        """Whether the node is there and has such services."""
+        """Whether the node is available and has the services."""
         return not self._closed and self._client(self._first).ready
 
     def wait_for_server(self, timeout: float | None = None) -> bool:
-        """Wait for the node; return whether it is there."""
+        """Wait up to `timeout` seconds (None: forever) for the node; return whether it is ready."""
         return self._client(self._first).wait_for_server(timeout)
 
     def close(self) -> None:
-        """Ask and watch no more; calls that wait end with NodeClosedError. Safe to call twice."""
-        with self._lock:
-            self._closed = True
-            made = [*self._clients.values(), *self._watches]
-            self._clients, self._watches = {}, []
-        for handle in made:
+        """End all calls, with NodeClosedError, and all subscriptions; safe to call twice."""
+        self._closed = True
+        clients, self._clients = self._clients, {}
+        subscriptions, self._subscriptions = self._subscriptions, {}
+        for handle in (*clients.values(), *subscriptions):
             handle.close()
 
     def _check_open(self) -> None:
@@ -502,28 +501,39 @@ class OtherNode(Handle):
             raise NodeClosedError(f"{self!r} is closed; create another one")
 
     def _client(self, service: str) -> ServiceClient:
-        with self._lock:
-            self._check_open()
-            client = self._clients.get(service)
-            if client is None:
-                name = f"{self.node}/{service}"
-                client = self._owner.create_service_client(name, self._services[service], self._qos)
-                self._clients[service] = client
-            return client
+        self._check_open()
+        client = self._clients.get(service)
+        if client is None:
+            name = f"{self.node}/{service}"
+            made = self._owner.create_service_client(name, self._services[service], self._qos)
+            client = self._clients.setdefault(service, made)
+            if client is not made:  # another thread was faster
+                made.close()
+            if self._closed:
+                client.close()
+                self._check_open()
+        return client
 
     def _call(self, service: str, request: dict[str, Any], deadline: Deadline) -> Message:
         return self._client(service).call(request, timeout=deadline.left())
 
-    def _watch(
+    def _subscribe(
         self,
         topic: str,
         type: str,
-        receive: Callable[[Message], None],
+        callback: Callable[[Message], None],
         qos: QoS | int,
         executor: Executor | None,
     ) -> Handle:
-        """Hear of the node's news until the handle, or this, is closed."""
-        watch = self._owner.create_subscription(topic, type, receive, qos, executor=executor)
-        with self._lock:
-            self._watches = [*(w for w in self._watches if not w.closed), watch]
-        return watch
+        """Subscribe to the node's events until the handle, or this client, is closed."""
+        subscription = self._owner.create_subscription(
+            topic, type, callback, qos, executor=executor
+        )
+        self._subscriptions[subscription] = None
+        for other in list(self._subscriptions):
+            if other.closed:
+                self._subscriptions.pop(other, None)
+        if self._closed:
+            subscription.close()
+            self._check_open()
+        return subscription

@@ -780,7 +780,7 @@ class ActionlibClient(ActionClient, Member):
             return
         if self._discovery is not None:
             self._discover(self._discovery)
-        self._warn(_log)
+        self._log_conflicts(_log)
         self._jobs.add(self._watch)
 
     def _discover(self, discovery: ActionDiscovery) -> None:

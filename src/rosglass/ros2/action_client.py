@@ -546,7 +546,7 @@ class Ros2ActionClient(ActionClient, NodeMember):
             return
         if self._version.follow(retry=idle) and self._version.types is not None:
             self._speak(self._version.types)
-        self._warn(_log, logging.INFO if self._version.pending else logging.WARNING)
+        self._log_conflicts(_log, logging.INFO if self._version.pending else logging.WARNING)
         self._readiness.update()
         for goal in self._live():
             goal._jobs.add(goal._watch)

@@ -829,7 +829,7 @@ class RemoteParameterServices(OtherNode, RemoteParameters):
             if message.node == self.node:
                 callback(event_from_message(message))
 
-        return self._watch(EVENTS, EVENT_TYPE, receive, EVENTS_QOS, executor)
+        return self._subscribe(EVENTS, EVENT_TYPE, receive, EVENTS_QOS, executor)
 
     def load(self, path: str | PathLike[str], deadline: Deadline) -> list[str]:
         """Set what a file has for the node, wildcards included."""

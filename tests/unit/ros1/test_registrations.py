@@ -382,7 +382,10 @@ def test_who_leaves_in_good_order_is_no_warning_and_who_dies_is(
     client.close()
     publisher.close()
     for topic in ("/go/goal", "/go/cancel", "/word"):
-        eventually(lambda topic=topic: f"{topic}: nobody" in caplog.text, lambda: caplog.text)  # type: ignore[misc]
+        eventually(
+            lambda topic=topic: f"{topic}: it has had no publisher" in caplog.text,
+            lambda: caplog.text,
+        )  # type: ignore[misc]
     assert [r.getMessage() for r in caplog.records if r.levelno >= logging.WARNING] == []
     # Nobody unregisters for those who are killed.
     other = connected(master, "other")

@@ -476,7 +476,7 @@ def test_a_result_that_cannot_be_decoded(client, peer, eventually):
     peer.answer()
     eventually(lambda: peer.asked)
     peer.get_result.reply(1, b"\0\1\0\0\4")
-    with pytest.raises(rosglass.ServiceError, match=f"bytes that are no {FIB}_GetResult_Response"):
+    with pytest.raises(rosglass.ServiceError, match=f"that are not a {FIB}_GetResult_Response"):
         goal.result(30)
     assert goal.status is LOST
 
