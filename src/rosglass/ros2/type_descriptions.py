@@ -8,12 +8,13 @@ their hash alone, among those that its node uses; here the types of the library 
 from __future__ import annotations
 
 import logging
+import math
 import re
 import threading
 import time
 from collections import deque
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from rosglass.comm import EndpointKind, Handle, Promise
 from rosglass.comm.core import NodeMember
@@ -46,12 +47,24 @@ from rosglass.ros2.announced import nodes_of
 from rosglass.ros2.rmw_services import create_service_client, create_service_server
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+    from concurrent.futures import Future
 
+    from rosglass.comm import EndpointInfo, NodeName, ServiceClient
     from rosglass.comm.types import Types
     from rosglass.interfaces import Definition, InterfaceDefinition
-    from rosglass.messages import Message, ServiceType
+    from rosglass.messages import ActionType, Message, MessageType, ServiceType
     from rosglass.ros2.core import Core
+    from rosglass.wires.base import Middleware
+
+    AnyType: TypeAlias = MessageType | ServiceType | ActionType
+    _Users: TypeAlias = Mapping[str, Sequence[EndpointInfo]]
+    _NewRequest: TypeAlias = tuple[
+        tuple[str, str, str],
+        tuple[EndpointInfo, ...] | None,
+        Callable[[], None] | None,
+        Promise[AnyType] | None,
+    ]
 
 __all__ = [
     "ACTION_PARTS",
@@ -70,7 +83,7 @@ _log = logging.getLogger("rosglass.ros2")
 #: The service's name below the node's.
 SERVICE = "get_type_description"
 _TYPE = "type_description_interfaces/srv/GetTypeDescription"
-#: What of an action is in the graph, with hashes; the action itself is not.
+#: The parts of an action that are in the graph, with hashes; the action itself is not.
 ACTION_PARTS = ("_SendGoal", "_GetResult", "_FeedbackMessage")
 
 _GOAL_PARTS = ("_Goal", "_Result", "_Feedback")
@@ -97,7 +110,7 @@ def is_hash(text: object) -> bool:
 
 
 class TypeDescriptionServer(Handle):
-    """Offers ``~/get_type_description`` of a node.
+    """The service server of a node's ``~/get_type_description``.
 
     Args:
         core: The node.
@@ -109,7 +122,7 @@ class TypeDescriptionServer(Handle):
         self._closed = False
 
     def open(self) -> None:
-        """Begin to offer it; raises NodeClosedError, or UnsupportedError without services."""
+        """Create the server; raises NodeClosedError, or UnsupportedError without services."""
         core = self._core
         name = f"{core.name.full}/{SERVICE}"
         kind = service_type()
@@ -119,7 +132,7 @@ class TypeDescriptionServer(Handle):
             server.close()
 
     def close(self) -> None:
-        """Withdraw it; safe to call twice."""
+        """Close the server; safe to call twice."""
         self._closed = True
         if self._server is not None:
             self._server.close()
@@ -137,7 +150,7 @@ class TypeDescriptionServer(Handle):
 
 
 def describe(types: Types, name: str, type_hash: str, *, sources: bool) -> dict[str, Any]:
-    """Return what ``~/get_type_description`` answers, as a dict.
+    """Return the response of ``~/get_type_description``, as a dict.
 
     Args:
         types: The node's types.
@@ -147,7 +160,7 @@ def describe(types: Types, name: str, type_hash: str, *, sources: bool) -> dict[
         sources: Whether to add the definitions' texts.
 
     Raises:
-        Error: There is none; the text says why.
+        Error: There is no such type.
     """
     if type_hash and not is_hash(type_hash):
         raise DefinitionError(f"{type_hash!r:.90} is no RIHS01 hash", "the request")
@@ -188,17 +201,17 @@ class WrongHashError(DefinitionConflictError):
 
 
 def read_answer(answer: Message, name: str, wanted: str, node: str) -> InterfaceDefinition:
-    """Return the definition that a node sent.
+    """Return the definition in a node's response.
 
     Args:
         answer: The response.
-        name: Full name of the type that it was asked for.
+        name: Full name of the requested type.
         wanted: The hash that was announced for it.
         node: The node's name.
 
     Raises:
-        WrongHashError: It sent something else.
-        Error: It sent nothing, or rubbish; the text says why.
+        WrongHashError: It sent another definition.
+        Error: It sent none, or one that cannot be read.
     """
     size = len(answer.type.encode(answer))
     if size > _MAX_ANSWER:
@@ -221,7 +234,7 @@ def read_answer(answer: Message, name: str, wanted: str, node: str) -> Interface
 
 
 def compose_action(name: str, parts: Mapping[str, InterfaceDefinition]) -> ActionDefinition:
-    """Put an action together from what the graph has of it.
+    """Compose an action of the parts that are in the graph.
 
     Args:
         name: The action's full name.
@@ -247,47 +260,31 @@ def compose_action(name: str, parts: Mapping[str, InterfaceDefinition]) -> Actio
     return action
 
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Container, Iterable, Mapping, Sequence
-    from concurrent.futures import Future
-
-    from rosglass.comm import EndpointInfo, ServiceClient
-    from rosglass.interfaces import Definition, InterfaceDefinition
-    from rosglass.messages import ActionType, MessageType, ServiceType
-    from rosglass.ros2.core import Core
-    from rosglass.wires.base import Middleware
-
-    AnyType: TypeAlias = MessageType | ServiceType | ActionType
-    _Users: TypeAlias = Mapping[str, Sequence[EndpointInfo]]
-    _Asked: TypeAlias = tuple[
-        tuple[str, str, str],
-        tuple[EndpointInfo, ...] | None,
-        Callable[[], None] | None,
-        Promise[AnyType] | None,
-    ]
-
-
-#: Seconds that a node has to answer, and after which the next one is asked meanwhile.
-_TIMEOUT, _HEDGE = 5.0, 1.0
+#: Seconds that a node has to answer a query, and until the next node is queried besides.
+_QUERY_TIMEOUT_S, _HEDGE_S = 5.0, 1.0
 #: Seconds that the graph has to become complete: a node's service may show after its publishers.
-_GRACE = 1.0
-#: The same while programs are there that have not said which nodes they have: Fast DDS takes 1 to
-#: 4 s, and until then its services belong to no node that could be asked.
+_GRACE_S = 1.0
+#: The same while participants have not announced their nodes: Fast DDS takes 1 to 4 s, and until
+#: then its services belong to no node that could be queried.
 _INTRODUCTION_S = 8.0
-#: Seconds until a node that did not answer is asked again: at first, and at most (it doubles).
-_AGAIN, _RARELY = 5.0, 60.0
-#: Seconds for which a definition that nobody queries for any more is still fetched.
-_INTEREST = 30.0
-#: Questions on their way at once, and definitions fetched in all: more come only from a graph gone
-#: wild.
-_MAX_ASKED, _MAX_FETCHED = 16, 2000
+#: Seconds until a node that did not answer is queried again: at first, and at most (it doubles).
+_RETRY_S, _MAX_RETRY_S = 5.0, 60.0
+#: Seconds for which a definition is still fetched after it was requested last.
+_INTEREST_S = 30.0
+#: Seconds for which an unused service client is kept.
+_LINGER_S = 5.0
+#: Pending queries, and definitions fetched in all: more only in a graph gone wild.
+_MAX_PENDING, _MAX_FETCHED = 16, 2000
+#: Seconds that an endpoint has to answer a lookup, and how many endpoints are looked up.
+_LOOKUP_TIMEOUT_S, _MAX_LOOKUPS = 2.0, 3
+_TOPICS = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
 
 
 class TypeFetcher(NodeMember):
-    """Fetches definitions for one node.
+    """Fetches type definitions for a node from other nodes.
 
-    All decisions are made in rounds on the node's own dispatcher; what the graph, timers and
-    answers bring only queries for the next round.
+    All decisions are made in rounds on the node's own dispatcher. Events of the graph, timers and
+    responses only schedule the next round.
 
     Args:
         core: The node.
@@ -295,22 +292,23 @@ class TypeFetcher(NodeMember):
 
     def __init__(self, core: Core) -> None:
         self._core = core
-        #: Changed by rounds only.
+        #: Changed in rounds only.
         self._requests: dict[tuple[str, str, str], TypeRequest] = {}
-        #: What was asked for since the last round, from any thread: a type's key, who uses it, who
-        #: is told when it has come, and what it fulfils.
-        self._asked_for: deque[_Asked] = deque()
+        #: What was requested since the last round, from any thread: a type's key, the endpoints
+        #: that use it, a listener and a promise.
+        self._new: deque[_NewRequest] = deque()
         self._answers: deque[tuple[TypeRequest, bytes | str, Future[Any]]] = deque()
-        self._clients = TypeClients(core)
+        #: Clients of ``get_type_description``, and monotonic times of their last use, by service.
+        self._clients: dict[str, tuple[ServiceClient, float]] = {}
         self._cache = TypeCache(cache_folder())
-        self._posted = self._closed = False
-        self._since = time.monotonic()
-        self._asked = self._fetched = 0
-        self._told: set[tuple[str, str]] = set()
+        self._scheduled = self._closed = False
+        self._started = time.monotonic()
+        self._pending = self._fetched = 0
+        self._warned: set[tuple[str, str]] = set()
         core.types.fetcher = self
         core.add(self)
 
-    # -- what others ask for ---------------------------------------------------------------------
+    # -- requests ----------------------------------------------------------------------------------
 
     def __call__(
         self,
@@ -330,8 +328,8 @@ class TypeFetcher(NodeMember):
         return "" if request is None else request.problem
 
     def knows(self, name: str) -> bool:
-        """Return whether somebody in the graph uses a type."""
-        return bool(spelled(name, self._core.graph.users()))
+        """Return whether an endpoint in the graph uses a type."""
+        return bool(find_full_names(name, self._core.graph.users()))
 
     def fetch(
         self, name: str, *, hash: str = "", node: str = "", timeout: float | None = 5.0
@@ -344,7 +342,7 @@ class TypeFetcher(NodeMember):
                 f"{hash!r:.90} is no type hash of {name}; write RIHS01_ and 64 hexadecimal digits"
             )
         promise: Promise[AnyType] = Promise(
-            f"{name} has not come", self._core.dispatcher, cancellable=True
+            f"{name} has not been received", self._core.dispatcher, cancellable=True
         )
         if hash:
             with suppress(Error):
@@ -357,23 +355,22 @@ class TypeFetcher(NodeMember):
         return promise
 
     def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - time passes, too
-        """Follow the graph: somebody to ask may have appeared."""
+        """Follow the graph: a node to query may have appeared."""
         if self._requests or self._clients:
-            self._kick()
+            self._schedule()
 
     def close(self) -> None:
-        """End all fetching; safe to call twice."""
+        """Fail what is pending; safe to call twice. The clients are closed with the node."""
         self._closed = True
-        self._end()
-        self._clients.close()
+        self._fail_all()
         self._core.remove(self)
 
-    def _end(self) -> None:
-        """End what was asked for; the last round's business when it runs while the node closes."""
+    def _fail_all(self) -> None:
+        """Fail every promise; also called by a round that runs while the node closes."""
         promises = []
-        while self._asked_for:
-            with suppress(IndexError):  # the other one took it
-                promises.append(self._asked_for.popleft()[-1])
+        while self._new:
+            with suppress(IndexError):  # another thread took it
+                promises.append(self._new.popleft()[-1])
         for request in self._requests.copy().values():
             promises += request.promises
             if request.lookup is not None:
@@ -384,12 +381,11 @@ class TypeFetcher(NodeMember):
                     NodeClosedError(f"node {self._core.name} is closed; connect again")
                 )
 
-    def _put(self, asked: _Asked) -> None:
-        """PendingQuery for a type in the next round; from any thread."""
-        self._asked_for.append(asked)
+    def _put(self, new: _NewRequest) -> None:
+        self._new.append(new)
         if self._closed:
-            self._end()
-        self._kick()
+            self._fail_all()
+        self._schedule()
 
     def _request(self, key: tuple[str, str, str]) -> TypeRequest:
         return self._requests.setdefault(key, TypeRequest(*key))
@@ -402,7 +398,7 @@ class TypeFetcher(NodeMember):
     def _expire(self, name: str, promise: Promise[AnyType], timeout: float) -> None:
         if promise.done():
             return
-        reason = "nobody in the graph uses it"
+        reason = "no node in the graph uses it"
         for request in self._requests.copy().values():
             if promise not in request.promises:
                 continue
@@ -412,29 +408,31 @@ class TypeFetcher(NodeMember):
                 servers = [query.server for query in request.queries.copy().values()]
                 reason = f"{nodes_of(servers)} did not answer yet"
             elif request.hash:
-                reason = "nobody in the graph uses this version of it"
-        text = f"no definition of {name} within {timeout:g} s: {reason}"
-        promise.set_exception(TypeNotFoundError(text))
+                reason = "no node in the graph uses this version of it"
+        promise.set_exception(
+            TypeNotFoundError(f"no definition of {name} within {timeout:g} s: {reason}")
+        )
 
-    # -- rounds ----------------------------------------------------------------------------------
+    # -- rounds ------------------------------------------------------------------------------------
 
-    def _kick(self) -> None:
-        if not self._posted and not self._closed:
-            self._posted = True
+    def _schedule(self) -> None:
+        if not self._scheduled and not self._closed:
+            self._scheduled = True
             self._core.own_dispatcher.post(self._round)
 
     def _round(self) -> None:
-        self._posted = False  # first: what is asked for from here on has a round of its own
-        while self._asked_for and not self._closed:
-            self._take_up(*self._asked_for.popleft())
+        self._scheduled = False  # first: requests from here on have a round of their own
+        while self._new and not self._closed:
+            key, endpoints, listener, promise = self._new.popleft()
+            self._request(key).add(endpoints, listener, promise)
         requests = list(self._requests.values())
         while self._answers:
-            self._take(*self._answers.popleft())
+            self._on_answer(*self._answers.popleft())
         users = self._core.graph.users()
         now = time.monotonic()
         for request in requests:
             request.promises = [promise for promise in request.promises if not promise.done()]
-            if not request.promises and now - request.used > _INTEREST:
+            if not request.promises and now - request.used > _INTEREST_S:
                 self._drop(request)
             elif self._requests.get(request.key) is request:
                 try:
@@ -443,52 +441,36 @@ class TypeFetcher(NodeMember):
                     break
                 except Exception:
                     _log.exception("fetching %s failed", request.name)
-        self._clients.close_idle(now)
+        for service, (client, used) in list(self._clients.items()):
+            if not client.pending and now - used > _LINGER_S:
+                del self._clients[service]
+                client.close()
         if self._closed:
-            self._end()
-
-    def _take_up(
-        self,
-        key: tuple[str, str, str],
-        endpoints: tuple[EndpointInfo, ...] | None,
-        listener: Callable[[], None] | None,
-        promise: Promise[AnyType] | None,
-    ) -> None:
-        """Begin to get a type that was asked for, or let one more wait for it."""
-        request, now = self._request(key), time.monotonic()
-        if endpoints is not None:
-            request.endpoints, request.used = endpoints, now
-        if listener is not None and listener not in request.listeners:
-            request.listeners.append(listener)
-        if promise is not None:
-            request.since = now
-            request.promises.append(promise)
+            self._fail_all()
 
     def _advance(self, request: TypeRequest, users: _Users, now: float) -> None:
         """Do what can be done now to get a definition."""
-        name = next(iter(spelled(request.name, users)), request.name)
+        name = next(iter(find_full_names(request.name, users)), request.name)
         if name.split("/")[1] == "action" and name not in users and not request.hash:
             self._advance_action(request, name, users, now)
-            return
-        if request.hash:
+        elif request.hash:
             found = self._core.types.library.version(name, request.hash)
             if found is None:
                 self._query_next(request, name, users, now)
             else:
-                self._arrived(request, found)
-            return
-        announced = self._announced(request, name, users, now)
-        if announced:
-            self._hand_over(request, name, announced, users, now)
+                self._on_definition(request, found)
+        elif announced := self._find_hash(request, name, users, now):
+            self._continue_as(request, name, announced, users, now)
 
-    def _hand_over(
+    def _continue_as(
         self, request: TypeRequest, name: str, announced: str, users: _Users, now: float
     ) -> None:
-        """Go on with the version that was found to be meant."""
-        if not request.looked:
-            request.looked = True  # the library may have it all along
+        """Continue with the request for the version that the graph has."""
+        if not request.searched_library:
+            request.searched_library = True
             with suppress(Error):
-                self._arrived(request, self._core.types.library.definition(name, hash=announced))
+                found = self._core.types.library.definition(name, hash=announced)
+                self._on_definition(request, found)
                 return
         target = self._request((name, announced, ""))
         target.used = now
@@ -501,11 +483,10 @@ class TypeFetcher(NodeMember):
         if not request.listeners or self._requests.get(target.key) is not target:
             self._drop(request)
         elif changed:
-            for listener in list(request.listeners):
-                listener()
+            request.notify()
 
-    def _announced(self, request: TypeRequest, name: str, users: _Users, now: float) -> str:
-        """Return the one hash that the graph has for a type, empty when there is none (yet)."""
+    def _find_hash(self, request: TypeRequest, name: str, users: _Users, now: float) -> str:
+        """Return the one hash that the graph has for a type; empty if it has none or several."""
         known: dict[str, set[str]] = {}
         for user in users.get(name, ()):
             if user.type_hash and request.node in ("", user.node.full):
@@ -513,31 +494,29 @@ class TypeFetcher(NodeMember):
         if len(known) == 1:
             return next(iter(known))
         if known:
-            told = "; ".join(f"{key} of {', '.join(sorted(of))}" for key, of in known.items())
-            problem = f"the graph has several versions ({told}); choose one by its hash or node"
+            versions = "; ".join(f"{key} of {', '.join(sorted(of))}" for key, of in known.items())
+            problem = f"the graph has several versions ({versions}); choose one by its hash or node"
             self._settle(request, DefinitionConflictError(f"{name}: {problem}"), problem)
-        elif request.promises and now - self._since > _GRACE and self._fulfil(request, name, ""):
-            pass  # nobody announces another version: what the library has is right
-        elif (name in users or request.endpoints) and not self._looked_up(request, name, users):
+        elif request.promises and now - self._started > _GRACE_S and self._fulfil(request, name):
+            pass  # no other version is announced: the library's is right
+        elif (name in users or request.endpoints) and not self._look_up(request, name, users):
             self._give_up(
                 request,
                 f"{nodes_of(users.get(name, request.endpoints))} announces no type hash and sends "
                 "no definitions (ROS 2 Humble and older, or a program that is not built on rcl)"
-                f"{_told(request)}; {adding_definitions(request.name, 2)}",
+                f"{request.lookup_problem}; {adding_definitions(request.name, 2)}",
                 now,
             )
         return ""
 
     def _advance_action(self, request: TypeRequest, name: str, users: _Users, now: float) -> None:
-        """Put an action together: only its parts are in the graph with their hashes."""
+        """Compose an action of its parts, the only ones that are announced with hashes."""
         parts: dict[str, InterfaceDefinition] = {}
         problems: list[str] = []
         for suffix in ACTION_PARTS:
             part = self._request((name + suffix, "", request.node))
-            if self._kick not in part.listeners:
-                part.listeners.append(self._kick)
-            part.used, part.endpoints = now, users.get(part.name, request.endpoints)
-            announced = self._announced(part, part.name, users, now)
+            part.add(users.get(name + suffix, request.endpoints), self._schedule, None)
+            announced = self._find_hash(part, part.name, users, now)
             found = announced and self._core.types.library.version(part.name, announced)
             if found:
                 parts[suffix] = found
@@ -548,117 +527,93 @@ class TypeFetcher(NodeMember):
             try:
                 action = compose_action(name, parts)
                 self._core.types.library.add_version(action)
-                self._arrived(request, action)
+                self._on_definition(request, action)
             except Error as error:
                 self._settle(request, error, str(error))
         elif problems:
             self._give_up(request, "; ".join(problems), now)
         elif (
-            request.promises and now - self._since > _GRACE and name + ACTION_PARTS[0] not in users
+            request.promises
+            and now - self._started > _GRACE_S
+            and name + ACTION_PARTS[0] not in users
         ):
-            self._fulfil(request, name, "")
+            self._fulfil(request, name)
 
-    # -- asking ----------------------------------------------------------------------------------
+    # -- queries -----------------------------------------------------------------------------------
 
     def _query_next(self, request: TypeRequest, name: str, users: _Users, now: float) -> None:
-        """PendingQuery the next node, or say why none is left."""
-        if any(now - query.started < _HEDGE for query in request.queries.values()):
+        """Query the next node, or give up when none is left."""
+        if any(now - query.started < _HEDGE_S for query in request.queries.values()):
             return
         same = [user for user in users.get(name, ()) if user.type_hash == request.hash]
         own = self._core.name
         nodes = dict.fromkeys(u.node for u in (*request.endpoints, *same) if u.node != own)
+        if not request.nodes.issuperset(nodes):
+            request.nodes.update(nodes)
+            request.since = now  # a new node's service may show later, too
         servers: dict[bytes | str, EndpointInfo] = {}
-        mute: list[str] = []
+        without: list[str] = []
         for node in nodes:
             kind, service = EndpointKind.SERVICE_SERVER, f"{node.full}/{SERVICE}"
             found = [s for s in self._core.graph.endpoints(kind, service) if s.node == node]
             servers.update((server.gid or node.full, server) for server in found)
             if not found:
-                mute.append(node.full)
-        # One that was restarted is asked again.
-        request.tried = {key: trial for key, trial in request.tried.items() if key in servers}
+                without.append(node.full)
+        # A node that was restarted is queried again.
+        request.failed = {key: one for key, one in request.failed.items() if key in servers}
         for key, server in servers.items():
-            trial = request.tried.get(key)
-            if key not in request.queries and (trial is None or now >= trial.again):
-                if self._asked < _MAX_ASKED:
+            failed = request.failed.get(key)
+            if key not in request.queries and (failed is None or now >= failed.next_try):
+                if self._pending < _MAX_PENDING:
                     self._query(request, key, server, name)
                 return
         if request.queries:
             return
-        if not request.stored:
-            request.stored = True
+        if not request.searched_cache:
+            request.searched_cache = True
             stored = self._cache.get(name, request.hash)
             if stored is not None:
                 self._core.types.library.add_version(stored)
-                self._arrived(request, stored)
+                self._on_definition(request, stored)
                 return
-        if not self._looked_up(request, name, users):
-            self._give_up(request, self._reasons(request, mute), now)
-
-    def _looked_up(self, request: TypeRequest, name: str, users: _Users) -> bool:
-        """Ask the middleware; returns whether it has answered well, or may still do so."""
-        if request.lookup is None or request.lookup.age > _RARELY:
-            endpoints = (*request.endpoints, *users.get(name, ()))
-            request.lookup = Lookup(self._core.middleware, name, endpoints, self._kick)
-        found = request.lookup.found
-        if request.lookup.done and found is not None:
-            if found.name == name and request.hash in ("", *announced_hashes(found)):
-                self._core.types.library.add_version(found)
-                self._arrived(request, found)
-                return True
-            request.lookup.found = None
-            request.lookup.problem = (
-                f"TypeLookup tells of {found.name} with the hash {rihs01(found)}"
-            )
-        return not request.lookup.done
-
-    def _reasons(self, request: TypeRequest, mute: Sequence[str]) -> str:
-        reasons = [f"{trial.node}: {trial.reason}" for trial in request.tried.values()]
-        if mute:
-            reasons.append(
-                f"{', '.join(mute)} has no {SERVICE} service (ROS 2 Humble or older, a node "
-                "started with start_type_description_service:=false, or a program that is not "
-                "built on rcl)"
-            )
-        if not reasons:
-            return "no other node in the graph uses this version of it"
-        told = f"asked for its definition: {'; '.join(reasons)}{_told(request)}"
-        if self._core.middleware.announces_requests and "/msg/" not in request.name:
-            told += (
-                ". Over DDS, ROS 2 nodes announce a service by the hash of its request, and do not "
-                "find its type by that when asked"
-            )
-        return f"{told}; {adding_definitions(request.name, 2)}"
+        if not self._look_up(request, name, users):
+            self._give_up(request, self._reasons(request, without), now)
 
     def _query(
         self, request: TypeRequest, key: bytes | str, server: EndpointInfo, name: str
     ) -> None:
-        query = PendingQuery(server, name)
+        query = PendingQuery(server, name, time.monotonic())
         if self._fetched >= _MAX_FETCHED:
-            self._failed(
-                request, key, query, f"not asked: {_MAX_FETCHED} types were fetched already"
-            )
+            reason = f"not queried: {_MAX_FETCHED} types were fetched already"
+            self._on_failure(request, key, query, reason)
             return
         fields = {"type_name": name, "type_hash": request.hash, "include_type_sources": True}
         try:
-            call = self._clients.get(server.name).call_async(fields, timeout=_TIMEOUT)
+            known = self._clients.get(server.name)
+            client = (
+                create_service_client(self._core, server.name, service_type())
+                if known is None
+                else known[0]
+            )
+            self._clients[server.name] = client, query.started
+            call = client.call_async(fields, timeout=_QUERY_TIMEOUT_S)
         except NodeClosedError:
             raise
         except Error as error:
-            self._failed(request, key, query, str(error))
+            self._on_failure(request, key, query, str(error))
             return
         request.queries[key] = query
-        self._asked += 1
-        self._core.timers.after(_HEDGE, self._kick)
-        call.add_done_callback(lambda done: self._on_answer(request, key, done))
+        self._pending += 1
+        self._core.timers.after(_HEDGE_S, self._schedule)
+
+        def on_response(done: Future[Any]) -> None:
+            self._answers.append((request, key, done))
+            self._schedule()
+
+        call.add_done_callback(on_response)
 
     def _on_answer(self, request: TypeRequest, key: bytes | str, call: Future[Any]) -> None:
-        """Take an answer in the thread that brings it, to look at it in the next round."""
-        self._answers.append((request, key, call))
-        self._kick()
-
-    def _take(self, request: TypeRequest, key: bytes | str, call: Future[Any]) -> None:
-        self._asked -= 1
+        self._pending -= 1
         query = request.queries.pop(key, None)
         if query is None or call.cancelled() or self._requests.get(request.key) is not request:
             return
@@ -667,144 +622,199 @@ class TypeFetcher(NodeMember):
             found = read_answer(call.result(), query.name, request.hash, node)
             self._core.types.library.add_version(found)
         except WrongHashError as error:
-            self._failed(request, key, query, str(error), believable=False)
-            if (node, request.name) not in self._told:
-                self._told.add((node, request.name))
-                _log.warning("%s is not believed: %s; it is not used", node, error)
+            self._on_failure(request, key, query, str(error), retry=False)
+            if (node, request.name) not in self._warned:
+                self._warned.add((node, request.name))
+                _log.warning("a definition from %s is not used: %s", node, error)
         except Error as error:
-            self._failed(request, key, query, str(error))
+            self._on_failure(request, key, query, str(error))
         else:
             self._fetched += 1
-            self._arrived(request, found)
+            self._on_definition(request, found)
             self._cache.put(found, request.hash)
 
-    def _failed(
+    def _on_failure(
         self,
         request: TypeRequest,
         key: bytes | str,
         query: PendingQuery,
         reason: str,
         *,
-        believable: bool = True,
+        retry: bool = True,
     ) -> None:
-        """Remember why a node did not help, and ask it again later, or never."""
-        before = request.tried.get(key)
-        count = 1 if before is None else before.count + 1
-        pause = min(_AGAIN * 2.0 ** (count - 1), _RARELY) if believable else float("inf")
-        again = time.monotonic() + pause
-        request.tried[key] = QueryResult(query.server.node.full, reason, count, again)
-        self._kick()
+        """Remember why a node did not help, and when to query it again, if ever."""
+        before = request.failed.get(key)
+        attempts = 1 if before is None else before.attempts + 1
+        pause = min(_RETRY_S * 2.0 ** (attempts - 1), _MAX_RETRY_S) if retry else math.inf
+        next_try = time.monotonic() + pause
+        request.failed[key] = QueryResult(query.server.node.full, reason, attempts, next_try)
+        self._schedule()
 
-    # -- endings ---------------------------------------------------------------------------------
+    def _look_up(self, request: TypeRequest, name: str, users: _Users) -> bool:
+        """Look a message up in the middleware; return whether that succeeded or goes on."""
+        lookup = request.lookup
+        if lookup is None or time.monotonic() - lookup.started > _MAX_RETRY_S:
+            endpoints = (*request.endpoints, *users.get(name, ()))
+            lookup = request.lookup = Lookup(self._core.middleware, name, endpoints, self._schedule)
+        found = lookup.found
+        if lookup.done and found is not None:
+            if found.name == name and request.hash in ("", *announced_hashes(found)):
+                self._core.types.library.add_version(found)
+                self._on_definition(request, found)
+                return True
+            lookup.found = None
+            lookup.problem = f"TypeLookup has {found.name} with the hash {rihs01(found)}"
+        return not lookup.done
 
-    def _arrived(self, request: TypeRequest, found: InterfaceDefinition) -> None:
-        """Tell everybody that the library has a definition now."""
+    def _reasons(self, request: TypeRequest, without: Sequence[str]) -> str:
+        reasons = [f"{failed.node}: {failed.reason}" for failed in request.failed.values()]
+        if without:
+            reasons.append(
+                f"{', '.join(without)} has no {SERVICE} service (ROS 2 Humble or older, a node "
+                "started with start_type_description_service:=false, or a program that is not "
+                "built on rcl)"
+            )
+        if not reasons:
+            return "no other node in the graph uses this version of it"
+        text = f"asked for its definition: {'; '.join(reasons)}{request.lookup_problem}"
+        if self._core.middleware.announces_requests and "/msg/" not in request.name:
+            text += (
+                ". Over DDS, ROS 2 nodes announce a service by the hash of its request, and do not "
+                "find its type by that when asked"
+            )
+        return f"{text}; {adding_definitions(request.name, 2)}"
+
+    # -- outcomes ----------------------------------------------------------------------------------
+
+    def _on_definition(self, request: TypeRequest, found: InterfaceDefinition) -> None:
+        """Complete a request whose definition is in the library now."""
         self._drop(request)
         self._fulfil(request, found.name, rihs01(found))
-        for listener in list(request.listeners):
-            listener()
+        request.notify()
 
-    def _fulfil(self, request: TypeRequest, name: str, type_hash: str) -> bool:
-        """Keep the promises, if the library has a type; returns whether it has."""
+    def _fulfil(self, request: TypeRequest, name: str, type_hash: str = "") -> bool:
+        """Fulfil the promises if the library has a type; return whether it has."""
         try:
             found = self._load(name, type_hash)
         except Error as error:
             if type_hash:
-                self._fail(request, error)
+                request.fail(error)
             return False
         for promise in request.promises:
             promise.set_result(found)
         return True
 
     def _give_up(self, request: TypeRequest, reason: str, now: float) -> None:
-        """Say why nothing will come, unless the graph may not be complete yet."""
-        limit = _INTRODUCTION_S if self._core.middleware.unnamed() else _GRACE
-        left = max(request.since, self._since) + limit - now
+        """Fail a request, unless the graph may not be complete yet."""
+        limit = _INTRODUCTION_S if self._core.middleware.unnamed() else _GRACE_S
+        left = max(request.since, self._started) + limit - now
         if left > 0:
-            self._core.timers.after(min(left, _GRACE) + 0.01, self._kick)
+            self._core.timers.after(min(left, _GRACE_S) + 0.01, self._schedule)
         else:
-            self._settle(
-                request, TypeNotFoundError(f"no definition of {request.name}: {reason}"), reason
-            )
+            error = TypeNotFoundError(f"no definition of {request.name}: {reason}")
+            self._settle(request, error, reason)
 
     def _settle(self, request: TypeRequest, error: Error, reason: str) -> None:
-        self._fail(request, error)
+        request.fail(error)
         changed, request.problem = request.problem != reason, reason
         if changed:
-            for listener in list(request.listeners):
-                listener()
+            request.notify()
         if not request.listeners:
             self._drop(request)
-
-    def _fail(self, request: TypeRequest, error: Error) -> None:
-        for promise in request.promises:
-            promise.set_exception(error)
 
     def _drop(self, request: TypeRequest) -> None:
         if self._requests.get(request.key) is request:
             del self._requests[request.key]
 
 
-def _told(request: TypeRequest) -> str:
-    problem = "" if request.lookup is None else request.lookup.problem
-    return f"; {problem}" if problem else ""
+class PendingQuery(NamedTuple):
+    """A query that a node has not answered yet; `started` is monotonic."""
+
+    server: EndpointInfo
+    name: str
+    started: float
 
 
-class PendingQuery:
-    """A question on its way to a node."""
+class QueryResult(NamedTuple):
+    """The failure of a node's last query, and the monotonic time of the next one."""
 
-    def __init__(self, server: EndpointInfo, name: str) -> None:
-        self.server, self.name = server, name
-        self.started = time.monotonic()
-
-
-class QueryResult:
-    """What came of asking a node, and when to ask it again."""
-
-    def __init__(self, node: str, reason: str, count: int, again: float) -> None:
-        self.node, self.reason, self.count, self.again = node, reason, count, again
+    node: str
+    reason: str
+    attempts: int
+    next_try: float
 
 
 class TypeRequest:
-    """A definition that is wanted, and how far getting it has come.
+    """A requested definition, and how far the search for it is.
 
     Args:
-        name: Its type's name.
-        type_hash: The hash that was announced for it; empty takes the one that is in the graph.
+        name: The type's name.
+        type_hash: The hash that is announced for it; empty for the one that the graph has.
         node: Full name of the node whose version is meant; empty for any.
 
     Attributes:
-        endpoints: Who uses it.
-        listeners: Told when it has come, or cannot be had.
-        promises: Fulfilled when it has come.
-        since: When it was wanted first, and `used` last; monotonic seconds.
-        queries: Questions on their way, by the server's identity.
-        tried: What came of earlier ones, by the same.
-        problem: Why it cannot be had; empty while there is hope.
-        looked: Whether the library was asked for the version that the graph has.
-        stored: Whether the cache on disk was.
-        lookup: What the middleware itself was asked.
+        key: Tells requests apart.
+        endpoints: The endpoints that use it.
+        listeners: Called when it is found, or cannot be.
+        promises: Fulfilled when it is found.
+        nodes: The nodes that have used it.
+        since: Monotonic time from which the graph has time to become complete.
+        used: Monotonic time of the last request by an endpoint.
+        queries: Pending queries, by the server's identity.
+        failed: Failures of earlier queries, likewise.
+        problem: Why it cannot be found; empty while it may be.
+        searched_library: Whether the library was searched for the version in the graph.
+        searched_cache: Whether the cache on disk was.
+        lookup: The last lookup in the middleware.
     """
 
     def __init__(self, name: str, type_hash: str, node: str) -> None:
         self.name, self.hash, self.node = name, type_hash, node
+        self.key = name, type_hash, node
         self.endpoints: Sequence[EndpointInfo] = ()
         self.listeners: list[Callable[[], None]] = []
         self.promises: list[Promise[AnyType]] = []
+        self.nodes: set[NodeName] = set()
         self.since = self.used = time.monotonic()
         self.queries: dict[bytes | str, PendingQuery] = {}
-        self.tried: dict[bytes | str, QueryResult] = {}
+        self.failed: dict[bytes | str, QueryResult] = {}
         self.problem = ""
-        self.looked = self.stored = False
+        self.searched_library = self.searched_cache = False
         self.lookup: Lookup | None = None
 
     @property
-    def key(self) -> tuple[str, str, str]:
-        """What tells it from other ones."""
-        return self.name, self.hash, self.node
+    def lookup_problem(self) -> str:
+        """Why the lookup failed, to be appended to a reason; empty if it did not."""
+        return f"; {self.lookup.problem}" if self.lookup is not None and self.lookup.problem else ""
+
+    def add(
+        self,
+        endpoints: Sequence[EndpointInfo] | None,
+        listener: Callable[[], None] | None,
+        promise: Promise[AnyType] | None,
+    ) -> None:
+        """Add what one more caller gave."""
+        now = time.monotonic()
+        if endpoints is not None:
+            self.endpoints, self.used = endpoints, now
+        if listener is not None and listener not in self.listeners:
+            self.listeners.append(listener)
+        if promise is not None:
+            self.since = now
+            self.promises.append(promise)
+
+    def notify(self) -> None:
+        """Call the listeners."""
+        for listener in list(self.listeners):
+            listener()
+
+    def fail(self, error: Error) -> None:
+        """Fail the promises."""
+        for promise in self.promises:
+            promise.set_exception(error)
 
 
-def spelled(name: str, known: Container[str]) -> list[str]:
+def find_full_names(name: str, known: Container[str]) -> list[str]:
     """Return the full names that a type's name may stand for, of those that are known.
 
     Args:
@@ -821,80 +831,20 @@ def spelled(name: str, known: Container[str]) -> list[str]:
     ]
 
 
-#: Seconds for which an unused connection to a node is kept.
-_LINGER = 5.0
-
-
-class TypeClients:
-    """One client of each ``get_type_description`` in use.
-
-    Args:
-        core: The node that queries.
-    """
-
-    def __init__(self, core: Core) -> None:
-        self._core = core
-        self._lock = threading.Lock()
-        self._closed = False
-        self._known: dict[str, tuple[ServiceClient, float]] = {}
-
-    def __bool__(self) -> bool:
-        return bool(self._known)
-
-    def get(self, service: str) -> ServiceClient:
-        """Return the client of a service; raises NodeClosedError, or what creating one raises."""
-        known = self._known.get(service)
-        if known is None:
-            client = create_service_client(self._core, service, service_type())
-        else:
-            client = known[0]
-        with self._lock:
-            closed = self._closed
-            if not closed:
-                self._known[service] = (client, time.monotonic())
-        if closed:
-            client.close()
-        return client
-
-    def close_idle(self, now: float) -> None:
-        """Close those that were not used for a while."""
-        with self._lock:
-            idle = [
-                service
-                for service, (client, used) in self._known.items()
-                if not client.pending and now - used > _LINGER
-            ]
-            clients = [self._known.pop(service)[0] for service in idle]
-        for client in clients:
-            client.close()
-
-    def close(self) -> None:
-        """Close all of them."""
-        with self._lock:
-            self._closed = True
-            clients, self._known = list(self._known.values()), {}
-        for client, _ in clients:
-            client.close()
-
-
-_TOPICS = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
-#: Seconds that each endpoint has to answer, and how many are asked.
-_LOOKUP_TIMEOUT_S, _MAX_LOOKED_UP = 2.0, 3
-
-
 class Lookup:
-    """Asks the middleware for a message's definition, on a thread that ends with the answer.
+    """A lookup of a message's definition in the middleware, on a thread of its own.
 
     Args:
-        middleware: What to ask.
+        middleware: The middleware.
         name: The message's name.
-        endpoints: Who uses it.
-        on_done: Called in that thread when there is an answer.
+        endpoints: The endpoints that use it.
+        on_done: Called on that thread at the end.
 
     Attributes:
-        done: Whether there is.
+        started: Monotonic time of its start.
+        done: Whether it has ended.
         found: The definition, if there was one.
-        problem: Why there is none although an endpoint announced one.
+        problem: Why there is none although an endpoint announces one.
     """
 
     def __init__(
@@ -907,26 +857,21 @@ class Lookup:
         self._middleware, self._on_done = middleware, on_done
         self.found: Definition | None = None
         self.problem = ""
-        self._begun = time.monotonic()
-        asked = [e for e in endpoints if e.kind in _TOPICS and e.type == name]
-        self.done = not (asked and middleware.describes_types)
+        self.started = time.monotonic()
+        queried = [e for e in endpoints if e.kind in _TOPICS and e.type == name][:_MAX_LOOKUPS]
+        self.done = not (queried and middleware.describes_types)
         self._thread = threading.Thread(
-            target=self._work, args=(asked[:_MAX_LOOKED_UP],), name=f"{name} lookup", daemon=True
+            target=self._run, args=(queried,), name=f"{name} lookup", daemon=True
         )
         if not self.done:
             self._thread.start()
-
-    @property
-    def age(self) -> float:
-        """Seconds since it was begun."""
-        return time.monotonic() - self._begun
 
     def join(self) -> None:
         """Wait for the thread, which takes a few seconds at most."""
         if self._thread.ident is not None and self._thread is not threading.current_thread():
             self._thread.join(_LOOKUP_TIMEOUT_S)
 
-    def _work(self, endpoints: list[EndpointInfo]) -> None:
+    def _run(self, endpoints: list[EndpointInfo]) -> None:
         for endpoint in endpoints:
             try:
                 self.found = self._middleware.describe_type(endpoint, _LOOKUP_TIMEOUT_S)

@@ -197,7 +197,7 @@ def test_a_liar_is_named_once(robot, cockpit, caplog) -> None:
     assert isinstance(eventually(lambda: samples)[0].type, OpaqueType)
     with pytest.raises(TypeNotFoundError, match=told):
         node.fetch_type(STATE)
-    assert caplog.text.count("/robot is not believed") == 1
+    assert caplog.text.count("a definition from /robot is not used") == 1
     assert process.event("asked") == STATE
     assert process.event("asked", timeout=0.5, otherwise=None) is None
     # Nothing else is disturbed.
